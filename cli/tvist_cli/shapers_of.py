@@ -91,7 +91,7 @@ def calibration_for(
     Raises:
         Failure: There is no such calibration or shaper.
     """
-    from tvist_controller.planning.choices import wanted_modes
+    from tvist_controller.planning.filter_planner import wanted_modes
     from tvist_controller.refusal import RefusalError
     from tvist_controller.sources.calibrations import default_for, load
     from tvist_controller.sources.mode_source import modal_source

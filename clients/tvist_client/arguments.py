@@ -137,8 +137,9 @@ def _one_or_more(values: Any, where: str) -> tuple[float, ...]:
 
 
 def _switch(value: Any, _: str) -> Any:
-    """Take 0, 1 and what numpy has for them, too; the robot refuses text."""
-    return bool(value) if value is not None and hasattr(value, "__bool__") else value
+    """Take 0, 1 and what numpy has for True and False, too; the robot refuses all else."""
+    numeric = hasattr(value, "__bool__") and not hasattr(value, "__len__")
+    return bool(value) if numeric and value in {0, 1} else value
 
 
 def _struct(value: Any, where: str, kinds: tuple[type[Struct], ...]) -> Struct:

@@ -2,12 +2,12 @@
 
 import inspect
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from functools import cached_property
 from inspect import Parameter, Signature, cleandoc
 from textwrap import fill
-from types import MethodType
-from typing import Any, Protocol, get_type_hints
+from types import CoroutineType, MethodType
+from typing import Any, Protocol, cast, get_type_hints
 
 from msgspec import Struct
 
@@ -87,8 +87,8 @@ class Sent(Described):
     ) -> None:
         self._kind, self._carry_out, self._positional, self._returns = kind, carry_out, positional, returns
 
-    async def __call__(self, owner: Any, *values: Any, **named: Any) -> Any:
-        """Send the command.
+    def __call__(self, owner: Any, *values: Any, **named: Any) -> Coroutine[Any, Any, Any]:
+        """Return a coroutine that sends the command, with the name of this method for Python's warnings.
 
         Raises:
             TypeError: The arguments are not those of the method.
@@ -97,6 +97,11 @@ class Sent(Described):
             given = self.__signature__.bind(owner, *values, **named).arguments
         except TypeError as error:
             raise TypeError(f"{self.__name__}(): {error}") from None
+        sent = cast("CoroutineType[Any, Any, Any]", self._sent(owner, given))
+        sent.__name__, sent.__qualname__ = self.__name__, self.__qualname__
+        return sent
+
+    async def _sent(self, owner: Any, given: dict[str, Any]) -> Any:
         of_message = {name: given[name] for name in arguments(self._kind) if name in given}
         extra = {name: given[name] for name in self._extra if name in given}
         known = {"token": owner.token} if "token" in self._kind.__struct_fields__ else {}

@@ -9,7 +9,7 @@ from contextlib import AbstractAsyncContextManager, AbstractContextManager, cont
 from functools import cached_property
 from inspect import get_annotations
 from types import FunctionType, TracebackType
-from typing import Any, ClassVar, Generic, Self, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Generic, Self, TypeVar, get_args, get_origin, get_type_hints
 
 from tvist_client import feed
 from tvist_client import robot as asynchronous
@@ -80,11 +80,12 @@ class Attribute:
     __doc__ = property(_description)
 
 
+_TWINS: dict[Any, Any] = {}
+"""The classes without `await` by those with it."""
+
+
 class Waiting:
     """Base of the classes without `await`."""
-
-    twins: ClassVar[dict[Any, Any]] = {}
-    """The classes without `await` by those with it."""
 
     def __init__(self, portal: Portal, inner: Any) -> None:
         self._portal, self._inner = portal, inner
@@ -100,7 +101,7 @@ def without_await(of: type, *internal: str, base: type[Waiting] = Waiting) -> An
         if not (name.startswith("_") or name in internal or hasattr(base, name)):
             member = inspect.getattr_static(of, name, None)
             members[name] = Waited(member) if callable(member) else Attribute(of, name)
-    twin = Waiting.twins[of] = type(of.__name__, (base,), members)
+    twin = _TWINS[of] = type(of.__name__, (base,), members)
     return twin
 
 
@@ -121,7 +122,7 @@ class Stream(Waiting, Iterator[M], Generic[M]):
         return message
 
 
-Waiting.twins[feed.Stream] = Stream
+_TWINS[feed.Stream] = Stream
 
 
 class Opened(Waiting):
@@ -175,12 +176,12 @@ def _result(kind: Any) -> Any:
     origin, parts = get_origin(kind), get_args(kind)
     if origin is AsyncIterator:
         return AbstractContextManager[_result(parts[0])]  # type: ignore[misc]
-    return Waiting.twins[origin][parts] if origin in Waiting.twins else Waiting.twins.get(kind, kind)
+    return _TWINS[origin][parts] if origin in _TWINS else _TWINS.get(kind, kind)
 
 
 def _twin(portal: Portal, result: Any) -> Any:
     """Return a result as it is without `await`."""
-    if (twin := Waiting.twins.get(type(result))) is not None:
+    if (twin := _TWINS.get(type(result))) is not None:
         return twin(portal, result)
     if isinstance(result, AbstractAsyncContextManager):
         return _entered(portal, result)

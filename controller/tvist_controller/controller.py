@@ -60,11 +60,8 @@ class Controller(Robot):
     ) -> Reply:
         """Carry out a command between two ticks. A refused command changes nothing.
 
-        Args:
-            command: The command.
-            plan: Plan for the command, if it was made beforehand; it is used if it still holds.
-            session: Session of the client that gets control, if `client_gone` will report its end.
-            origin: IP address of the machine that sent it, if known.
+        A plan that was made beforehand is used if it still holds. The session is that of the client that gets control,
+        if `client_gone` will report its end; the origin the IP address of the machine that sent it, if known.
         """
         self.counters.commands += 1
         row = COMMANDS[type(command)]
@@ -111,11 +108,10 @@ class Controller(Robot):
     def receive_setpoint(
         self, setpoint: c.Setpoint | Unreadable | None, note: Callable[[], None] | None = None
     ) -> None:
-        """Take a set-point. If it is not accepted, it is counted and dropped, since its sender expects no answer.
+        """Take a set-point, None for one that was not admitted.
 
-        Args:
-            setpoint: The set-point; None for one that was not admitted.
-            note: Notes it in the journal; called before anything changes, if it is of the client in control.
+        If it is not accepted, it is counted and dropped, since its sender expects no answer. One of the client in
+        control is first noted in the journal.
         """
         self.counters.setpoints_received += 1
         if setpoint is None or not is_holders(self.session.lease, setpoint.token):
@@ -128,20 +124,10 @@ class Controller(Robot):
         else:
             self.counters.setpoints_refused += 1
 
-    def refuse_setpoint(self, why: str) -> None:
-        """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""
-        self.counters.setpoints_received += 1
-        self.counters.setpoints_refused += 1
-        self.motion.streams.refuse(why)
-
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session, which ends the rights it held."""
         self._look_again()
         self.session.end_rights(client, session)
-
-    def missed(self, ticks: int) -> None:
-        """Count ticks that began too late."""
-        self.counters.missed_ticks += ticks
 
     def fail(self, why: str) -> None:
         """Let the next tick deal with a failure of the plant that something outside the controller has seen."""
@@ -165,14 +151,17 @@ class Controller(Robot):
             self.tick_number = max(self.tick_number, 0 if tick is None else tick - 1)
             self.counters.missed_ticks = self.watching.missed
             self.watching.tell_cycle()
-        try:
-            if self.supervision is not None:
+        if self.supervision is not None:
+            try:
                 self.supervision.look()
-                self.counters.missed_ticks = self.supervision.missed
-            if self.now >= self._next_timeout:
+            except PlantError as error:  # leases still end while it does not answer
+                self._failed = error
+            self.counters.missed_ticks = self.supervision.missed
+        if self.now >= self._next_timeout:
+            try:
                 self._watch_time()
-        except PlantError as error:  # it does not answer, or a push that ends fails
-            self._failed = error
+            except PlantError as error:  # a push that ends
+                self._failed = error
         if not self.programs.idle:
             self._look_again()
             self.programs.advance(self.tick_number + 1)

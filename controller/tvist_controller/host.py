@@ -13,16 +13,17 @@ from tvist_controller.cell.gripper import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
 from tvist_controller.dispatch.rights import Standing, is_holders, may_step
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Sink
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.socket_traffic import NoPorts, SocketNews, SocketPorts
+from tvist_controller.programs.sockets import SocketNews, SocketPorts
 from tvist_controller.safety.experience import Experience
 from tvist_plant.foreign import told
 from tvist_plant.user_file import named
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command, Forget, Setpoint
 from tvist_protocol.journal import Entry, entry_of
+from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Done, Refused, Reply
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event
@@ -52,13 +53,11 @@ class Host:
         survives: bool = False,
     ) -> None:
         self.controller, self._experience, self._survives = controller, experience, survives
-        self._ports = ports or NoPorts()
+        self._ports = ports or SocketPorts()
         self.failure: str | None = None
         """Why the controller has stopped ticking; None if it ticks."""
         self._sinks = sinks
-        self.standing = self._standing()
-        """The part of the controller's state that any thread may read."""
-        self._info: tuple[int, Standing | None, bytes] = -1, None, b""
+        self._info: tuple[object, bytes] = None, b""
         self._stepping = False
 
     def request(self, data: bytes, origin: str | None = None) -> Reply:
@@ -69,13 +68,10 @@ class Host:
         return self.carry_out(admitted if origin is None else admitted._replace(origin=origin))
 
     def carry_out(self, admitted: Admitted, plan: Plan | None = None, attend: Attend | None = None) -> Reply:
-        """Carry out a command.
+        """Carry out a command; a plan that was made beforehand is used if it still holds.
 
-        Args:
-            admitted: The command.
-            plan: Plan for the command, if it was made beforehand; it is used if it still holds.
-            attend: Called before each tick of a step, so that others may send something meanwhile. It may carry out
-                other commands, but no step.
+        `attend` is called before each tick of a step, so that others may send something meanwhile. It may carry out
+        other commands, but no step.
         """
         command = admitted.command
         if self._stepping and isinstance(command, SimulationStep):
@@ -97,8 +93,12 @@ class Host:
             self._experience.void()
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
             reply = self._step(command, attend)
-        self.standing = self._standing()
         return reply
+
+    @property
+    def standing(self) -> Standing:
+        """Who has rights now; any thread may read it."""
+        return Standing(self.controller.session.lease, self.controller.session.clock)
 
     def setpoint(self, data: bytes) -> None:
         """Admit and take a set-point."""
@@ -106,23 +106,22 @@ class Host:
 
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session; this matters only if it held control or the clock."""
-        if session in self._standing().sessions_of(client):
+        if session in self.standing.sessions_of(client):
             self._note(Entry(tick=self._next, kind="client_gone", client=client, session=session))
             self.controller.client_gone(client, session)
             self._carry_out_orders()
-            self.standing = self._standing()
 
     def missed(self, ticks: int) -> None:
         """Count ticks that began too late."""
         self._note(Entry(tick=self._next, kind="missed", count=ticks))
-        self.controller.missed(ticks)
+        self.controller.counters.missed_ticks += ticks
 
     def info(self) -> bytes:
-        """Return the encoded description of the controller, which is made at most once between two ticks."""
-        now = self.controller.tick_number, self.standing
-        if self._info[0] != now[0] or self._info[1] is not now[1]:
-            self._info = *now, encode(info_of(self.controller))
-        return self._info[2]
+        """Return the encoded description of the controller, which is made anew after each tick and command."""
+        now = self.controller.tick_number, self.controller.counters.commands, self.standing
+        if self._info[0] != now:
+            self._info = now, encode(info_of(self.controller))
+        return self._info[1]
 
     def tick(self) -> None:
         """Compute one control period."""
@@ -155,8 +154,8 @@ class Host:
         if experience is not None:
             experience.watch(
                 report.sample,
-                controller.assumed.beliefs,
-                held=controller.assumed.held,
+                controller.assumed.present,
+                held=controller.motion.robot_mode is RobotMode.RUNNING,
                 placements=controller.cycle.placements,
             )
         for sink in self._sinks:
@@ -164,15 +163,13 @@ class Host:
                 sink.event(event)
             sink.report(report)
         self._tell_truth()
-        if controller.session.lease is not self.standing.lease:
-            self.standing = self._standing()
         for one in news:
             self.socket(one)
         self.tell_raised()
 
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
-            if beliefs.payload != self.controller.assumed.beliefs().payload:
+            if beliefs.declared != self.controller.assumed.assumed:
                 continue  # it is void: another payload was declared, learnt or forgotten since
             self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
             self.controller.assumed.learn(lesson, plan)
@@ -274,10 +271,6 @@ class Host:
                     self._note(Entry(tick=self._next, kind="setpoint_refused", why=setpoint.why))
 
         self.controller.receive_setpoint(setpoint, note)
-
-    def _standing(self) -> Standing:
-        controller = self.controller
-        return Standing(controller.session.lease, controller.session.clock)
 
     def _step(self, step: SimulationStep, attend: Attend | None) -> Done:
         """Tick as often as a step says, or until its token no longer gives the right to advance time."""

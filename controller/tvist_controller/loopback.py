@@ -1,12 +1,12 @@
 """The server within a process, without network, thread or clock. Time advances when a client steps it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
-from tvist_controller.instruments.report import Report
-from tvist_controller.instruments.sink import Sink, Topic
-from tvist_controller.safety.experience import Student, experience_of
+from tvist_controller.instruments.report import Report, Sink, Topic
+from tvist_controller.safety.experience import Experience
+from tvist_controller.safety.payload_student import experience_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant
 from tvist_protocol.codec import encode
@@ -21,17 +21,19 @@ class LoopbackHost(Sink):
     Args:
         setup: Initial setup; its clock should be `free` or `lockstep`.
         plant: Plant to control; None for the flexible arm of the setup.
-        students: Who studies the robot's motions, besides those that the setup asks for.
+        experience: What the robot makes of its motions; None for what the setup asks for.
 
     Raises:
         ValueError: The setup is invalid, or the plant does not fit it.
     """
 
-    def __init__(self, setup: Setup, plant: Plant | None = None, students: Sequence[Student] = ()) -> None:
+    def __init__(
+        self, setup: Setup, plant: Plant | None = None, experience: Experience | None = None
+    ) -> None:
         self.controller = Controller(setup, plant)
         self.entries: list[Entry] = []
         """Inputs of the controller; together with the setup, all that a replay needs."""
-        self._host = Host(self.controller, self, experience=experience_of(setup, students))
+        self._host = Host(self.controller, self, experience=experience or experience_of(setup))
         self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
 
     def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  the network does not name its clients either

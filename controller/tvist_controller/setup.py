@@ -21,6 +21,7 @@ from tvist_plant.model import carries_weight
 from tvist_plant.plant import Hand, Plant, RealArm, SimulatedArm
 from tvist_plant.variants import hidden_variant
 from tvist_protocol.calibration import Calibration, calibration_of
+from tvist_protocol.commands import SetPayload
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
@@ -170,15 +171,13 @@ class Setup:
         stands = replace(self, q=tuple(measured_standing(plant, len(self.q)).q.tolist()))
         if not (isinstance(plant, RealArm) and plant.supervised):
             return stands
-        told = plant.payload
-        payload = Payload(mass=told.mass, com=told.com, inertia=told.inertia)
+        payload = payload_of(plant.payload)
         return replace(stands, description=plant.described(), payload=payload, carried=None, positions=True)
 
     def to_builtins(self) -> dict[str, Any]:
         """Convert the setup to maps and lists for a recording."""
-        content = {name: msgspec.to_builtins(getattr(self, name)) for name in _RECORDED}
-        content["own_shapers"] = [msgspec.to_builtins(own.recorded) for own in self.own_shapers]
-        content |= {name: getattr(self, name) for name in ("compensate_sag", "shape_servo")}
+        content = {name: getattr(self, name) for name in (*_RECORDED, "compensate_sag", "shape_servo")}
+        content["own_shapers"] = [own.recorded for own in self.own_shapers]
         optional = {
             "cell": self.cell,
             "plant": self.plant and self.plant.recorded,
@@ -186,9 +185,9 @@ class Setup:
             "instance": self.instance or None,
             "adapt": self.adapt,
         }
-        return content | {
-            name: msgspec.to_builtins(value) for name, value in optional.items() if value is not None
-        }
+        content |= {name: value for name, value in optional.items() if value is not None}
+        recorded: dict[str, Any] = msgspec.to_builtins(content)
+        return recorded
 
     @classmethod
     def from_builtins(
@@ -231,6 +230,11 @@ class Setup:
 def body(payload: Payload) -> Body:
     """Convert a payload from the wire to the plant's type."""
     return Body(mass=payload.mass, com=payload.com, inertia=payload.inertia)
+
+
+def payload_of(told: Body | SetPayload) -> Payload:
+    """Return the payload, for the wire, that a command declares or that a plant carries."""
+    return Payload(mass=told.mass, com=told.com, inertia=told.inertia)
 
 
 def paper_payload(description: RobotDescription, mass: float | None = None) -> Payload:

@@ -1,6 +1,6 @@
 """A robot in this process, as fast as it computes, with the same client as a robot on the network."""
 
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from msgspec.structs import replace
@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from tvist_client.robot import Robot
 from tvist_client.transports.loopback import LoopbackTransport
 from tvist_controller.api.line import Setup
-from tvist_controller.api.robot import LoopbackHost, Student
+from tvist_controller.api.robot import LoopbackHost
 from tvist_server.config import ServeConfig
 
 
@@ -33,7 +33,7 @@ def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
 
 
 @asynccontextmanager
-async def robot_in_process(setup: Setup, students: Sequence[Student] = ()) -> AsyncIterator[Robot]:
-    """Run a robot in this process, whose motions students may study, and yield a client of it."""
-    async with Robot.over(LoopbackTransport(LoopbackHost(setup, students=students))) as robot:
+async def robot_in_process(setup: Setup) -> AsyncIterator[Robot]:
+    """Run a robot in this process, and yield a client of it."""
+    async with Robot.over(LoopbackTransport(LoopbackHost(setup))) as robot:
         yield robot

@@ -15,6 +15,7 @@ from tvist_controller.api.robot import (
     Presence,
     RecordedPlant,
     SocketNews,
+    Unreadable,
     load_plant,
 )
 from tvist_lab.recordings.mcap_file import RecordingFile
@@ -226,7 +227,7 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
             presence.gone(entry.client or "", entry.session or "")
             controller.client_gone(entry.client or "", entry.session or "")
         case "missed":
-            controller.missed(entry.count or 0)
+            controller.counters.missed_ticks += entry.count or 0
         case "socket":
             controller.programs.sockets.hear(SocketNews.of(entry))
         case "gripper":
@@ -238,7 +239,8 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
         case "lesson":
             controller.assumed.learn(lesson_of(entry))
         case "setpoint_refused":
-            controller.refuse_setpoint(entry.why or "")
+            lease = controller.session.lease
+            controller.receive_setpoint(Unreadable(None if lease is None else lease.token, entry.why or ""))
         case _:
             _give_message(controller, entry, presence)
 

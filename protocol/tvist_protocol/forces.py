@@ -8,12 +8,12 @@ from tvist_protocol.client_message import Leased
 from tvist_protocol.values import Fraction, Pose
 
 Push = Annotated[float, Meta(ge=-1e4, le=1e4)]
-Wrench = tuple[Push, Push, Push, Push, Push, Push]
+Wrench = Annotated[tuple[Push, Push, Push, Push, Push, Push], "x y z rx ry rz"]
 """Force [N] and torque [N m]."""
-Choices = tuple[bool, bool, bool, bool, bool, bool]
+Choices = Annotated[tuple[bool, bool, bool, bool, bool, bool], "x y z rx ry rz"]
 """Of the axes of a frame: three directions, then the turns about them."""
 Limit = Annotated[float, Meta(ge=0, le=1e3)]
-Limits = tuple[Limit, Limit, Limit, Limit, Limit, Limit]
+Limits = Annotated[tuple[Limit, Limit, Limit, Limit, Limit, Limit], "x y z rx ry rz"]
 """Of the same axes [m/s and rad/s, or m and rad]."""
 Gain = Annotated[float, Meta(ge=0, le=2)]
 FrameType = Literal[1, 2, 3]

@@ -8,7 +8,7 @@ import logging
 from collections.abc import Callable
 
 from tvist_controller.controller import Controller
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Sink
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import Command, ReleaseControl, TakeControl
 from tvist_protocol.errors import RefusedError

@@ -3,9 +3,11 @@
 import inspect
 import pydoc
 
+import numpy as np
 import pytest
 
 from tvist_client import Arm, LoopbackTransport, Motion, Robot, blocking
+from tvist_client.arguments import given
 from tvist_client.command import Sent
 from tvist_client.commands import Commands, Questions
 
@@ -62,6 +64,21 @@ def test_an_argument_that_a_command_lacks_is_named_with_it(fake, wrong, said):
         with pytest.raises(TypeError, match=said):
             wrong(arm)
         assert isinstance(arm.move_j([0.5, 0, 0, 0, 0, 0], wait=False), blocking.Motion)
+
+
+async def test_an_unknown_argument_is_an_error_at_the_call_and_a_forgotten_await_names_the_command(fake):
+    async with Robot.over(LoopbackTransport(fake)) as robot, robot.control("me") as arm:
+        with pytest.raises(TypeError, match="speed"):
+            arm.move_j([0.0] * 6, speed=1)
+        forgotten = arm.move_j([0.0] * 6)
+        assert forgotten.__qualname__.endswith(".move_j")
+        forgotten.close()
+
+
+@pytest.mark.parametrize("value", [1.5, -1, float("nan"), 1j, 10**400, "yes"])
+def test_what_is_neither_true_nor_false_reaches_the_codec_as_it_is(value):
+    assert given(bool).convert(value, "shaped") is value
+    assert given(bool).convert(np.True_, "shaped") is True
 
 
 def test_attributes_without_await_are_described_and_only_read(fake):

@@ -1,17 +1,20 @@
 """Robots that move along curves, of which the wire has none yet."""
 
+from dataclasses import replace
+
 import numpy as np
 from tests.search.draws import SHAPERS
 from tests.search.subject import Subject
 
 from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.move_planner import MovePlanner
+from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
 from tvist_protocol import commands as c
 
-from .curves import random_arc, tool_circle
+from .curves import quickest_on, random_arc, tool_circle
 from .robots import PAPER, UR5E, setup
 
 DISC = paper_payload(UR5E, 5.0)
@@ -49,10 +52,22 @@ def moving(curve, shaper: str, limits: MotionLimits, speed: float = 1.0) -> Subj
 
 def start(robot: Subject, curve, limits: MotionLimits = PAPER) -> None:
     """Begin a motion along a curve, as a command for it would."""
-    own = setup(payload=DISC)
-    now = robot.controller.snapshot()
-    planned = MovePlanner(own, FilterPlanner(own)).along(curve, limits, now)
-    robot.controller.motion.move(planned)
+    own, now, arm = setup(payload=DISC), robot.controller.snapshot(), arm_limits(UR5E)
+    filters = FilterPlanner(own)
+
+    def make(slower):
+        acceleration = limits.acceleration * slower.acceleration * (1.0 - now.excess)
+        kept = replace(limits, velocity=limits.velocity * slower.velocity, acceleration=acceleration)
+        return quickest_on(curve, kept, rate_of(now.speed, limits.velocity, now.slowest))
+
+    fitted = MovePlanner(own, filters).fit(make, now, lambda: filters.like(now.filter), limits)
+    velocity, most = (
+        limits.velocity * fitted.slower.velocity,
+        limits.acceleration * fitted.slower.acceleration,
+    )
+    room = arm.velocity / velocity, arm.acceleration / most
+    moved = PlannedMove((fitted.motion,), velocity, fitted.limited, room=room, surplus=now.surplus)
+    robot.controller.motion.move(moved)
 
 
 def played(robot: Subject, ticks: int = 200) -> np.ndarray:

@@ -7,11 +7,12 @@ import pinocchio as pin
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import least_squares
 
-from tvist_controller.trajectory import Bends, Curve
+from tvist_controller.trajectory import MotionLimits, PlannedMotion, quickest_motion
+from tvist_controller.trajectory.spline import Knots, SplineCurve, kept_by
 from tvist_plant.description import Payload
 from tvist_plant.model import FLANGE, rigid_model
 
-from .robots import Q1, UR5E
+from .robots import Q1, UR5E, H
 
 BENT = np.array([0.2, -1.4, 1.7, -1.8, -1.5, 0.3])
 """A posture far from any singular one [rad]."""
@@ -19,47 +20,43 @@ ENOUGH = 1.02
 """What a bound by sampling is widened by."""
 
 
-class Arc(Curve):
+class Arc(SplineCurve):
     """q(s) = c + R (u cos s/R + v sin s/R): a circle's arc, in a plane of joint space that u and v span."""
 
     def __init__(self, start, u, v, radius: float, angle: float) -> None:
         swing = np.hypot(u, v)
         self.u, self.v, self.radius = u / swing.max(), v / swing.max(), radius
-        self.centre = np.array(start) - radius * self.u
-        slope = swing / swing.max()
-        super().__init__(radius * angle, Bends(slope, 1.0 / radius, 1.0 / radius**2))
-
-    def derivatives(self, s):
-        angle = s[:, None] / self.radius
-        sine, cosine = np.sin(angle), np.cos(angle)
-        return (
-            self.centre + self.radius * (self.u * cosine + self.v * sine),
-            self.v * cosine - self.u * sine,
-            -(self.u * cosine + self.v * sine) / self.radius,
+        centre, turns = np.array(start) - radius * self.u, np.linspace(0.0, angle, 200)[:, None]
+        out, along = (
+            self.u * np.cos(turns) + self.v * np.sin(turns),
+            self.v * np.cos(turns) - self.u * np.sin(turns),
         )
+        super().__init__(Knots(radius * turns[:, 0], centre + radius * out, along, -out / radius))
 
 
-class JointSpline(Curve):
+def through(postures) -> SplineCurve:
     """A spline of degree five through postures, scaled so that no joint turns farther than its parameter goes."""
+    chords = np.abs(np.diff(postures, axis=0)).max(axis=1)
+    u = np.concatenate([[0.0], np.cumsum(chords)])
+    fine = np.linspace(0.0, u[-1], 4000)
+    scale = ENOUGH * np.abs(make_interp_spline(u, postures, k=5)(fine, 1)).max()
+    spline = make_interp_spline(scale * u, postures, k=5)
+    s = scale * np.linspace(0.0, u[-1], 400)
+    return SplineCurve(Knots(s, spline(s), spline(s, 1), spline(s, 2)))
 
-    def __init__(self, postures) -> None:
-        chords = np.abs(np.diff(postures, axis=0)).max(axis=1)
-        u = np.concatenate([[0.0], np.cumsum(chords)])
-        fine = np.linspace(0.0, u[-1], 4000)
-        spline = make_interp_spline(u, postures, k=5)
-        scale = ENOUGH * np.abs(spline(fine, 1)).max()
-        self._splines = [make_interp_spline(scale * u, postures, k=5).derivative(k) for k in range(3)]
-        third = self._splines[2].derivative()(scale * fine)
-        bends = Bends(
-            ENOUGH * np.abs(self._splines[1](scale * fine)).max(axis=0),
-            ENOUGH * float(np.abs(self._splines[2](scale * fine)).max()),
-            ENOUGH * float(np.abs(third).max()),
-        )
-        super().__init__(float(scale * u[-1]), bends)
 
-    def derivatives(self, s):
-        q, slope, second = (spline(s, extrapolate=True) for spline in self._splines)
-        return q, slope, second
+def quickest_on(curve: SplineCurve, limits: MotionLimits, speed: float = 1.0) -> PlannedMotion:
+    """A motion with one velocity for the whole curve; its tightest bend uses half of the joints' limits."""
+    slope, second, third = float(curve.bends.slope.max()), curve.bends.second, curve.bends.third
+    velocity = min(
+        limits.velocity / slope,
+        np.sqrt(0.5 * limits.acceleration / second),
+        np.cbrt(0.25 * limits.jerk / third),
+        0.25 * limits.jerk * slope / (3.0 * second * limits.acceleration),
+    )
+    kept = kept_by(curve.bends, limits, float(velocity))
+    assert kept is not None, "this velocity leaves room for acceleration and jerk"
+    return quickest_motion(curve, kept, H, speed)
 
 
 def random_arc(random, start=Q1) -> Arc:
@@ -68,7 +65,7 @@ def random_arc(random, start=Q1) -> Arc:
 
 
 @cache
-def tool_circle(radius: float = 0.08, points: int = 41) -> JointSpline:
+def tool_circle(radius: float = 0.08, points: int = 41) -> SplineCurve:
     """Most of a circle of the flange in a vertical plane, its orientation held."""
     model = rigid_model(UR5E, Payload())
     data, frame = model.createData(), model.getFrameId(FLANGE)
@@ -94,10 +91,10 @@ def tool_circle(radius: float = 0.08, points: int = 41) -> JointSpline:
         assert np.abs(found.fun).max() < 1e-9
         q = found.x
         postures.append(q)
-    return JointSpline(np.array(postures))
+    return through(np.array(postures))
 
 
-def progress(curve: Curve, references) -> tuple[np.ndarray, float]:
+def progress(curve: SplineCurve, references) -> tuple[np.ndarray, float]:
     """Where references are on a curve, by what is nearest, and the farthest that they are off it [rad]."""
     length = float(curve.end[0])
     places = np.linspace(0.0, length, 800)

@@ -79,7 +79,7 @@ class Progress:
     def __init__(self, robot: Subject) -> None:
         self.robot = robot
         motions = robot.controller.motion.motions
-        paths = [robot.controller.cycle.trajectory.path, *(part.path for part in motions.coming)]
+        paths = [robot.controller.cycle.trajectory.path, *(part.path for part in motions.move.coming)]
         lengths = [float(path.end[0]) for path in paths]
         self._begun = dict(zip(map(id, paths), np.cumsum([0.0, *lengths]), strict=False))
         self._paths = paths  # kept, since their ids are used

@@ -3,7 +3,9 @@
 import numpy as np
 from tests.plant.arms import chain, changed, forward_kinematics
 
+from tvist_controller.kinematics import choice
 from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.postures import ANY, arm_table
 from tvist_plant.description import load
 
 UR5E = load("ur5e")
@@ -71,6 +73,36 @@ def error(description, pose, q):
 
 def wrapped(difference):
     return np.remainder(difference + np.pi, 2 * np.pi) - np.pi
+
+
+def improved(table, links, pose, near):
+    """What `all_postures` finds, each improved as far as its error is not rounding; rows without one begin with NaN."""
+    found = np.empty((8, 6))
+    choice.all_postures(table, links, *pose, near, found)
+    for row in range(8):
+        if np.isnan(found[row, 0]):
+            continue
+        choice.represent(table, near, found[row])
+        if choice.descend(links, *pose, near, 0.0, 5, found[row]) > choice.ACCURACY:
+            found[row, 0] = np.nan
+    return found
+
+
+def every(description, pose):
+    """The distinct postures that have a pose, whatever the ranges; those next to zero of a curve of them."""
+    table, links, zero = arm_table(description), Arm(description).chain, np.zeros(description.joints)
+    table[:-1, 4] = 2 * np.pi
+    if table[-1, 0] != ANY:
+        found = improved(table, links, pose, zero)
+    else:
+        starts = np.random.default_rng(1).uniform(-np.pi, np.pi, (63, description.joints))
+        found = np.empty((128, description.joints))
+        choice.search(table, links, starts, *pose, zero, found)
+    kept = []
+    for q in found[~np.isnan(found[:, 0])]:
+        if all(np.abs(wrapped(q - other)).max() > 1e-6 for other in kept):
+            kept.append(q)
+    return np.array(kept).reshape(len(kept), description.joints)
 
 
 def nearest(postures, near, limit):

@@ -5,7 +5,7 @@ import numpy as np
 
 from tvist_controller.controller import Controller
 from tvist_controller.foresight.stopper import Stopper
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Sink
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.elastic_lead import loads_of
 from tvist_controller.line.limits import TorqueRoom

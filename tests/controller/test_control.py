@@ -6,7 +6,7 @@ import pytest
 from tests.plant.arms import frames
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import rotation_vector
+from tvist_controller.kinematics.pose import rotation_vector
 from tvist_controller.line.differentiator import Differentiator, Target
 from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.inverse_dynamics import InverseDynamics
@@ -20,6 +20,12 @@ from .robots import Q1, Q2, Q3, UR5E, H, cut
 # ---------------------------------------------------------------- differentiator
 
 
+def updated(differentiator, q):
+    """Take the reference of a tick; return the target of the tick before."""
+    differentiator.push(q)
+    return differentiator.published
+
+
 def parabola(tick):
     """1.1 - 0.7 t + 1.3 t² and another joint."""
     time = H * tick
@@ -29,7 +35,7 @@ def parabola(tick):
 def test_on_a_parabola_position_velocity_and_acceleration_are_those_of_the_tick_before():
     differentiator = Differentiator(parabola(-2), H)
     for tick in range(-1, 50):
-        target = differentiator.update(parabola(tick))
+        target = updated(differentiator, parabola(tick))
     time = H * 48
     assert (target.q == parabola(48)).all()
     assert target.qd == pytest.approx([-0.7 + 2.6 * time, 0.5], abs=1e-12)
@@ -39,25 +45,25 @@ def test_on_a_parabola_position_velocity_and_acceleration_are_those_of_the_tick_
 def test_the_newest_state_goes_on_with_the_same_second_difference():
     differentiator = Differentiator(parabola(-2), H)
     for tick in range(-1, 50):
-        differentiator.update(parabola(tick))
+        updated(differentiator, parabola(tick))
     newest = differentiator.newest
     assert (newest.q == parabola(49)).all()
     following = newest.q + H * newest.qd + 0.5 * H**2 * newest.qdd
-    assert differentiator.update(following).qdd == pytest.approx(newest.qdd, abs=1e-9)
+    assert updated(differentiator, following).qdd == pytest.approx(newest.qdd, abs=1e-9)
     assert following == pytest.approx(parabola(50), abs=1e-14)
 
 
 def test_on_a_parabola_the_newest_state_is_its_own():
     differentiator = Differentiator(parabola(0), H)
     for tick in range(1, 5):
-        differentiator.update(parabola(tick))
+        updated(differentiator, parabola(tick))
     assert differentiator.newest.qd == pytest.approx([-0.7 + 2.6 * 4 * H, 0.5], abs=1e-12)
 
 
 def test_at_rest_it_is_zero_to_the_bit():
     differentiator = Differentiator(Q3, H)
     for _ in range(5):
-        target = differentiator.update(Q3.copy())
+        target = updated(differentiator, Q3.copy())
     for state in (target, differentiator.newest):
         assert (state.q == Q3).all()
         assert not state.qd.any()

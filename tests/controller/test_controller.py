@@ -540,7 +540,7 @@ def test_a_state_is_what_the_wire_takes():
 
 def test_missed_ticks_are_published():
     robot = Robot()
-    robot.controller.missed(3)
+    robot.controller.counters.missed_ticks += 3
     assert robot.tick().missed_ticks == 3
 
 

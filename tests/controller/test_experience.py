@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.safety.motion_record import AFTER, LONGEST
+from tvist_controller.safety.experience import AFTER, LONGEST, Experience
 from tvist_controller.setup import paper_payload
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
@@ -36,10 +36,10 @@ class Recalling:
 class Served:
     """A robot that a client moves, tick by tick."""
 
-    def __init__(self, *students, shaper="elastic", **changes):
+    def __init__(self, student=None, shaper="elastic", **changes):
         setup = free_setup(None, shaper=shaper)
         self.setup = replace(setup, description=setup.description.clean(), **changes)
-        self.host = LoopbackHost(self.setup, students=students)
+        self.host = LoopbackHost(self.setup, experience=student and Experience(student.study))
         self.states, self.events = [], []
         self.host.subscribe("state", lambda data: self.states.append(decode_state(data)))
         self.host.subscribe("event", self.events.append)
@@ -95,11 +95,11 @@ def test_what_is_learnt_is_told_journaled_replayed_and_undone():
     robot = Served(Recalling(2.0), payload=paper_payload(ROBOT, 1.0), carried=paper_payload(ROBOT, 2.0))
     controller = robot.host.controller
     robot.move(Q2)
-    assert (controller.declared.mass, controller.assumed.beliefs().payload.mass) == (1.0, 2.0)
+    assert (controller.declared.mass, controller.assumed.assumed.mass) == (1.0, 2.0)
     assert b"it carries 2 kg" in b"".join(robot.events)
     robot.move(Q1)
     robot.ask(Forget(token=robot.token, what="payload"))
-    assert controller.assumed.beliefs().payload.mass == 1.0
+    assert controller.assumed.assumed.mass == 1.0
     robot.move(Q2)
     assert [entry.kind for entry in robot.host.entries].count("lesson") == 1
     assert replay(robot.setup, robot.host.entries, robot.states[1:]).first_difference is None

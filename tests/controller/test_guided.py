@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import turn
+from tvist_controller.kinematics.pose import turn
 from tvist_controller.trajectory import MotionLimits, Speed
 from tvist_controller.trajectory.guided import _step
 from tvist_protocol import commands as c

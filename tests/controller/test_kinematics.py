@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from tests.plant.arms import chain
 
-from tvist_controller.kinematics import arm, pose, rotation
+from tvist_controller.kinematics import arm, pose
 from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload, load
 from tvist_plant.model import FLANGE, rigid_model
@@ -61,7 +61,7 @@ def test_the_compiled_kernels_equal_their_python_source(monkeypatch):
         return np.concatenate([part.ravel() for some in parts for part in some])
 
     compiled = found()
-    for module in (arm, pose, rotation):
+    for module in (arm, pose):
         for name, one in vars(module).copy().items():
             if hasattr(one, "py_func"):
                 monkeypatch.setattr(module, name, one.py_func)

@@ -16,6 +16,12 @@ from .robots import PAPER, ROUNDING, H
 from .streams import there_and_back
 
 
+def at_rest(q, limits, period, reach=np.inf, torque=None):
+    """A limiter that starts at rest."""
+    still = np.zeros_like(q)
+    return Limiter((q, still, still), limits, period, np.broadcast_to(reach, q.shape), torque)
+
+
 def followed(limiter: Limiter, points) -> np.ndarray:
     """What comes out for a walk from rest; with each point goes the slope of the parabola through the last three."""
     out, before, last = [limiter.q], limiter.q, limiter.q
@@ -57,7 +63,7 @@ def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalle
     random = np.random.default_rng(seed)
     walk = np.cumsum(np.cumsum(random.normal(0, roughness, (150, joints)), axis=0) / 10, axis=0)
     walk = np.clip(walk, -6.0, 6.0)
-    limiter = Limiter(np.zeros(joints), limits, H)
+    limiter = at_rest(np.zeros(joints), limits, H)
     out = followed(limiter, walk)
     way = np.abs(out[-1] - walk[-1]).max()
     ramps = limits.velocity / limits.acceleration + 4 * limits.acceleration / limits.jerk
@@ -76,7 +82,7 @@ def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalle
 def test_a_walk_inside_the_limits_passes_to_the_bit_and_is_never_limited():
     time = np.arange(2000) * H
     walk = np.stack([0.1 * (1 - np.cos(2.0 * time)) ** 2, 0.1 * np.sin(1.0 * time) ** 3], axis=1)
-    limiter = Limiter(walk[0], PAPER, H)
+    limiter = at_rest(walk[0], PAPER, H)
     for before, point in pairwise(walk):
         assert (limiter.follow(point, (point - before) / H) == point).all()
         assert not limiter.limited
@@ -94,7 +100,7 @@ def test_after_catching_up_with_what_moves_it_passes_to_the_bit_again(motion, ju
     """The closer, the slower: as fast as the signal could still brake, so that it is not overshot."""
     time = np.arange(4000) * H
     walk = np.stack([motion(time) + jump * (time > 1.0), 0.1 * motion(time)], axis=1)
-    limiter = Limiter(walk[0], PAPER, H)
+    limiter = at_rest(walk[0], PAPER, H)
     out = followed(limiter, walk[1:])
     assert_within(out, PAPER)
     equal = out == walk
@@ -113,7 +119,7 @@ def test_at_the_change_from_catching_up_to_passing_acceleration_does_not_step_be
     random = np.random.default_rng(5)
     worst = 0.0
     for _ in range(40):
-        limiter = Limiter(np.zeros(1), PAPER, H)
+        limiter = at_rest(np.zeros(1), PAPER, H)
         jump, speed = random.uniform(1e-5, 0.02), random.uniform(-0.5, 0.5)
         walk = [np.array([jump + speed * H * k]) for k in range(600)]
         out = followed(limiter, walk)
@@ -122,7 +128,7 @@ def test_at_the_change_from_catching_up_to_passing_acceleration_does_not_step_be
 
 
 def test_where_no_catching_up_can_be_computed_it_brakes_inside_the_limits(monkeypatch):
-    limiter = Limiter(np.zeros(2), PAPER, H)
+    limiter = at_rest(np.zeros(2), PAPER, H)
     out = list(followed(limiter, [np.full(2, 0.5 * 1.9 * (k * H) ** 2) for k in range(1, 200)]))
 
     class Refusing:
@@ -144,7 +150,7 @@ def test_the_state_it_tells_is_one_that_a_motion_can_go_on_from():
     def cubic(time):
         return 0.9 * time**2 + 10.0 * time**3
 
-    limiter = Limiter(np.zeros(1), MotionLimits(1.5, 20.0, 2000.0), H)
+    limiter = at_rest(np.zeros(1), MotionLimits(1.5, 20.0, 2000.0), H)
     followed(limiter, [np.array([cubic(k * H)]) for k in range(1, 50)])
     q, qd, qdd = limiter.state
     time = 49 * H
@@ -160,7 +166,7 @@ def test_the_state_it_tells_is_one_that_a_motion_can_go_on_from():
 def test_a_motion_made_at_the_very_limits_passes_to_the_bit(limits):
     motion = there_and_back(limits)
     walk = motion(np.arange(3000) * H)
-    limiter = Limiter(walk[0], limits, H)
+    limiter = at_rest(walk[0], limits, H)
     assert (followed(limiter, walk[1:]) == walk).all()
     assert not limiter.limited
 
@@ -172,7 +178,7 @@ def test_a_trapezoid_of_velocity_is_rounded_to_the_jerk_limit(jerk):
     velocity = np.interp(time, [0.1, 0.6, 1.1, 1.6], [0.0, 0.8, 0.8, 0.0])
     walk = np.cumsum(velocity * H)[:, None]
     limits = MotionLimits(1.5, 2.0, jerk)
-    out = followed(Limiter(np.zeros(1), limits, H), walk)
+    out = followed(at_rest(np.zeros(1), limits, H), walk)
     assert_within(out, limits)
     assert (out[-200:] == walk[-1]).all()
     assert np.abs(out[1:] - walk).max() < 2 * 1.6 * 1.6 / jerk
@@ -181,7 +187,7 @@ def test_a_trapezoid_of_velocity_is_rounded_to_the_jerk_limit(jerk):
 def test_the_range_is_never_left_however_hard_the_signal_drives_at_its_end():
     reach = np.array([1.0, 2.0])
     for speed in (0.3, 1.4, 5.0):
-        limiter = Limiter(np.zeros(2), PAPER, H, reach=reach)
+        limiter = at_rest(np.zeros(2), PAPER, H, reach=reach)
         walk = [np.minimum([speed * k * H, -speed * k * H], reach) for k in range(1500)]
         walk = [np.maximum(point, -reach) for point in walk]
         out = followed(limiter, walk)
@@ -216,7 +222,7 @@ def test_a_limit_that_falls_in_motion_is_kept_to_what_jerk_needs(seed):
     time = np.arange(1500) * H
     walk = swing * (1 - np.cos(random.uniform(2, 6) * time))[:, None] ** 2
     torque = Narrow()
-    limiter = Limiter(np.zeros(3), PAPER, H, torque=torque)
+    limiter = at_rest(np.zeros(3), PAPER, H, torque=torque)
     excess, before = 0.0, (limiter.q, limiter.q)
     for point, last in zip(walk[1:], walk, strict=False):
         q = limiter.follow(point, (point - last) / H)
@@ -240,7 +246,7 @@ class Weak:
 def test_a_joint_whose_torque_is_low_still_stops_inside_its_range(speed):
     """Its stop is judged by the acceleration that the torque permits, which is what it stops with."""
     reach = 2.0
-    limiter = Limiter(np.zeros(2), MotionLimits(3.0, 40.0, 2000.0), H, reach=np.full(2, reach), torque=Weak())
+    limiter = at_rest(np.zeros(2), MotionLimits(3.0, 40.0, 2000.0), H, reach=np.full(2, reach), torque=Weak())
     ramp = np.minimum(speed * H * np.arange(4000), reach)
     out = followed(limiter, np.column_stack((ramp, -ramp)))
     assert np.abs(out).max() <= reach

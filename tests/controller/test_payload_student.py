@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controller.test_experience import Q1, Q2, ROBOT, Served
 
+from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.safety import payload_monitor
-from tvist_controller.safety.experience import Taught
-from tvist_controller.safety.motion_record import Beliefs, MotionRecord
+from tvist_controller.safety.experience import MotionRecord, Taught
 from tvist_controller.safety.payload_student import DEAD, PayloadStudent
 from tvist_controller.setup import Setup, paper_payload
 from tvist_controller.sources.calibrations import load
+from tvist_controller.sources.mode_source import first_source
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
 from tvist_protocol.codec import decode_event
@@ -29,16 +30,20 @@ def disc(mass):
     return paper_payload(ROBOT, mass)
 
 
+def taken_for(payload):
+    return FilterState("zv", 1, first_source(ROBOT, None), payload, payload)
+
+
 class Following(Served):
     """A robot that follows its payload."""
 
-    def __init__(self, declared, carried, *students, **changes):
+    def __init__(self, declared, carried, student=None, **changes):
         changes = {"adapt": "payload", "calibration": MODAL} | changes
-        super().__init__(*students, payload=disc(declared), carried=disc(carried), **changes)
+        super().__init__(student, payload=disc(declared), carried=disc(carried), **changes)
 
     @property
     def assumed(self):
-        return self.host.controller.assumed.beliefs().payload
+        return self.host.controller.assumed.assumed
 
     def told(self, kind):
         return [event for event in map(decode_event, self.events) if event.kind == kind]
@@ -203,7 +208,7 @@ def test_a_motion_that_tells_nothing_teaches_nothing(motion, what):
 def test_no_record_makes_a_payload_that_is_none(seed, ticks, size):
     random = np.random.default_rng(seed)
     q, moments = random.standard_normal((ticks, 6)), size * random.standard_normal((ticks, 6))
-    record = MotionRecord(q, moments, min(ticks, 5), True, Beliefs(disc(2.0)))
+    record = MotionRecord(q, moments, min(ticks, 5), True, taken_for(disc(2.0)))
     lesson = PayloadStudent(ROBOT).study(record)
     if lesson is not None:
         assert 0.0 <= lesson.payload.mass <= 5.0

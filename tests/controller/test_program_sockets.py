@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tvist_controller.programs.socket_traffic import (
+from tvist_controller.programs.sockets import (
     Close,
     Expire,
     Open,

@@ -5,7 +5,12 @@ import math
 import msgspec
 import pytest
 
-from tvist_controller.planning.choices import choose_filter, choose_source, make_estimator, wanted_modes
+from tvist_controller.planning.filter_planner import (
+    choose_filter,
+    choose_source,
+    make_estimator,
+    wanted_modes,
+)
 from tvist_controller.refusal import RefusalError, check_body, check_joints, check_motion
 from tvist_controller.setup import paper_payload
 from tvist_protocol.commands import SetEstimator

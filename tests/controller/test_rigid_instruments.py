@@ -17,7 +17,7 @@ from tvist_controller.instruments.wrench import (
     SHAPED_QDD,
 )
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import rotation_vector
+from tvist_controller.kinematics.pose import rotation_vector
 from tvist_plant.chain import chain_of
 from tvist_plant.description import Payload, load
 from tvist_plant.model import FLANGE, rigid_model
@@ -114,18 +114,18 @@ def test_the_force_on_an_arm_with_seven_joints():
 
 
 def test_an_estimate_is_that_of_its_formula_to_the_last_bit(arm):
-    wrench, random = module.ToolWrench(arm), np.random.default_rng(5)
+    body, random = RigidBody(arm), np.random.default_rng(5)
     drives, offset = arm.drives, [0.1, -0.2, 0.3, 0.4, -1.0, 2.0]
     for _ in range(30):
         motion = random.uniform(-3.0, 3.0, (ROWS, 6))
-        found = wrench.estimate(motion, offset)
+        found = body.external(motion, offset)
         share = motion[SHAPED_QD] / drives.friction_width
         friction = np.array(drives.coulomb_friction) * (share if drives.linear_friction else np.tanh(share))
         expected = motion[SHAPED_MOMENT] + np.array(drives.rotor_inertia) * motion[SHAPED_QDD] + friction
         torque, force = expected - motion[ACTUAL_MOMENT], np.empty(6)
         assert found[6:].tolist() == torque.tolist()
-        module.force_at(wrench._arm.chain, motion[ACTUAL_Q], torque, force)
+        module.force_at(body._tool.chain, motion[ACTUAL_Q], torque, force)
         assert found[:6].tolist() == force.tolist()
         plain, slip = np.empty(12), share if drives.linear_friction else np.tanh(share)
-        module.estimate.py_func(wrench._arm.chain, motion, wrench._drives, slip, plain)
+        module.estimate.py_func(body._tool.chain, motion, body._drives, slip, plain)
         assert plain.tolist() == found.tolist()

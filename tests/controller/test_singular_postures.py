@@ -11,6 +11,8 @@ from tests.controller.postures import (
     PUMA,
     UR5E,
     error,
+    every,
+    improved,
     pose_of,
     wrapped,
 )
@@ -19,10 +21,10 @@ from tests.plant.arms import chain, frames
 import tvist_controller.kinematics
 from tvist_controller.kinematics import choice
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.choice import closest, improved_postures, search
-from tvist_controller.kinematics.geometry import arm_table
+from tvist_controller.kinematics.choice import closest, search
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
 from tvist_controller.kinematics.least_squares import approach
+from tvist_controller.kinematics.postures import arm_table
 
 
 @pytest.mark.parametrize("case", FREE)
@@ -71,7 +73,7 @@ def test_the_border_of_the_reach_belongs_to_it_and_nothing_beyond(description, e
     outwards /= np.linalg.norm(outwards)
 
     def close(distance):
-        postures = ik.all(rotation, position + distance * outwards)
+        postures = every(description, (rotation, position + distance * outwards))
         return [p for p in postures if np.abs(wrapped(p - q)).max() < 0.2]
 
     for distance in (0.0, 1e-16, 1e-11, -1e-6):
@@ -80,7 +82,7 @@ def test_the_border_of_the_reach_belongs_to_it_and_nothing_beyond(description, e
         assert not close(distance)
     with pytest.raises(InverseKinematicsError) as refusal:
         ik.solve(rotation, position + 10.0 * outwards, q)
-    assert (refusal.value.code, refusal.value.joint) == ("no_solution", None)
+    assert (refusal.value.code, refusal.value.limit) == ("no_solution", None)
 
 
 def uncompile(monkeypatch):
@@ -98,12 +100,11 @@ def test_the_compiled_kernels_equal_their_python_source(case, monkeypatch):
     description, q = FREE.get(case, (UR5E, (0.5, -1.0, 1.2, 0.4, 0.6, 0.7)))
     table, pose, near = arm_table(description), pose_of(description, q), np.array(q) + 0.1
     links = Arm(description).chain
-    expected, found = np.empty((2, 8, 6))
     one, other = np.empty((2, 6))
-    improved_postures(table, links, *pose, near, expected)
+    expected = improved(table, links, pose, near)
     status = closest(table, links, *pose, near, one)
     uncompile(monkeypatch)
-    choice.improved_postures(table, links, *pose, near, found)
+    found = improved(table, links, pose, near)
     assert choice.closest(table, links, *pose, near, other) == status
     assert status % choice.ON_CURVE == choice.FOUND
     exist = ~np.isnan(expected[:, 0])

@@ -131,6 +131,19 @@ def test_a_stop_of_its_controller_ends_motions_and_the_line_begins_again_where_i
     assert stands == pytest.approx(arm.q, abs=1e-12)
 
 
+def test_a_lease_ends_while_its_controller_does_not_answer(arm, monkeypatch):
+    robot = Robot(plant=arm, clock="realtime", lease_s=0.2)
+    robot.tick(5)
+
+    def silent():
+        raise PlantError("no answer")
+
+    monkeypatch.setattr(arm, "seen", silent)
+    robot.tick(200)
+    assert robot.controller.session.lease is None
+    assert "lease_lost" in [event.kind for event in robot.events]
+
+
 def test_nothing_is_sent_while_its_controller_has_it(robot, arm):
     moving(robot, arm)
     halted(robot, arm, SafetyMode.PROTECTIVE_STOP)

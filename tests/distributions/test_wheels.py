@@ -175,7 +175,7 @@ class TestFresh:
         )
         for kernel in ROOT.glob("*/tvist_*/**/__pycache__/*.kernel"):  # compiled from equal sources
             there = own.joinpath(*kernel.relative_to(ROOT).parts[1:])
-            there.parent.mkdir(exist_ok=True)
+            there.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(kernel, there)
         with Served("--clock", "lockstep", python=python) as served:
             assert "ok" in run(python, "-m", "tvist_client", "check", served.endpoint)

@@ -13,8 +13,10 @@ import msgspec
 import numpy as np
 
 from tvist_controller.api.line import DrivenLine, body, load_calibration, paper_payload
-from tvist_controller.safety.motion_record import AFTER, Beliefs, MotionRecord
+from tvist_controller.planning.snapshot import FilterState
+from tvist_controller.safety.experience import AFTER, MotionRecord
 from tvist_controller.safety.payload_student import PayloadStudent
+from tvist_controller.sources.mode_source import first_source
 from tvist_lab.study.line import PAPER, RESTING, Unchanged
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe, own_move
@@ -96,7 +98,7 @@ class Driven:
         noise = 0.5 * np.random.default_rng([seed, 99]).standard_normal(measured.moment.shape)
         return MotionRecord(
             measured.q[kept], (sensors * measured.moment + noise)[kept], self.stop - self.first, True,
-            Beliefs(self.believed),
+            taken_for(self.believed),
         )  # fmt: skip
 
     def peak(self, arm, carried, seed):
@@ -104,6 +106,11 @@ class Driven:
         response = self.respond(arm, carried, seed)
         up = np.einsum("tji,j->ti", response.flange_rotation, [0.0, 0.0, GRAVITY])
         return float(np.linalg.norm(response.specific_force - up, axis=1)[self.stop + 4 :].max())
+
+
+def taken_for(payload):
+    """What a robot takes its arm for that was told a payload."""
+    return FilterState("zv", 1, first_source(ROBOT, None), payload, payload)
 
 
 def followed(seed, *, friction=True, masses=0.0, motions=2):
@@ -118,7 +125,7 @@ def followed(seed, *, friction=True, masses=0.0, motions=2):
     payload = paper_payload(ROBOT, believed)
     for number, move in enumerate(moves[:motions]):
         record = Driven.of(arm.known, move, payload.mass).record(arm, mass, 10 * seed + number)
-        lesson = student.study(replace(record, beliefs=Beliefs(payload)))
+        lesson = student.study(replace(record, beliefs=taken_for(payload)))
         payload = payload if lesson is None else lesson.payload
         masses_believed.append(payload.mass)
     last = moves[-1]

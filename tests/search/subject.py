@@ -130,7 +130,7 @@ class Subject:
     def resting(self):
         """Whether the shaped reference stands still, at rest or paused, and no part of its motion will follow."""
         cycle, motion = self.controller.cycle, self.controller.motion
-        if motion.activity is Activity.MOVING and motion.motions.coming:
+        if motion.activity is Activity.MOVING and (move := motion.motions.move) is not None and move.coming:
             return False
         return cycle.mode.at_rest or (not cycle.trajectory.finished and cycle.stands_still)
 

@@ -9,7 +9,7 @@ from tests.controller.robots import UR5E, Robot, cut, setup
 from tests.server.test_config import config, sentence
 
 from tvist_controller.foresight.collision import CollisionModel
-from tvist_controller.kinematics.geometry import is_of_ur_form
+from tvist_controller.kinematics.postures import is_of_ur_form
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_plant.description import load
 from tvist_protocol import commands as c

@@ -5,7 +5,7 @@ import contextlib
 
 import pytest
 
-from tvist_controller.programs.socket_traffic import Close, Expire, Open, Send, Taken, Wait, Waited
+from tvist_controller.programs.sockets import Close, Expire, Open, Send, Taken, Wait, Waited
 from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.gateways.sockets import MAX_UNREAD, MAX_UNSENT, PATIENCE, ProgramSockets
 

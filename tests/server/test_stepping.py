@@ -10,7 +10,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit
 from tvist_controller.dispatch.rights import Lease
 from tvist_controller.host import Host
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Sink
 from tvist_controller.loopback import LoopbackHost
 from tvist_lab.in_process import free_setup
 from tvist_protocol import commands as c

@@ -7,6 +7,7 @@ import time
 
 import pytest
 
+from tvist_controller.kinematics import arm
 from tvist_controller.safety import payload_student
 from tvist_plant.description import load
 from tvist_server.studies import Studies
@@ -30,7 +31,7 @@ def test_studies_do_not_inherit_what_the_tick_thread_has():
 
 
 def test_compiled_code_is_loaded_before_the_first_tick(monkeypatch):
-    compiled, called = payload_student.along, []
-    monkeypatch.setattr(payload_student, "along", lambda *given: called.append(given) or compiled(*given))
+    compiled, called = arm.torques_of, []
+    monkeypatch.setattr(arm, "torques_of", lambda *given: called.append(given) or compiled(*given))
     payload_student.PayloadStudent(load("ur5e"))
     assert called

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_controller.controller import Controller
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Sink
 from tvist_controller.setup import Setup
 from tvist_plant.plant import PERIOD
 from tvist_server.clock import Clock, Lockstep, Realtime

@@ -43,7 +43,7 @@ LOOK = 0.5
 """Time between two looks at what is on disk [s]."""
 FILTERS = (("elastic", 1), ("auto", 1), ("zv", 1), ("none", 2))
 """Shapers, each with a number of modes, that together use the kernels of all."""
-STUDIES = {"all_to_drives", "drive", "improved_postures", "mean_delay", "play", "product_taps", "shape_all"}
+STUDIES = {"all_to_drives", "drive", "mean_delay", "play", "product_taps", "shape_all"}
 """Kernels that no served robot calls."""
 KERNELS = tuple(kernel for kernel in kernels if kernel.name.rpartition(".")[2] not in STUDIES)
 """Kernels that a served robot may call."""

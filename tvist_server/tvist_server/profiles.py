@@ -5,7 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from tvist_controller.kinematics.geometry import is_of_ur_form
+from tvist_controller.kinematics.postures import is_of_ur_form
 from tvist_plant.description import RobotDescription
 
 ProfileName = Literal["ursim", "real"]

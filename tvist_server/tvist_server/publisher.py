@@ -10,8 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
-from tvist_controller.instruments.report import Report
-from tvist_controller.instruments.sink import Sink, Topic
+from tvist_controller.instruments.report import Report, Sink, Topic
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event, State, Telemetry, Truth

@@ -9,9 +9,9 @@ from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
-from tvist_controller.instruments.sink import Sink
-from tvist_controller.programs.socket_traffic import SocketNews
-from tvist_controller.safety.experience import Student, experience_of
+from tvist_controller.instruments.report import Sink
+from tvist_controller.programs.sockets import SocketNews
+from tvist_controller.safety.payload_student import experience_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant, RealArm
 from tvist_protocol.codec import encode
@@ -51,7 +51,6 @@ class ServedRobot:
         programs: Folder with programs that clients load by their names.
         hosts: Machines that programs may connect to, besides the one that sent them [none].
         keep: Number of ticks that the recording keeps at least; None keeps all.
-        students: Who studies the robot's motions, besides those that the setup asks for.
 
     Raises:
         ValueError: The setup is invalid.
@@ -67,7 +66,6 @@ class ServedRobot:
         programs: ProgramFolder | None = None,
         hosts: AllowedHosts | None = None,
         keep: int | None = None,
-        students: Sequence[Student] = (),
     ) -> None:
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
@@ -103,14 +101,12 @@ class ServedRobot:
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
         """Gateway for the sockets of programs."""
-        self._studies = Studies() if self._realtime and (students or setup.adapt) else None
+        self._studies = Studies() if self._realtime and setup.adapt else None
         if self._studies is None:
-            experience = experience_of(setup, students)
+            experience = experience_of(setup)
         else:
             planner = Planner(setup)  # used by the studies' thread alone
-            experience = experience_of(
-                setup, students, self._studies.later, lambda lesson, on: planner.for_lesson(lesson, on.state)
-            )
+            experience = experience_of(setup, self._studies.later, planner.for_lesson)
         self._host = Host(
             self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience,
             survives=True,

@@ -12,7 +12,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, NamedTuple
 
 from tvist_controller.controller import Controller
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Sink
 from tvist_server.assembly import check_paces, drivers, made_robot, protected, ur_interfaces
 from tvist_server.clock import Realtime
 from tvist_server.config import ServeConfig

@@ -11,7 +11,7 @@ from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import REBOUND, TORQUE_SHARE, acceleration_on_way
 from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
-from tvist_controller.planning.choices import choose_filter, wanted_modes
+from tvist_controller.planning.filter_planner import choose_filter, wanted_modes
 from tvist_controller.planning.fitting import keeping_motion
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body, paper_payload

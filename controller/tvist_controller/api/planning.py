@@ -4,7 +4,7 @@ The modules behind it may change.
 """
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import turned
+from tvist_controller.kinematics.pose import turned
 from tvist_controller.paths.poses import placement_vector
 
 __all__ = [

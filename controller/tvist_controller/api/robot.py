@@ -7,12 +7,12 @@ from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.rights import Presence
 from tvist_controller.host import Host
-from tvist_controller.instruments.report import truth_of
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Sink, truth_of
 from tvist_controller.loopback import LoopbackHost
+from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.programs.compiling import ScriptCompiler
-from tvist_controller.programs.socket_traffic import SocketNews
-from tvist_controller.safety.experience import Student, experience_of
+from tvist_controller.programs.sockets import SocketNews
+from tvist_controller.safety.payload_student import experience_of
 from tvist_controller.sources.own_plants import WORLD, OwnPlant, RecordedPlant, load_plant
 
 __all__ = [
@@ -26,7 +26,7 @@ __all__ = [
     "ScriptCompiler",
     "Sink",
     "SocketNews",
-    "Student",
+    "Unreadable",
     "experience_of",
     "info_of",
     "load_plant",

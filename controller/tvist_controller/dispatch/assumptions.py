@@ -11,36 +11,19 @@ from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety.motion_record import Beliefs
 from tvist_controller.safety.payload_monitor import PayloadMonitor
-from tvist_controller.setup import body
+from tvist_controller.setup import body, payload_of
 from tvist_controller.sources.calibrations import fits
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.lessons import PayloadLesson
-from tvist_protocol.modes import RobotMode
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
 
 
-def payload_of(command: SetPayload) -> Payload:
-    """Return the payload that a command declares."""
-    return Payload(mass=command.mass, com=command.com, inertia=command.inertia)
-
-
 class Assumptions:
-    """The control line's payload and filter, whose changes must not spoil the robot's motion.
-
-    Args:
-        payload: Initial payload.
-        source: Source of the first filter's modes.
-        motion: The arm's motion, and with it the control line.
-        peripherals: Tells clients what is assumed.
-        plan: Plans what a lesson changes.
-        emit: Emits events.
-        follows: Whether the robot follows its payload.
-    """
+    """The control line's payload and filter, whose changes must not spoil the robot's motion."""
 
     def __init__(
         self,
@@ -48,10 +31,10 @@ class Assumptions:
         source: ModeSource,
         motion: MotionControl,
         peripherals: Peripherals,
-        plan: Callable[[PayloadLesson, FilterState], Plan],
+        plan: Callable[[PayloadLesson, FilterState], Plan],  # plans what a lesson changes
         emit: Emit,
         *,
-        follows: bool,
+        follows: bool,  # whether the robot follows its payload
     ) -> None:
         self.declared = payload
         """Declared payload."""
@@ -66,9 +49,8 @@ class Assumptions:
         self._warn_of_payload()
         self._warn_of_arm()
 
-    @property
     def present(self) -> FilterState:
-        """The present state that a new filter depends on."""
+        """Return the present state that a new filter depends on: what the robot takes its arm for."""
         tvist = self._cycle.tvist
         return FilterState(tvist.name, tvist.estimator.modes, self.source, self.assumed, self.declared)
 
@@ -99,18 +81,9 @@ class Assumptions:
 
     # ------------------------------------------------------------------ payload
 
-    @property
-    def held(self) -> bool:
-        """Whether the drives hold or move the arm, so that a payload can be learnt from its motions."""
-        return self._motion.robot_mode is RobotMode.RUNNING
-
-    def beliefs(self) -> Beliefs:
-        """Return what the robot takes its arm for."""
-        return Beliefs(self.assumed, self.present)
-
     def learn(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
         """Take a lesson at rest; a plan that was made for it beforehand is used if it still holds."""
-        present = self.present
+        present = self.present()
         if plan is None or plan.state != {"filter": present}:
             plan = self._plan(lesson, present)
         found: Any = plan.found
@@ -141,16 +114,14 @@ class Assumptions:
 
     def _clear_with(self, payload: Payload, tvist: Filter | None) -> None:
         """Put a payload into the collision model, unless the rest of the motion would not be clear with it."""
-        self._motion.ahead.check_payload(body(payload), tvist, self._motion.motions.coming)
+        move = self._motion.motions.move
+        self._motion.ahead.check_payload(body(payload), tvist, () if move is None else move.coming)
 
     def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, told: bool = False) -> None:
-        """Compute dynamics and modes with a payload.
+        """Compute dynamics and modes with a payload, which is phased in.
 
-        Args:
-            payload: The payload.
-            tvist: Filter for it; None if its modes are not known to differ.
-            ticks: Number of ticks in which it is phased in.
-            told: Whether a warning tells that the arm carries more, which is above its rating.
+        The filter is None if its modes are not known to differ. `told` says whether a warning tells that the arm
+        carries more, which is above its rating.
         """
         self.assumed, carried = payload, body(payload)
         self._cycle.dynamics.declare(carried, ticks)

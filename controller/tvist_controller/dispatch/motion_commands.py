@@ -146,7 +146,7 @@ def _freedrive(robot: Robot, call: Call[f.Freedrive]) -> Reply:
 
 
 def _end_force_mode(robot: Robot, _: Call[f.EndForceMode]) -> None:
-    if robot.force_control.compliant is None:
+    if robot.guidance.compliant is None:
         why = "neither force_mode nor freedrive is on"
         guided = robot.motion.activity is Activity.GUIDED
         raise RefusalError("busy" if guided else "wrong_mode", "", why)

@@ -22,11 +22,10 @@ class Planner:
     def __init__(self, setup: Setup) -> None:
         self._description = setup.description
         self.filters = FilterPlanner(setup)
-        moves = MovePlanner(setup, self.filters)
-        self._reachable = Reachable(setup.description)
+        moves, reachable = MovePlanner(setup, self.filters), Reachable(setup.description)
         self._scripts = ScriptCompiler(setup.description)
-        self._paths = PathPlanner(setup, self.filters, moves, self._reachable)
-        planners = (self.filters, moves, self._paths, self._reachable, self._scripts)
+        paths = PathPlanner(setup, self.filters, moves, reachable)
+        planners = (self.filters, moves, paths, reachable, self._scripts)
         self._planners: dict[type, Any] = {type(one): one for one in planners}
 
     def rehearse_scripts(self) -> None:

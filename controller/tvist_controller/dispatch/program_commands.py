@@ -66,18 +66,6 @@ def _stop(robot: Robot, _: Call[p.ProgramStop]) -> None:
     robot.motion.stop(None, why)
 
 
-def _close_popup(robot: Robot, _: Call[p.ProgramClosePopup]) -> None:
-    robot.programs.popups.dismiss()
-
-
-def _interpret(robot: Robot, call: Call[p.ProgramInterpret]) -> Accepted:
-    return Accepted(id=robot.programs.statements.interpret(call.planned()))
-
-
-def _skip(robot: Robot, call: Call[p.ProgramSkip]) -> None:
-    robot.programs.statements.skip(call.command.what)
-
-
 def _check_power(robot: Robot, command: str) -> None:
     """Refuse to start a program where the arm has no power or is in a protective stop."""
     activity = robot.motion.activity
@@ -92,8 +80,16 @@ ROWS: tuple[Row, ...] = (
     Row(p.ProgramPlay, _play, changes_io=True),
     Row(p.ProgramPause, _pause, changes_io=True),
     Row(p.ProgramStop, _stop, lease="if named", changes_io=True, stops=True),
-    Row(p.ProgramClosePopup, _close_popup, lease="none"),
-    Row(p.ProgramInterpret, _interpret, changes_io=True, plan=_COMPILED_AFTER, long=True),
-    Row(p.ProgramSkip, _skip, changes_io=True),
+    Row(p.ProgramClosePopup, lambda robot, _: robot.programs.popups.close(), lease="none"),
+    Row(
+        p.ProgramInterpret,
+        lambda robot, call: Accepted(id=robot.programs.statements.interpret(call.planned())),
+        changes_io=True,
+        plan=_COMPILED_AFTER,
+        long=True,
+    ),
+    Row(
+        p.ProgramSkip, lambda robot, call: robot.programs.statements.skip(call.command.what), changes_io=True
+    ),
 )
 """The commands."""

@@ -42,17 +42,7 @@ from tvist_protocol.values import Payload
 
 
 class Robot(ABC):
-    """The parts of one robot, on which commands act.
-
-    Args:
-        setup: Initial setup, with the posture in which an arm stands that cannot be placed.
-        plant: Plant to control; None for the flexible arm that the setup describes.
-        planner: Plans what takes longer than a tick can wait.
-        order: Has commands of programs planned beside the ticks; None to plan them in the ticks.
-
-    Raises:
-        ValueError: The plant does not fit the setup.
-    """
+    """The parts of one robot, on which commands act; a `Controller` makes them."""
 
     def __init__(self, setup: Setup, plant: Plant | None, planner: MakesPlans, order: Order | None) -> None:
         self.setup = setup
@@ -86,7 +76,7 @@ class Robot(ABC):
             self.watching = Watching(plant, self.peripherals, self.emit, self.cycle, self.modes)
         elif isinstance(plant, RealArm) and plant.supervised:
             self.supervision = Supervision(plant, self.peripherals, self.emit, motion, safety)
-        self.forces = ToolForces(description, self.peripherals, lambda: self.latest, lambda: self.declared)
+        self.forces = ToolForces(description, self.peripherals, lambda: self.report, lambda: self.declared)
         """Forces and torques on the arm."""
         self.cell = None
         """What stands around the robot; None for nothing."""
@@ -152,13 +142,12 @@ class Robot(ABC):
 
     def snapshot(self, time: float | None = None) -> Snapshot:
         """The present state that plans depend on; for a time, that of a path that goes on from the running motion."""
-        return self.motion.snapshot(self.assumed.present, self.programs.statements.last, time)
+        return self.motion.snapshot(self.assumed.present(), self.programs.statements.last, time)
 
     def io(self, *, wrench: bool = True) -> Io:
         """Return inputs, outputs and registers as they are for the next tick.
 
-        Args:
-            wrench: Whether to compute the wrench at the tool, which takes a third of a tick.
+        To compute the wrench at the tool takes a third of a tick.
         """
         said, payload = self.watching or self.supervision, self.assumed
         io = self.peripherals.io(

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from tvist_controller.dispatch import motion_commands, program_commands
-from tvist_controller.dispatch.assumptions import payload_of
 from tvist_controller.dispatch.robot import Robot
 from tvist_controller.planning.command_row import Call, Row
 from tvist_controller.planning.filter_planner import FilterPlanner
@@ -17,7 +16,7 @@ from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import FILTER, TOOL
 from tvist_controller.refusal import RefusalError, check_body, check_joints
 from tvist_controller.safety.faults import check_fault
-from tvist_controller.setup import body
+from tvist_controller.setup import body, payload_of
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import SimulatedArm
 from tvist_protocol import commands as c

@@ -73,8 +73,6 @@ class CollisionModel:
         self._bodies = np.zeros((len(self._names), BODY))
         self._far = np.full((len(self._names), description.joints), np.inf)
         """How far each joint may carry each body [m/rad]."""
-        self._own = np.zeros(len(self._names))
-        """Distance of the farthest point of each body from the origin of its link [m]."""
         for number, body in enumerate(collision.bodies):
             place = pin.SE3.Identity() if body.link < 0 else link_frame(description, body.link)
             ends = np.array([place.act(np.array(end)) for end in (body.start, body.end)])
@@ -154,19 +152,21 @@ class CollisionModel:
     def declare(self, payload: Payload) -> None:
         """Change the payload in place."""
         self.declared = payload
-        pairs = self._all_pairs
+        pairs, carried = self._all_pairs, self._bodies[:, [LINK]] > np.arange(len(self._still))
         if self._names:
             number, centre = self._names.index(PAYLOAD), np.array(payload.com)
             distance = float(np.linalg.norm(centre))
             inset = centre * min(self._payload_radius / distance, 1.0) if distance > 0.0 else centre
             ends = np.array([self._flange.act(end) for end in (inset, 2.0 * centre - inset)])
             self._put(number, self._flange_link, ends, self._payload_radius)
+            carried[number] = payload.mass > 0.0 and self._flange_link > np.arange(len(self._still))
             pairs = pairs if payload.mass > 0.0 else pairs[(pairs[:, [ONE, OTHER]] != number).all(axis=1)]
         pairs = np.array([self._bounded(pair) for pair in pairs]).reshape(-1, ARMS + len(self._still))
         self._parts = self._chain, self._bodies, pairs, np.zeros((len(self._names), 6))
         """Chain, bodies, pairs that can meet, and scratch, as the kernels of `clearance` take them."""
         self._found = np.zeros(len(pairs))
-        self._reach = self._reaches(loaded=payload.mass > 0.0)
+        self._reach = np.where(carried, self._far, 0.0).max(axis=0, initial=0.0)
+        """Largest distance of any point of the arm from each joint's axis, in any posture, shape (n,) [m]."""
 
     def _gaps(self, q: Floats) -> Floats:
         """Distance of each pair of bodies at a posture [m]."""
@@ -182,23 +182,9 @@ class CollisionModel:
         """Place a body by the ends of its axis in pinocchio's frame of its link, shape (2, 3) [m]."""
         row = self._bodies[number]
         row[LINK], row[FIRST:RADIUS], row[RADIUS] = link, (ends @ self._axes[link]).ravel(), radius
-        self._own[number] = radius + float(np.linalg.norm(ends, axis=1).max())
+        own = radius + float(np.linalg.norm(ends, axis=1).max())
         along = np.cumsum(self._links)
-        self._far[number] = self._own[number] + np.abs(along[link] - along[1:])
-
-    def _reaches(self, *, loaded: bool) -> Floats:
-        """Largest distance of any point of the arm from each joint's axis, in any posture, shape (n,) [m]."""
-        joints = len(self._still)
-        own = np.zeros(joints)  # from the joint's origin to the farthest point of its own link
-        for name, row, farthest in zip(self._names, self._bodies, self._own, strict=True):
-            if row[LINK] > 0 and (loaded or name != PAYLOAD):
-                joint = int(row[LINK]) - 1
-                own[joint] = max(own[joint], farthest)
-        reach, beyond = np.zeros(joints), 0.0
-        for joint in reversed(range(joints)):
-            reach[joint] = beyond = max(own[joint], beyond)
-            beyond += self._links[joint + 1]
-        return reach
+        self._far[number] = own + np.abs(along[link] - along[1:])
 
     def _bounded(self, pair: Floats) -> Floats:
         """Return a pair with how far each joint between its bodies may bring them [m/rad]."""

@@ -4,7 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tvist_controller.line.differentiator import STILL, Floats
+from tvist_controller.line.differentiator import STILL, Floats, rests_at
 from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.line.shaped_reference import ShapedReference
 from tvist_controller.trajectory import Trajectory
@@ -39,11 +39,12 @@ class LineSimulation:
         while not self.rests and len(self.references) < ticks + 2:
             x = trajectory.next()
             x_star = x if line_filter is None else line_filter.filter(x)
-            target = self._shaped.update(x_star)
+            self._shaped.take(x_star, x_star)
             self.samples.append(x_star)
             self.references.append(self._shaped.position)
-            settled = line_filter is None or line_filter.settled
-            self.rests = trajectory.standing and settled and target.rests_at(self._shaped.posture(x), PERIOD)
+            settled, shaped = line_filter is None or line_filter.settled, self._shaped
+            standing = trajectory.standing and settled
+            self.rests = standing and rests_at(shaped.posture(x), shaped.joints.published, PERIOD)
 
     @cached_property
     def last(self) -> int:

@@ -1,7 +1,7 @@
 """Planning of stops: what decision 13 calls a permitted stop, and the quickest of them."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
@@ -116,10 +116,7 @@ class StopPlanner:
             ahead.until(ticks + 1)
             news = ahead.samples[2 + len(along) :]
             along.extend(forecast.path.forwards(x - newest) for x in news)
-            if ahead.rests and ticks > ahead.last - 1:
-                return False
-            shares = (stop.share((number + 1) * self.period) for number in range(len(along)))
-            return all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
+            return not (ahead.rests and ticks > ahead.last - 1) and self._behind(stop, along)
 
         return self._quickest_on_path(state, newest, forecast, wanted, permitted, asked)
 
@@ -146,9 +143,7 @@ class StopPlanner:
         along = [path.forwards(x - samples[1]) for x in samples[2:]]
 
         def permitted(stop: SlowedStop) -> bool:
-            shares = (stop.share((number + 1) * self.period) for number in range(len(along)))
-            behind = all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
-            return behind and stop.hardest <= self.highest
+            return self._behind(stop, along) and stop.hardest <= self.highest
 
         stops = (
             SlowedStop(
@@ -162,6 +157,11 @@ class StopPlanner:
             for acceleration in self._ladder(wanted)
         )
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
+
+    def _behind(self, stop: PathStop | SlowedStop, along: Sequence[float]) -> bool:
+        """Return whether a stop is never ahead of a motion, of which the distance at each tick is known."""
+        shares = (stop.share(number * self.period) for number in range(1, len(along) + 1))
+        return all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
 
     def asked(self, ahead: Floats) -> Floats:
         """Largest torques that a motion needs for its future references, shape (k, n): shape (n,) [N m]."""

@@ -55,8 +55,11 @@ class Peripherals:
             bank: list(_EMPTY[bank.partition("_")[2]]) for bank in get_args(Bank)
         }
         self._written: dict[tuple[Bank, int], int] = {}
-        self._tool_voltage = 0
-        self._tool_types, self._tool_output_mode, self._tool_digital_modes = 0b11, 0, [1, 1]
+        self._tool: dict[str, Any] = {
+            "tool_output_voltage": 0, "tool_analog_input_types": 0b11, "tool_output_mode": 0,
+            "tool_digital_output0_mode": 1, "tool_digital_output1_mode": 1,
+        }  # fmt: skip
+        """Settings of the tool, as fields of `Io`."""
         self.changed = True
         """True if `io` has to be published, since something in it has changed; whoever publishes it resets this."""
         self.wrench_zero: list[float] | None = None
@@ -72,7 +75,7 @@ class Peripherals:
         for number, ratio in enumerate((command.standard_analog_output_0, command.standard_analog_output_1)):
             if command.standard_analog_output_mask >> number & 1:
                 self.set_analog_output(number, ratio)
-                self.choose_output(number, voltage=bool(command.standard_analog_output_type >> number & 1))
+                self.choose(2 + number, voltage=bool(command.standard_analog_output_type >> number & 1))
 
     def set_digital_outputs(self, mask: int, values: int) -> None:
         """Set the digital outputs that the mask selects."""
@@ -103,38 +106,23 @@ class Peripherals:
 
     # ------------------------------------------------------------------ for programs
 
-    def output_is_voltage(self, number: int) -> bool:
-        """Return whether an analogue output is a voltage rather than a current."""
-        return bool(self._analog_types >> (2 + number) & 1)
+    def choose(self, terminal: int, *, voltage: bool) -> None:
+        """Make an analogue input, 0 or 1, or output, 2 or 3, a voltage or a current.
 
-    def choose_output(self, number: int, *, voltage: bool) -> None:
-        """Make an analogue output a voltage or a current; it keeps its share of the range."""
-        self._choose(2 + number, voltage=voltage)
-
-    def choose_input(self, number: int, *, voltage: bool) -> None:
-        """Make an analogue input a voltage or a current; the signal at it keeps its number."""
-        self._choose(number, voltage=voltage)
-
-    def _choose(self, bit: int, *, voltage: bool) -> None:
-        self._analog_types = self._analog_types & ~(1 << bit) | voltage << bit
+        The signal at an input keeps its number, an output its share of the range.
+        """
+        self._analog_types = self._analog_types & ~(1 << terminal) | voltage << terminal
         self.changed = True
 
     def choose_tool_input(self, number: int, *, voltage: bool) -> None:
         """Make an analogue input of the tool a voltage or a current; the signal at it keeps its number."""
-        self._tool_types = self._tool_types & ~(1 << number) | voltage << number
+        types = self._tool["tool_analog_input_types"]
+        self.set_tool(tool_analog_input_types=types & ~(1 << number) | voltage << number)
+
+    def set_tool(self, **settings: int) -> None:
+        """Change settings of the tool: its supply and the modes of its terminals, as fields of `Io`."""
+        self._tool.update(settings)
         self.changed = True
-
-    def set_tool_output_mode(self, mode: int) -> None:
-        """Use the tool's digital outputs as such (0) or as a supply (1)."""
-        self._tool_output_mode, self.changed = mode, True
-
-    def set_tool_digital_output_mode(self, number: int, mode: int) -> None:
-        """Let a digital output of the tool sink (1), source (2) or both (3)."""
-        self._tool_digital_modes[number], self.changed = mode, True
-
-    def set_tool_voltage(self, voltage: int) -> None:
-        """Set the supply of the tool [V]."""
-        self._tool_voltage, self.changed = voltage, True
 
     def zero_wrench(self, wrench: list[float] | None) -> None:
         """Take a force and torque as zero, see `wrench_zero`; None for nothing [N, N m]."""
@@ -204,6 +192,9 @@ class Peripherals:
         assumed: Payload | None = None,
     ) -> Io:
         """Return the message that publishes all this, with the fields of the loaded program and the rest."""
+        registers: dict[str, Any] = {
+            f"{bank}_register": list(values) for bank, values in self._registers.items()
+        }
         return Io(
             tick=tick,
             actual_digital_input_bits=self.digital_inputs,
@@ -212,21 +203,12 @@ class Peripherals:
             standard_analog_output=[self._analog_output(number) for number in range(2)],
             analog_io_types=self._analog_types,
             tool_analog_input=list(self.tool_analog_inputs),
-            input_bit_register=list(self._registers["input_bit"]),
-            input_int_register=list(self._registers["input_int"]),
-            input_double_register=list(self._registers["input_double"]),
-            output_bit_register=list(self._registers["output_bit"]),
-            output_int_register=list(self._registers["output_int"]),
-            output_double_register=list(self._registers["output_double"]),
+            **registers,
             tcp_offset=list(self.tcp_offset),
             payload=self._payload_at(tick, payload),
             target_speed_fraction=speed,
             **program,
-            tool_output_voltage=self._tool_voltage,
-            tool_analog_input_types=self._tool_types,
-            tool_output_mode=self._tool_output_mode,
-            tool_digital_output0_mode=self._tool_digital_modes[0],
-            tool_digital_output1_mode=self._tool_digital_modes[1],
+            **self._tool,
             tcp_force_zero=self.wrench_zero,
             assumed_payload=assumed,
             actual_TCP_force=wrench,
@@ -248,7 +230,7 @@ class Peripherals:
         return Payload(mass=mass, com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))
 
     def _analog_output(self, number: int) -> float:
-        return analog_value(self.analog_shares[number], voltage=self.output_is_voltage(number))
+        return analog_value(self.analog_shares[number], voltage=bool(self._analog_types >> (2 + number) & 1))
 
 
 def _check(k: int, value: Register, bank: Bank) -> None:

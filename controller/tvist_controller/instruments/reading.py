@@ -14,7 +14,6 @@ from tvist_controller.instruments.wrench import (
     RUNNING,
     SHAPED,
     UNSHAPED,
-    ToolWrench,
     as_rows,
     joint_lists,
 )
@@ -57,7 +56,6 @@ class Reading:
         state: State,
         io: Io,
         rigid: RigidBody,
-        wrench: ToolWrench,
         ratings: list[JointRating],
         current: list[float],
         meters: Meters,
@@ -74,7 +72,7 @@ class Reading:
         """Temperatures of the joints [°C]."""
         self.power, self.consumed, self.dissipated = meters.power, meters.consumed, meters.dissipated
         """Power from the supply [W]; energy from it, and returned by braking, since the first tick [J]."""
-        self.rigid, self.wrench, self.ratings = rigid, wrench, ratings
+        self.rigid, self.ratings = rigid, ratings
 
     @property
     def powered(self) -> bool:
@@ -128,4 +126,4 @@ class Reading:
         """Force at the TCP [N, N m], then external torques on the joints [N m], shape (6 + n,)."""
         if not self.driven:
             return np.zeros(6 + len(self.ratings))
-        return self.wrench.estimate(self.motion, self.io.tcp_offset)
+        return self.rigid.external(self.motion, self.io.tcp_offset)

@@ -1,17 +1,23 @@
-"""What clients get of a tick: its state, made or encoded when somebody wants it, and the truth."""
+"""What clients get of a tick: its state, made or encoded when somebody wants it, the truth, and who receives them."""
+
+from typing import Literal
 
 import numpy as np
 from msgspec import Struct
 
 from tvist_controller.instruments.state_layout import Layout, width, write_state
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import rotation_vector
+from tvist_controller.kinematics.pose import rotation_vector
 from tvist_controller.line.differentiator import Floats, middle_of
 from tvist_controller.line.sample import Sample
 from tvist_plant.plant import PERIOD, Plant, PlantTruth
 from tvist_protocol.codec import decode_state, encode
-from tvist_protocol.stream import State, Truth
+from tvist_protocol.io import Io
+from tvist_protocol.journal import Entry
+from tvist_protocol.stream import Event, State, Truth
 
+Topic = Literal["state", "event", "truth", "telemetry", "io"]
+"""Topic of messages that are published without a request."""
 Key = tuple[object, ...]
 MODES = ("f_d", "zeta", "participation")
 TRUE_MODES_EVERY = 50
@@ -127,6 +133,38 @@ class Report(Struct, gc=False):
             motor_limited=motors is not None and motors.limited,
             flange_wrench=None if sample.wrench is None else sample.wrench.tolist(),
         )
+
+
+class Sink:
+    """Takes messages in the controller's thread. No method may raise, and none may block except in lockstep.
+
+    By default each method ignores its message.
+    """
+
+    wants_truth = False
+    """Whether it asks for what a real robot cannot measure just now, although the robot does not publish it."""
+
+    def report(self, report: Report) -> None:
+        """Take a tick's report, by default as its state, which takes a while to make."""
+        self.state(report.state)
+
+    def state(self, state: State) -> None:
+        """Take a tick's state."""
+
+    def event(self, event: Event) -> None:
+        """Take an event; it comes before the state of its tick."""
+
+    def truth(self, truth: Truth) -> None:
+        """Take what a real robot cannot measure, if it is published or this sink wants it."""
+
+    def io(self, io: Io) -> None:
+        """Take changed inputs, outputs and registers; they precede the state of their tick."""
+
+    def raised(self, error: Exception) -> None:
+        """Take what a plant, a function of a program or a tick has raised, for a log; the robot has dealt with it."""
+
+    def journal(self, entry: Entry) -> None:
+        """Take an input of the controller, which precedes the tick of its number."""
 
 
 def true_modes(plant: Plant, joints: int) -> dict[str, list[float]]:

@@ -6,9 +6,10 @@ from math import hypot
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.kinematics.arm import Arm, end_motion
+from tvist_controller.instruments.wrench import ROWS, SHAPED_QD, estimate
+from tvist_controller.kinematics.arm import AT_FLANGE, Arm, end_motion
+from tvist_controller.setup import body
 from tvist_plant.chain import BODY, momentum, sweep
-from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_protocol.values import Payload
@@ -28,13 +29,7 @@ def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
 
 
 def carried(omega: list[float], alpha: list[float], arm: list[float]) -> list[float]:
-    """Acceleration of one point of a body relative to another, α × r + ω × (ω × r) [m/s²].
-
-    Args:
-        omega: Angular velocity [rad/s].
-        alpha: Angular acceleration [rad/s²].
-        arm: r, from the other point to this one [m].
-    """
+    """Acceleration of one point of a body relative to another at r, the arm, α × r + ω × (ω × r) [m/s²]."""
     return add(cross(alpha, arm), cross(omega, cross(omega, arm)))
 
 
@@ -52,35 +47,52 @@ def momentum_of(chain: Floats, q: Floats, qd: Floats, bodies: Floats) -> tuple[f
 class RigidBody:
     """The arm as the controller models it.
 
-    Motions are joint positions [rad], velocities [rad/s] and accelerations [rad/s²], shape (3, n).
-
-    Args:
-        description: The robot.
+    Motions are joint positions [rad], velocities [rad/s] and accelerations [rad/s²], shape (3, n); offsets are the tool
+    centre point in the flange frame: x y z [m] and rotation vector [rad].
     """
 
     def __init__(self, description: RobotDescription) -> None:
         self._arm = self._tool = Arm(description)
         self._payload: Payload | None = None
-        self._offset = [0.0] * 6  # as messages have it
+        self._offset: tuple[float, ...] = AT_FLANGE
+        drives = description.drives
+        self._drives = np.array([drives.rotor_inertia, drives.coulomb_friction])
+        self._width, self._linear = drives.friction_width, drives.linear_friction
         self._joints_to_elbow = min(description.joints, ELBOW)
         still = np.zeros((3, description.joints))
-        self.tool(still, self._offset)  # this loads compiled code, which takes many ticks, as the next two do
+        self.tool(still, AT_FLANGE)  # this loads compiled code, which takes many ticks, as the next three do
+        self.external(np.zeros((ROWS, description.joints)), AT_FLANGE)
         self.flange_rotation(still[0])
         momentum_of(self._arm.chain, still[0], still[1], self._arm.scratch)
 
-    def tool(self, motion: Floats, offset: list[float]) -> Floats:
+    def tool(self, motion: Floats, offset: Sequence[float]) -> Floats:
         """Return the motion of the tool centre point in the base frame, shape (18,).
 
         Its pose, x y z [m] and rotation vector [rad]; its velocity, linear [m/s] and angular [rad/s]; its
         acceleration, linear [m/s²] and angular [rad/s²].
-
-        Args:
-            motion: The joints' motion.
-            offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
         """
-        if offset != self._offset:
-            self._offset, self._tool = list(offset), self._arm.with_tool(offset)
-        return np.concatenate((self._tool.motion(motion[0], motion[1]), self._tool.acceleration(*motion)))
+        tool = self._at(offset)
+        return np.concatenate((tool.motion(motion[0], motion[1]), tool.acceleration(*motion)))
+
+    def _at(self, offset: Sequence[float]) -> Arm:
+        if (wanted := tuple(offset)) != self._offset:
+            self._offset, self._tool = wanted, self._arm.with_tool(wanted)
+        return self._tool
+
+    def external(self, rows: Floats, offset: Sequence[float]) -> Floats:
+        """Return force and torque at the tool centre point, base frame [N, N m], and torques on the joints [N m].
+
+        External torques on the joints are the torques of drives that follow their target (rigid arm with the declared
+        payload, rotors and friction), minus the measured torques.
+
+        F with Jᵀ F = τ by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) if the manipulability
+        w is below w₀ (Nakamura and Hanafusa, 1986). Components that affect no joint are zero. The rows are those of
+        `joint_lists`; the result has shape (6 + n,).
+        """
+        share = rows[SHAPED_QD] / self._width
+        out = np.empty(6 + len(share))
+        estimate(self._at(offset).chain, rows, self._drives, share if self._linear else np.tanh(share), out)
+        return out
 
     def flange_rotation(self, q: Floats) -> Floats:
         """Rotation from the flange to the base frame, shape (3, 3)."""
@@ -114,5 +126,4 @@ class RigidBody:
         if payload is self._payload or payload == self._payload:
             return
         self._payload = payload
-        body = Body(mass=payload.mass, com=payload.com, inertia=payload.inertia)
-        self._arm.chain[-2, BODY:] = self._arm.loaded(body)
+        self._arm.chain[-2, BODY:] = self._arm.loaded(body(payload))

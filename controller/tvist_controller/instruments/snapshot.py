@@ -4,7 +4,7 @@ from tvist_controller.instruments.motors import Meters, joint_ratings
 from tvist_controller.instruments.reading import POWERED, Reading, computed_once
 from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.variables import READERS
-from tvist_controller.instruments.wrench import RUNNING, ToolWrench
+from tvist_controller.instruments.wrench import RUNNING
 from tvist_plant.description import RobotDescription
 from tvist_protocol.io import Io
 from tvist_protocol.stream import State
@@ -24,7 +24,7 @@ class Instruments:
     """Reads a robot's values tick by tick; if ticks are skipped, temperatures and energies are less accurate."""
 
     def __init__(self, description: RobotDescription) -> None:
-        self._rigid, self._wrench = RigidBody(description), ToolWrench(description)
+        self._rigid = RigidBody(description)
         self._ratings = joint_ratings(description)
         self._constants = [rating.torque_constant for rating in self._ratings]
         self._idle = [0.0] * description.joints
@@ -33,7 +33,7 @@ class Instruments:
     def snapshot(self, state: State, io: Io) -> Snapshot:
         """Return the values of a tick, from its state and the terminals and registers at that tick."""
         current = self.follow(state.tick, state.robot_mode, state.actual_moment, state.actual_qd)
-        return Snapshot(state, io, self._rigid, self._wrench, self._ratings, current, self._meters)
+        return Snapshot(state, io, self._rigid, self._ratings, current, self._meters)
 
     def follow(self, tick: int, mode: int, moment: list[float], velocity: list[float]) -> list[float]:
         """Let temperatures and energies go on to a tick whose other values nobody reads; return the currents [A].

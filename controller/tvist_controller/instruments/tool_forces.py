@@ -5,14 +5,14 @@ from collections.abc import Callable
 import numpy as np
 
 from tvist_controller.instruments.peripherals import Peripherals
+from tvist_controller.instruments.report import Report
 from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.wrench import (
     ACTUAL_Q,
     ROWS,
+    RUNNING,
     SHAPED,
-    ToolWrench,
-    at_tool,
-    since_zeroed,
+    sensed_at_tool,
     without_weight,
 )
 from tvist_controller.line.line_tick import QDD, TORQUE, Q
@@ -20,60 +20,52 @@ from tvist_controller.line.sample import Sample
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_plant.plant import GRAVITY, PERIOD
-from tvist_protocol.stream import State
 from tvist_protocol.values import Payload
 
 
 class ToolForces:
-    """What acts on the arm from outside: by the sensor in its flange if it has one, else by the drives' torques.
-
-    Args:
-        description: The robot.
-        peripherals: The tool centre point, and the wrench that counts as zero.
-        latest: Returns the state of the last tick.
-        declared: Returns the declared payload.
-    """
+    """What acts on the arm from outside: by the sensor in its flange if it has one, else by the drives' torques."""
 
     def __init__(
         self,
         description: RobotDescription,
-        peripherals: Peripherals,
-        latest: Callable[[], State],
+        peripherals: Peripherals,  # the tool centre point, and the wrench that counts as zero
+        latest: Callable[[], Report],  # of the last tick
         declared: Callable[[], Payload],
     ) -> None:
-        self._wrench, self._peripherals, self._latest = ToolWrench(description), peripherals, latest
+        self._peripherals, self._latest = peripherals, latest
         self._rigid, self._declared = RigidBody(description), declared
 
     def torques(self) -> list[float]:
         """External torques on the joints, shape (n,) [N m]."""
-        return self._estimate()[6:]
+        torques: list[float] = self._estimate()[6:].tolist()
+        return torques
 
     def wrench(self) -> list[float]:
         """External force and torque at the tool centre point, base frame [N, N m]."""
-        state = self._latest()
-        if state.flange_wrench is None:
-            return since_zeroed(self._estimate()[:6], self._peripherals.wrench_zero)
-        found = self._sensed(np.array(state.flange_wrench), np.array(state.actual_q))
+        sample = self._latest().sample
+        if sample.wrench is None:
+            found = self._since_zeroed(self._estimate()[:6])
+        else:
+            found = self._sensed(sample.wrench, sample.measured.q)
         wrench: list[float] = found.tolist()
         return wrench
 
     def zero(self) -> None:
         """Take the present force and torque at the tool as zero; of a sensor, in its own frame."""
-        state = self._latest()
-        if state.flange_wrench is None:
-            self._peripherals.zero_wrench(self._estimate()[:6])
-            return
-        rotation = self._rigid.flange_rotation(np.array(state.actual_q))
-        felt = without_weight(np.array(state.flange_wrench), rotation, self._declared())
-        self._peripherals.zero_wrench(felt.tolist())
+        sample = self._latest().sample
+        if sample.wrench is None:
+            found = self._estimate()[:6]
+        else:
+            rotation = self._rigid.flange_rotation(sample.measured.q)
+            found = without_weight(sample.wrench, rotation, self._declared())
+        self._peripherals.zero_wrench(found.tolist())
 
     def felt(self, sample: Sample) -> Floats:
         """Return the same as `wrench` for a tick whose signals are known, shape (6,), with the arm driven."""
-        measured, zero = sample.measured, self._peripherals.wrench_zero
         if sample.wrench is not None:
-            return self._sensed(sample.wrench, measured.q)
-        found = self._estimated(sample, sample.signals[TORQUE])
-        return found if zero is None else found - zero
+            return self._sensed(sample.wrench, sample.measured.q)
+        return self._since_zeroed(self._estimated(sample, sample.signals[TORQUE])[:6])
 
     def estimated(self, sample: Sample, qd_before: Floats) -> Floats:
         """Return the force that the drives' torques and the measured motion tell, shape (3,) [N].
@@ -85,12 +77,24 @@ class ToolForces:
         motion = np.array([measured.q, measured.qd, (measured.qd - qd_before) / PERIOD])
         return self._estimated(sample, self._rigid.moment(motion, self._declared()))[:3]
 
+    def _estimate(self) -> Floats:
+        """What the drives' torques tell of the last tick; zeros with the brakes on."""
+        latest = self._latest()
+        sample = latest.sample
+        if latest.modes[0] != RUNNING:
+            return np.zeros(6 + len(sample.measured.q))
+        return self._estimated(sample, sample.signals[TORQUE])
+
     def _estimated(self, sample: Sample, torque: Floats | list[float]) -> Floats:
         measured = sample.measured
-        motion = np.zeros((ROWS, len(measured.q)))
-        motion[SHAPED], motion[SHAPED.stop] = sample.signals[Q : QDD + 1], torque
-        motion[ACTUAL_Q:] = measured.q, measured.qd, measured.moment
-        return self._wrench.estimate(motion, self._peripherals.tcp_offset)[:6]
+        rows = np.zeros((ROWS, len(measured.q)))
+        rows[SHAPED], rows[SHAPED.stop] = sample.signals[Q : QDD + 1], torque
+        rows[ACTUAL_Q:] = measured.q, measured.qd, measured.moment
+        return self._rigid.external(rows, self._peripherals.tcp_offset)
+
+    def _since_zeroed(self, found: Floats) -> Floats:
+        zero = self._peripherals.wrench_zero
+        return found if zero is None else found - zero
 
     @property
     def basis(self) -> tuple[object, ...]:
@@ -107,12 +111,8 @@ class ToolForces:
         """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N].
 
         The payload is taken to be accelerated as the flange is, whose accelerometer also feels that the arm bends; of a
-        plant without one, which measures zeros, only the weight is taken away.
-
-        Args:
-            sample: Signals of the tick.
-            wrench: What the sensor measured, see `Measurement.wrench`.
-            zeroed: Whether what was taken as zero is of this sensor.
+        plant without one, which measures zeros, only the weight is taken away. `zeroed` tells whether what was taken as
+        zero is of this sensor.
         """
         measured, zero = sample.measured, self._peripherals.wrench_zero
         rotation, specific = self._rigid.flange_rotation(measured.q), measured.accelerometer
@@ -123,10 +123,5 @@ class ToolForces:
         return found
 
     def _sensed(self, raw: Floats, q: Floats) -> Floats:
-        rotation, zero = self._rigid.flange_rotation(q), self._peripherals.wrench_zero
-        felt = without_weight(raw, rotation, self._declared())
-        return at_tool(felt if zero is None else felt - zero, rotation, self._peripherals.tcp_offset)
-
-    def _estimate(self) -> list[float]:
-        found: list[float] = self._wrench.of(self._latest(), self._peripherals.tcp_offset).tolist()
-        return found
+        rotation, there = self._rigid.flange_rotation(q), self._peripherals
+        return sensed_at_tool(raw, rotation, self._declared(), there.wrench_zero, there.tcp_offset)

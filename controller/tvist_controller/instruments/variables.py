@@ -15,9 +15,8 @@ from tvist_controller.instruments.wrench import (
     ACTUAL_QD,
     SHAPED,
     UNSHAPED,
-    at_tool,
+    sensed_at_tool,
     since_zeroed,
-    without_weight,
 )
 from tvist_plant.plant import GRAVITY
 from tvist_protocol.io import BITS, NUMBERS
@@ -138,8 +137,8 @@ def _tool_force(r: Reading) -> list[float]:
     raw, zero = r.state.flange_wrench, r.io.tcp_force_zero
     if raw is None:
         return since_zeroed(r.estimate[:6].tolist(), zero)
-    felt = without_weight(np.array(raw), r.rotation, r.io.payload)
-    sensed: list[float] = at_tool(felt if zero is None else felt - zero, r.rotation, r.io.tcp_offset).tolist()
+    found = sensed_at_tool(np.array(raw), r.rotation, r.io.payload, zero, r.io.tcp_offset)
+    sensed: list[float] = found.tolist()
     return sensed
 
 

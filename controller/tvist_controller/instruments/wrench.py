@@ -1,4 +1,4 @@
-"""The wrench at the tool, by a force sensor in the flange or estimated from the drives' torques."""
+"""The wrench at the tool, by a force sensor in the flange or estimated from the drives' torques, see `RigidBody`."""
 
 from collections.abc import Sequence
 from struct import pack
@@ -6,11 +6,9 @@ from struct import pack
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.least_squares import solve_in_place
 from tvist_controller.kinematics.pose import locate
 from tvist_kernels.compiling import inlined
-from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_plant.plant import GRAVITY
 from tvist_protocol.modes import RobotMode
@@ -76,7 +74,7 @@ def product(A: Floats, B: Floats) -> Floats:
 def force_at(chain: Floats, q: Floats, torque: Floats, force: Floats) -> None:
     """Compute force and torque [N, N m], shape (6,), at a chain's end that cause torques on the joints, shape (n,).
 
-    See `ToolWrench.estimate`.
+    See `RigidBody.external`.
     """
     n = q.shape[0]
     J = np.empty((6, n))
@@ -100,91 +98,39 @@ def force_at(chain: Floats, q: Floats, torque: Floats, force: Floats) -> None:
 
 
 @compiled_for_ticks
-def estimate(chain: Floats, motion: Floats, drives: Floats, slip: Floats, out: Floats) -> None:
-    """Estimate what acts on the arm from outside; see `ToolWrench.estimate`.
-
-    Args:
-        chain: The links, the tool centre point being their end, see `tvist_plant.chain`, shape (n+1, 22).
-        motion: See `joint_lists`, shape (10, n).
-        drives: Inertia of the rotors [kg m²] and Coulomb friction [N m], shape (2, n).
-        slip: Share of the friction that acts, shape (n,) [-].
-        out: Result: force and torque at the point [N, N m], then torques on the joints [N m], shape (6 + n,).
-    """
+def estimate(
+    chain: Floats,  # its end is the tool centre point, see `tvist_plant.chain`, shape (n+1, 22)
+    motion: Floats,  # see `joint_lists`, shape (10, n)
+    drives: Floats,  # inertia of the rotors [kg m²] and Coulomb friction [N m], shape (2, n)
+    slip: Floats,  # share of the friction that acts, shape (n,) [-]
+    out: Floats,  # force and torque at the point [N, N m], then torques on the joints [N m], shape (6 + n,)
+) -> None:
+    """Estimate what acts on the arm from outside; see `RigidBody.external`."""
     for j in range(slip.shape[0]):
         expected = motion[SHAPED_MOMENT, j] + drives[0, j] * motion[SHAPED_QDD, j] + drives[1, j] * slip[j]
         out[6 + j] = expected - motion[ACTUAL_MOMENT, j]
     force_at(chain, motion[ACTUAL_Q], out[6:], out[:6])
 
 
-class ToolWrench:
-    """Estimates the force at the tool centre point that explains the measured torques.
-
-    Args:
-        description: The robot.
-    """
-
-    def __init__(self, description: RobotDescription) -> None:
-        self._arm = Arm(description)
-        drives = description.drives
-        self._drives = np.array([drives.rotor_inertia, drives.coulomb_friction])
-        self._width, self._linear = drives.friction_width, drives.linear_friction
-        self._offset: tuple[float, ...] = (0.0,) * 6
-        # Loads compiled code, which takes many ticks.
-        self.estimate(np.zeros((ROWS, description.joints)), self._offset)
-
-    def estimate(self, motion: Floats, offset: Sequence[float]) -> Floats:
-        """Return force and torque at the tool centre point, base frame [N, N m], and torques on the joints [N m].
-
-        External torques on the joints are the torques of drives that follow their target (rigid arm with the declared
-        payload, rotors and friction), minus the measured torques.
-
-        F with Jᵀ F = τ by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) if the manipulability
-        w is below w₀ (Nakamura and Hanafusa, 1986). Components that affect no joint are zero.
-
-        Args:
-            motion: See `joint_lists`, shape (10, n).
-            offset: Tool centre point in the flange frame [m, rad].
-
-        Returns:
-            Shape (6 + n,).
-        """
-        if tuple(offset) != self._offset:
-            self._offset, self._arm = tuple(offset), self._arm.with_tool(offset)
-        share = motion[SHAPED_QD] / self._width
-        out = np.empty(6 + len(share))
-        slip = share if self._linear else np.tanh(share)
-        estimate(self._arm.chain, motion, self._drives, slip, out)
-        return out
-
-    def of(self, state: State, offset: Sequence[float]) -> Floats:
-        """Return what `estimate` does for a tick; zeros with the brakes on."""
-        if state.robot_mode != RUNNING:
-            return np.zeros(6 + len(state.actual_q))
-        return self.estimate(as_rows(joint_lists(state)), offset)
-
-
 def without_weight(raw: Floats, rotation: Floats, payload: Payload) -> Floats:
     """Return what a sensor feels beside the weight of the payload, in its own frame, shape (6,) [N, N m].
 
-    As on UR's e-Series, only the weight is taken away, not what it takes to accelerate the payload.
-
-    Args:
-        raw: Force and torque about the flange's origin in its frame, shape (6,) [N, N m].
-        rotation: Rotation from the flange to the base frame, shape (3, 3).
-        payload: Declared payload.
+    As on UR's e-Series, only the weight is taken away, not what it takes to accelerate the payload. What it measures
+    is about the flange's origin in its frame, and the rotation that from there to the base frame.
     """
     weight = -payload.mass * GRAVITY * rotation[2]
     felt: Floats = raw - np.concatenate((weight, np.cross(payload.com, weight)))
     return felt
 
 
-def at_tool(felt: Floats, rotation: Floats, offset: Sequence[float]) -> Floats:
-    """Return a wrench at the tool centre point in the base frame, shape (6,) [N, N m].
+def sensed_at_tool(
+    raw: Floats, rotation: Floats, payload: Payload, zero: list[float] | None, offset: Sequence[float]
+) -> Floats:
+    """Return what a sensor tells of the wrench at the tool centre point, in the base frame, shape (6,) [N, N m].
 
-    Args:
-        felt: Force and torque about the flange's origin in its frame, shape (6,) [N, N m].
-        rotation: Rotation from the flange to the base frame, shape (3, 3).
-        offset: Tool centre point in the flange frame [m, rad].
+    That is without the payload's weight, see `without_weight`, and what a program has taken as zero; the offset is the
+    tool centre point in the flange frame [m, rad].
     """
-    force = felt[:3]
-    return np.concatenate((rotation @ force, rotation @ (felt[3:] - np.cross(offset[:3], force))))
+    felt = without_weight(raw, rotation, payload)
+    force, torque = np.split(felt if zero is None else felt - zero, 2)
+    return np.concatenate((rotation @ force, rotation @ (torque - np.cross(offset[:3], force))))

@@ -13,8 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller._compiled import compiled, compiled_for_ticks
-from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse
-from tvist_controller.kinematics.rotation import turned_by
+from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse, turned_by
 from tvist_plant.chain import BODY, SCRATCH, SHIFT, TURN, chain_of, collect_inertia, sweep, torques
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, Floats, payload_inertia, rigid_model
@@ -109,9 +108,11 @@ class Arm:
 
     def loaded(self, payload: Payload) -> Floats:
         """Return the inertial parameters of the last link with a payload on the flange, shape (10,)."""
-        if payload.mass == 0.0:
-            return self.bare
-        parameters: Floats = self.bare + self._flange.act(payload_inertia(payload)).toDynamicParameters()
+        return self.bare if payload.mass == 0.0 else self.bare + self.on_flange(payload)
+
+    def on_flange(self, payload: Payload) -> Floats:
+        """Return the inertial parameters of a payload on the flange in the last link's frame, shape (10,)."""
+        parameters: Floats = self._flange.act(payload_inertia(payload)).toDynamicParameters()
         return parameters
 
     def pose(self, q: Floats) -> tuple[Floats, Floats]:

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.kinematics.geometry import representation
 from tvist_controller.kinematics.least_squares import ACCURACY, AIM, approach, descend, put
 from tvist_controller.kinematics.pose import locate, pose_error
-from tvist_controller.kinematics.postures import DEFINITE, FREE, postures
+from tvist_controller.kinematics.postures import DEFINITE, FREE, postures, representation
 from tvist_kernels.compiling import inlined
 from tvist_plant.model import Floats
 
@@ -80,23 +79,6 @@ def _sample_curves(
             # The way from a posture within the ranges to the nearest one may lead out of them.
             if inside or least[row] >= OUTSIDE:
                 put(posture, table[row])
-
-
-@compiled
-def improved_postures(
-    arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats
-) -> None:
-    """Compute what `all_postures` does, and improve each by least squares as far as its error is not rounding."""
-    all_postures(arm, chain, rotation, position, near, table)
-    for row in range(8):
-        if math.isnan(table[row, 0]):
-            continue
-        represent(arm, near, table[row])
-        posture = table[row].copy()
-        if descend(chain, rotation, position, near, 0.0, 5, posture) <= ACCURACY:
-            table[row] = posture
-        else:
-            table[row, 0] = math.nan
 
 
 @inlined

@@ -4,7 +4,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tvist_controller.line.differentiator import Differentiator, Floats, Target
+from tvist_controller.line.differentiator import Differentiator, Floats, Target, rests_at
 from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.guard import Guard, Obstacle
@@ -240,7 +240,7 @@ class ControlCycle:
         return (
             self.trajectory.standing
             and (not self.mode.shaped or self.filter.settled)
-            and sample.target.rests_at(sample.reference, PERIOD)
+            and rests_at(sample.reference, sample.target, PERIOD)
         )
 
     def _settle(self) -> None:

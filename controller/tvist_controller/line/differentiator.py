@@ -25,11 +25,12 @@ class Target(Struct, frozen=True, eq=False, gc=False):
     qdd: Floats
     """q̈*, shape (n,) [rad/s^2]."""
 
-    def rests_at(self, reference: Floats, period: float) -> bool:
-        """Return whether the shaped reference of the next tick has come to rest at an unshaped reference."""
-        # The central differences' equivalent of q*ᵢ - q*ᵢ₋₁.
-        step = period * (self.qd - 0.5 * period * self.qdd)
-        return bool(max(np.abs(step).max(), np.abs(reference - self.q).max()) <= STILL)
+
+def rests_at(reference: Floats, target: Target, period: float) -> bool:
+    """Return whether the shaped reference of the next tick has come to rest at an unshaped reference."""
+    # The central differences' equivalent of q*ᵢ - q*ᵢ₋₁.
+    step = period * (target.qd - 0.5 * period * target.qdd)
+    return bool(max(np.abs(step).max(), np.abs(reference - target.q).max()) <= STILL)
 
 
 def central_differences(references: Floats, period: float) -> tuple[Floats, Floats, Floats]:
@@ -93,11 +94,6 @@ class Differentiator:
     def fork(self) -> Self:
         """Return an independent copy of the present state."""
         return copy.copy(self)
-
-    def update(self, q: Floats) -> Target:
-        """Take the reference of this tick and return the target of the previous tick."""
-        self.push(q)
-        return self.published
 
     def push(self, q: Floats) -> None:
         """Take the reference of this tick."""

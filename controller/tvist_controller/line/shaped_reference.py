@@ -65,11 +65,6 @@ class ShapedReference:
         """Return the joint positions that a sample stands for, shape (n,) [rad]."""
         return sample if self.posture_of is None else self.posture_of(sample)
 
-    def update(self, sample: Floats) -> Target:
-        """Take the shaped sample of this tick, and return the target of the previous tick."""
-        self.take(sample, sample)
-        return self.joints.published
-
     def fork(self) -> Self:
         """Return an independent copy of the present state."""
         other = copy.copy(self)

@@ -33,23 +33,20 @@ class Driven:
 
 
 class Still(SimulatedArm):
-    """A plant that does nothing but keep its last command."""
+    """A plant that does nothing."""
 
     payload = Payload()
 
     def __init__(self, joints: int) -> None:
         still: Floats = np.zeros(joints)
-        self.last = DriveCommand(still, still, still)
-        """The last command."""
         self._nothing = Measurement(still, still, still, np.zeros(3))
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
-        """Keep a command; see `SimulatedArm.reset`."""
-        return self.step(command)
+        """See `SimulatedArm.reset`."""
+        return self._nothing
 
-    def step(self, command: DriveCommand) -> Measurement:
-        """Keep a command; see `Plant.step`."""
-        self.last = command
+    def step(self, command: DriveCommand) -> Measurement:  # noqa: ARG002
+        """See `Plant.step`."""
         return self._nothing
 
 
@@ -72,10 +69,10 @@ class DrivenLine:
         declared: Payload,
         law: Floats | None = None,
     ) -> None:
-        self._drives, self._law = Still(description.joints), law
+        self._law = law
         self._cycle = ControlCycle(
-            description, passes, q=start, declared=declared, carried=declared, seed=0, plant=self._drives,
-            law=law,
+            description, passes, q=start, declared=declared, carried=declared, seed=0, law=law,
+            plant=Still(description.joints),
         )  # fmt: skip
 
     def drive(
@@ -100,8 +97,7 @@ class DrivenLine:
         cycle = self._cycle
         cycle.drives.compensate(self._law if law is None else law)
         cycle.use(cycle.tvist, elastic)
-        cycle.reset(start)
-        rest, delay = self._drives.last, cycle.drives.delay
+        rest, delay = cycle.reset(start).command, cycle.drives.delay
         if elastic is not None:
             return Driven(rest, *self._tick_by_tick(shaped, ticks, resting), delay)
         whole = np.empty((ticks, len(start)))
@@ -117,7 +113,8 @@ class DrivenLine:
         for tick in range(ticks):
             if tick == resting:
                 self._cycle.begin(Known(list(shaped), PERIOD))
-            target, command = self._cycle.step().target, self._drives.last
+            sample = self._cycle.step()
+            target, command = sample.target, sample.command
             targets[tick] = target.q, target.qd, target.qdd
             commands[tick] = command.q, command.qd, command.torque
         return targets, commands

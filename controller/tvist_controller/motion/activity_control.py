@@ -22,7 +22,7 @@ from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.arm_power import ArmPower
 from tvist_controller.motion.motions import Motions
-from tvist_controller.motion.safety_system import PUT, SafetySystem, runtime_of
+from tvist_controller.motion.safety_system import PUT, RUNTIME, SafetySystem
 from tvist_controller.motion.setpoints import Setpoints
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.snapshot import FilterState, Snapshot
@@ -116,12 +116,18 @@ class MotionControl:
         )
         if time is None:
             return now
-        course, passed = self.motions.course
-        if course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
+        move = self.motions.move
+        if move is None or move.course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
             return replace(now, movable=False)
         # Its time runs at full rate, whatever the rate of the running motion is.
         return replace(
-            now, movable=True, q=course.end, speed=1.0, slowest=None, after=course, until=passed + time
+            now,
+            movable=True,
+            q=move.course.end,
+            speed=1.0,
+            slowest=None,
+            after=move.course,
+            until=move.passed + time,
         )
 
     def move(self, planned: PlannedMove) -> int:
@@ -149,8 +155,10 @@ class MotionControl:
 
     @property
     def runtime(self) -> RuntimeState:
-        """Whether something moves."""
-        return runtime_of(self.activity, slowing=self.motions.speed > 0.0 and not self.cycle.mode.at_rest)
+        """Whether something moves; a paused motion may still be slowing."""
+        if self.activity is Activity.PAUSED and self.motions.speed > 0.0 and not self.cycle.mode.at_rest:
+            return RuntimeState.PAUSING
+        return RUNTIME.get(self.activity, RuntimeState.STOPPED)
 
     @property
     def safety_mode(self) -> SafetyMode:

@@ -1,22 +1,27 @@
 """Force mode and freedrive: guided motions that give way to the force at the tool, and what ends them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Literal
 
 import numpy as np
+import pinocchio as pin
 
 from tvist_controller.instruments.tool_forces import ToolForces
-from tvist_controller.kinematics.rotation import turn
+from tvist_controller.kinematics.pose import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.force_sensing import SILENT, ContactWatch, ExternalSensor
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Finding, Monitor
-from tvist_controller.motion.task_frame import Feature, frame_of
 from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import Compliant, ForceTask
 from tvist_controller.trajectory.compliant import CRAWL, FREE_DAMPING
 from tvist_plant.plant import PERIOD
 
+Feature = tuple[float, ...] | Literal["base", "tool"]
+"""Pose of a frame in the base frame, x y z [m] and rotation vector [rad], or the frame of the base or of the tool."""
+NEAR = 1e-3
+"""Distance of the tool from the frame's origin, and speed, below which the axes stay as they are [m, m/s]."""
 SMOOTHED = 0.04
 """Time constant of a wrench that is estimated from the drives' torques, which the arm's elasticity shakes [s]."""
 HAND_SPEED = np.repeat([0.5, 1.5], 3)
@@ -54,19 +59,14 @@ class ForceControl(Monitor):
         self._basis: object = None
 
     @property
-    def compliant(self) -> Compliant | None:
-        """The present motion that gives way; None without one."""
-        return self._guidance.compliant
-
-    @property
     def by_hand(self) -> bool:
         """Whether the arm can be moved by hand."""
-        return self._by_hand and self.compliant is not None
+        return self._by_hand and self._guidance.compliant is not None
 
     @property
     def hindrance(self) -> int:
         """0 if the arm can be moved by hand freely, 1 near a singular posture, 2 if that hardly lets it move."""
-        share = 1.0 if not self.by_hand or (lead := self.compliant) is None else lead.hindered
+        share = 1.0 if not self.by_hand or (lead := self._guidance.compliant) is None else lead.hindered
         return 0 if share == 1.0 else 1 if share > CRAWL else 2
 
     def begin(self, task: ForceTask, feature: Feature, kind: int, trigger: str = "force_mode") -> int:
@@ -84,7 +84,7 @@ class ForceControl(Monitor):
         self.check_sensor()
         self._guidance.check(trigger)
         self.awake = True
-        lead = self.compliant or self._new()
+        lead = self._guidance.compliant or self._new()
         lead.aim(task, frame_of(feature, kind))
         self._by_hand = trigger == "freedrive"
         return self._guidance.follow(trigger, lead)
@@ -98,7 +98,7 @@ class ForceControl(Monitor):
 
     def end(self) -> None:
         """Come to rest where the arm is, if force mode is on; a motion in the other axes ends, too."""
-        if self.compliant is not None:
+        if self._guidance.compliant is not None:
             self._guidance.stop_joints(GENTLE, "end_force_mode")
 
     def check_sensor(self) -> None:
@@ -141,8 +141,8 @@ class ForceControl(Monitor):
         else:
             inner = guidance.halting(state, guidance.limits.acceleration)
         return Compliant(
-            state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: guidance.tool, inner=inner,
-            felt=self._felt,
+            state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: self._motion.tool,
+            inner=inner, felt=self._felt,
         )  # fmt: skip
 
     def _felt(self) -> Floats:
@@ -206,14 +206,14 @@ class ForceControl(Monitor):
         why = f"forces are now those of {source}"
         if self.external.awaited:
             why = f"the external force sensor has told nothing for {1e3 * SILENT:g} ms: {why}"
-        if self.compliant is not None:
+        if self._guidance.compliant is not None:
             return Finding(why, then="interruption")
         return Finding(why) if self.external.awaited else None
 
     def _excess(self, sample: Sample, force: float) -> str | None:
         if not force <= MOST:
             return f"force at the tool is {force:.0f} N, above {MOST:g} N for more than 10 ms"
-        lead = self.compliant
+        lead = self._guidance.compliant
         if lead is None or self._by_hand:
             return None
         there, here = lead.kinematics.pose(sample.target.q), lead.kinematics.pose(sample.measured.q)
@@ -226,3 +226,44 @@ class ForceControl(Monitor):
             f"the tool is {abs(off[axis]):.3g} off its way in axis {axis} of force mode; limits[{axis}] "
             f"is {lead.task.limits[axis]:g}"
         )
+
+
+def frame_of(feature: Feature, kind: int) -> Callable[[tuple[Floats, Floats], Floats], Floats]:
+    """Return the function that gives the axes of a task, as columns in the base frame, shape (3, 3).
+
+    Its arguments are the tool's pose, as rotation matrix and position, and its velocity, shape (3,) [m/s].
+
+    With kind 2 the axes stay as the frame's. With 1, the frame is turned so that its y axis points from the
+    tool to the frame's origin; with 3, so that its x axis is the tool's velocity projected into its x-y
+    plane.
+    """
+    if feature == "tool":
+        return lambda pose, _: pose[0]
+    axes, origin = np.eye(3), np.zeros(3)
+    if not isinstance(feature, str):
+        axes, origin = np.asarray(pin.exp3(np.array(feature[3:]))), np.array(feature[:3])
+    if kind == 1:
+        return lambda pose, _: _turned_to(axes, 1, origin - pose[1])
+    if kind == 3:
+        latest = [axes]
+
+        def along(_: tuple[Floats, Floats], velocity: Floats) -> Floats:
+            flat = velocity - axes[:, 2] * (axes[:, 2] @ velocity)
+            if np.linalg.norm(flat) > NEAR:
+                x = flat / np.linalg.norm(flat)
+                latest[0] = np.column_stack((x, np.cross(axes[:, 2], x), axes[:, 2]))
+            return latest[0]
+
+        return along
+    return lambda _pose, _velocity: axes
+
+
+def _turned_to(axes: Floats, axis: int, direction: Floats) -> Floats:
+    """Axes, of which one is turned into a direction by the shortest way."""
+    length = np.linalg.norm(direction)
+    if length < NEAR:
+        return axes
+    turned: Floats = (
+        np.asarray(pin.Quaternion.FromTwoVectors(axes[:, axis], direction / length).matrix()) @ axes
+    )
+    return turned

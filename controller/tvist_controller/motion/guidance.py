@@ -5,7 +5,7 @@ from typing import TypeVar
 import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import turn, turned
+from tvist_controller.kinematics.pose import turn, turned
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, REBOUND, TorqueRoom, arm_limits
 from tvist_controller.line.line_mode import LineMode
@@ -39,7 +39,7 @@ class Guidance:
 
     def _rehearse(self) -> None:
         """Compile what a motion of the tool uses, or load it from disk, before a tick needs it."""
-        q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self.tool
+        q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self.motion.tool
         speed = Speed((q, still, still), self.limits, self.torque, PERIOD, arm=arm)
         speed.aim(arm.jacobian(q)[:, 0] * 1e-3, 1.0, 1.0)
         speed.next()
@@ -53,9 +53,9 @@ class Guidance:
             RefusalError: The present activity does not allow it, or its motion cannot be taken over.
         """
         self.check("servo_j", shaped=shaped)
-        servo = self._present(Servo, shaped)
-        if servo is None:
-            servo = Servo(self._start(shaped), self._most(shaped), self.reach, self.torque, PERIOD)
+        servo = self._present(Servo, shaped) or Servo(
+            self._start(shaped), self._most(shaped), self.reach, self.torque, PERIOD
+        )
         servo.aim(q, lookahead, gain)
         return self.follow("servo_j", servo, shaped=shaped)
 
@@ -81,7 +81,7 @@ class Guidance:
         """
         self.check("speed_l", shaped=shaped)
         accelerations = (acceleration, angular_acceleration)
-        return self._approach("speed_l", self.tool, twist, accelerations, shaped=shaped)
+        return self._approach("speed_l", self.motion.tool, twist, accelerations, shaped=shaped)
 
     def _approach(
         self, trigger: str, tool: Arm | None, goal: Floats, accelerations: tuple[float, ...], *, shaped: bool
@@ -114,7 +114,7 @@ class Guidance:
         corresponds to it at their present velocities.
         """
         cycle = self._cycle
-        state, present, tool = cycle.newest, cycle.trajectory, self.tool
+        state, present, tool = cycle.newest, cycle.trajectory, self.motion.tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
         duration = max(
             float(np.linalg.norm(twist[:3])) / acceleration,
@@ -131,11 +131,6 @@ class Guidance:
         stop.aim(np.zeros(6), harder * acceleration, harder * angular_acceleration)
         stop.acceleration = harder * fastest / duration
         self._halt("stop_l", stop, stop.duration)
-
-    @property
-    def tool(self) -> Arm:
-        """Kinematics of the present tool centre point."""
-        return self.motion.tool
 
     def _most(self, shaped: bool) -> MotionLimits:
         """Limits of a reference."""

@@ -10,7 +10,6 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.limits import REDUCED_SHARE, acceleration_on_way, rate_of
 from tvist_controller.motion.safety_system import SafetySystem
-from tvist_controller.planning.course import Course
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.trajectory import Guided, PlannedMotion
 from tvist_protocol.replies import Code
@@ -40,7 +39,8 @@ class RunningMove:
         self._window, self._peak = planned.window, planned.peak
         self._room, self._surplus = planned.room, planned.surplus
         self._held = False
-        self._course = planned.course
+        self.course = planned.course
+        """What its last part may go on from; None if it cannot."""
         self._parts = len(planned.parts)
         self._trajectory, *coming = planned.parts
         self.coming: tuple[PlannedMotion, ...] = tuple(coming)
@@ -55,9 +55,9 @@ class RunningMove:
         self._begin()
 
     @property
-    def course(self) -> tuple[Course | None, float]:
-        """What its last part may go on from, and the time of that part, 0 before it begins [s]; None if it cannot."""
-        return self._course, 0.0 if self.coming else self._trajectory.time
+    def passed(self) -> float:
+        """Time of its last part, 0 before that begins [s]."""
+        return 0.0 if self.coming else self._trajectory.time
 
     def extend(self, planned: PlannedMove, speed: float, slowest: float | None) -> None:
         """Go on to further parts of the path; speeds as in `RunningMotion`.
@@ -72,7 +72,7 @@ class RunningMove:
         else:
             self._cycle.go_on(longer)
             self._velocity, self._window, self.coming = planned.velocity, planned.window, tuple(coming)
-        self._peak, self._course = planned.peak, planned.course
+        self._peak, self.course = planned.peak, planned.course
         self._parts += len(coming)
         self.pace(speed, slowest)
 
@@ -184,8 +184,8 @@ class Motions:
 
     def extend(self, planned: PlannedMove) -> None:
         """Let the running motion go on to further parts of its path; the plan holds for the present state."""
-        assert self._move is not None
-        self._move.extend(planned, self.wanted_speed, self.slowest)
+        assert self.move is not None
+        self.move.extend(planned, self.wanted_speed, self.slowest)
         self._warn(planned)
 
     def _warn(self, planned: PlannedMove) -> None:
@@ -211,36 +211,16 @@ class Motions:
 
     def go_on(self) -> bool:
         """Start the next part of the running motion, since one has come to rest; return whether there was one."""
-        move = self._move
+        move = self.move
         if move is None or not move.coming:
             return False
         move.go_on(self.wanted_speed, self.slowest)
         return True
 
     @property
-    def _move(self) -> RunningMove | None:
+    def move(self) -> RunningMove | None:
         """The running motion, if it is a planned one."""
         return self._running if isinstance(self._running, RunningMove) else None
-
-    @property
-    def coming(self) -> tuple[PlannedMotion, ...]:
-        """Parts of the running motion that have not begun."""
-        return () if self._move is None else self._move.coming
-
-    @property
-    def course(self) -> tuple[Course | None, float]:
-        """What the running motion may go on from, and its time [s]; None if it cannot go on."""
-        return (None, 0.0) if self._move is None else self._move.course
-
-    @property
-    def progress(self) -> tuple[int, float] | None:
-        """Number of the running motion's present part, and the length covered on it [m]; None if it has no length."""
-        return None if self._move is None else self._move.progress
-
-    @property
-    def stops_at(self) -> tuple[int, float] | None:
-        """Progress at which a stop of the running motion ends; None if no stop on its path has begun."""
-        return None if self._move is None else self._move.stops_at
 
     def set_speed(self, fraction: float) -> None:
         """Scale the time of the running motion and of later ones."""
@@ -259,13 +239,13 @@ class Motions:
 
     def hold(self) -> None:
         """Bring a planned motion to a standstill on its path."""
-        if self._move is not None:
-            self._move.hold()
+        if self.move is not None:
+            self.move.hold()
 
     def release(self) -> None:
         """Resume a planned motion."""
-        if self._move is not None:
-            self._move.release(self.wanted_speed, self.slowest)
+        if self.move is not None:
+            self.move.release(self.wanted_speed, self.slowest)
 
     def done(self) -> None:
         """Report that the shaped reference has come to rest at the motion's target."""

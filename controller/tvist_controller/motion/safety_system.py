@@ -90,7 +90,7 @@ PUT: dict[ResetMode, Activity] = {
     "POWER_OFF": Activity.POWER_OFF,
 }
 """Activity at rest in each robot mode."""
-_RUNTIME = {
+RUNTIME = {
     Activity.MOVING: RuntimeState.PLAYING,
     Activity.STREAMING: RuntimeState.PLAYING,
     Activity.GUIDED: RuntimeState.PLAYING,
@@ -102,12 +102,6 @@ _RUNTIME = {
     Activity.PROTECTIVE_STOPPING: RuntimeState.STOPPING,
 }
 """Runtime state of each activity; it is STOPPED for all others."""
-
-
-def runtime_of(activity: Activity, *, slowing: bool) -> RuntimeState:
-    """Return the runtime state, which says whether something moves; a paused motion may still be slowing."""
-    state = _RUNTIME.get(activity, RuntimeState.STOPPED)
-    return RuntimeState.PAUSING if state is RuntimeState.PAUSED and slowing else state
 
 
 def at_rest(activity: Activity, *, emergency: bool) -> Activity:

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.paths.fairing import Meeting, meetings
-from tvist_controller.paths.legs import JointWay, Leg, Pacing
+from tvist_controller.paths.legs import JointWay, Leg, Meeting, Pacing, meetings
 from tvist_controller.paths.tool_curves import EvenBlend, ToolBlend, ToolCurve, ToolPart, ToolState, evenly
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.trajectory.limits import Floats

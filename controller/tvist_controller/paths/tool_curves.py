@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.kinematics.rotation import turn, turned
+from tvist_controller.kinematics.pose import turn, turned
 from tvist_controller.paths.poses import Placement
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import evaluate, hermite

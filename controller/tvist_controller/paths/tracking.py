@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.pose import ACCURATE
-from tvist_controller.kinematics.rotation import turn
+from tvist_controller.kinematics.pose import ACCURATE, turn
 from tvist_controller.paths.poses import Placement
 from tvist_controller.paths.tool_curves import ToolCurve, ToolState
 from tvist_controller.trajectory.limits import Floats

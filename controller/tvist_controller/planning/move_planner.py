@@ -8,17 +8,15 @@ import numpy as np
 
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.line.limits import arm_limits, rate_of
-from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitter, Slower, keeping_motion
 from tvist_controller.planning.slower import Limited, longer_joint_motion, slower_joint_motion
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import Course, Snapshot
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
     JointLine,
     MotionLimits,
-    Path,
     PlannedMotion,
     Way,
     at_least,
@@ -57,15 +55,13 @@ class PlannedMove(NamedTuple):
     """`Filter.surplus` of the filter that it was planned for [-]."""
 
 
-class MovePlanner:
+class MovePlanner(Fitter):
     """Plans the motions of one robot."""
 
     def __init__(self, setup: Setup, filters: FilterPlanner) -> None:
-        self._description, self._filters = setup.description, filters
-        payload = body(setup.payload)
-        self._collisions = CollisionModel(setup.description, payload)
-        self.fitter = Fitter(setup)
-        """Keeps motions within the limits of the joints."""
+        super().__init__(setup)
+        self._filters = filters
+        self._collisions = CollisionModel(setup.description, body(setup.payload))
 
     def move(self, command: MoveJ, now: Snapshot, *, at_once: bool = False) -> PlannedMove:
         """Plan a motion from rest; the command's content has been checked.
@@ -75,19 +71,47 @@ class MovePlanner:
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
-        path = JointLine(now.q, np.array(command.q, dtype=float))
-        limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
-        if command.duration is None:
-            planned = self.along(path, limits, now, at_once=at_once)
-            slower = None if now.excess > 0.0 else slower_joint_motion(planned.parts[0], limits)
-        else:
-            limits = self._lasting(path, command.duration, now)
+        path, duration = JointLine(now.q, np.array(command.q, dtype=float)), command.duration
+        limits, agility = MotionLimits(command.velocity, command.acceleration, command.jerk), None
+        if duration is not None:
+            limits = self._lasting(path, duration, now)
             agility = at_least(limits, AGILE.acceleration, AGILE.jerk)
-            planned = self.along(path, limits, now, agility, at_once=at_once)
-            slower = longer_joint_motion(planned.parts[0], command.duration)
-        if slower is None or (planned.limited is not None and planned.limited[0] == "limit_torque"):
-            return planned
-        return planned._replace(limited=slower)
+        rate = rate_of(now.speed, limits.velocity, now.slowest)
+
+        def make(slower: Slower) -> PlannedMotion:
+            kept = replace(
+                limits,
+                velocity=limits.velocity * slower.velocity,
+                acceleration=limits.acceleration * slower.acceleration,
+            )
+            if now.excess > 0.0 and not at_once:
+                return keeping_motion(path, kept, self._filters.like(now.filter), rate, agility)
+            spared = replace(kept, acceleration=kept.acceleration * (1.0 - now.excess))
+            return quickest_motion(path, spared, PERIOD, rate, agility)
+
+        tvist = None if at_once else lambda: self._filters.like(now.filter)
+        try:
+            motion, slower, limited, _ = self.fit(make, now, tvist, limits if agility is None else None)
+        except ValueError as error:
+            raise RefusalError("out_of_range", "velocity", str(error)) from error
+        found = self.meeting(path.whole, now)
+        if found is not None:
+            share, meeting = found
+            time = motion.time_at(share)
+            raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
+        if limited is None or limited[0] != "limit_torque":
+            if duration is not None:
+                limited = longer_joint_motion(motion, duration) or limited
+            elif now.excess == 0.0:
+                limited = slower_joint_motion(motion, limits) or limited
+        velocity, arms = limits.velocity * slower.velocity, arm_limits(self._description)
+        return PlannedMove(
+            (motion,),
+            velocity,
+            limited,
+            room=(arms.velocity / velocity, arms.acceleration / (limits.acceleration * slower.acceleration)),
+            surplus=now.surplus,
+        )
 
     def _lasting(self, path: JointLine, duration: float, now: Snapshot) -> MotionLimits:
         """Limits with which a motion takes a duration [s], or those of the arm if it takes longer with these."""
@@ -98,57 +122,6 @@ class MovePlanner:
             return limits
         return MotionLimits(
             limits.velocity * slower, limits.acceleration * slower**2, limits.jerk * slower**3
-        )
-
-    def along(
-        self,
-        path: Path,
-        limits: MotionLimits,
-        now: Snapshot,
-        agility: MotionLimits | None = None,  # of pauses and changes of the speed; None: the motion's own
-        *,
-        at_once: bool = False,
-    ) -> PlannedMove:
-        """Plan a motion along a path, from where the reference is at rest to rest; for `at_once` see `move`.
-
-        Raises:
-            RefusalError: There is no such motion, or it would lead to a collision.
-        """
-        rate = rate_of(now.speed, limits.velocity, now.slowest)
-
-        def make(slower: Slower) -> PlannedMotion:
-            kept = replace(
-                limits,
-                velocity=limits.velocity * slower.velocity,
-                acceleration=limits.acceleration * slower.acceleration,
-            )
-            spared = replace(kept, acceleration=kept.acceleration * (1.0 - now.excess))
-            if isinstance(path, JointLine) and now.excess > 0.0 and not at_once:
-                return keeping_motion(path, kept, self._filters.like(now.filter), rate, agility)
-            return quickest_motion(path, spared, PERIOD, rate, agility)
-
-        try:
-            fitted = self.fitter.fit(
-                make,
-                now,
-                None if at_once else lambda: self._filters.like(now.filter),
-                limits if agility is None else None,
-            )
-        except ValueError as error:
-            raise RefusalError("out_of_range", "velocity", str(error)) from error
-        motion, slower = fitted.motion, fitted.slower
-        found = self.meeting(path.whole, now)
-        if found is not None:
-            share, meeting = found
-            time = motion.time_at(share)
-            raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
-        velocity, arms = limits.velocity * slower.velocity, arm_limits(self._description)
-        return PlannedMove(
-            (motion,),
-            velocity,
-            fitted.limited,
-            room=(arms.velocity / velocity, arms.acceleration / (limits.acceleration * slower.acceleration)),
-            surplus=now.surplus,
         )
 
     def meeting(self, way: Way, now: Snapshot) -> tuple[float, Meeting] | None:

@@ -1,30 +1,26 @@
 """Planning of motions of the tool and of paths of several parts."""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from tvist_controller.foresight.collision import CLEARANCE
-from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.paths.legs import Leg
 from tvist_controller.paths.pacing import Ground, JointLimits, fastest, going_on, ground_of, joined, law_of
 from tvist_controller.paths.route import Branch, Route, Run, length_of, route_of
 from tvist_controller.paths.tracking import Tracker, WayError
-from tvist_controller.planning.course import Course
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitted, Slower
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
-from tvist_controller.planning.path_legs import PathLegs
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.slower import Limited, slower_path
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import Course, Snapshot
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Way, at_least, quickest_motion
 from tvist_controller.trajectory.retiming import RetimedLaw
-from tvist_controller.trajectory.spline import SplineCurve
+from tvist_controller.trajectory.spline import Knots, SplineCurve
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import MoveC, MoveL, MovePath
 from tvist_shaping.base import Filter
@@ -50,7 +46,7 @@ class PathPlanner:
         self, setup: Setup, filters: FilterPlanner, moves: MovePlanner, reachable: Reachable
     ) -> None:
         self._description, self._filters, self._moves = setup.description, filters, moves
-        self._reachable, self._legs = reachable, PathLegs(setup.description, reachable)
+        self._reachable = reachable
 
     def plan(self, command: MoveL | MoveC | MovePath, now: Snapshot) -> PlannedMove | None:
         """Plan a motion from rest, or the rest of one that goes on; the command's content has been checked.
@@ -62,26 +58,23 @@ class PathPlanner:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
         tracker = Tracker(self._description, now.tcp)
-        legs = list(self._legs.of(command, tracker, now))
+        legs = list(self._reachable.legs(command, tracker, now))
         count = len(command.segments) if isinstance(command, MovePath) else 1
         if now.after is not None:
             return self._further(command.jerk, legs, count, tracker, now)
         route = self._route(legs, tracker, now)
         runs = route.runs or [[]]
         length = sum(map(length_of, runs))
-        tvist, done, motions = self._filters.like(now.filter), 0.0, list[_Motion]()
-        told: Limited | None = None
+        tvist, done, moves = self._filters.like(now.filter), 0.0, list[PlannedMove]()
         for run in runs:
             goes_on = run is runs[-1] and bool(legs) and legs[-1].blend > 0.0
-            found = self._motion(run, command.jerk, tvist, now, goes_on=goes_on)
-            slower = found.slower
-            if slower is not None and len(legs) > 1:
-                slower = slower[0], f"{run[0].where}: {slower[1]}"
-            told = told or _told(found.fitted, run) or slower
-            self._check_clear(found.fitted.motion.path.whole, run, (done, length), now)
-            motions.append(found)
+            several = len(legs) > 1
+            move = self._along(run, route, command.jerk, tvist, now, count, goes_on=goes_on, several=several)
+            self._check_clear(move.parts[0].path.whole, run, (done, length), now)
+            moves.append(move)
             done += length_of(run)
-        return _planned_move(motions, route, told, range(count), tvist, count)
+        told = next((move.limited for move in moves if move.limited is not None), None)
+        return _joined(moves, route, told, range(count))
 
     def _route(self, legs: list[Leg], tracker: Tracker, now: Snapshot, start: Branch | None = None) -> Route:
         try:
@@ -103,46 +96,33 @@ class PathPlanner:
         run, *coming = route.runs
         if len(branch.legs) + len(legs) > 1 and cuts.branch == cuts.known and coming:
             return None  # the arm is so near the end that no blend fits
-        acceleration = np.array(self._description.limits.acceleration) * (1.0 - now.excess)
-        knots = joined(run, before.knots(cuts))
-        self._legs.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
-        curve = SplineCurve(knots, acceleration)
+        curve, joints = self._curve(joined(run, before.knots(cuts)), run, tvist, now)
         ground = before.ground.then(cuts.first, cuts.branch, run, curve)
         delay = max(self._delay(curve, tvist), before.window)
-        joints = self._joints(acceleration, tvist)
 
         def make(slower: Slower) -> PlannedMotion:
-            law = going_on(
-                before.law,
-                (cuts.first, cuts.known - cuts.first),
-                ground,
-                curve,
-                joints,
-                jerk,
-                delay,
-                slower.rate,
-            )
+            edges = cuts.first, cuts.known - cuts.first
+            law = going_on(before.law, edges, ground, curve, joints, jerk, delay, slower.rate)
             if law is None:
                 raise _TooLateError
             return self._planned(curve, law, 1.0)
 
         try:
-            fitted = self._moves.fitter.fit(make, now, None)
+            fitted = self._moves.fit(make, now, None)
         except _TooLateError:
             return None
         self._check_clear(curve.way(np.array([branch.s]), curve.end), run, (0.0, length_of(run)), now)
         law = fitted.motion.law
         assert isinstance(law, RetimedLaw)
-        motion = _Motion(fitted, delay, fastest(law, curve), ground)
-        motions = [motion]
+        told, count = _told(fitted, run, branch.s), before.segments + count
+        course = None if coming else _course(run, route, curve, ground, law, count, delay, branch.s)
+        velocity = fastest(law, curve)
+        moves = [PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak, course=course)]
         for further in coming:
-            motion = self._motion(further, jerk, tvist, now)
-            self._check_clear(motion.fitted.motion.path.whole, further, (0.0, length_of(further)), now)
-            motions.append(motion)
-        segments = range(before.segments - 1, before.segments + count)
-        return _planned_move(
-            motions, route, _told(fitted, run, branch.s), segments, tvist, before.segments + count, branch.s
-        )
+            move = self._along(further, route, jerk, tvist, now, count)
+            self._check_clear(move.parts[0].path.whole, further, (0.0, length_of(further)), now)
+            moves.append(move)
+        return _joined(moves, route, told, range(before.segments - 1, count), branch.s)
 
     def _check_clear(self, way: Way, run: Run, part: tuple[float, float], now: Snapshot) -> None:
         """Refuse a way that something is in the way of; `part` is its start on the whole path and that's length."""
@@ -161,37 +141,51 @@ class PathPlanner:
 
     # ------------------------------------------------------------------ time
 
-    def _motion(
-        self, run: Run, jerk: float, tvist: Filter, now: Snapshot, *, goes_on: bool = False
-    ) -> "_Motion":
-        """A motion from rest along a run."""
+    def _along(
+        self,
+        run: Run,
+        route: Route,
+        jerk: float,
+        tvist: Filter,
+        now: Snapshot,
+        count: int,
+        *,
+        goes_on: bool = False,
+        several: bool = True,  # whether what makes it slower is to name the part of the path
+    ) -> PlannedMove:
+        """Plan a motion from rest along a run of a route with a number of segments."""
         if not run:  # the arm is there already
             still = JointLine(now.q, now.q)
             motion = quickest_motion(still, arm_limits(self._description), PERIOD, now.speed)
-            return _Motion(Fitted(motion), 0.0, 0.0, None)
-        knots = joined(run)
-        self._legs.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
-        acceleration = np.array(self._description.limits.acceleration) * (1.0 - now.excess)
-        curve = SplineCurve(knots, acceleration)
+            return PlannedMove((motion,), 0.0, None, window=0.0, peak=tvist.peak)
+        curve, joints = self._curve(joined(run), run, tvist, now)
         delay, ground = self._delay(curve, tvist), ground_of(run, curve)
-        joints = self._joints(acceleration, tvist)
         law = law_of(run, curve, ground, joints, jerk, delay, goes_on=goes_on)
         alone = not goes_on and all(piece.where == run[0].where for piece in run)
-        told = slower_path(run, curve, law, joints, self._description) if alone else None
+        slower = slower_path(run, curve, law, joints, self._description) if alone else None
+        if slower is not None and several:
+            slower = slower[0], f"{run[0].where}: {slower[1]}"
         highest = fastest(law, curve)
         rate = rate_of(now.speed, highest, now.slowest)
 
         def make(slower: Slower) -> PlannedMotion:
             return self._planned(curve, law.slowed(law.duration / slower.rate), rate)
 
-        fitted = self._moves.fitter.fit(make, now, lambda: self._filters.like(now.filter))
-        return _Motion(fitted, delay, highest * fitted.slower.rate, ground, told)
+        fitted = self._moves.fit(make, now, lambda: self._filters.like(now.filter))
+        kept, last = fitted.motion.law, run is route.runs[-1]
+        assert isinstance(kept, RetimedLaw)
+        course = _course(run, route, curve, ground, kept, count, delay) if last else None
+        velocity, told = highest * fitted.slower.rate, _told(fitted, run) or slower
+        return PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak, course=course)
 
-    def _joints(self, acceleration: Floats, tvist: Filter) -> JointLimits:
+    def _curve(self, knots: Knots, run: Run, tvist: Filter, now: Snapshot) -> tuple[SplineCurve, JointLimits]:
+        """The joints' way along a run, which is within their range, and their limits on it."""
+        self._reachable.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         limits, peak = self._description.limits, tvist.peak
-        return JointLimits(
-            SPARED * np.array(limits.velocity) / peak, SPARED * acceleration / peak**2, min(limits.jerk)
-        )
+        acceleration = np.array(limits.acceleration) * (1.0 - now.excess)
+        velocity = SPARED * np.array(limits.velocity) / peak
+        joints = JointLimits(velocity, SPARED * acceleration / peak**2, min(limits.jerk))
+        return SplineCurve(knots, acceleration), joints
 
     @staticmethod
     def _planned(curve: SplineCurve, law: RetimedLaw, rate: float) -> PlannedMotion:
@@ -224,52 +218,35 @@ class _TooLateError(Exception):
     """Raised if a running motion cannot go on within the limits any more."""
 
 
-class _Motion(NamedTuple):
-    """A motion along a run."""
-
-    fitted: Fitted
-    delay: float
-    """Delay of the shaper on it [s]."""
-    velocity: float
-    """Largest velocity of any joint [rad/s]."""
-    ground: Ground | None
-    """What limits it; None if nothing moves."""
-    slower: Limited | None = None
-    """What makes a motion along one segment slower than asked, see `slower_path`."""
-
-
-def _planned_move(
-    motions: list[_Motion],
-    route: Route,
-    told: Limited | None,
-    segments: range,
-    tvist: Filter,
-    count: int,
-    start: float = 0.0,
+def _joined(
+    moves: list[PlannedMove], route: Route, told: Limited | None, segments: range, start: float = 0.0
 ) -> PlannedMove:
     """Put the motions of a path together; `start` is where its first run begins on its curve [m]."""
-    runs = route.runs or [[]]
-    return PlannedMove(
-        tuple(motion.fitted.motion for motion in motions),
-        max(motion.velocity for motion in motions),
-        told,
-        tuple(route.skipped),
-        max(motion.delay for motion in motions),
-        marks_of(runs, segments, start),
-        tvist.peak,
-        course=_course(motions[-1], runs[-1], route, count, start if len(runs) == 1 else 0.0),
+    return moves[-1]._replace(
+        parts=tuple(part for move in moves for part in move.parts),
+        velocity=max(move.velocity for move in moves),
+        limited=told,
+        skipped=tuple(route.skipped),
+        window=max(move.window for move in moves),
+        marks=marks_of(route.runs or [[]], segments, start),
     )
 
 
-def _course(motion: _Motion, run: Run, route: Route, segments: int, start: float = 0.0) -> Course | None:
-    """What a motion may go on from; `start` is where its run begins on its curve [m]."""
-    path, law = motion.fitted.motion.path, motion.fitted.motion.law
-    durations = any(piece.pacing.duration is not None for piece in run)
-    if motion.ground is None or durations or not isinstance(path, SplineCurve):
+def _course(
+    run: Run,  # the last one of the route
+    route: Route,
+    curve: SplineCurve,
+    ground: Ground,
+    law: RetimedLaw,
+    segments: int,
+    window: float,
+    start: float = 0.0,  # where the run begins on the curve [m]
+) -> Course | None:
+    """What a motion may go on from; nothing if its duration was asked for."""
+    if any(piece.pacing.duration is not None for piece in run):
         return None
-    assert isinstance(law, RetimedLaw)
     branches = tuple(replace(branch, s=start + branch.s) for branch in route.branches)
-    return Course(path, motion.ground, law, branches, segments, motion.delay)
+    return Course(curve, ground, law, branches, segments, window)
 
 
 def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tuple[int, float], ...]:

@@ -1,6 +1,7 @@
 """What the functions of programs may use of the robot."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from tvist_controller.cell.live_cell import LiveCell
@@ -11,15 +12,26 @@ from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.planning.plan import Plan, Plans
+from tvist_controller.refusal import RefusalError
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Reply
 from tvist_protocol.stream import State
 from tvist_protocol.values import Payload
+from tvist_urscript import Fault
 
 OWN_TOKEN = "program"  # noqa: S105  the lease was checked when the program was played
 """Token in the commands that a program makes, which are not sent to clients."""
+
+
+@contextmanager
+def refusals_as_faults() -> Iterator[None]:
+    """End the program with an error where the robot refuses what it asks for."""
+    try:
+        yield
+    except RefusalError as refusal:
+        raise Fault(refusal.reply.why) from refusal
 
 
 @dataclass(frozen=True)

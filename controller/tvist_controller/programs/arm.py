@@ -3,9 +3,8 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from tvist_controller.programs.access import Access
+from tvist_controller.programs.access import Access, refusals_as_faults
 from tvist_controller.programs.journey import Journey, RateLimit, Turns
-from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import Segment
 from tvist_protocol.stream import Event
@@ -109,7 +108,7 @@ class ProgramArm:
     def _led(self, journey: Journey) -> bool:
         """Whether another thread has let the arm give way meanwhile, so that force control has to lead the moves."""
         waits = journey.number is None and not journey.over
-        return waits and self._access.force.compliant is not None
+        return waits and self._access.guidance.compliant is not None
 
     def _present(self) -> Journey | None:
         """Return the moves of this thread that may be blended with a further one."""
@@ -194,7 +193,7 @@ class ProgramArm:
     @property
     def lost(self) -> bool:
         """Whether the program began a force mode that a stop has ended."""
-        return self._gives is self._thread()[0] and self._access.force.compliant is None
+        return self._gives is self._thread()[0] and self._access.guidance.compliant is None
 
     def give_way(self, start: Callable[[], int]) -> Turns:
         """Let the arm give way to forces, or change how; `start` begins that and returns its number."""
@@ -210,9 +209,8 @@ class ProgramArm:
                     raise Fault(STREAMED)
                 yield
             self._own = True
-            self._guided = start()
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal
+            with refusals_as_faults():
+                self._guided = start()
         finally:
             self._own, self._asked = False, self._asked - 1
         self._gives = self._thread()[0]
@@ -220,7 +218,7 @@ class ProgramArm:
     def hold_again(self, *, by_hand: bool) -> None:
         """End what `give_way` has begun: freedrive, or else force mode."""
         force, self._gives = self._access.force, None
-        if force.compliant is not None and force.by_hand == by_hand:
+        if force.by_hand == by_hand and self._access.guidance.compliant is not None:
             self.brake(force.end, wholly=True)
 
     def steer(self, start: Callable[[bool], int | None]) -> None:
@@ -234,10 +232,9 @@ class ProgramArm:
         )
         self._journey, self._own = None, True
         try:
-            self._guided = start(shaped)
+            with refusals_as_faults():
+                self._guided = start(shaped)
             self.driver = None if self._guided is None else self._thread()
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal
         finally:
             self._own = False
 
@@ -307,10 +304,6 @@ class ProgramArm:
     def guides(self) -> bool:
         """Whether a guided motion of the program is running."""
         return self._guided is not None
-
-    def slow_down(self) -> None:
-        """Let the guided motion come to rest until the next command."""
-        self._access.guidance.slow_down()
 
     def settle(self) -> None:
         """Stop a motion whose thread has ended without another that took it over; called at the end of each turn."""

@@ -34,19 +34,14 @@ class StatementQueue:
         self._program: Machine | None = None
         """The main program if it takes statements."""
         self._queue: deque[tuple[int, Script]] = deque()
-        self._last: Script | None = None
-        """The last statement that was added, or the program."""
+        self.last: Script | None = None
+        """What the next statement is compiled after: the last one, or the program; None if no program takes any."""
         self._lengths: deque[tuple[int, int]] = deque()
         """Number and length of each statement that is held."""
         self._held = self._added = 0
         """Characters of the statements that are held, and of those since the last that forgets."""
         self._waiting = self._ending = self._clearing = self._published = False
         self._interpreted = self._executed = self._cleared = self._forgotten = 0
-
-    @property
-    def last(self) -> Script | None:
-        """What the next statement is compiled after; None if no program takes statements."""
-        return self._last
 
     @property
     def published(self) -> Interpreter | None:
@@ -66,7 +61,7 @@ class StatementQueue:
         """Handle the start of the main program."""
         self.close()
         if WAITS in machine.script.used:
-            self._program, self._last, self._published = machine, machine.script, True
+            self._program, self.last, self._published = machine, machine.script, True
             self._lengths.clear()
             self._held = self._added = 0
             self._waiting = self._clearing = False
@@ -75,7 +70,7 @@ class StatementQueue:
     def close(self) -> None:
         """Handle the end of the main program."""
         self._queue.clear()
-        self._program = self._last = None
+        self._program = self.last = None
 
     def carry_out(self, *, clear_queue: bool, clear_at_end: bool) -> Turns:
         """Carry out statements until `end` is called."""
@@ -99,8 +94,8 @@ class StatementQueue:
                         yield
         finally:
             self._waiting, self._peripherals.changed = False, True
-        if clear_at_end and self._last is not None:
-            self._forget(machine, self._last.scopes)
+        if clear_at_end and self.last is not None:
+            self._forget(machine, self.last.scopes)
             self._restart(machine)
 
     def end(self) -> None:
@@ -134,8 +129,8 @@ class StatementQueue:
 
     def _restart(self, machine: Machine) -> None:
         """Compile later statements after the program alone."""
-        if self._last is not None:
-            self._last = machine.script.forgetting(self._last)
+        if self.last is not None:
+            self.last = machine.script.forgetting(self.last)
             self._forgotten, self._added = self._interpreted, 0
 
     # ------------------------------------------------------------------ for clients
@@ -150,7 +145,7 @@ class StatementQueue:
         self._lengths.append((self._interpreted, len(script.text)))
         self._held += len(script.text)
         self._added += len(script.text)
-        self._last = script
+        self.last = script
         if clears:
             self._restart(self._program)
         return self._interpreted

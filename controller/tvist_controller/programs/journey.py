@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.access import OWN_TOKEN, Access
+from tvist_controller.programs.access import OWN_TOKEN, Access, refusals_as_faults
 from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
@@ -142,7 +142,8 @@ class Journey:
 
     def stop(self) -> None:
         """Note that a protective stop has begun: what it passes has been passed when the program is resumed."""
-        self.outcome, self._stops_at = "protective_stop", self._motion.motions.stops_at
+        move = self._motion.motions.move
+        self.outcome, self._stops_at = "protective_stop", None if move is None else move.stops_at
 
     # ------------------------------------------------------------------ in every tick
 
@@ -176,7 +177,8 @@ class Journey:
             self._start(legs, plan)
             while self.outcome is None:
                 yield
-                self._pass_blends(self._motion.motions.progress)
+                move = self._motion.motions.move
+                self._pass_blends(None if move is None else move.progress)
                 self._go_on()
             self._pass_blends(self._stops_at)
             self._marks, ended = [], len(self._marks)
@@ -199,10 +201,8 @@ class Journey:
         )
 
     def _start(self, legs: list[Segment], plan: Plan) -> None:
-        try:
+        with refusals_as_faults():
             reply = self._access.send(self._command(legs), plan)
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal
         assert isinstance(reply, Accepted)
         assert isinstance(plan.found, PlannedMove)
         self.number, self.outcome, self._stops_at = reply.id, None, None
@@ -278,10 +278,8 @@ class Journey:
         return self._access.latest().tick
 
     def _check_ready(self) -> None:
-        try:
+        with refusals_as_faults():
             self._motion.check("move_j")
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal
 
     def _refused(self, refusal: RefusalError, legs: list[Segment]) -> None:
         """End a program whose move is impossible, or stop the robot if it is a line or path that leads nowhere."""

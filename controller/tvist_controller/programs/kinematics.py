@@ -6,7 +6,7 @@ import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
-from tvist_controller.kinematics.rotation import turn
+from tvist_controller.kinematics.pose import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.paths.poses import placement, placement_vector

@@ -7,12 +7,11 @@ from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.compiling import Kept, KeptPrograms, built_in
 from tvist_controller.programs.functions.family import Parts
-from tvist_controller.programs.indicators import Popups, RunstateOutputs
+from tvist_controller.programs.indicators import MissedTurns, Popups, RunstateOutputs, Watchdogs
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.sockets import Sockets
-from tvist_controller.programs.watchdogs import MissedTurns, Watchdogs
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
@@ -49,7 +48,7 @@ class ProgramPlayer:
     def __init__(self, access: Access, safety: SafetyControl) -> None:
         self._access, self._motion, self._safety, self._emit = access, access.motion, safety, access.emit
         self.arm = ProgramArm(access, self._thread, self._lives, lambda work: self._machine().charge(work))
-        self._missed_turns = MissedTurns(self.arm, access.emit)
+        self._missed_turns = MissedTurns(self.arm, access)
         self.popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
         self.sockets = Sockets(

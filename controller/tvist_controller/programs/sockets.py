@@ -1,31 +1,21 @@
 """Sockets of programs: what they have received, and what waits for more.
 
-The network is the host's: it connects, sends and receives, and reports what happened as `SocketNews`, which the journal
-contains. So a replay gets the same bytes at the same ticks. The gripper of a cell needs no network: it is part of the
-simulation, and answers a tick later.
+The network is the host's: it gets orders after programs had their turn. What happened it reports before a tick, as
+`SocketNews`, which the journal contains. So a replay gets the same bytes at the same ticks. The gripper of a cell needs
+no network: it is part of the simulation, and answers a tick later.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from math import ceil
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from tvist_controller.cell.gripper import Requests
 from tvist_controller.cell.live_cell import LiveCell
 from tvist_controller.events import Emit
 from tvist_controller.programs.arguments import readable
-from tvist_controller.programs.socket_traffic import (
-    Close,
-    Expire,
-    Open,
-    Send,
-    SocketNews,
-    SocketOrder,
-    Taken,
-    Wait,
-    Waited,
-)
 from tvist_plant.plant import PERIOD
+from tvist_protocol.journal import Entry, SocketChange
 from tvist_urscript import Fault, Machine
 
 MAX_SOCKETS = 16
@@ -36,6 +26,93 @@ Take = Callable[[bytes], tuple[T, int] | None]
 """Finds what a program reads at the beginning of the received bytes: its value and its length in bytes; None as long
 as it has not arrived completely.
 """
+
+
+class SocketNews(NamedTuple):
+    """Something that happened to a socket."""
+
+    number: int
+    """Number of the socket; with `expired`, that of the wait."""
+    change: SocketChange
+    data: bytes = b""
+    """What it has received."""
+
+    @classmethod
+    def of(cls, entry: Entry) -> "SocketNews":
+        """Return the news that an entry of the journal contains."""
+        if entry.socket is None or entry.change is None:
+            raise ValueError(
+                f"the journal's socket entry before tick {entry.tick} has no number or no change"
+            )
+        return cls(entry.socket, entry.change, entry.data or b"")
+
+
+class Open(NamedTuple):
+    """Connect a socket; `opened` or `failed` is the answer."""
+
+    socket: int
+    """Number of the socket; no number comes twice."""
+    origin: str | None
+    """Address of the machine that sent and started the program; None if it is unknown."""
+    address: str
+    """Name or IP address of the machine to connect to."""
+    port: int
+
+
+class Send(NamedTuple):
+    """Send bytes over a socket."""
+
+    socket: int
+    data: bytes
+
+
+class Close(NamedTuple):
+    """Close a socket; nothing that comes from it later counts."""
+
+    socket: int
+
+
+class Taken(NamedTuple):
+    """A program has read bytes that a socket had received, so there is room for more."""
+
+    socket: int
+    amount: int
+
+
+class Wait(NamedTuple):
+    """A program begins to wait for a socket."""
+
+    wait: int
+    """Number of the wait; no number comes twice."""
+    socket: int
+
+
+class Waited(NamedTuple):
+    """A wait is over, so that no time has to be kept for it any more."""
+
+    wait: int
+
+
+class Expire(NamedTuple):
+    """Tell the program by `expired` when so much wall time has passed since it began to wait; robot time has passed."""
+
+    wait: int
+    socket: int
+    seconds: float
+
+
+SocketOrder = Open | Send | Close | Taken | Wait | Waited | Expire
+
+
+class SocketPorts:
+    """Carries the sockets of one robot's programs; this one has no network, so no socket can be opened.
+
+    What happens to them later reaches the host by `Host.socket`.
+    """
+
+    def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketNews]:
+        """Carry out orders without blocking; return news that are known at once, which count after this tick."""
+        return [SocketNews(order.socket, "failed") for order in orders if isinstance(order, Open)]
 
 
 @dataclass

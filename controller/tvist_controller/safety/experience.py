@@ -1,14 +1,95 @@
 """Records the motions of a robot, has them studied, and keeps the lessons until the arm rests."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import NamedTuple
 
+import numpy as np
+
+from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
-from tvist_controller.safety.motion_record import Beliefs, MotionRecord, MotionRecorder
-from tvist_controller.safety.payload_student import PayloadStudent
-from tvist_controller.setup import Setup
+from tvist_controller.planning.plan import Plan
+from tvist_controller.planning.snapshot import FilterState
 from tvist_plant.user_file import named
 from tvist_protocol.lessons import PayloadLesson
+
+LONGEST = 10_000
+"""Number of ticks of the longest motion that is recorded; of a longer one nothing is kept."""
+AFTER = 150
+"""Number of ticks that are recorded after a motion has ended, in which the arm rings down."""
+
+
+@dataclass(frozen=True)
+class MotionRecord:
+    """A motion of T ticks, of which the last ones are at rest."""
+
+    q: Floats
+    """Measured joint angles, shape (T, n) [rad]."""
+    moments: Floats
+    """Measured motor torques on the joint side, shape (T, n) [N m]."""
+    stop: int
+    """Number of ticks until the commands rested."""
+    whole: bool
+    """Whether it went as planned: shaped from rest to rest, without stop, stream or bypass."""
+    beliefs: FilterState
+    """What the controller took the arm for, and shaped with."""
+
+
+Record = Callable[[], MotionRecord]
+"""Makes the record of a motion that has ended, which takes longer than a tick has."""
+
+
+class MotionRecorder:
+    """Records one motion after the other."""
+
+    def __init__(self) -> None:
+        self._samples: list[Sample] = []
+        self._ticks, self._stop = 0, 0
+        self._whole = self._moves = False
+        self._beliefs: FilterState | None = None
+
+    def take(self, sample: Sample, present: Callable[[], FilterState]) -> Record | None:
+        """Take a tick in which the drives hold or move the arm; return the motion that is complete with it.
+
+        That may be one that the next one has cut short; None if there is none. What is believed at present is asked
+        for at the beginning of a motion only.
+        """
+        resting, done = sample.mode.at_rest, None
+        if not resting and (not self._moves or self._stop):
+            done = self._finished()
+            self.forget()
+            self._moves, self._whole, self._beliefs = True, True, present()
+        if not self._moves:
+            return done
+        self._whole = self._whole and (resting or sample.mode is LineMode.SHAPED)
+        if self._ticks < LONGEST + AFTER:
+            self._samples.append(sample)
+        self._ticks += 1
+        if resting and not self._stop:
+            self._stop = self._ticks
+        if self._stop and self._ticks == self._stop + AFTER:
+            done = self._finished()
+            self.forget()
+        return done
+
+    def forget(self) -> None:
+        """Drop the present motion, since the drives do not hold the arm, or it was placed elsewhere."""
+        self._moves, self._samples, self._ticks, self._stop = False, [], 0, 0
+
+    def _finished(self) -> Record | None:
+        samples, stop, whole, beliefs = self._samples, self._stop, self._whole, self._beliefs
+        if not stop or stop > LONGEST or beliefs is None:
+            return None
+
+        def record() -> MotionRecord:
+            q = np.array([sample.measured.q for sample in samples])
+            return MotionRecord(
+                q, np.array([sample.measured.moment for sample in samples]), stop, whole, beliefs
+            )
+
+        return record
+
 
 Work = Callable[[], None]
 """A study, which takes a fraction of a second and touches nothing that ticks use."""
@@ -16,14 +97,13 @@ Later = Callable[[Work], Callable[[], bool]]
 """Has a study made beside the ticks; returns what tells whether it has ended."""
 
 
-class Student(Protocol):
-    """Learns from motions.
+Study = Callable[[MotionRecord], PayloadLesson | None]
+"""Returns what a motion teaches; None if it teaches nothing.
 
-    One thread at a time uses it. It returns all that it learns as lessons, so a replay needs no students.
-    """
-
-    def study(self, motion: MotionRecord) -> PayloadLesson | None:
-        """Return what a motion teaches; None if it teaches nothing."""
+One thread at a time calls it. What is learnt is in its lessons alone, so a replay studies nothing.
+"""
+Plans = Callable[[PayloadLesson, FilterState], Plan]
+"""Plans what a lesson changes."""
 
 
 def at_once(work: Work) -> Callable[[], bool]:
@@ -39,29 +119,25 @@ WAITING = 16
 class Taught(NamedTuple):
     """A lesson, and what it depends on."""
 
-    beliefs: Beliefs
+    beliefs: FilterState
     """What the controller took the arm for during the motion."""
     lesson: PayloadLesson
     """What was learnt."""
-    plan: Any
+    plan: Plan | None
     """Plan for it; None if there is none yet."""
 
 
-Planned = Callable[[PayloadLesson, Beliefs], Any]
-"""Plans what a lesson changes."""
-
-
 class Experience:
-    """What a robot makes of its motions, each of which the students study in their order."""
+    """What a robot makes of its motions, which are studied in their order."""
 
     def __init__(
         self,
-        students: Sequence[Student],
+        study: Study,
         later: Later = at_once,  # has a study made beside the ticks
-        plan: Planned | None = None,  # of what a lesson changes; None: in the tick that takes it
+        plan: Plans | None = None,  # of what a lesson changes; None: in the tick that takes it
     ) -> None:
         self._recorder = MotionRecorder()
-        self._students, self._later, self._plan = students, later, plan
+        self._study, self._later, self._plan = study, later, plan
         self._under_way: list[tuple[Callable[[], bool], list[Taught]]] = []
         self._raised: list[Exception] = []
         self._said = set[str]()
@@ -70,36 +146,31 @@ class Experience:
     def watch(
         self,
         sample: Sample,
-        beliefs: Callable[[], Beliefs],  # what the controller takes the arm for
+        present: Callable[[], FilterState],  # what the controller takes the arm for
         *,
         held: bool,  # whether the drives hold the arm
         placements: int,  # number of times that the arm was put somewhere, see `ControlCycle`
     ) -> None:
         """Take a tick."""
-        recorder = self._recorder
         if placements != self._placements or not held:
             self._placements = placements
-            recorder.forget()
-        if not held:
-            return
-        known = beliefs() if recorder.begins and not sample.mode.at_rest else None
-        record = recorder.take(sample, known)
+            self._recorder.forget()
+        record = self._recorder.take(sample, present) if held else None
         if record is None or len(self._under_way) >= WAITING:
             return
-        for student in self._students:
-            learnt: list[Taught] = []
+        learnt: list[Taught] = []
 
-            def study(student: Student = student, learnt: list[Taught] = learnt) -> None:
-                try:
-                    motion = record()
-                    lesson = student.study(motion)
-                    if lesson is not None:
-                        plan = None if self._plan is None else self._plan(lesson, motion.beliefs)
-                        learnt.append(Taught(motion.beliefs, lesson, plan))
-                except Exception as error:  # noqa: BLE001  a robot goes on without the lesson, and says so
-                    self._raised.append(error)
+        def study() -> None:
+            try:
+                motion = record()
+                lesson = self._study(motion)
+                if lesson is not None:
+                    plan = None if self._plan is None else self._plan(lesson, motion.beliefs)
+                    learnt.append(Taught(motion.beliefs, lesson, plan))
+            except Exception as error:  # noqa: BLE001  a robot goes on without the lesson, and says so
+                self._raised.append(error)
 
-            self._under_way.append((self._later(study), learnt))
+        self._under_way.append((self._later(study), learnt))
 
     def void(self) -> None:
         """Drop what is being learnt of motions so far, since it is to be forgotten, or the arm carries another load."""
@@ -118,12 +189,3 @@ class Experience:
         new = [error for error in raised if named(error) not in self._said]
         self._said.update(map(named, new))
         return new
-
-
-def experience_of(
-    setup: Setup, students: Sequence[Student] = (), later: Later = at_once, plan: Planned | None = None
-) -> Experience | None:
-    """Return what a robot makes of its motions, with further students; None if nobody studies them."""
-    own = [PayloadStudent(setup.description)] if setup.adapt == "payload" else []
-    everyone = [*own, *students]
-    return Experience(everyone, later, plan) if everyone else None

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 from itertools import count
+from typing import Any
 
 import numpy as np
 
@@ -36,11 +37,14 @@ def check_fault(command: SimulationInject, description: RobotDescription) -> Non
         raise RefusalError("out_of_range", "joint", why, joints - 1)
 
 
+_NEEDED: dict[str, Callable[..., Any]] = {"torque": Plant.push, "nan": Plant.make_nan}
+"""Method of the plant that a fault needs."""
+
+
 class Faults:
     """Starts faults, and ends those with a duration."""
 
     def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
-        self._motion = motion
         self._inputs: dict[str, tuple[Callable[[], None], Callable[[], None]]] = {
             "reduced": (partial(safety.reduce, reduced=True), partial(safety.reduce, reduced=False)),
             "safeguard_stop": (
@@ -58,12 +62,10 @@ class Faults:
             "power_loss": lambda: safety.cut_power("a loss of power was injected"),
             "violation": lambda: safety.cut_power("the safety system found a violation", "violation"),
             "fault": lambda: safety.cut_power("the safety system failed", "fault"),
+            "nan": motion.cycle.plant.make_nan,
         }
         """Functions for the faults that have no duration."""
-        plant = motion.cycle.plant
-        self._pushable = plant if plant.can(Plant.push) else None
-        if plant.can(Plant.make_nan):
-            self._momentary["nan"] = plant.make_nan
+        self._plant = motion.cycle.plant
         self._push = np.zeros(motion.cycle.description.joints)
         self._ends: list[tuple[int, int, str, Callable[[], None]]] = []
         self._number = count()
@@ -74,8 +76,12 @@ class Faults:
         Raises:
             RefusalError: The plant does not support it.
         """
-        self._check_plant(command.fault)
         fault, seconds = command.fault, command.seconds
+        needed = _NEEDED.get(fault)
+        if needed is not None and not self._plant.can(needed):
+            plant, method = type(self._plant).__name__, needed.__name__
+            why = f"fault is {fault!r}: the plant {plant} cannot simulate it, since it has no method {method}"
+            raise RefusalError("unknown_fault", "fault", why)
         ends = tick + round((seconds or 0.0) / PERIOD)
         if fault == "torque":
             joint, value = command.joint or 0, command.value or 0.0
@@ -106,20 +112,8 @@ class Faults:
         """End all present faults, and release the arm."""
         self.end()
         self._push[:] = 0.0
-        if self._pushable is not None:
-            self._pushable.push(self._push)
-
-    def _check_plant(self, fault: str) -> None:
-        """Check that the plant supports a fault of its own."""
-        if (fault == "torque" and self._pushable is None) or (
-            fault == "nan" and fault not in self._momentary
-        ):
-            plant = type(self._motion.cycle.plant).__name__
-            missing = "push" if fault == "torque" else "make_nan"
-            why = (
-                f"fault is {fault!r}: the plant {plant} cannot simulate it, since it has no method {missing}"
-            )
-            raise RefusalError("unknown_fault", "fault", why)
+        if self._plant.can(Plant.push):
+            self._plant.push(self._push)
 
     def _forget(self, faults: set[str]) -> None:
         """Drop the end times of faults; those with a duration then last until something else ends them."""
@@ -131,5 +125,4 @@ class Faults:
 
     def _add(self, joint: int, torque: float) -> None:
         self._push[joint] += torque
-        if self._pushable is not None:
-            self._pushable.push(self._push)
+        self._plant.push(self._push)

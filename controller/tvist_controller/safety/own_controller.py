@@ -15,6 +15,7 @@ from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
+from tvist_controller.setup import payload_of
 from tvist_plant.plant import PlantError, RealArm, Sight
 from tvist_protocol.commands import Command, SetPayload
 from tvist_protocol.io import Io, SetIo, SimulationSetInputs
@@ -58,8 +59,7 @@ class RemoteStatus:
         """Return the payload that the robot was told; `payload` if it does not say."""
         if self._sight is None or self._sight.payload is None:
             return payload
-        told = self._sight.payload
-        return Payload(mass=told.mass, com=told.com, inertia=told.inertia)
+        return payload_of(self._sight.payload)
 
     def io(self, io: Io, *, force: bool) -> Io:
         """Return `io` with what the robot says of itself; its force at the tool only if that is wanted."""

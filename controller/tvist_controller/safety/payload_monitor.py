@@ -3,17 +3,17 @@
 from typing import ClassVar
 
 import numpy as np
-import pinocchio as pin
 
 from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.inverse_dynamics import SLEW
 from tvist_controller.line.line_tick import QD, QDD, Q
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.monitor import Finding, Monitor
-from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
+from tvist_plant.chain import BODY, torques
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.model import FLANGE, carries_weight, rigid_model
+from tvist_plant.model import carries_weight
 from tvist_plant.plant import GRAVITY, PERIOD
 
 EVERY = 10
@@ -69,29 +69,6 @@ def correlate(
         sums[2, memory] = fade[memory] * sums[2, memory] + FRICTION * bound
 
 
-class Patience:
-    """How long a doubt waits in a robot that follows its payload: until a motion has been studied in vain."""
-
-    def __init__(self) -> None:
-        self.begin()
-
-    def begin(self) -> None:
-        """Begin anew, since there is no doubt any more."""
-        self._doubted = self._rested = 0.0
-        self._moved = False
-
-    def lasts(self, doubtful: bool, at_rest: bool) -> bool:
-        """Take `EVERY` ticks; return whether a motion may still tell what the arm carries."""
-        if not doubtful:
-            self.begin()
-            return True
-        span = EVERY * PERIOD
-        self._doubted += span
-        self._moved = self._moved or not at_rest
-        self._rested = self._rested + span if at_rest and self._moved else 0.0
-        return self._rested < STUDIED and self._doubted < PATIENCE
-
-
 class PayloadMonitor(Monitor):
     """Compares the payload that the drives feel with the declared one, in motion and at rest.
 
@@ -112,21 +89,18 @@ class PayloadMonitor(Monitor):
     5 kg change the frequency by a fifth and the shoulder's torque by half.
 
     A robot that follows its payload finds it after a motion by itself. There the warning waits as long as that may
-    still come, see `Patience`, and is about the payload that is assumed. So there is one verdict at a time.
+    still come, until a motion has been studied in vain, and is about the payload that is assumed. So there is one
+    verdict at a time.
     """
 
     needs: ClassVar = "drives alone"  # else what the tool touches would be taken for a payload
 
     def __init__(self, description: RobotDescription, declared: Payload, *, follows: bool = False) -> None:
-        self._patience = Patience() if follows else None
+        self._follows = follows
         drives = description.drives
         self._judges = carries_weight(description)
-        model = rigid_model(description, Payload())
-        flange = model.getFrameId(FLANGE)
-        self._placement = model.frames[flange].placement
-        self._chain = chain_of(model, flange)
-        self._chain[:, BODY:] = 0.0  # only the kilogram has mass in this chain
-        self._scratch = np.zeros((description.joints + 1, SCRATCH))
+        self._arm = Arm(description)
+        self._arm.chain[:, BODY:] = 0.0  # only the kilogram has mass in this chain
         self._sum = np.zeros(description.joints)
         # Without this floor, a joint without friction would dominate the estimate.
         self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
@@ -135,7 +109,7 @@ class PayloadMonitor(Monitor):
         still = np.zeros_like(self._sum)  # the first calls load compiled code, which takes many ticks
         add(still, still, still)
         nothing = np.zeros_like(self._sums)
-        correlate(self._chain, still, still, still, self._scratch, self._friction, still, self._fade, nothing)
+        self._correlate(np.zeros((QDD + 1, len(still))), nothing)
 
     def declare(self, payload: Payload, ticks: int, *, found: bool = False, told: bool = False) -> None:
         """Set another payload: discard past measurements, and wait for the ticks in which it is phased in.
@@ -145,8 +119,7 @@ class PayloadMonitor(Monitor):
         """
         self.payload = payload
         self._called = "assumed" if found else "declared"
-        kilogram = pin.Inertia(1.0, np.array(payload.com), np.zeros((3, 3)))
-        self._chain[-2, BODY:] = self._placement.act(kilogram).toDynamicParameters()
+        self._arm.chain[-2, BODY:] = self._arm.on_flange(Payload(mass=1.0, com=payload.com))
         self.restart()
         self._wait, self._warned = ticks, told
 
@@ -156,8 +129,12 @@ class PayloadMonitor(Monitor):
         self._time = 0.0
         self._sums = np.zeros((3, len(self._fade)))
         self._warned = False
-        if self._patience is not None:
-            self._patience.begin()
+        self._be_sure()
+
+    def _be_sure(self) -> None:
+        """Forget a doubt."""
+        self._doubted = self._rested = 0.0
+        self._moved = False
 
     @property
     def excess(self) -> tuple[float, float]:
@@ -178,25 +155,25 @@ class PayloadMonitor(Monitor):
         self._ticks += 1
         if self._ticks < EVERY:
             return None
-        signals = sample.signals
-        correlate(
-            self._chain, signals[Q], signals[QD], signals[QDD], self._scratch, self._friction, self._sum,
-            self._fade, self._sums,
-        )  # fmt: skip
+        self._correlate(sample.signals, self._sums)
         self._ticks, self._time = 0, float(self._fade[0]) * self._time + EVERY * PERIOD
         why = self._judge(sample.mode.at_rest)
         return None if why is None else Finding(why, "payload_mismatch")
 
+    def _correlate(self, signals: Floats, sums: Floats) -> None:
+        arm, q, qd, qdd = self._arm, signals[Q], signals[QD], signals[QDD]
+        correlate(arm.chain, q, qd, qdd, arm.scratch, self._friction, self._sum, self._fade, sums)
+
     def _judge(self, at_rest: bool) -> str | None:
         if not self._judges or self._warned or self._time < ENOUGH:
             return None
-        doubtful = _contradicts(*self.excess)
-        if self._patience is not None and self._patience.lasts(doubtful, at_rest):
+        if not _contradicts(*self.excess):
+            self._be_sure()
+            return None
+        if self._follows and self._waits(at_rest):
             return None
         mass, bound = self._estimate(1)
-        if not (
-            doubtful and _contradicts(mass, bound)
-        ):  # what is named has to contradict the declaration, too
+        if not _contradicts(mass, bound):  # what is named has to contradict the declaration, too
             return None
         self._warned = True
         felt = self.payload.mass + mass
@@ -209,6 +186,14 @@ class PayloadMonitor(Monitor):
             f"{told}declare them, in a program with set_payload({felt:.1f}, …) or set_target_payload({felt:.1f}, …) "
             "and their centre of mass, or find out what pushes the arm"
         )
+
+    def _waits(self, at_rest: bool) -> bool:
+        """Take `EVERY` ticks of doubt; return whether a motion may still tell what the arm carries."""
+        span = EVERY * PERIOD
+        self._doubted += span
+        self._moved = self._moved or not at_rest
+        self._rested = self._rested + span if at_rest and self._moved else 0.0
+        return self._rested < STUDIED and self._doubted < PATIENCE
 
 
 def _contradicts(mass: float, bound: float) -> bool:

@@ -12,16 +12,15 @@ and counts as known to the deviation of `UNKNOWN`: it costs certainty, and makes
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
-from tvist_controller._compiled import compiled
+from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.safety.motion_record import MotionRecord
-from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
+from tvist_controller.safety.experience import Experience, Later, MotionRecord, Plans, at_once
+from tvist_controller.setup import Setup
+from tvist_plant.chain import BODY
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
-from tvist_plant.model import FLANGE, rigid_model
-from tvist_plant.plant import GRAVITY, PERIOD
+from tvist_plant.plant import PERIOD
 from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.values import Payload
 
@@ -83,69 +82,6 @@ class Estimate:
         return float(np.sqrt(self.covariance[0, 0]))
 
 
-@compiled
-def along(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, out: Floats) -> None:
-    """Compute the torques of a chain in N states, each of shape (N, n); see `tvist_plant.chain.torques`."""
-    for row in range(len(q)):
-        torques(chain, q[row], qd[row], qdd[row], GRAVITY, scratch, out[row])
-
-
-class PayloadStudent:
-    """Follows the payload from motion to motion; see `experience.Student`.
-
-    A motion is first judged alone. If its mass is that of what was known before, both are combined, as a Kalman filter
-    does; else the payload has changed, and what was known is void.
-    """
-
-    def __init__(self, description: RobotDescription) -> None:
-        self._arm = _Arm(description)
-        self._own, self._rated = description.payload, description.limits.payload
-        self._known: Estimate | None = None
-        self._believed: Payload | None = None
-
-    def study(self, motion: MotionRecord) -> PayloadLesson | None:
-        """Return what the arm carries, if it differs from what is believed by more than `DEAD`, for sure."""
-        believed = motion.beliefs.payload
-        if not motion.whole or len(motion.moments) < LEAST * BLOCK:
-            return None
-        centre = np.array(believed.com if believed.mass >= LIGHT else self._own.com)
-        known = self._known
-        if known is None or believed != self._believed:
-            known = _independent(np.array([believed.mass, *centre]), *DECLARED)
-        self._believed = believed
-        equations = self._arm.equations(motion, known.x)
-        alone = equations.solve(_independent(known.x, self._rated, CENTRE))
-        if alone is None or alone.deviation > VAGUE:
-            return None
-        now = Estimate(known.x, known.covariance + _independent(known.x, *DRIFT).covariance)
-        changed = abs(alone.x[0] - known.x[0]) > SURE * np.hypot(alone.deviation, now.deviation)
-        found = alone if changed else equations.solve(now)
-        if found is None or found.x[0] < -SURE * found.deviation - DEAD:  # something holds the arm up
-            return None
-        self._known = found
-        return self._lesson(believed, found)
-
-    def _lesson(self, believed: Payload, found: Estimate) -> PayloadLesson | None:
-        mass, certain = float(found.x[0]), SURE * found.deviation
-        beyond = mass > self._rated + certain
-        assumed = round(min(max(mass, 0.0), self._rated), 3)
-        if not abs(assumed - believed.mass) > max(DEAD, certain):
-            return None
-        x, y, z = np.clip(found.x[1:], -FARTHEST, FARTHEST).round(4).tolist()
-        why = f"the arm carries {mass:.2f} kg ± {found.deviation:.2f} kg, not {believed.mass:g} kg"
-        if beyond:
-            why += f", which is above its rating: {self._rated:g} kg are assumed"
-        payload = Payload(mass=assumed, com=(x, y, z), inertia=self._inertia(assumed, believed))
-        self._believed = payload
-        return PayloadLesson(payload=payload, why=why, beyond=beyond)
-
-    def _inertia(self, mass: float, believed: Payload) -> tuple[float, float, float, float, float, float]:
-        """Scale the inertia of what is believed, or of the robot file's payload, with the mass."""
-        like = believed if believed.mass >= LIGHT else self._own
-        xx, xy, xz, yy, yz, zz = (mass / like.mass * value if like.mass else 0.0 for value in like.inertia)
-        return xx, xy, xz, yy, yz, zz
-
-
 def _independent(x: Floats, mass: float, centre: float) -> Estimate:
     return Estimate(x, np.diag(np.square([mass, centre, centre, centre])))
 
@@ -192,31 +128,76 @@ class Equations:
         return Estimate(self.at + found[:4] / scale, covariance / np.outer(scale, scale))
 
 
-class _Arm:
-    """Makes the equations of an arm's motions."""
+class PayloadStudent:
+    """Follows the payload from motion to motion; see `experience.Study`.
+
+    A motion is first judged alone. If its mass is that of what was known before, both are combined, as a Kalman filter
+    does; else the payload has changed, and what was known is void.
+    """
 
     def __init__(self, description: RobotDescription) -> None:
         drives = description.drives
-        model = rigid_model(description, Body())
-        flange = model.getFrameId(FLANGE)
-        self._placement, self._chain = model.frames[flange].placement, chain_of(model, flange)
-        self._scratch = np.zeros((description.joints + 1, SCRATCH))
+        self._arm = Arm(description)
+        self._links = self._arm.chain[:, BODY:].copy()
         self._friction, self._width = np.array(drives.coulomb_friction), drives.friction_width
         self._linear, self._rotors = drives.linear_friction, np.array(drives.rotor_inertia)
         self._noise = NOISE[0] * self._friction + NOISE[1] * np.array(description.limits.torque)
         still = np.zeros((1, description.joints))
-        self._torques(
-            0, self._chain[0, BODY:], still, still, still
-        )  # loads compiled code, which takes many ticks
+        self._torques(0, self._links[0], still, still, still)  # loads compiled code, which takes many ticks
+        self._own, self._rated = description.payload, description.limits.payload
+        self._known: Estimate | None = None
+        self._believed: Payload | None = None
 
-    def equations(self, motion: MotionRecord, at: Floats) -> Equations:
+    def study(self, motion: MotionRecord) -> PayloadLesson | None:
+        """Return what the arm carries, if it differs from what is believed by more than `DEAD`, for sure."""
+        believed = motion.beliefs.declared
+        if not motion.whole or len(motion.moments) < LEAST * BLOCK:
+            return None
+        centre = np.array(believed.com if believed.mass >= LIGHT else self._own.com)
+        known = self._known
+        if known is None or believed != self._believed:
+            known = _independent(np.array([believed.mass, *centre]), *DECLARED)
+        self._believed = believed
+        equations = self._equations(motion, known.x)
+        alone = equations.solve(_independent(known.x, self._rated, CENTRE))
+        if alone is None or alone.deviation > VAGUE:
+            return None
+        now = Estimate(known.x, known.covariance + _independent(known.x, *DRIFT).covariance)
+        changed = abs(alone.x[0] - known.x[0]) > SURE * np.hypot(alone.deviation, now.deviation)
+        found = alone if changed else equations.solve(now)
+        if found is None or found.x[0] < -SURE * found.deviation - DEAD:  # something holds the arm up
+            return None
+        self._known = found
+        return self._lesson(believed, found)
+
+    def _lesson(self, believed: Payload, found: Estimate) -> PayloadLesson | None:
+        mass, certain = float(found.x[0]), SURE * found.deviation
+        beyond = mass > self._rated + certain
+        assumed = round(min(max(mass, 0.0), self._rated), 3)
+        if not abs(assumed - believed.mass) > max(DEAD, certain):
+            return None
+        x, y, z = np.clip(found.x[1:], -FARTHEST, FARTHEST).round(4).tolist()
+        why = f"the arm carries {mass:.2f} kg ± {found.deviation:.2f} kg, not {believed.mass:g} kg"
+        if beyond:
+            why += f", which is above its rating: {self._rated:g} kg are assumed"
+        payload = Payload(mass=assumed, com=(x, y, z), inertia=self._inertia(assumed, believed))
+        self._believed = payload
+        return PayloadLesson(payload=payload, why=why, beyond=beyond)
+
+    def _inertia(self, mass: float, believed: Payload) -> tuple[float, float, float, float, float, float]:
+        """Scale the inertia of what is believed, or of the robot file's payload, with the mass."""
+        like = believed if believed.mass >= LIGHT else self._own
+        xx, xy, xz, yy, yz, zz = (mass / like.mass * value if like.mass else 0.0 for value in like.inertia)
+        return xx, xy, xz, yy, yz, zz
+
+    def _equations(self, motion: MotionRecord, at: Floats) -> Equations:
         """Return the equations of a motion about a mass [kg] and centre of mass [m], shape (4,)."""
         speeds = np.gradient(motion.q, PERIOD, axis=0)
         q, qd, measured = _means(motion.q), _means(speeds), _means(motion.moments)
         qdd, centre = np.gradient(qd, BLOCK * PERIOD, axis=0), at[1:]
         per_kg = self._payload(centre, q, qd, qdd)
         sides = [self._payload(centre + move, q, qd, qdd) - per_kg for move in 0.01 * np.eye(3)]
-        links = [self._torques(link, self._chain[link, BODY:], q, qd, qdd) for link in range(q.shape[1])]
+        links = [self._torques(link, self._links[link], q, qd, qdd) for link in range(q.shape[1])]
         sign = _means(speeds / self._width if self._linear else np.tanh(speeds / self._width))
         sharper = np.zeros_like(sign) if self._linear else _means(np.tanh(2.0 * speeds / self._width)) - sign
         at_rest = np.arange(len(q))[:, None] * BLOCK >= motion.stop
@@ -237,17 +218,14 @@ class _Arm:
 
     def _payload(self, centre: Floats, q: Floats, qd: Floats, qdd: Floats) -> Floats:
         """Torques that a kilogram needs, with its centre in the flange frame, shape (N, n) [N m/kg]."""
-        kilogram = pin.Inertia(1.0, centre, np.zeros((3, 3)))
-        parameters = self._placement.act(kilogram).toDynamicParameters()
-        return self._torques(len(self._friction) - 1, parameters, q, qd, qdd)
+        x, y, z = centre.tolist()
+        return self._torques(q.shape[1] - 1, self._arm.on_flange(Body(mass=1.0, com=(x, y, z))), q, qd, qdd)
 
     def _torques(self, link: int, body: Floats, q: Floats, qd: Floats, qdd: Floats) -> Floats:
         """Torques that the arm needs if one of its links alone has mass, shape (N, n) [N m]."""
-        chain, out = self._chain.copy(), np.empty_like(q)
-        chain[:, BODY:] = 0.0
-        chain[link, BODY:] = body
-        along(chain, q, qd, qdd, self._scratch, out)
-        return out
+        self._arm.chain[:, BODY:] = 0.0
+        self._arm.chain[link, BODY:] = body
+        return self._arm.torques(q, qd, qdd)
 
 
 def _means(values: Floats) -> Floats:
@@ -258,3 +236,10 @@ def _means(values: Floats) -> Floats:
 def _each(values: Floats) -> list[Floats]:
     """Return a column for each joint that has its values alone."""
     return [values * (np.arange(values.shape[1]) == joint) for joint in range(values.shape[1])]
+
+
+def experience_of(setup: Setup, later: Later = at_once, plan: Plans | None = None) -> Experience | None:
+    """Return what a robot makes of its motions; None if it learns nothing of them."""
+    if setup.adapt != "payload":
+        return None
+    return Experience(PayloadStudent(setup.description).study, later, plan)

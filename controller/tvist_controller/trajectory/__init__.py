@@ -5,11 +5,9 @@ from tvist_controller.trajectory.compliant import Compliant, ForceTask
 from tvist_controller.trajectory.guided import Guided, Servo, StuckError
 from tvist_controller.trajectory.limits import MotionLimits
 from tvist_controller.trajectory.motion import DoubleS, PlannedMotion, at_least, quickest_motion
-from tvist_controller.trajectory.path import Bends, Curve, JointLine, Path, Way
-from tvist_controller.trajectory.path_stop import PathStop
-from tvist_controller.trajectory.slowed_stop import SlowedStop
+from tvist_controller.trajectory.path import JointLine, Path, Way
 from tvist_controller.trajectory.speed import Speed
-from tvist_controller.trajectory.stop import JointStop
+from tvist_controller.trajectory.stop import JointStop, PathStop, SlowedStop
 from tvist_controller.trajectory.stream import SetpointStream
 
 AnyStop = JointStop | PathStop | SlowedStop
@@ -17,9 +15,7 @@ AnyStop = JointStop | PathStop | SlowedStop
 
 __all__ = [
     "AnyStop",
-    "Bends",
     "Compliant",
-    "Curve",
     "DoubleS",
     "ForceTask",
     "Forecast",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.rotation import turn, turned
+from tvist_controller.kinematics.pose import turn, turned
 from tvist_controller.trajectory.guided import Following, Guided, StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits

@@ -77,9 +77,7 @@ class Following(Guided):
         self._follow(state)
 
     def _follow(self, state: tuple[Floats, Floats, Floats]) -> None:
-        self._limiter = Limiter(
-            state[0], self.limits, self._period, reach=self._reach, torque=self._torque, state=state
-        )
+        self._limiter = Limiter(state, self.limits, self._period, self._reach, self._torque)
 
     @property
     def state(self) -> tuple[Floats, Floats, Floats]:

@@ -110,28 +110,24 @@ class Limiter:
 
     def __init__(
         self,
-        q: Floats,  # at rest to start from, shape (n,) [rad]
+        state: tuple[Floats, Floats, Floats],  # q, q̇ and q̈ to start from, each of shape (n,)
         limits: MotionLimits,
         period: float,  # tick [s]
-        *,
-        reach: Floats | None = None,  # largest |q| of each joint, shape (n,) [rad]; None for no limit
-        torque: TorqueRoom | None = None,  # None for no limit
-        state: tuple[Floats, Floats, Floats] | None = None,  # q, q̇ and q̈ to start from instead
+        reach: Floats,  # largest |q| of each joint, shape (n,) [rad]
+        torque: TorqueRoom | None,  # None for no limit
     ) -> None:
-        n = len(q)
+        (q, qd, qdd), n = state, len(state[0])
         self._limits, self._period = limits, period
-        self._reach = np.full(n, np.inf) if reach is None else np.array(reach, dtype=float)
+        self._reach = np.array(reach, dtype=float)
         self._torque = torque
         self.q = np.array(q, dtype=float)
         """Position of the reference, shape (n,) [rad]."""
         # Velocity of the signal; differences of the reference, and its second difference a tick earlier.
-        self._signal_qd, self._bend_before, self._now = np.zeros(n), np.zeros(n), np.zeros((DIFFERENCES, n))
-        self._state: Floats | None = None  # derivatives, if they differ from those of the differences
-        if state is not None:
-            _, qd, qdd = state
-            self._signal_qd, self._now[STEP] = qd, period * (qd - 0.5 * period * qdd)
-            self._now[BEND] = self._bend_before = period * period * qdd
-            self._state = np.stack(state)
+        self._signal_qd, self._bend_before, self._now = qd, period * period * qdd, np.zeros((DIFFERENCES, n))
+        self._now[STEP], self._now[BEND] = period * (qd - 0.5 * period * qdd), self._bend_before
+        self._state: Floats | None = np.stack(
+            state
+        )  # derivatives, if they differ from those of the differences
         self._behind: Bools | None = None  # which joints are not on the signal, if any
         self.behind = 0.0
         """Time by which joints lag behind a signal that is at its limits, so that they cannot catch up [s]."""

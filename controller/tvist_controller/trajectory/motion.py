@@ -258,12 +258,12 @@ class PlannedMotion(Trajectory):
 def quickest_motion(
     path: Path, limits: MotionLimits, period: float, speed: float = 1.0, agility: MotionLimits | None = None
 ) -> PlannedMotion:
-    """Return the double-S motion along a path from rest to rest within limits; see `PlannedMotion`.
+    """Return the double-S motion along a path from rest to rest within limits of its parameter; see `PlannedMotion`.
 
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.
     """
-    return PlannedMotion(path, DoubleS(path.start, path.end, path.planned(limits)), period, speed, agility)
+    return PlannedMotion(path, DoubleS(path.start, path.end, limits), period, speed, agility)
 
 
 def _stands_sooner(paused: PlannedMotion, free: PlannedMotion) -> bool:

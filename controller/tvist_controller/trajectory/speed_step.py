@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse
-from tvist_controller.kinematics.rotation import turn_into
+from tvist_controller.kinematics.pose import locate, newton, pseudo_inverse, turn_into
 from tvist_kernels.compiling import inlined
 from tvist_plant.model import Floats
 

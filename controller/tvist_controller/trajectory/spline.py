@@ -5,13 +5,28 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.trajectory.limits import Floats
-from tvist_controller.trajectory.path import Bends, Curve
+from tvist_controller.trajectory.limits import Floats, MotionLimits
+from tvist_controller.trajectory.path import Path, Way
 
 SAMPLES = np.linspace(0.0, 1.0, 9)
 """Places in each interval at which derivatives are sampled for their bounds."""
 ENOUGH = 1.05
 """Factor from the largest sample of a derivative to a bound of it [-]."""
+CURVED_SHARE = 0.5
+"""Largest share of the joints' acceleration and jerk that the curve itself may use up during a motion [-]."""
+LOOKS = 12
+"""Number of times that the range of a stop is widened before the whole rest of the curve is taken."""
+
+
+class Bends(NamedTuple):
+    """Upper bounds of a curve's derivatives with respect to its parameter s, on a part of it."""
+
+    slope: Floats
+    """|dq/ds| of each joint, shape (n,) [rad per unit of s]."""
+    second: float
+    """|d²q/ds²| of any joint."""
+    third: float
+    """|d³q/ds³| of any joint."""
 
 
 class Knots(NamedTuple):
@@ -76,8 +91,16 @@ def evaluate(
             out[3, number, joint] = 6.0 * c3 + u * (24.0 * c4 + u * 60.0 * c5)
 
 
-class SplineCurve(Curve):
+class SplineCurve(Path):
     """A curve through knots whose positions and first two derivatives are known.
+
+    Its parameter s goes from 0 or another start to an end above that, in any unit. Interpolation may pass either end by
+    a thousandth of a tick's step, where the outermost polynomials continue. With ṡ, s̈ and s⃛ the joints have
+
+        q̇ = q' ṡ,    q̈ = q' s̈ + q'' ṡ²,    q⃛ = q' s⃛ + 3 q'' ṡ s̈ + q''' ṡ³,
+
+    so bounds of the derivatives convert limits of the joints into limits of s. `most` limits the acceleration of each
+    joint while the motion's rate changes, shape (n,) [rad/s^2]; None if the limit of the parameter suffices.
 
     Raises:
         ValueError: The knots are not finite, or do not move any joint.
@@ -98,7 +121,18 @@ class SplineCurve(Curve):
         sizes = np.abs(self._evaluate(s)).reshape(4, len(lengths), len(SAMPLES), -1).max(axis=2)
         self._slope = ENOUGH * sizes[1]
         self._second, self._third = ENOUGH * sizes[2].max(axis=1), ENOUGH * sizes[3].max(axis=1)
-        super().__init__(float(knots.s[-1]), self._bends(0, len(lengths)), most, start=float(knots.s[0]))
+        start, end = float(knots.s[0]), float(knots.s[-1])
+        if not start < end < np.inf:
+            raise ValueError(f"length is {end - start}: must be more than 0")
+        self.bends = self._bends(0, len(lengths))
+        """Bounds of its derivatives."""
+        slope, second, third = self.bends
+        if not 0.0 < float(slope.max()) < np.inf:
+            raise ValueError(f"slope is {slope.tolist()}: must be finite, and of one joint more than 0")
+        if not (second < np.inf and third < np.inf):
+            raise ValueError(f"second is {second} and third {third}: both must be finite")
+        super().__init__(np.array([start]), np.array([end]))
+        self._most, self.posture_of = most, self._posture
 
     def become(self, other: "SplineCurve") -> None:
         """Go on as another curve, which is the same between where this one is used now and its end."""
@@ -124,6 +158,42 @@ class SplineCurve(Curve):
         high = min(max(int(np.searchsorted(self._knots, end, side="left")), low + 1), last)
         return self._bends(low, high)
 
+    def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the joints' state of motion, by the chain rule."""
+        q, slope, second = self.derivatives(x.reshape(-1))
+        xd, xdd = xd.reshape(-1, 1), xdd.reshape(-1, 1)
+        qd, qdd = slope * xd, slope * xdd + second * xd**2
+        return (q[0], qd[0], qdd[0]) if x.ndim == 1 else (q, qd, qdd)
+
+    def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:
+        """Return the parameter's derivatives and, if they are limited, those of the joints."""
+        own = np.array((xd, xdd))
+        if self._most is None:
+            return own
+        _, qd, qdd = self.states(x, xd, xdd)
+        return np.concatenate((own, np.array((qd, qdd)) * (acceleration / self._most)), axis=1)
+
+    def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
+        """Return the limits that the curve leaves at this velocity, from x on for as far as a stop takes."""
+        start, end = float(x[0]), float(self.end[0])
+        span = 0.1 * velocity
+        for look in range(LOOKS):
+            to = start + span if look < LOOKS - 1 else end
+            kept = kept_by(self.bends_within(start, to), limits, velocity)
+            if kept is None or to >= end:
+                return kept
+            needed = velocity * (0.5 * velocity / kept.acceleration + 2.0 * kept.acceleration / kept.jerk)
+            if needed <= span:
+                return kept
+            span = 1.25 * needed
+        raise AssertionError("the last look reaches the end")
+
+    def way(self, start: Floats, end: Floats) -> Way:
+        """Return the part of the curve between two parameters."""
+        along = end - start
+        slope = self.bends_within(float(start[0]), float(end[0])).slope
+        return Way(lambda share: self.posture(start + share * along), abs(float(along[0])) * slope)
+
     def _posture(self, x: Floats) -> Floats:
         assert x.shape == (1,), "a parameter is one number, and compiled code does not check"
         evaluate(self._knots, self._coefficients, x, self._one)
@@ -141,3 +211,16 @@ class SplineCurve(Curve):
             float(self._second[low:high].max()),
             float(self._third[low:high].max()),
         )
+
+
+def kept_by(bends: Bends, limits: MotionLimits, velocity: float) -> MotionLimits | None:
+    """Limits that a part of a curve leaves at a velocity; the acceleration leaves a share of the jerk."""
+    slope, second, third = float(bends.slope.max()), bends.second, bends.third
+    acceleration = (limits.acceleration - second * velocity**2) / slope
+    bent = CURVED_SHARE * limits.jerk - third * velocity**3
+    if 3.0 * second * velocity * acceleration > bent:
+        acceleration = bent / (3.0 * second * velocity)
+    if acceleration <= 0.0:
+        return None
+    jerk = (limits.jerk - third * velocity**3 - 3.0 * second * velocity * acceleration) / slope
+    return MotionLimits(velocity, acceleration, jerk)

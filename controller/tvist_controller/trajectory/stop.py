@@ -1,53 +1,71 @@
-"""Stops from any state of motion, with independent joints."""
+"""Stops: of independent joints, along a path, and of a known motion that becomes slower and slower."""
+
+import math
+from collections.abc import Sequence
 
 import numpy as np
 import ruckig
 
-from tvist_controller.trajectory.base import Trajectory
+from tvist_controller.trajectory.base import Forecast, Trajectory
 from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.path import Path
 
 
-class JointStop(Trajectory):
-    """Shortest stop within limits of acceleration and jerk; every joint stops as soon as it can."""
+class Slowing(Trajectory):
+    """The shortest way to rest of several entries, each within limits of acceleration and jerk."""
 
     def __init__(
-        self, q: Floats, qd: Floats, qdd: Floats, *, acceleration: float, jerk: float, period: float
+        self,
+        start: Sequence[Sequence[float]],  # positions, velocities and accelerations, n each
+        acceleration: float,
+        jerk: float,
+        period: float,  # tick [s]
     ) -> None:
-        n = len(q)
-        request = ruckig.InputParameter(n)
-        request.control_interface = ruckig.ControlInterface.Velocity
-        request.synchronization = ruckig.Synchronization.No
-        request.current_position, request.current_velocity = q.tolist(), qd.tolist()
-        request.current_acceleration = qdd.tolist()
-        request.target_velocity, request.target_acceleration = [0.0] * n, [0.0] * n
-        request.max_acceleration, request.max_jerk = [acceleration] * n, [jerk] * n
-        self._trajectory = ruckig.Trajectory(n)
-        ruckig.Ruckig(n).calculate(request, self._trajectory)
-        self.acceleration = acceleration
-        """Acceleration limit [rad/s^2]."""
-        self.jerk = jerk
-        """Jerk limit [rad/s^3]."""
-        self._period = period
-        self._ticks = 0
+        self._slowing = _slowing(start, acceleration, jerk)
+        self.acceleration, self.jerk = acceleration, jerk
+        """Limits of the joints' acceleration [rad/s^2] and of the entries' jerk [rad/s^3]."""
+        self._period, self._ticks = period, 0
 
     @property
     def duration(self) -> float:
-        """Time until every joint is at rest [s]."""
-        return float(self._trajectory.duration)
+        """Time from its start until rest [s]."""
+        return float(self._slowing.duration)
 
     def at(self, time: float) -> tuple[Floats, Floats, Floats]:
         """Position, velocity and acceleration at a time after the start [s], each of shape (n,)."""
-        position, velocity, acceleration = self._trajectory.at_time(min(time, self.duration))[:3]
+        position, velocity, acceleration = self._slowing.at_time(min(time, self.duration))[:3]
         return np.array(position), np.array(velocity), np.array(acceleration)
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
         """Evaluate `at` at k times, shape (k,) [s]; each result has shape (k, n)."""
-        duration, at_time = self.duration, self._trajectory.at_time
+        duration, at_time = self.duration, self._slowing.at_time
         states = [at_time(min(time, duration)) for time in times.tolist()]
         position, velocity, acceleration = (
             np.array([state[order] for state in states]) for order in range(3)
         )
         return position, velocity, acceleration
+
+    def next(self) -> Floats:
+        """Advance by one tick and return the sample."""
+        self._ticks += 1
+        return self._sample(self._ticks * self._period)
+
+    def _sample(self, time: float) -> Floats:
+        return self.at(time)[0]
+
+    @property
+    def finished(self) -> bool:
+        """Whether it has come to rest."""
+        return self._ticks * self._period >= self.duration
+
+
+class JointStop(Slowing):
+    """Shortest stop within limits of acceleration and jerk; every joint stops as soon as it can."""
+
+    def __init__(
+        self, q: Floats, qd: Floats, qdd: Floats, *, acceleration: float, jerk: float, period: float
+    ) -> None:
+        super().__init__((q.tolist(), qd.tolist(), qdd.tolist()), acceleration, jerk, period)
 
     @property
     def end(self) -> Floats:
@@ -57,19 +75,183 @@ class JointStop(Trajectory):
     @property
     def farthest(self) -> Floats:
         """Largest absolute position of each joint on the way, shape (n,) [rad]."""
-        return np.array([max(-bound.min, bound.max) for bound in self._trajectory.position_extrema])
-
-    def next(self) -> Floats:
-        """Advance by one tick and return the position."""
-        self._ticks += 1
-        return self.at(self._ticks * self._period)[0]
+        return np.array([max(-bound.min, bound.max) for bound in self._slowing.position_extrema])
 
     @property
     def velocity(self) -> Floats:
         """Velocity at the last reference, shape (n,) [rad/s]."""
         return self.at(self._ticks * self._period)[1]
 
+
+class PathStop(Slowing):
+    """Shortest stop along a path within limits of acceleration and jerk of its parameter.
+
+    Its samples are the parameter, so it stays on the path; on a straight line in joint space, all joints stay in
+    phase. No other motion on the same path, from the same state and within the same limits, that does not turn back
+    is slower at any moment or comes to rest sooner: the stop always has the lowest possible acceleration, until the
+    acceleration has to return to zero. A stop that brakes at least as hard as the motion would ever have done is
+    therefore never ahead of the motion.
+
+    It brakes from its first step with full jerk: the second difference b of the positions played last becomes b -
+    jerk·h, and the stop continues from the state of motion that central differences give with this step. If the
+    motion is so slow that the limits let it stand at once, it does.
+    """
+
+    path: Path
+
+    def __init__(
+        self,
+        path: Path,
+        x: Floats,  # newest sample, shape (m,) [rad]
+        step: Floats,  # from the sample before, along the path's direction, shape (m,) [rad]
+        xdd: Floats,  # second difference of the last three, likewise, shape (m,) [rad/s^2]
+        *,
+        acceleration: float,  # limit for the joints [rad/s^2]
+        braking: float,  # corresponding one for the parameter [rad/s^2]
+        jerk: float,  # limit for the parameter [rad/s^3]
+        period: float,  # tick [s]
+    ) -> None:
+        before = path.forwards(xdd)
+        most, present = jerk * period, max(path.forwards(step) / period, 0.0)
+        # The hardest braking from which the velocity can still reach zero without turning back.
+        turning = jerk * (0.5 * period - math.sqrt(0.25 * period**2 + 2.0 * present / jerk))
+        gentle = before > -braking
+        bend = max(before - most, -braking, turning) if gentle else min(before + most, -braking)
+        goes_on = -jerk if bend > -braking else 0.0
+        speed = present + 0.5 * period * bend - period * period * goes_on / 6.0
+        halt = -present / period  # the second difference if the next step is zero
+        if abs(halt - before) <= most and halt >= -braking:
+            speed = bend = 0.0
+        super().__init__(([0.0], [speed], [bend]), braking, jerk, period)
+        self.path, self._origin, self.acceleration = path, x, acceleration
+        self.braking = braking
+        """Acceleration limit for the parameter [rad/s^2]."""
+
+    def share(self, time: float) -> float:
+        """Distance that the parameter has covered at a time after the start [rad]."""
+        return float(self._slowing.at_time(min(time, self.duration))[0][0])
+
+    def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration of the joints at k times after the start, shape (k, n)."""
+        x, xd, xdd = (each * self.path.direction for each in super().states(times))
+        return self.path.states(self._origin + x, xd, xdd)
+
+    @property
+    def forecast(self) -> Forecast:
+        """Forecast of its motion, which brakes from the start."""
+        return Forecast(self.path, self._sample(self.duration), self.braking, self.jerk, 0.0)
+
+    @property
+    def end(self) -> Floats:
+        """Joint positions at which the stop ends, shape (n,) [rad]."""
+        return self.path.posture(self._sample(self.duration))
+
+    def _sample(self, time: float) -> Floats:
+        return self._origin + self.share(time) * self.path.direction
+
+
+class SlowedStop(Trajectory):
+    """A motion whose time passes ever more slowly until it stands.
+
+    Where the path has tight bends ahead, for which the motion slows down by itself, a stop that knows only the path's
+    curvature finds no limits that suit all of them. This one passes them as the motion would have, only later: it is
+    on the path, never ahead of the motion, and no faster.
+    """
+
+    path: Path
+
+    def __init__(
+        self,
+        path: Path,
+        ahead: Floats,  # parameter at the last two ticks and the coming ones, shape (k, m), k >= 4
+        *,
+        acceleration: float,  # that the slowing of time may cause at any joint [rad/s^2]
+        jerk: float,  # that it may cause [rad/s^3]
+        fastest: float,  # largest velocity of any joint now [rad/s]
+        period: float,  # tick [s]
+    ) -> None:
+        self.path, self.acceleration, self.jerk = path, acceleration, jerk
+        slowing = _slowing(([0.0], [1.0], [0.0]), acceleration / fastest, jerk / fastest)
+        self.duration = float(slowing.duration)
+        """Time from its start until rest [s]."""
+        self._period, self._ticks = period, 0
+        ticks = np.arange(int(np.ceil(self.duration / period)) + 1)
+        times = [float(slowing.at_time(min(tick * period, self.duration))[0][0]) for tick in ticks.tolist()]
+        self._samples = _between(ahead, np.array(times) / period)
+        """Its samples, of which the first is the newest one of the motion."""
+        joints = np.array([path.posture(x) for x in (ahead[0], *self._samples, self._samples[-1])])
+        self._states = (
+            joints[1:-1],
+            0.5 * (joints[2:] - joints[:-2]) / period,
+            np.diff(joints, 2, axis=0) / period**2,
+        )
+
+    @property
+    def hardest(self) -> float:
+        """Largest acceleration of any joint in it [rad/s^2]."""
+        return float(np.abs(self._states[2]).max())
+
+    def share(self, time: float) -> float:
+        """Distance that the parameter has covered at a time after the start."""
+        return self.path.forwards(self._samples[self._number(time)] - self._samples[0])
+
+    def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration of the joints at k times after the start, each of shape (k, n)."""
+        numbers = [self._number(time) for time in times.tolist()]
+        q, qd, qdd = (each[numbers] for each in self._states)
+        return q, qd, qdd
+
+    def next(self) -> Floats:
+        """Advance by one tick and return the parameter."""
+        self._ticks += 1
+        x: Floats = self._samples[min(self._ticks, len(self._samples) - 1)]
+        return x
+
     @property
     def finished(self) -> bool:
-        """Whether every joint is at rest."""
-        return self._ticks * self._period >= self.duration
+        """Whether it has come to rest."""
+        return self._ticks >= len(self._samples) - 1
+
+    @property
+    def forecast(self) -> Forecast:
+        """Forecast of its motion, which brakes from the start."""
+        along = self._samples[:, self.path.leading]
+        braking, jerk = (
+            float(np.abs(np.diff(along, order)).max(initial=0.0)) / self._period**order for order in (2, 3)
+        )
+        return Forecast(self.path, self._samples[-1], braking, jerk, 0.0)
+
+    @property
+    def end(self) -> Floats:
+        """Joint positions at which the stop ends, shape (n,) [rad]."""
+        end: Floats = self._states[0][-1]
+        return end
+
+    def _number(self, time: float) -> int:
+        return min(round(time / self._period), len(self._samples) - 1)
+
+
+def _between(ahead: Floats, ticks: Floats) -> Floats:
+    """Samples of a motion between its ticks, which count from the second: cubic splines through four of them."""
+    last = len(ahead) - 1
+    number = np.minimum(ticks.astype(int), last - 1) + 1
+    t = (ticks - (number - 1))[:, None]
+    before, start, end, then = (ahead[np.minimum(number + step, last)] for step in (-1, 0, 1, 2))
+    own, next_ = 0.5 * (end - before), 0.5 * (then - start)
+    change = end - start
+    found: Floats = start + t * (
+        own + t * (3.0 * change - 2.0 * own - next_ + t * (own + next_ - 2.0 * change))
+    )
+    return found
+
+
+def _slowing(start: Sequence[Sequence[float]], acceleration: float, jerk: float) -> ruckig.Trajectory:
+    request = ruckig.InputParameter(n := len(start[0]))
+    request.control_interface = ruckig.ControlInterface.Velocity
+    request.synchronization = ruckig.Synchronization.No
+    request.current_position, request.current_velocity, request.current_acceleration = start
+    request.target_velocity = request.target_acceleration = [0.0] * n
+    request.max_acceleration, request.max_jerk = [acceleration] * n, [jerk] * n
+    found = ruckig.Trajectory(n)
+    ruckig.Ruckig(n).calculate(request, found)
+    return found

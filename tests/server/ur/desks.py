@@ -5,7 +5,7 @@ import asyncio
 from tests.controller.robots import Robot
 
 from tvist_controller.host import Host
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Sink
 from tvist_protocol.codec import encode
 from tvist_server.ur_ports import UrPorts
 

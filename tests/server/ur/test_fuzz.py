@@ -13,7 +13,7 @@ import pytest
 from tests.controller.robots import UR5E, Robot
 
 from tvist_controller.host import Host
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Sink
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_protocol.codec import encode
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS

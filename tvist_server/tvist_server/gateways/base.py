@@ -4,8 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from typing import Protocol, get_args
 
-from tvist_controller.instruments.report import Report
-from tvist_controller.instruments.sink import Topic
+from tvist_controller.instruments.report import Report, Topic
 from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Reply

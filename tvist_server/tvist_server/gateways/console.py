@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from queue import SimpleQueue
 
-from tvist_controller.instruments.sink import Topic
+from tvist_controller.instruments.report import Topic
 from tvist_protocol.errors import harmless
 from tvist_protocol.stream import Event, EventKind
 from tvist_server.gateways.base import Gateway, Message

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from typing import TYPE_CHECKING
 
-from tvist_controller.instruments.sink import Topic
+from tvist_controller.instruments.report import Topic
 from tvist_protocol.stream import Event, State, Telemetry
 from tvist_server.gateways.base import Gateway, GatewayError, Message
 

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Final
 
-from tvist_controller.instruments.sink import Topic
-from tvist_controller.programs.socket_traffic import (
+from tvist_controller.instruments.report import Topic
+from tvist_controller.programs.sockets import (
     Close,
     Expire,
     Open,

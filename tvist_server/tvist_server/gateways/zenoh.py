@@ -12,8 +12,7 @@ from functools import partial
 import zenoh
 from zenoh.handlers import Callback
 
-from tvist_controller.instruments.report import Report
-from tvist_controller.instruments.sink import Topic
+from tvist_controller.instruments.report import Report, Topic
 from tvist_protocol import keys
 from tvist_protocol.codec import MAX_BYTES
 from tvist_protocol.replies import Refused, Reply

@@ -9,8 +9,7 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from tvist_controller.instruments.report import Report
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Report, Sink
 from tvist_plant.user_file import named
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io

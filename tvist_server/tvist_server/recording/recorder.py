@@ -14,8 +14,7 @@ from typing import Any, Self
 
 import msgspec
 
-from tvist_controller.instruments.report import Report
-from tvist_controller.instruments.sink import Sink
+from tvist_controller.instruments.report import Report, Sink
 from tvist_protocol.errors import TvistError
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.motion.task_frame import Feature
+from tvist_controller.motion.force_control import Feature
 from tvist_controller.programs.arguments import (
     Flag,
     Target,
@@ -122,7 +122,7 @@ class ForceFunctions(Family):
         sensor_cog: Place = NOWHERE,
     ) -> Turns:
         """Use the force sensor whose values clients write by RTDE; its mass is part of the payload to declare."""
-        if self._access.force.compliant is not None:
+        if self._access.guidance.compliant is not None:
             raise Fault(
                 "the force sensor stays the same in force mode and freedrive: call end_force_mode before"
             )

@@ -6,6 +6,7 @@ from typing import Annotated, Final
 import numpy as np
 
 from tvist_controller.line.differentiator import STILL, Floats
+from tvist_controller.programs.access import refusals_as_faults
 from tvist_controller.programs.arguments import (
     Bit,
     Joints,
@@ -21,8 +22,8 @@ from tvist_controller.programs.arguments import (
 from tvist_controller.programs.force_mode_moves import TURN, ForceModeMoves, approach
 from tvist_controller.programs.functions.family import Family, Parts
 from tvist_controller.programs.journey import Turns
-from tvist_controller.refusal import SLOWEST, RefusalError, check_joints
-from tvist_controller.trajectory import Guided, Speed
+from tvist_controller.refusal import SLOWEST, check_joints
+from tvist_controller.trajectory import Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, Segment
 from tvist_protocol.transitions import Activity
@@ -143,7 +144,7 @@ class MotionFunctions(Family):
     def _follow(self, segment: Segment) -> Turns:
         if self._arm.lost:
             yield from self._arm.regain()
-        moves = self._arm if self._access.force.compliant is None else self._led
+        moves = self._arm if self._access.guidance.compliant is None else self._led
         yield from moves.follow(segment)
 
     # ------------------------------------------------------------------ guided motions
@@ -255,24 +256,18 @@ class MotionFunctions(Family):
 
         def until_reached() -> Iterator[None]:
             yield
-            while isinstance(speed := self._guided, Speed) and speed.duration > 0.0:
+            while isinstance(speed := self._access.guidance.guided, Speed) and speed.duration > 0.0:
                 yield
 
         return until_reached
-
-    @property
-    def _guided(self) -> Guided | None:
-        return self._access.guidance.guided
 
     def _posture(self, name: str, value: object) -> tuple[float, ...]:
         """Joint positions within their range, from these or from a pose."""
         if is_pose(value):
             return self._kinematics.posture(pose(name, value), self._near)
         q = numbers(name, value, self._access.description.joints)
-        try:
+        with refusals_as_faults():
             check_joints(q, self._access.description, name)
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal
         return q
 
     def _pose(self, name: str, value: object) -> tuple[float, float, float, float, float, float]:

@@ -3,11 +3,10 @@
 from typing import Annotated
 
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.access import OWN_TOKEN
+from tvist_controller.programs.access import OWN_TOKEN, refusals_as_faults
 from tvist_controller.programs.arguments import Vector3, pose, several, within
 from tvist_controller.programs.functions.family import Family
 from tvist_controller.programs.journey import DELAY, Turns
-from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
 from tvist_plant.robot_checks import lacking_inertia
 from tvist_plant.robot_tables import Tensor
@@ -119,7 +118,5 @@ class SettingFunctions(Family):
         self._access.peripherals.payload_change = (before, ticks, now + ticks) if ticks else None
 
     def _send(self, command: SetTcp | SetPayload | ZeroFtsensor, plan: Plan | None = None) -> None:
-        try:
+        with refusals_as_faults():
             self._access.send(command, plan)
-        except RefusalError as refusal:
-            raise Fault(refusal.reply.why) from refusal

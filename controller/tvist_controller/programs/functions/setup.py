@@ -60,22 +60,21 @@ class SetupFunctions(Family):
 
     def __init__(self, on: Parts) -> None:
         super().__init__(on)
-        self._terminals = on.access.peripherals
         self._motion_version = 2
 
     # ------------------------------------------------------------------ tool
 
     def set_tool_analog_input_domain(self, port: Bit, domain: Annotated[bool, either]) -> None:
         """Make an analogue input of the tool a current (0) or a voltage (1)."""
-        self._arm.then(lambda: self._terminals.choose_tool_input(port, voltage=domain))
+        self._arm.then(lambda: self._peripherals.choose_tool_input(port, voltage=domain))
 
     def set_tool_output_mode(self, mode: Bit) -> None:
         """Use the digital outputs of the tool as such (0), or as a second supply (1)."""
-        self._arm.then(lambda: self._terminals.set_tool_output_mode(mode))
+        self._arm.then(lambda: self._peripherals.set_tool(tool_output_mode=mode))
 
     def set_tool_digital_output_mode(self, n: Bit, mode: Annotated[int, whole(1, 3)]) -> None:
         """Let a digital output of the tool sink (1), source (2), or both (3)."""
-        self._arm.then(lambda: self._terminals.set_tool_digital_output_mode(n, mode))
+        self._arm.then(lambda: self._peripherals.set_tool(**{f"tool_digital_output{n}_mode": mode}))
 
     def set_tool_communication(
         self,

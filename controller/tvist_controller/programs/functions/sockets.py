@@ -7,7 +7,7 @@ from struct import pack, unpack_from
 from typing import Annotated, Any, TypeVar
 
 from tvist_controller.programs.arguments import Flag, Number, Text, a_list, text, whole
-from tvist_controller.programs.functions.family import Family, Parts
+from tvist_controller.programs.functions.family import Family
 from tvist_controller.programs.sockets import Take
 from tvist_urscript import Value, costs, to_str
 from tvist_urscript.texts import DECIMAL
@@ -50,10 +50,6 @@ class SocketFunctions(Family):
 
     title = "Sockets"
 
-    def __init__(self, on: Parts) -> None:
-        super().__init__(on)
-        self._sockets = on.sockets
-
     @costs(20)
     def socket_open(
         self, address: Text, port: Annotated[int, whole(1, 65535)], socket_name: Name = _ONE
@@ -64,12 +60,12 @@ class SocketFunctions(Family):
         gripper of a cell at `127.0.0.1` port 63352.
         """
         yield from self._arm.finish()
-        return (yield from self._sockets.connect(socket_name, address, port))
+        return (yield from self._parts.sockets.connect(socket_name, address, port))
 
     @costs(5)
     def socket_close(self, socket_name: Name = _ONE) -> None:
         """Close a socket. Nothing happens if it is not open."""
-        self._arm.then(lambda: self._sockets.disconnect(socket_name))
+        self._arm.then(lambda: self._parts.sockets.disconnect(socket_name))
 
     @costs(10)
     def socket_read_binary_integer(
@@ -122,8 +118,10 @@ class SocketFunctions(Family):
     def socket_get_var(self, name: Text, socket_name: Name = _ONE) -> Generator[None, None, int]:
         r"""Send `GET name\n` and return the integer of the answer `name value\n`; 0 if none comes within 2 s."""
         yield from self._arm.finish()
-        self._sockets.send(socket_name, to_bytes(f"GET {name}\n"))
-        found = yield from self._sockets.read(socket_name, lambda got: _variable(got, name), ANSWER, _idle)
+        self._parts.sockets.send(socket_name, to_bytes(f"GET {name}\n"))
+        found = yield from self._parts.sockets.read(
+            socket_name, lambda got: _variable(got, name), ANSWER, _idle
+        )
         return found or 0
 
     @costs(10)
@@ -153,10 +151,10 @@ class SocketFunctions(Family):
 
     def _send(self, name: str, data: bytes) -> bool:
         def send() -> None:
-            self._sockets.send(name, data)
+            self._parts.sockets.send(name, data)
 
         self._arm.then(send)
-        return self._sockets.is_open(name)
+        return self._parts.sockets.is_open(name)
 
     def _read_list(
         self,
@@ -171,7 +169,7 @@ class SocketFunctions(Family):
         return a_list((0,) + (missing,) * count if found is None else (count, *found))
 
     def _read(self, name: str, take: Take[T], timeout: float) -> Generator[None, None, T | None]:
-        return self._sockets.read(name, take, timeout, self._go_on)
+        return self._parts.sockets.read(name, take, timeout, self._go_on)
 
     def _go_on(self, waited: int) -> Generator[None, None, None]:
         """Begin the moves that wait for a further one, if its data have not come by now; it may come under way."""

@@ -21,7 +21,7 @@ from tvist_controller.programs.arguments import (
     is_pose,
     numbers,
 )
-from tvist_controller.programs.functions.family import Family, Parts
+from tvist_controller.programs.functions.family import Family, Parts, reads
 from tvist_controller.programs.functions.settings import ToolPose
 from tvist_controller.refusal import RefusalError, check_joints
 from tvist_plant.plant import PERIOD
@@ -50,6 +50,27 @@ def _target(state: State) -> _Target:
     return _Target(state.unshaped_q, state.unshaped_qd, state.unshaped_qdd)
 
 
+def _positions(on: Parts) -> Array:
+    return a_list(on.access.latest().actual_q)
+
+
+def _pose(on: Parts, q: Sequence[float], tcp: Sequence[float] | None = None) -> Pose:
+    return a_pose(on.kinematics.tool_pose(np.array(q), tcp))
+
+
+def _speed(on: Parts, q: Sequence[float], qd: Sequence[float]) -> Array:
+    return a_list((on.kinematics.jacobian(np.array(q)) @ np.array(qd)).tolist())
+
+
+def _target_pose(on: Parts) -> Pose:
+    return _pose(on, _target(on.access.latest()).q)
+
+
+def _target_speed(on: Parts) -> Array:
+    target = _target(on.access.latest())
+    return _speed(on, target.q, target.qd)
+
+
 class StateFunctions(Family):
     """Reads the state of one robot."""
 
@@ -60,128 +81,108 @@ class StateFunctions(Family):
         self._instruments: Instruments | None = None
         """What computes RTDE's variables, made when the first is read."""
 
-    def get_steptime(self) -> float:
-        """Return the control period [s]."""
-        return PERIOD
-
-    def get_actual_joint_positions(self) -> Array:
-        """Return the measured joint positions [rad]."""
-        return a_list(self._access.latest().actual_q)
-
-    def get_joint_positions(self) -> Array:
-        """Return the measured joint positions: an older name [rad]."""
-        return self.get_actual_joint_positions()
-
-    def get_actual_joint_speeds(self) -> Array:
-        """Return the measured joint velocities [rad/s]."""
-        return a_list(self._access.latest().actual_qd)
-
-    def get_target_joint_positions(self) -> Array:
-        """Return the joint positions that the program asks for at present, before shaping [rad]."""
-        return a_list(_target(self._access.latest()).q)
-
-    def get_target_joint_speeds(self) -> Array:
-        """Return the joint velocities that the program asks for at present [rad/s]."""
-        return a_list(_target(self._access.latest()).qd)
-
-    def get_target_joint_accelerations(self) -> Array:
-        """Return the joint accelerations that the program asks for at present [rad/s^2]."""
-        return a_list(_target(self._access.latest()).qdd)
-
-    @costs(50)
-    def get_actual_tcp_pose(self) -> Pose:
-        """Return the pose of the tool by the measured joint positions."""
-        return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().actual_q)))
-
-    def get_actual_tcp_speed(self) -> Array:
-        """Return the velocity of the tool by the measured joint velocities [m/s, rad/s]."""
-        state = self._access.latest()
-        return self._speed(state.actual_q, state.actual_qd)
-
-    @costs(50)
-    def get_target_tcp_pose(self) -> Pose:
-        """Return the pose of the tool that the program asks for at present."""
-        return a_pose(self._kinematics.tool_pose(np.array(_target(self._access.latest()).q)))
-
-    @costs(50)
-    def get_target_tcp_speed(self) -> Array:
-        """Return the velocity of the tool that the program asks for at present [m/s, rad/s]."""
-        target = _target(self._access.latest())
-        return self._speed(target.q, target.qd)
-
-    @costs(50)
-    def tool_pose(self) -> Pose:
-        """Return `get_target_tcp_pose`: PolyScope's name for the feature Tool, where a program uses one."""
-        return self.get_target_tcp_pose()
-
-    @costs(50)
-    def get_target_tcp_pose_along_path(self) -> Pose:
-        """Return `get_target_tcp_pose`, since nothing offsets the path."""
-        return self.get_target_tcp_pose()
-
-    @costs(50)
-    def get_target_tcp_speed_along_path(self) -> Array:
-        """Return `get_target_tcp_speed`, since nothing offsets the path."""
-        return self.get_target_tcp_speed()
-
-    @costs(50)
-    def get_actual_tool_flange_pose(self) -> Pose:
-        """Return the pose of the flange by the measured joint positions."""
-        return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().actual_q), (0.0,) * 6))
+    get_steptime = reads("Return the control period [s].", lambda _: PERIOD)
+    get_actual_joint_positions = reads("Return the measured joint positions [rad].", _positions)
+    get_joint_positions = reads("Return the measured joint positions: an older name [rad].", _positions)
+    get_actual_joint_speeds = reads(
+        "Return the measured joint velocities [rad/s].", lambda on: a_list(on.access.latest().actual_qd)
+    )
+    get_target_joint_positions = reads(
+        "Return the joint positions that the program asks for at present, before shaping [rad].",
+        lambda on: a_list(_target(on.access.latest()).q),
+    )
+    get_target_joint_speeds = reads(
+        "Return the joint velocities that the program asks for at present [rad/s].",
+        lambda on: a_list(_target(on.access.latest()).qd),
+    )
+    get_target_joint_accelerations = reads(
+        "Return the joint accelerations that the program asks for at present [rad/s^2].",
+        lambda on: a_list(_target(on.access.latest()).qdd),
+    )
+    get_actual_tcp_pose = reads(
+        "Return the pose of the tool by the measured joint positions.",
+        lambda on: _pose(on, on.access.latest().actual_q),
+        50,
+    )
+    get_actual_tcp_speed = reads(
+        "Return the velocity of the tool by the measured joint velocities [m/s, rad/s].",
+        lambda on: _speed(on, on.access.latest().actual_q, on.access.latest().actual_qd),
+    )
+    get_target_tcp_pose = reads(
+        "Return the pose of the tool that the program asks for at present.", _target_pose, 50
+    )
+    get_target_tcp_speed = reads(
+        "Return the velocity of the tool that the program asks for at present [m/s, rad/s].",
+        _target_speed,
+        50,
+    )
+    tool_pose = reads(
+        "Return `get_target_tcp_pose`: PolyScope's name for the feature Tool, where a program uses one.",
+        _target_pose,
+        50,
+    )
+    get_target_tcp_pose_along_path = reads(
+        "Return `get_target_tcp_pose`, since nothing offsets the path.", _target_pose, 50
+    )
+    get_target_tcp_speed_along_path = reads(
+        "Return `get_target_tcp_speed`, since nothing offsets the path.", _target_speed, 50
+    )
+    get_actual_tool_flange_pose = reads(
+        "Return the pose of the flange by the measured joint positions.",
+        lambda on: _pose(on, on.access.latest().actual_q, (0.0,) * 6),
+        50,
+    )
 
     @costs(50)
     def get_target_waypoint(self) -> Pose:
         """Return the pose at the end of the present move; without one, the present target."""
         segment = self._arm.waypoint
         if segment is None or not self._access.motion.motions.running:
-            return self.get_target_tcp_pose()
+            return _target_pose(self._parts)
         if isinstance(segment, JointSegment):
-            return a_pose(self._kinematics.tool_pose(np.array(segment.q)))
+            return _pose(self._parts, segment.q)
         return a_pose(segment.pose)
 
-    def get_tcp_offset(self) -> Pose:
-        """Return the tool centre point in the flange frame."""
-        return a_pose(self._access.motion.tcp)
-
-    def get_target_payload(self) -> float:
-        """Return the mass of the declared payload [kg]."""
-        return self._access.declared().mass
-
-    def get_target_payload_cog(self) -> Array:
-        """Return the centre of mass of the declared payload [m]."""
-        return a_list(self._access.declared().com)
+    get_tcp_offset = reads(
+        "Return the tool centre point in the flange frame.", lambda on: a_pose(on.access.motion.tcp)
+    )
+    get_target_payload = reads(
+        "Return the mass of the declared payload [kg].", lambda on: on.access.declared().mass
+    )
+    get_target_payload_cog = reads(
+        "Return the centre of mass of the declared payload [m].", lambda on: a_list(on.access.declared().com)
+    )
 
     def get_target_payload_inertia(self) -> Array:
         """Return the inertia of the declared payload, Ixx Iyy Izz Ixy Ixz Iyz [kg m^2]."""
         xx, xy, xz, yy, yz, zz = self._access.declared().inertia
         return a_list((xx, yy, zz, xy, xz, yz))
 
-    @costs(80)
-    def get_joint_torques(self) -> Array:
-        """Return the external torques on the joints: without what the arm itself needs [N m]."""
-        return a_list(self._access.forces.torques())
-
-    @costs(80)
-    def get_tcp_force(self) -> Array:
-        """Return the external force and torque at the tool in the base frame [N, N m]."""
-        return a_list(self._access.forces.wrench())
-
-    @costs(80)
-    def force(self) -> float:
-        """Return the size of the external force at the tool [N]."""
-        return math.hypot(*self._access.forces.wrench()[:3])
-
-    def is_steady(self) -> bool:
-        """Return whether the target has been at rest for 500 ms."""
-        return self._access.motion.steady
-
-    def get_tool_current(self) -> float:
-        """Return the current of the tool's supply [A]: 0, since nothing draws any."""
-        return 0.0
-
-    def get_tool_accelerometer_reading(self) -> Array:
-        """Return what the accelerometer in the flange measures, gravity included [m/s^2]."""
-        return a_list(self._access.latest().actual_tool_accelerometer)
+    get_joint_torques = reads(
+        "Return the external torques on the joints: without what the arm itself needs [N m].",
+        lambda on: a_list(on.access.forces.torques()),
+        80,
+    )
+    get_tcp_force = reads(
+        "Return the external force and torque at the tool in the base frame [N, N m].",
+        lambda on: a_list(on.access.forces.wrench()),
+        80,
+    )
+    force = reads(
+        "Return the size of the external force at the tool [N].",
+        lambda on: math.hypot(*on.access.forces.wrench()[:3]),
+        80,
+    )
+    is_steady = reads(
+        "Return whether the target has been at rest for 500 ms.", lambda on: on.access.motion.steady
+    )
+    get_tool_current = reads(
+        "Return the current of the tool's supply [A]: 0, since nothing draws any.", lambda _: 0.0
+    )
+    get_tool_accelerometer_reading = reads(
+        "Return what the accelerometer in the flange measures, gravity included [m/s^2].",
+        lambda on: a_list(on.access.latest().actual_tool_accelerometer),
+    )
 
     @costs(300)
     def get_rtde_value(self, key: Text) -> Value:
@@ -203,9 +204,6 @@ class StateFunctions(Family):
         past = self._access.motion.past
         ago = integer("steps", steps, 0, max(len(past) - 1, 0))
         return a_list(past[-1 - ago].tolist() if past else self._access.latest().actual_q)
-
-    def _speed(self, q: list[float], qd: list[float]) -> Array:
-        return a_list((self._kinematics.jacobian(np.array(q)) @ np.array(qd)).tolist())
 
 
 class PoseFunctions(Family):

@@ -1,11 +1,12 @@
 """Functions for digital and analogue inputs and outputs, registers and flags."""
 
+from collections.abc import Callable
 from typing import Annotated
 
 from tvist_controller.instruments.peripherals import MAX_INTEGER, MIN_INTEGER
 from tvist_controller.programs.arguments import Bit, Flag, Number, Share, either, integer, shown, whole
-from tvist_controller.programs.functions.family import Family, Parts
-from tvist_protocol.io import BITS, NUMBERS
+from tvist_controller.programs.functions.family import Family, Parts, described
+from tvist_protocol.io import BITS, NUMBERS, Bank
 from tvist_urscript import Array, Fault, costs
 
 STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
@@ -31,6 +32,36 @@ NumberPlace = Annotated[int, whole(0, NUMBERS - 1)]
 FlagPlace = Annotated[int, whole(0, FLAGS - 1)]
 
 
+def _register(what: str, place: object, bank: Bank) -> Callable[[Family, int], bool | float]:
+    def get(self: Family, address: int) -> bool | float:
+        registers = self._peripherals
+        return registers.bit(bank, address) if bank.endswith("bit") else registers.doubles(bank)[address]
+
+    return described(get, what, address=place)
+
+
+def _input(what: str, place: object) -> Callable[[Family, int], bool]:
+    def get(self: Family, n: int) -> bool:
+        return bool(self._peripherals.digital_inputs >> n & 1)
+
+    return described(get, what, n=place)
+
+
+def _output(what: str, place: object) -> Callable[[Family, int], bool]:
+    def get(self: Family, n: int) -> bool:
+        return bool(self._peripherals.digital_outputs >> n & 1)
+
+    return described(get, what, n=place)
+
+
+def _sets(what: str, place: object) -> Callable[[Family, int, Flag], None]:
+    @costs(10)
+    def set_one(self: Family, n: int, b: Flag) -> None:
+        self._arm.then(lambda: self._peripherals.set_digital_outputs(1 << n, b << n))
+
+    return described(set_one, what, n=place)
+
+
 class RegisterFunctions(Family):
     """Reads and writes the registers of one robot."""
 
@@ -38,49 +69,41 @@ class RegisterFunctions(Family):
 
     def __init__(self, on: Parts) -> None:
         super().__init__(on)
-        self._registers = on.access.peripherals
         self._flags = [False] * FLAGS
 
-    def read_input_boolean_register(self, address: BitPlace) -> bool:
-        """Read an input bit, which clients write."""
-        return self._registers.bit("input_bit", address)
-
-    def read_input_integer_register(self, address: NumberPlace) -> int:
-        """Read an input integer, which clients write."""
-        return self._registers.integers("input_int")[address]
-
-    def read_input_float_register(self, address: NumberPlace) -> float:
-        """Read an input number, which clients write."""
-        return self._registers.doubles("input_double")[address]
-
-    def read_output_boolean_register(self, address: BitPlace) -> bool:
-        """Read an output bit, which programs write."""
-        return self._registers.bit("output_bit", address)
-
-    def read_output_integer_register(self, address: NumberPlace) -> int:
-        """Read an output integer, which programs write."""
-        return self._registers.integers("output_int")[address]
-
-    def read_output_float_register(self, address: NumberPlace) -> float:
-        """Read an output number, which programs write."""
-        return self._registers.doubles("output_double")[address]
+    read_input_boolean_register = _register("Read an input bit, which clients write.", BitPlace, "input_bit")
+    read_input_integer_register = _register(
+        "Read an input integer, which clients write.", NumberPlace, "input_int"
+    )
+    read_input_float_register = _register(
+        "Read an input number, which clients write.", NumberPlace, "input_double"
+    )
+    read_output_boolean_register = _register(
+        "Read an output bit, which programs write.", BitPlace, "output_bit"
+    )
+    read_output_integer_register = _register(
+        "Read an output integer, which programs write.", NumberPlace, "output_int"
+    )
+    read_output_float_register = _register(
+        "Read an output number, which programs write.", NumberPlace, "output_double"
+    )
 
     @costs(8)
     def write_output_boolean_register(self, address: BitPlace, value: Flag) -> None:
         """Write an output bit, which clients read."""
-        self._arm.then(lambda: self._registers.write("output_bit", address, value))
+        self._arm.then(lambda: self._peripherals.write("output_bit", address, value))
 
     @costs(8)
     def write_output_integer_register(
         self, address: NumberPlace, value: Annotated[int, whole(MIN_INTEGER, MAX_INTEGER)]
     ) -> None:
         """Write an output integer of 32 bits, which clients read."""
-        self._arm.then(lambda: self._registers.write("output_int", address, value))
+        self._arm.then(lambda: self._peripherals.write("output_int", address, value))
 
     @costs(8)
     def write_output_float_register(self, address: NumberPlace, value: Number) -> None:
         """Write an output number, which clients read."""
-        self._arm.then(lambda: self._registers.write("output_double", address, value))
+        self._arm.then(lambda: self._peripherals.write("output_double", address, value))
 
     def get_flag(self, n: FlagPlace) -> bool:
         """Return one of 32 flags, which only programs can read and set."""
@@ -101,95 +124,57 @@ class TerminalFunctions(Family):
 
     title = "Inputs and outputs"
 
-    def __init__(self, on: Parts) -> None:
-        super().__init__(on)
-        self._terminals = on.access.peripherals
-
     # ------------------------------------------------------------------ digital
 
-    @costs(10)
-    def set_digital_out(self, n: Old, b: Flag) -> None:
-        """Set a digital output: 0 to 7 standard, 8 and 9 those of the tool, as before configurable ones existed."""
-        self._set(n, b)
-
-    @costs(10)
-    def set_standard_digital_out(self, n: Standard, b: Flag) -> None:
-        """Set one of the eight standard digital outputs."""
-        self._set(n, b)
-
-    @costs(10)
-    def set_configurable_digital_out(self, n: Configurable, b: Flag) -> None:
-        """Set one of the eight configurable digital outputs."""
-        self._set(n, b)
-
-    @costs(10)
-    def set_tool_digital_out(self, n: Tool, b: Flag) -> None:
-        """Set one of the two digital outputs of the tool."""
-        self._set(n, b)
-
-    def get_digital_in(self, n: Old) -> bool:
-        """Return a digital input, numbered as in `set_digital_out`."""
-        return self._input(n)
-
-    def get_digital_out(self, n: Old) -> bool:
-        """Return a digital output, numbered as in `set_digital_out`."""
-        return self._output(n)
-
-    def get_standard_digital_in(self, n: Standard) -> bool:
-        """Return one of the eight standard digital inputs."""
-        return self._input(n)
-
-    def get_standard_digital_out(self, n: Standard) -> bool:
-        """Return one of the eight standard digital outputs."""
-        return self._output(n)
-
-    def get_configurable_digital_in(self, n: Configurable) -> bool:
-        """Return one of the eight configurable digital inputs."""
-        return self._input(n)
-
-    def get_configurable_digital_out(self, n: Configurable) -> bool:
-        """Return one of the eight configurable digital outputs."""
-        return self._output(n)
-
-    def get_tool_digital_in(self, n: Tool) -> bool:
-        """Return one of the two digital inputs of the tool."""
-        return self._input(n)
-
-    def get_tool_digital_out(self, n: Tool) -> bool:
-        """Return one of the two digital outputs of the tool."""
-        return self._output(n)
+    set_digital_out = _sets(
+        "Set a digital output: 0 to 7 standard, 8 and 9 those of the tool, as before configurable ones existed.",
+        Old,
+    )
+    set_standard_digital_out = _sets("Set one of the eight standard digital outputs.", Standard)
+    set_configurable_digital_out = _sets("Set one of the eight configurable digital outputs.", Configurable)
+    set_tool_digital_out = _sets("Set one of the two digital outputs of the tool.", Tool)
+    get_digital_in = _input("Return a digital input, numbered as in `set_digital_out`.", Old)
+    get_digital_out = _output("Return a digital output, numbered as in `set_digital_out`.", Old)
+    get_standard_digital_in = _input("Return one of the eight standard digital inputs.", Standard)
+    get_standard_digital_out = _output("Return one of the eight standard digital outputs.", Standard)
+    get_configurable_digital_in = _input("Return one of the eight configurable digital inputs.", Configurable)
+    get_configurable_digital_out = _output(
+        "Return one of the eight configurable digital outputs.", Configurable
+    )
+    get_tool_digital_in = _input("Return one of the two digital inputs of the tool.", Tool)
+    get_tool_digital_out = _output("Return one of the two digital outputs of the tool.", Tool)
 
     # ------------------------------------------------------------------ analogue, tool and run state
 
     @costs(10)
     def set_analog_out(self, n: Bit, f: Share) -> None:
         """Set an analogue output to a share of its range."""
-        self._arm.then(lambda: self._terminals.set_analog_output(n, f))
+        self._arm.then(lambda: self._peripherals.set_analog_output(n, f))
 
     set_standard_analog_out = set_analog_out
 
     def set_analog_outputdomain(self, port: Bit, domain: Voltage) -> None:
         """Make an analogue output a current (0) or a voltage (1)."""
-        self._arm.then(lambda: self._terminals.choose_output(port, voltage=domain))
+        self._arm.then(lambda: self._peripherals.choose(2 + port, voltage=domain))
 
     def set_analog_inputrange(self, port: AnalogPort, range: Annotated[int, whole(0, 2)]) -> None:
         """Make ports 0 and 1 a voltage by ranges 0 and 2; those of the tool, 2 and 3, by 0 and 1, or a current by 2."""
         if port > 1:
-            self._arm.then(lambda: self._terminals.choose_tool_input(port - 2, voltage=range < 2))
+            self._arm.then(lambda: self._peripherals.choose_tool_input(port - 2, voltage=range < 2))
         elif range == 1:
             raise Fault("range is 1: a range from -5 to 5 V exists no more, so it must be 0 or 2")
         else:
-            self._arm.then(lambda: self._terminals.choose_input(port, voltage=True))
+            self._arm.then(lambda: self._peripherals.choose(port, voltage=True))
 
     def set_standard_analog_input_domain(self, port: Bit, domain: Voltage) -> None:
         """Make an analogue input a current (0) or a voltage (1)."""
-        self._arm.then(lambda: self._terminals.choose_input(port, voltage=domain))
+        self._arm.then(lambda: self._peripherals.choose(port, voltage=domain))
 
     def set_tool_voltage(self, voltage: Annotated[int, whole(0, 24)]) -> None:
         """Set the supply of the tool: 0, 12 or 24 V."""
         if voltage not in {0, 12, 24}:
             raise Fault(f"voltage is {voltage}: it must be 0, 12 or 24")
-        self._arm.then(lambda: self._terminals.set_tool_voltage(voltage))
+        self._arm.then(lambda: self._peripherals.set_tool(tool_output_voltage=voltage))
 
     def set_runstate_outputs(self, outputs: object) -> None:
         """Accept that no output shows whether a program runs."""
@@ -204,23 +189,14 @@ class TerminalFunctions(Family):
 
     def get_standard_analog_in(self, n: Bit) -> float:
         """Return an analogue input of the control box [A or V]."""
-        return self._terminals.analog_inputs[n]
+        return self._peripherals.analog_inputs[n]
 
     def get_tool_analog_in(self, n: Bit) -> float:
         """Return an analogue input of the tool [V]."""
-        return self._terminals.tool_analog_inputs[n]
+        return self._peripherals.tool_analog_inputs[n]
 
     def get_analog_out(self, n: Bit) -> float:
         """Return an analogue output as a share of its range."""
-        return self._terminals.analog_shares[n]
+        return self._peripherals.analog_shares[n]
 
     get_standard_analog_out = get_analog_out
-
-    def _set(self, bit: int, on: bool) -> None:
-        self._arm.then(lambda: self._terminals.set_digital_outputs(1 << bit, on << bit))
-
-    def _input(self, bit: int) -> bool:
-        return bool(self._terminals.digital_inputs >> bit & 1)
-
-    def _output(self, bit: int) -> bool:
-        return bool(self._terminals.digital_outputs >> bit & 1)

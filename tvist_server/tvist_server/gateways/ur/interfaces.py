@@ -10,8 +10,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from weakref import WeakValueDictionary
 
-from tvist_controller.instruments.report import Report
-from tvist_controller.instruments.sink import Topic
+from tvist_controller.instruments.report import Report, Topic
 from tvist_controller.instruments.snapshot import Instruments, Snapshot
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
