@@ -51,6 +51,15 @@ def _paper(result: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def _stiction(result: dict[str, Any]) -> dict[str, Any]:
+    rows: dict[str, dict[str, str]] = {}
+    for one in result["summary"]:
+        less = one["reduction_percent"]
+        rows.setdefault(one["controller"], {})[one["shaper"]] = f"{less['median']:.1f} / {less['p5']:.1f}"
+    heading = ("known friction", *next(iter(rows.values())))
+    return {"table": markdown_table(heading, [(name, *cells.values()) for name, cells in rows.items()])}
+
+
 def _robustness(result: dict[str, Any]) -> dict[str, Any]:
     columns = robustness.columns(result["hidden"])
     tables = {
@@ -87,6 +96,12 @@ class Page:
 PAGES = {
     "paper": Page("docs/reference/paper.md", "tvist paper --runs 10 --seed 0", _paper),
     "robots": Page("docs/reference/robots.md", "tvist robots --measure --vary 50", _robots),
+    "stiction": Page(
+        "docs/reference/stiction.md",
+        "tvist study tools/tables/stiction.py",
+        _stiction,
+        "--output build/stiction",
+    ),
     "robustness": Page(
         "docs/reference/robustness.md",
         "tvist study robustness --against zv auto auto-target smoothing elastic elastic-16 elastic-auto "
