@@ -276,7 +276,7 @@ class TestDishonesty:
 class TestElastic:
     def test_the_drives_get_the_stage_with_its_tick_on_every_arm(self, ur5e, modal, task):
         class Bare(Named):
-            elastic = Stepping.elastic
+            driven = Stepping.driven
 
         def made(kind, *arms):
             case = Case(ur5e, task.move, arms=tuple(ARMS[place] for place in arms))
