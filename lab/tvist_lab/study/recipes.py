@@ -14,6 +14,7 @@ from tvist_controller.api.line import (
     choose_filter,
     elastic_feed_forward,
     keeping_motion,
+    known_friction,
     paper_payload,
     wanted_modes,
 )
@@ -140,18 +141,14 @@ class Recipe:
         except EstimatorError as error:
             raise RecipeError(f"shaper {self.shaper}: {error}") from error
 
-    def friction(self, description: RobotDescription) -> Floats | None:
-        """Return the friction that the drives are fed forward, see `ModeSource.friction`.
+    def friction(self, description: RobotDescription, tvist: Filter | None = None) -> Floats | None:
+        """Return the friction that the drives are fed forward with a filter or unshaped, see `known_friction`.
 
         Raises:
             RecipeError: The calibration has it for some joints only, or more than the drives have torque.
         """
         try:
-            return (
-                None
-                if self.calibration is None
-                else ModeSource("modal", description, self.calibration).friction
-            )
+            return known_friction(tvist, description, self.calibration)
         except EstimatorError as error:
             raise RecipeError(f"shaper {self.shaper}: {error}") from error
 
