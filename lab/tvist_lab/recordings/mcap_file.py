@@ -141,6 +141,7 @@ def read(path: str | os.PathLike[str]) -> RecordingFile:
     Raises:
         RecordingFileError: The file cannot be opened, is not an MCAP file, or contains no state or the states of
             several robots.
+        RecordingError: A folder or pattern names no recording, or several.
     """
     path = Path(path)
     content = _Content(path, files_of(path))

@@ -141,7 +141,8 @@ def files_of(path: Path) -> tuple[Path, ...]:
             return (path,)
     names = sorted({_run_of(file) for file in found})
     if len(names) != 1:
-        there = f"{len(names)} recordings, {', '.join(names)}: give one of them" if names else "no recording"
+        several = f"{len(names)} recordings, {', '.join(names)}: give one of them"
+        there = several if names else "no recording: no MCAP file is there"
         raise RecordingError(f"{path} names {there}")
     return tuple(sorted(found, key=lambda file: (len(file.name), file.name)))
 
