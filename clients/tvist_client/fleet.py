@@ -6,7 +6,7 @@ One session without a namespace sees the robots of all namespaces. Of each robot
 
 import asyncio
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from functools import partial
 
 import msgspec
@@ -21,7 +21,7 @@ from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
 from tvist_protocol import keys
-from tvist_protocol.codec import decode_info, decode_reply, decode_telemetry, encode
+from tvist_protocol.codec import decode, decode_reply, encode
 from tvist_protocol.commands import Stop
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Info
@@ -119,7 +119,7 @@ class Fleet(Across):
     async def look(self) -> list[FleetRobot]:
         """Ask every robot what it is and how it is; natural order."""
         places = sorted(self.places, key=_by_number)
-        answers = await asyncio.gather(*(self._ask(place, keys.info, None) for place in places))
+        answers = await asyncio.gather(*(self._ask(place, "info", None) for place in places))
         return [self._row(place, answer) for place, answer in zip(places, answers, strict=True)]
 
     async def stop(self, places: Collection[Place]) -> list[StopReport]:
@@ -129,7 +129,7 @@ class Fleet(Across):
             places: Robots, there or not.
         """
         wanted, data = sorted(places, key=_by_number), encode(Stop())
-        answers = await asyncio.gather(*(self._ask(place, keys.command, data) for place in wanted))
+        answers = await asyncio.gather(*(self._ask(place, "command", data) for place in wanted))
         return [_stopped(place, answer) for place, answer in zip(wanted, answers, strict=True)]
 
     # ------------------------------------------------------------------ what arrives, in Zenoh's threads
@@ -147,15 +147,13 @@ class Fleet(Across):
 
     def _hear(self, place: Place, data: bytes) -> None:
         try:
-            self._told[place] = (self._loop.time(), decode_telemetry(data))
+            self._told[place] = (self._loop.time(), decode(Telemetry, data))
         except ProtocolError:  # another version's; its silence is reported
             return
 
     # ------------------------------------------------------------------ one robot
 
-    async def _ask(
-        self, place: Place, leaf: Callable[[str], str], data: bytes | None
-    ) -> bytes | NotConnectedError:
+    async def _ask(self, place: Place, leaf: keys.Leaf, data: bytes | None) -> bytes | NotConnectedError:
         """Return a robot's answer, or why there is none: the others are not kept waiting by an error."""
         answer: asyncio.Future[bytes | NotConnectedError] = self._loop.create_future()
 
@@ -214,7 +212,7 @@ def _info(answer: bytes | NotConnectedError) -> tuple[Info | None, str]:
     if isinstance(answer, NotConnectedError):
         return None, str(answer)
     try:
-        return understood(decode_info, answer), ""
+        return understood(partial(decode, Info), answer), ""
     except ClientError as error:
         return None, str(error)
 

@@ -90,7 +90,7 @@ class Playback:
     Raises:
         RecordingError: The recording does not describe its robot.
         ProtocolError: The name is not allowed.
-        ExposureError: The robot would be reachable in an unintended way.
+        StartError: The robot would be reachable in an unintended way.
         GatewayError: The server cannot listen on an endpoint.
     """
 

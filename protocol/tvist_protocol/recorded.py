@@ -71,11 +71,11 @@ def topics(robot: str) -> dict[type[msgspec.Struct], str]:
         ProtocolError: The name is not allowed in a key.
     """
     return {
-        State: keys.state(robot),
-        Event: keys.event(robot),
-        Truth: keys.truth(robot),
-        Io: keys.io(robot),
-        Entry: keys.state(robot).removesuffix("state") + tag(Entry),
+        State: keys.key(robot, "state"),
+        Event: keys.key(robot, "event"),
+        Truth: keys.key(robot, "truth"),
+        Io: keys.key(robot, "io"),
+        Entry: f"{keys.PREFIX}/{robot}/{tag(Entry)}",
     }
 
 

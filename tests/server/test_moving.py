@@ -21,8 +21,9 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.foreign import called
 from tvist_plant.plant import PERIOD, Measurement, Sight
 from tvist_protocol import commands as c
-from tvist_protocol.codec import decode_state, encode
+from tvist_protocol.codec import decode, encode
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.stream import State
 from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.moving import registers as r
 from tvist_server.moving.commanded_robot import CommandedRobot
@@ -493,7 +494,7 @@ def test_what_is_wrong_in_rows_is_said_and_no_set_point_leaves_the_limits(monkey
     assert any(said in why for why in told)
     assert len(told) < 60
     assert all(why.isprintable() for why in told)
-    assert all(decode_state(encode(state)) for state in robot.states)  # which bounds each number
+    assert all(decode(State, encode(state)) for state in robot.states)  # which bounds each number
     sent = np.reshape(far.written, (-1, 4, 6))
     assert (np.abs(sent) <= UR5E.limits.position).all()
     assert 1e-4 < np.abs(np.diff(sent, axis=1)).max() <= 0.5 * PERIOD * (1 + 1e-9)

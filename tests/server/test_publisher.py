@@ -5,8 +5,8 @@ from copy import copy
 
 from tests.controller.robots import Robot
 
-from tvist_protocol.codec import decode_event, decode_state
-from tvist_protocol.stream import Event
+from tvist_protocol.codec import decode
+from tvist_protocol.stream import Event, State
 from tvist_server.courier import Courier
 from tvist_server.gateways.base import Gateway
 from tvist_server.publisher import MAX_WAITING, Publisher
@@ -50,8 +50,8 @@ def test_messages_and_answers_go_out_in_their_order():
     assert gateway.published == []
     made.hand_on()
     assert [topic for topic, _ in gateway.published] == ["event", "state", "reply"]
-    assert decode_event(gateway.published[0][1]).tick == 1
-    assert decode_state(gateway.published[1][1]) == STATE
+    assert decode(Event, gateway.published[0][1]).tick == 1
+    assert decode(State, gateway.published[1][1]) == STATE
 
 
 def test_in_real_time_states_without_room_are_dropped_and_counted_and_events_are_not():
@@ -134,7 +134,7 @@ def test_what_no_gateway_takes_is_neither_queued_nor_made():
     gateway.takes = {"event", "state"}
     made.report(report)
     made.hand_on()
-    assert decode_state(gateway.published[-1][1]) == STATE
+    assert decode(State, gateway.published[-1][1]) == STATE
 
 
 def test_a_courier_is_not_woken_when_nothing_waits():

@@ -4,6 +4,8 @@ import ipaddress
 import re
 from collections.abc import Sequence
 
+from tvist_server.option_values import StartError
+
 LOCALHOST = "localhost"
 _NAME = re.compile(r"(?!.*(^|\.)\d+$)[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 """Host names. The last part is no number, since the whole would be a mistyped address."""
@@ -17,13 +19,13 @@ class AllowedHosts:
         given: IP addresses, networks such as 192.168.1.0/24, and names.
 
     Raises:
-        ValueError: One is none of these.
+        StartError: One is none of these.
     """
 
     def __init__(self, given: Sequence[str]) -> None:
         for text in given:
             if _network(text) is None and not _NAME.fullmatch(text):
-                raise ValueError(
+                raise StartError(
                     f"ur_allow has {text!r}: must be an IP address, a network such as 192.168.1.0/24, or a name"
                 )
         self._names = set(given)

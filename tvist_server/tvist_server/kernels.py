@@ -33,7 +33,7 @@ from tvist_protocol.kinematics import ForwardKinematics
 from tvist_protocol.motions import MoveL
 from tvist_protocol.replies import Accepted, Refused, Reply, ToolPose
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
-from tvist_server.config_file import from_mapping
+from tvist_server.config import from_mapping
 from tvist_server.gateways.starting import Tell
 from tvist_server.punctual import processors
 

@@ -8,7 +8,8 @@ import msgspec
 
 from tvist_controller.dispatch.admission import Admitted
 from tvist_plant.user_file import LARGEST, UserFileError, read_bytes
-from tvist_protocol.codec import decode_info, encode
+from tvist_protocol.codec import decode, encode
+from tvist_protocol.info import Info
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad
 from tvist_protocol.replies import Refused
 from tvist_server.polyscope import PolyscopeError, script_of
@@ -85,7 +86,7 @@ class ProgramFolder:
 
     def listed(self, info: bytes) -> bytes:
         """Add the files to the programs in an encoded `info`."""
-        content = decode_info(info)
+        content = decode(Info, info)
         programs = sorted({*content.programs, *self.names()})
         return encode(msgspec.structs.replace(content, programs=programs))
 

@@ -60,7 +60,7 @@ class Server:
             hear meanwhile that the robots are starting.
 
     Raises:
-        ConfigError: The configuration is invalid.
+        StartError: The configuration is invalid.
         RecordingError: A recording cannot be written.
         GatewayError: The server cannot listen on an endpoint.
     """

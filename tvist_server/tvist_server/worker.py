@@ -13,13 +13,14 @@ from zenoh.handlers import Callback
 
 from tvist_plant.user_file import UserFileError
 from tvist_protocol import keys
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
 from tvist_server.ending import Ending, limit_shutdown
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.distant_metrics import DistantMetrics
 from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.starting import Starting
+from tvist_server.option_values import StartError
 from tvist_server.recording import RecorderError
 from tvist_server.server import Recording, Server
 from tvist_server.spread import Share
@@ -167,8 +168,8 @@ def work(config: ServeConfig, share: Share, first: First) -> None:
         return
     try:
         server = Server(config, share=share)
-    except (ConfigError, UserFileError, GatewayError, RecorderError) as error:
-        first.say(Refused(str(error), isinstance(error, ConfigError)))
+    except (StartError, UserFileError, GatewayError, RecorderError) as error:
+        first.say(Refused(str(error), isinstance(error, StartError)))
         return
     first.say(Made(server.ur))
     if not first.told():

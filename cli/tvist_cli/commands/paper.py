@@ -45,9 +45,9 @@ def paper(
     from tvist_lab.in_process import free_setup, robot_in_process
     from tvist_lab.studies.paper.experiment import count, experiment
     from tvist_lab.studies.paper.report import as_dict
-    from tvist_server.config import ConfigError
+    from tvist_server.option_values import StartError
 
-    with told(ConfigError, code=2):
+    with told(StartError, code=2):
         setup = free_setup(calibration=calibration, seed=seed)
     compile_if_new()
 

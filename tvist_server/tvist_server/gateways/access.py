@@ -182,7 +182,7 @@ def _operating(robots: Sequence[str]) -> list[dict[str, Any]]:
 
 def _at(namespace: str, robot: str) -> str:
     """Place of a robot: what its keys begin with."""
-    return keys.within(namespace, keys.state(robot).rpartition("/")[0])
+    return keys.within(namespace, f"{keys.PREFIX}/{keys.check_robot_name(robot)}")
 
 
 def _keys(places: Sequence[str], *leaves: str) -> list[str]:

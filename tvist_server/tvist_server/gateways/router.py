@@ -58,7 +58,7 @@ class Router:
         insecure: Whether other machines may connect without certificates.
 
     Raises:
-        ExposureError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
+        StartError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
         GatewayError: The router cannot listen on an endpoint.
     """
 

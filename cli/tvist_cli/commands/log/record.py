@@ -37,8 +37,8 @@ def record(
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     from tvist_client.robot import Robot
-    from tvist_server.durations import ticks_of
     from tvist_server.ending import Ending
+    from tvist_server.option_values import ticks_of
     from tvist_server.recording import RecorderError
     from tvist_server.recording.recorder import Recorder
 

@@ -6,6 +6,7 @@ from typing import get_args
 
 from tvist_protocol.io import Bank
 from tvist_server.gateways.ur.rtde.registers import NUMBERS, SINGLE_BITS, WORDS
+from tvist_server.option_values import StartError
 from tvist_server.rtde.wire import Wire
 
 DIGITAL: dict[str, tuple[int, int]] = {"standard": (0, 8), "configurable": (8, 8), "tool": (16, 2)}
@@ -61,10 +62,10 @@ def matching(patterns: Iterable[str]) -> list[str]:
     """Return the input variables that patterns name, in which `*`, `?` and `[0-9]` stand for others.
 
     Raises:
-        ValueError: A pattern names none.
+        StartError: A pattern names none.
     """
     found = {pattern: [name for name in INPUTS if fnmatchcase(name, pattern)] for pattern in patterns}
     if wrong := [pattern for pattern, names in found.items() if not names]:
         why = "must be the name of an RTDE input, such as speed_slider_mask or input_int_register_*"
-        raise ValueError(f"reserve_inputs has {wrong[0]!r}: {why}")
+        raise StartError(f"reserve_inputs has {wrong[0]!r}: {why}")
     return [name for names in found.values() for name in names]
