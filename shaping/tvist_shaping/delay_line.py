@@ -6,14 +6,11 @@ so a delay may change at every tick without a transient, and it reproduces cubic
 fractional delays is Laakso et al., 1996).
 """
 
-import copy
-from typing import Self
-
 import numpy as np
 import numpy.typing as npt
 
 from tvist_shaping._compiled import compiled
-from tvist_shaping._types import Floats
+from tvist_shaping._types import Floats, Forked
 from tvist_shaping.errors import DelayError, ShapingError
 
 _MARGIN = 3
@@ -74,7 +71,7 @@ def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats
     return -1
 
 
-class DelayLine:
+class DelayLine(Forked):
     """The latest samples of a reference, which can be read at any fractional delay.
 
     Attributes:
@@ -190,12 +187,6 @@ class DelayLine:
         self._bits = other._bits  # noqa: SLF001  one of its own kind
         self.still = other.still if other.still < other.capacity else max(other.still, self.capacity)
 
-    def fork(self) -> Self:
-        """Return an independent copy with the same samples."""
-        other = copy.copy(self)
-        other._part()  # noqa: SLF001  one of its own kind
-        return other
-
     def gather(self, A: Floats, delays: Floats, out: Floats) -> None:
         """Convolve the reference with impulses, eq. (10) of the paper.
 
@@ -218,7 +209,7 @@ class DelayLine:
         if refused >= 0:
             raise DelayError(float(delays[refused]), self.max_delay)
 
-    def _part(self) -> None:
+    def _unshare(self) -> None:
         self.ring, self.scratch = self.ring.copy(), np.empty_like(self.scratch)
 
     def _sample(self, q: npt.ArrayLike) -> Floats:

@@ -14,15 +14,13 @@ velocity limit, but it slows down by itself; its speed is then limited such that
 there is no room, s waits; when the reference is at rest, o and n agree and there is nothing left to fade.
 """
 
-import copy
 import math
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from tvist_shaping._compiled import compiled
-from tvist_shaping._types import Floats
+from tvist_shaping._types import Floats, Forked
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import FilterError
 
@@ -175,7 +173,7 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     return s, (s - share) / period, slope
 
 
-class Fade:
+class Fade(Forked):
     """Shapes like one filter at the beginning, like another at the end, and keeps a motion's limits in between.
 
     As long as the reference keeps limits of velocity, acceleration and jerk, the output keeps those of velocity and
@@ -230,14 +228,11 @@ class Fade:
         """Whether the last output was entirely the new filter's, as all later ones will be."""
         return self.share == 1.0
 
-    def fork(self) -> Self:
-        """Return an independent copy of the present state, with copies of both filters; see `Filter.fork`."""
-        other = copy.copy(self)
-        other.old, other.new = self.old.fork(), self.new.fork()
-        if self.new.estimator is self.old.estimator:  # both use its state
-            other.new.estimator = other.old.estimator
-        other._history = self._history.copy()  # noqa: SLF001  one of its own kind
-        return other
+    def _unshare(self) -> None:
+        shared = self.new.estimator is self.old.estimator  # both use its state
+        self.old, self.new, self._history = self.old.fork(), self.new.fork(), self._history.copy()
+        if shared:
+            self.new.estimator = self.old.estimator
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
         """Shape one sample.

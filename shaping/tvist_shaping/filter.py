@@ -258,6 +258,6 @@ class TvistFilter(Filter):
             out[i] = self.filter(samples[i])
         return out
 
-    def _part(self) -> None:
-        super()._part()
+    def _unshare(self) -> None:
+        super()._unshare()
         self._work, self._eased = self._work.copy(), self._eased.copy()

@@ -9,17 +9,16 @@ from typing import TypeAlias
 import numpy as np
 
 from tvist_shaping._types import Floats
-from tvist_shaping.aimed import AimedFilter, TargetDesign
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.catalogue import SHAPERS
+from tvist_shaping.designs import ConstantDesign, SmoothedDesign, TargetDesign, running_means
 from tvist_shaping.errors import DesignError, UnknownShaperError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.filter import TvistFilter
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.fir_shaper import FirShaper
 from tvist_shaping.shaper import Shaper
-from tvist_shaping.smoothing import SmoothedDesign, SmoothingFilter, running_means
-from tvist_shaping.steady import Design, ShortDesign, SteadyFilter
+from tvist_shaping.steady import AimedFilter, Design, ShortDesign, SteadyFilter
 
 AnyShaper: TypeAlias = Shaper | FirShaper
 """Types that a user's own shaper may have."""
@@ -201,7 +200,8 @@ class Registry:
         feed_forward, smoothing = self.feed_forward_of(name), _smoothing(name)
         if smoothing:
             weights = running_means(*means_of(smoothing[1]))
-            return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
+            design = ConstantDesign(name, weights, estimator.modes)
+            return SteadyFilter(design, estimator, joints=joints, feed_forward=feed_forward)
         if name in DESIGNS:
             kind = AimedFilter if name == AIMED else SteadyFilter
             slower = max(

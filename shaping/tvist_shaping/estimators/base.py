@@ -1,13 +1,11 @@
 """Base of all estimators, which provide a filter with the modes of the arm."""
 
-import copy
 from abc import ABC, abstractmethod
-from typing import Self
 
-from tvist_shaping._types import Floats
+from tvist_shaping._types import Floats, Forked
 
 
-class Estimator(ABC):
+class Estimator(Forked, ABC):
     """Damped frequency and damping ratio of each mode as functions of q, sec. 3.3 of the paper.
 
     Attributes:
@@ -62,16 +60,3 @@ class Estimator(ABC):
             Modes, see `estimate`.
         """
         return self.estimate(q)
-
-    def fork(self) -> Self:
-        """Return an independent copy of the present state: equal configurations give equal estimates.
-
-        Returns:
-            The copy. It shares constant data with the original; use both in the same thread.
-        """
-        other = copy.copy(self)
-        other._part()  # noqa: SLF001  one of its own kind
-        return other
-
-    def _part(self) -> None:  # noqa: B027  most estimators share only constant data
-        """Replace everything that is modified in place by copies, since a new copy still shares it."""

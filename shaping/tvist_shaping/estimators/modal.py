@@ -166,7 +166,7 @@ class Modal(Estimator):
         self._go_to(q)
         return self._poles.copy()
 
-    def _part(self) -> None:
+    def _unshare(self) -> None:
         self._poles, self._shapes = self._poles.copy(), self._shapes.copy()
         self._scratch, self._q = np.empty_like(self._scratch), self._q.copy()
 
