@@ -42,8 +42,8 @@ def translate(
     known = {**{name: entry[0] for name, entry in PURE.items()}, **signatures}
     errors: dict[tuple[int, int, str], ScriptError] = {}
 
-    def report(line: int, column: int, why: str) -> None:
-        errors.setdefault((line, column, why), ScriptError(line, column, why))
+    def report(at: tree.Node, why: str) -> None:
+        errors.setdefault((at.line, at.column, why), ScriptError(at.line, at.column, why))
 
     try:
         program = program_of(text) if after is None else _statements(text)

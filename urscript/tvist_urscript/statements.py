@@ -98,8 +98,7 @@ class Statements(Expressions):
         """Return the cost of the present statement, and report it as an error if it exceeds MOST_OPERATIONS."""
         if self.cost > MOST_OPERATIONS:
             self.report(
-                statement.line,
-                statement.column,
+                statement,
                 f"a statement of {self.cost} operations is too long: the limit is {MOST_OPERATIONS}",
             )
         return self.cost
@@ -181,7 +180,7 @@ class Statements(Expressions):
         at = Position.of(statement)
         self.loops += 1
         if self.loops > MOST_LOOPS:
-            self.report(statement.line, statement.column, f"more than {MOST_LOOPS} loops are nested here")
+            self.report(statement, f"more than {MOST_LOOPS} loops are nested here")
         body, _ = self.block(statement.body, 0)
         self.loops -= 1
         return ast.While(test, [*at.charge(cost, check=True), *body], [], **at.given)
@@ -220,9 +219,7 @@ class Statements(Expressions):
             case "break" | "continue":
                 if not self.loops:
                     self.report(
-                        statement.line,
-                        statement.column,
-                        syntax_error(statement.line, f"{statement.word} is outside of a loop"),
+                        statement, syntax_error(statement.line, f"{statement.word} is outside of a loop")
                     )
                 return [ast.Break(**at.given) if statement.word == "break" else ast.Continue(**at.given)]
             case "enter_critical":
@@ -237,9 +234,9 @@ class Statements(Expressions):
         if indices and len(plain) == len(indices) and self.built_in_array(statement.target):
             setter = BUILT_IN_ARRAYS[name][1]
             if not setter:
-                self.report(statement.line, statement.column, f"{name} cannot be assigned")
+                self.report(statement, f"{name} cannot be assigned")
                 return at.statement(at.constant(None))
-            return at.statement(self.call_built_in(at, setter, [*plain, statement.value]))
+            return at.statement(self.call_built_in(statement, setter, [*plain, statement.value]))
         value = self.value(statement.value)
         if indices:
             here = Position(*first(indices[0]))
