@@ -45,7 +45,8 @@ CHANNELS = (
     Channel("tvist/{robot}/truth", "put", "server", (Truth,), (),
         "values that a real robot cannot measure, 500 Hz; only with `serve --truth`"),
     Channel("tvist/{robot}/event", "put", "server", (Event,), (), "an event, with its tick"),
-    Channel("tvist/{robot}/telemetry", "put", "server", (Telemetry,), (), "timing and counters of the server, 1 Hz"),
+    Channel("tvist/{robot}/telemetry", "put", "server", (Telemetry,), (),
+        "timing and counters of the server, 1 Hz"),
     Channel("tvist/{robot}/io", "put", "server", (Io,), (),
         "inputs, outputs, registers and tool; sent before the state of a tick with a change, and at 1 Hz"),
     Channel("tvist/{robot}/command", "queryable", "client", COMMANDS, REPLIES,
@@ -58,7 +59,8 @@ CHANNELS = (
         "exists from when the robot is ready until its server ends"),
     Channel("tvist/{robot}/client/{client}", "liveliness", "client", (), (),
         "optional; if it exists when control is taken, the lease ends at once when it disappears. "
-        "`/<session>`, Zenoh's id of the client's session, may follow, to distinguish clients of the same name"),
+        "`/<session>`, Zenoh's id of the client's session, may follow, to distinguish "
+        "clients of the same name"),
 )  # fmt: skip
 
 

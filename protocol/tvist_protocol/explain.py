@@ -194,7 +194,7 @@ def _untyped(data: bytes, kind: Any) -> Any:
 
 
 def explain_unencodable(message: msgspec.Struct, error: Exception) -> ProtocolError:
-    """Return the error of a message that cannot be written as MessagePack; it names the field and its value."""
+    """Return the error of a message that cannot be written as MessagePack, with the field and its value."""
     where, value = next(_unencodable(message, "", _DEPTH), ("", message))
     kind = f"{type(value).__module__}.{type(value).__qualname__}".removeprefix("builtins.")
     match value:

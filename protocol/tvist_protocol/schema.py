@@ -22,7 +22,7 @@ def json_schema(message: type[msgspec.Struct]) -> dict[str, Any]:
 def components(
     messages: tuple[type[msgspec.Struct], ...], reference: str
 ) -> tuple[tuple[dict[str, Any], ...], dict[str, Any]]:
-    """Return references to messages, and the JSON Schemas of these and what they share, by the names of their types.
+    """Return references to messages, and the JSON Schemas of these and what they share, by name.
 
     The text of a reference has `{name}` in it.
     """

@@ -58,18 +58,7 @@ class Filter(Forked, ABC):
     fault: str | None
 
     def __init__(self, name: str, estimator: Estimator, joints: int, period: float, capacity: int) -> None:
-        """Initialize the common parts of all filters; a derived class then calls `reset`.
-
-        Args:
-            name: Name of the filter.
-            estimator: The estimator.
-            joints: Number of joints of the arm, >= 1.
-            period: Time between two samples h [s], > 0.
-            capacity: Number of samples to keep.
-
-        Raises:
-            FilterError: An argument is out of range.
-        """
+        """Initialize the common parts of all filters; a derived class then calls `reset`."""
         if joints < 1:
             raise FilterError("joints", joints, "at least 1")
         if not 0.0 < period < np.inf:
@@ -218,11 +207,7 @@ class Filter(Forked, ABC):
         self._line, self._q_star = DelayLine(width, self._line.capacity), np.zeros(width)
 
     def _check_made(self) -> None:
-        """Refuse a shaper that fails at once, since there are no weights yet to continue with.
-
-        Raises:
-            ShaperFailureError: The shaper fails.
-        """
+        """Refuse a shaper that fails at once, since there are no weights yet to continue with."""
         if self.fault is not None:
             raise ShaperFailureError(self.name, self.fault)
 

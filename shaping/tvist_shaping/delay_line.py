@@ -21,16 +21,8 @@ _MARGIN = 3
 def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats, out: Floats) -> int:
     """Compute a weighted sum of delayed samples; the formula is in `DelayLine.gather`.
 
-    Args:
-        buffer: Ring buffer of samples, shape (capacity, joints).
-        newest: Row of the newest sample; older ones precede it, modulo capacity.
-        A: Amplitudes [-], shape (N,).
-        delays: Delays [ticks], shape (N,).
-        first: Scratch, shape (joints,).
-        out: Result, shape (joints,).
-
-    Returns:
-        Index of the first delay that exceeds the buffer, or -1; `out` is written only in the latter case.
+    The buffer is a ring of samples, shape (capacity, joints), whose row `newest` is the newest one. `out` is
+    written only if -1 is returned, otherwise the index of the first delay that exceeds the buffer.
     """
     capacity, joints = buffer.shape
     for j in range(A.shape[0]):
@@ -149,12 +141,7 @@ class DelayLine(Forked):
         self._bits = bits
 
     def pushed(self, samples: Floats, head: int) -> None:
-        """Note samples that a kernel has appended already.
-
-        Args:
-            samples: The samples, shape (k, joints), k >= 1.
-            head: Row of the newest one.
-        """
+        """Note samples that a kernel has appended already."""
         rows = [sample.tobytes() for sample in samples[-self.capacity :]]
         equal = 0
         for bits in reversed(rows):

@@ -58,19 +58,13 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     period: float,
     lag: tuple[float, float],
 ) -> tuple[float, float, float]:
-    """Compute one tick of a fade.
+    """Compute one tick of a fade, and return its s, ṡ and s̈; s is 1 when the fade is complete.
 
-    Args:
-        old: The old filter's output at the last three ticks, the present one last [rad], shape (3, joints).
-        new: The new filter's output, in the same form.
-        out: The fade's output, in the same form; its last row is written.
-        progress: State of the previous tick: s [-], 0 to 1; ṡ [1/s], >= 0; requested rate of change of ṡ, s̈ [1/s²].
-        limits: Limits for every joint: velocity [rad/s], acceleration [rad/s²], and jerk of the motion [rad/s³].
-        period: Tick [s].
-        lag: Excess of the new filter's mean delay over the old one's [s], and its rate of change [-].
-
-    Returns:
-        s, ṡ and s̈ of this tick; s is 1 when the fade is complete.
+    `old` and `new` are the filters' outputs at the last three ticks, the present one last [rad], shape (3,
+    joints), and `out` the fade's, whose last row is written. `progress` is what the previous tick returned: s
+    [-], ṡ [1/s] and the requested rate of change of ṡ [1/s²]. `limits` are those of every joint: velocity
+    [rad/s], acceleration [rad/s²] and jerk of the motion [rad/s³]. `lag` is the excess of the new filter's
+    mean delay [s], and its rate of change [-].
     """
     share, rate, slope = progress
     velocity, acceleration, jerk = limits

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
+from functools import partial
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -47,29 +48,14 @@ def _brief(mean_delay: float, residual: float, third: float, name: str, slower: 
     return ShortDesign(mean_delay * slower, wanted=wanted, name=name)
 
 
-def _auto(slower: float) -> Design:
-    return _brief(0.030, 0.035, 0.06, "auto", slower)
-
-
-def _short(slower: float) -> Design:
-    return _brief(0.028, 0.05, 0.08, "short", slower)
-
-
-def _auto_target(slower: float) -> Design:
-    return TargetDesign(_brief(0.026, 0.035, 0.06, AIMED, slower), slower)
-
-
-def _elastic_auto(slower: float) -> Design:
-    return SmoothedDesign(_auto(slower), running_means(8, 8), ELASTIC_AUTO)
-
-
+_auto = partial(_brief, 0.030, 0.035, 0.06, "auto")
 AIMED, ELASTIC_AUTO = "auto-target", "elastic-auto"
 DESIGNS: Mapping[str, Callable[[float], Design]] = MappingProxyType(
     {
         "auto": _auto,
-        "short": _short,
-        AIMED: _auto_target,
-        ELASTIC_AUTO: _elastic_auto,
+        "short": partial(_brief, 0.028, 0.05, 0.08, "short"),
+        AIMED: lambda slower: TargetDesign(_brief(0.026, 0.035, 0.06, AIMED, slower), slower),
+        ELASTIC_AUTO: lambda slower: SmoothedDesign(_auto(slower), running_means(8, 8), ELASTIC_AUTO),
     }
 )
 """Designs with constant mean delay against an arm's four lowest modes: one with a smaller residual, one that is
@@ -222,11 +208,7 @@ def means_of(length: int) -> tuple[int, int]:
 
 
 def _smoothing(name: str) -> tuple[FeedForward, int] | None:
-    """Return feed-forward and length [ms] of a filter that only smooths; None for any other name.
-
-    Raises:
-        DesignError: Its name says a length that no such filter has.
-    """
+    """Return feed-forward and length [ms] of a filter that only smooths; None for any other name."""
     if name in SMOOTHED:
         return SMOOTHED[name], SMOOTHING
     found = _LENGTH.fullmatch(name)

@@ -55,7 +55,7 @@ def quotient(a: Number, b: Number) -> Number:
 
 
 def combine(of: Callable[[Any, Any], Value], a: Value, b: Value, done: str, work: Work) -> Value:
-    """Apply a function to numbers, to the elements of lists of equal length, or to those of a list and a number."""
+    """Apply a function to numbers, to the elements of lists of equal length, or of a list and a number."""
     if type(a) is Array and type(b) is Array:
         return _elementwise(of, a, b, done, work)
     if type(a) in NUMBERS:
@@ -88,7 +88,7 @@ def _elementwise(of: Callable[[Any, Any], Value], a: Array, b: Array, done: str,
 
 
 def multiply(a: Value, b: Value, work: Work) -> Value:
-    """Return a * b of numbers, a number and a list, lists of equal length by elements, matrices and vectors."""
+    """Return a * b of numbers, a number and a list, equally long lists by elements, matrices and vectors."""
     if type(a) in NUMBERS:
         if type(b) in NUMBERS:
             return _product(a, b)  # type: ignore[arg-type]

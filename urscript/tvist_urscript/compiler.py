@@ -77,11 +77,7 @@ def translate(
 
 
 def program_of(text: str) -> tree.Function:
-    """Return a script's tree: its `def` or `sec`, or its statements as one.
-
-    Raises:
-        ScriptError: The text is no program.
-    """
+    """Return a script's tree: its `def` or `sec`, or its statements as one."""
     statements = _parsed(text)
     head = statements[0]
     if not isinstance(head, tree.Function) or not (

@@ -228,9 +228,7 @@ class Expressions:
     def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
         """Put the arguments of a call into the order of the parameters; they are computed in the order of the text.
 
-        Args:
-            node: The call.
-            parameters: For each parameter its name, and the name of its default where it has one.
+        A parameter is its name, and the name of its default where it has one.
         """
         at = Position.of(node)
         given: dict[str, ast.expr] = {}

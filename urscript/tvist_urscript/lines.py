@@ -48,11 +48,7 @@ _AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL", "DOT"))
 
 
 class Lines:
-    """Turns the tokens of a text into those of the grammar, where each statement has one end.
-
-    Args:
-        several: Whether several statements may follow each other on a line.
-    """
+    """Turns the tokens of a text into those of the grammar, where each statement has one end."""
 
     always_accept = (END,)
 
@@ -60,11 +56,7 @@ class Lines:
         self._several = several
 
     def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
-        """Drop line breaks inside statements, and add the ends of statements that no line break marks.
-
-        Raises:
-            ScriptError: A name is too long, or brackets are nested too deep.
-        """
+        """Drop line breaks inside statements, and add the ends of statements that no line break marks."""
         brackets = 0
         last = END
         pending: Token | None = None

@@ -18,8 +18,8 @@ _NUMBERED = re.compile(r"[fc](\d+)_")
 class Namespace:
     """The functions, constants and variables of a program and of the statements that are added to it.
 
-    They are what scripts may call beside the functions of `PURE`, what takes the elements of a list from the budget,
-    and what compiled code calls of the machine that runs it.
+    They are what scripts may call beside the functions of `PURE`, what takes the elements of a list from the
+    budget, and what compiled code calls of the machine that runs it.
     """
 
     def __init__(

@@ -37,15 +37,10 @@ class Statements(Expressions):
         self.temporary = count()
 
     def block(self, body: list[tree.Statement], since: int, cost: int = 0) -> tuple[list[ast.stmt], int]:
-        """Translate statements.
+        """Translate statements; return them and the most evaluations since the budget was checked.
 
-        Args:
-            body: The statements.
-            since: Largest number of evaluations since the last check of the budget.
-            cost: Evaluations of the code before, such as the conditions of an `if`, that are still to be charged.
-
-        Returns:
-            The statements of Python, and `since` at their end.
+        Before them it is `since`; `cost` is that of the code before, such as conditions, which is still to be
+        charged.
         """
         result: list[ast.stmt] = []
         piece: list[ast.stmt] = []
@@ -104,17 +99,9 @@ class Statements(Expressions):
         return self.cost
 
     def branches(self, statement: tree.If, test: ast.expr, since: int) -> tuple[list[ast.stmt], int]:
-        """Translate the branches of an `if`.
+        """Translate the branches of an `if`, whose first condition is charged already; see `block`.
 
         Each branch charges the cost of the conditions that are evaluated before it.
-
-        Args:
-            statement: The `if`.
-            test: Its first condition, which is translated and charged already.
-            since: See `block`.
-
-        Returns:
-            The statements of Python, and the largest `since` at the end of any branch.
         """
         at = Position.of(statement)
         chains = [
@@ -149,18 +136,10 @@ class Statements(Expressions):
     def links(
         self, statement: tree.If, chain: list[Branch], test: ast.expr, since: int, cost: int
     ) -> tuple[list[Link], int, int, int]:
-        """Translate the branches of one chain, see LINK.
+        """Translate the branches of one chain, see LINK, whose first condition is charged already.
 
-        Args:
-            statement: The `if`.
-            chain: Condition and statements of each branch.
-            test: The first condition, which is translated and charged already.
-            since: See `block`.
-            cost: See `block`.
-
-        Returns:
-            Position, condition and statements of each branch; the cost to charge if none is taken; the largest `since`
-            at the end of any branch; and `since` if none is taken.
+        Return them, the cost to charge if none is taken, the largest `since` at the end of any, and that if
+        none is.
         """
         links: list[Link] = []
         latest = since

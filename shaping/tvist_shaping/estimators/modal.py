@@ -133,12 +133,6 @@ class Modal(Estimator):
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Estimate the modes at a configuration, each as the continuation of the last estimate's.
 
-        Args:
-            q: Joint angles [rad], shape (joints,).
-
-        Returns:
-            f_d [Hz] and ζ [-], each of shape (modes,), clamped to `f_d_min` and `zeta_max`.
-
         Raises:
             EstimatorError: q or the mass matrix has the wrong shape, or the arm has fewer vibrating modes at q.
         """
@@ -146,17 +140,7 @@ class Modal(Estimator):
         return self._describe()
 
     def settle(self, q: Floats) -> tuple[Floats, Floats]:
-        """Estimate the lowest modes at a configuration, regardless of the last estimate.
-
-        Args:
-            q: Joint angles, see `estimate`.
-
-        Returns:
-            Modes, see `estimate`.
-
-        Raises:
-            EstimatorError: See `estimate`.
-        """
+        """Estimate the lowest modes at a configuration, regardless of the last estimate; see `estimate`."""
         if self._lie(q) != RESTING or not self._lowest:
             self._take_lowest(q, self._mass_matrix(q))
         return self._describe()

@@ -49,20 +49,7 @@ def evaluate(
     ranges: Floats,
     modes: Floats,
 ) -> bool:
-    """Evaluate both polynomials at one configuration.
-
-    Args:
-        q: Joint angles [rad], shape (n,).
-        joints: Indices of the selected joints, shape (k,).
-        centre: Centre [rad], shape (k,).
-        multiples: `BasisFunctions.multiples`, shape (rows, k).
-        coefficients: Coefficients of f_d and ζ, shape (2, terms).
-        ranges: Range of f_d and range of ζ, shape (2, 2).
-        modes: Result: f_d [Hz] and ζ [-], shape (2, 1).
-
-    Returns:
-        Whether one of them was clamped to its range.
-    """
+    """Evaluate both polynomials at one configuration: f_d [Hz] and ζ [-]; return whether one was clamped."""
     f_d = coefficients[0, 0]
     zeta = coefficients[1, 0]
     term = 1
@@ -174,17 +161,7 @@ class Polynomial(Estimator):
         return float(self._ranges[1, 1])
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
-        """Evaluate both polynomials at a configuration.
-
-        Args:
-            q: Joint angles [rad], shape (n,), with n above the largest index used.
-
-        Returns:
-            f_d [Hz] and ζ [-], each of shape (1,).
-
-        Raises:
-            EstimatorError: q has too few joints.
-        """
+        """Evaluate both polynomials at a configuration; see `Estimator.estimate`."""
         if q.shape[0] < self._joints_needed:
             raise EstimatorError("q", q.shape, f"of at least {self._joints_needed} joints")
         modes = np.empty((2, 1))
