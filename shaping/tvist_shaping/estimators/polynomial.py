@@ -130,6 +130,7 @@ class Polynomial(Estimator):
             raise EstimatorError("f_d_range", f_d_range, f"within {F_D_RANGE[0]:g} to {F_D_RANGE[1]:g} Hz")
         if z_low < 0.0 or z_high >= 1.0:
             raise EstimatorError("zeta_range", zeta_range, "within 0 <= ζ < 1")
+        self.modes, self.f_d_min, self.zeta_max = 1, f_low, z_high
         self._ranges: Floats = np.array([[f_low, f_high], [z_low, z_high]])
         joints_used = np.array(self.basis.joints, dtype=np.int64)
         self.coefficients = Coefficients(
@@ -144,21 +145,6 @@ class Polynomial(Estimator):
             f"Polynomial(joints={self.basis.joints}, degree={self.basis.degree}, "
             f"{len(self.basis)} terms, f_d_range=({f_low}, {f_high}), zeta_range=({z_low}, {z_high}))"
         )
-
-    @property
-    def modes(self) -> int:
-        """Number of modes, which is 1."""
-        return 1
-
-    @property
-    def f_d_min(self) -> float:
-        """Lower end of f_d's range [Hz]."""
-        return float(self._ranges[0, 0])
-
-    @property
-    def zeta_max(self) -> float:
-        """Upper end of ζ's range [-]."""
-        return float(self._ranges[1, 1])
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Evaluate both polynomials at a configuration; see `Estimator.estimate`."""
