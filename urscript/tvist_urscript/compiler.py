@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from types import CodeType, MappingProxyType
 
 from tvist_urscript import tree
-from tvist_urscript.errors import ScriptError, syntax_error
+from tvist_urscript.errors import ScriptError, no_program, syntax_error
 from tvist_urscript.failures import FILE
 from tvist_urscript.functions import MOST_FUNCTIONS, Functions
 from tvist_urscript.names import outline, scopes
@@ -85,7 +85,7 @@ def program_of(text: str) -> tree.Function:
     ):
         return _together(text, statements)
     if head.kind == "thread":
-        raise ScriptError(head.line, head.column, syntax_error(head.line, "a thread belongs into a program"))
+        raise no_program(head, "a thread belongs into a program")
     if head.parameters:
         name, _ = head.parameters[0]
         raise ScriptError(name.line, name.column, f"the program {head.name} cannot have parameters")

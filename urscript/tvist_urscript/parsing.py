@@ -8,7 +8,7 @@ from lark.exceptions import VisitError
 
 from tvist_urscript import tree
 from tvist_urscript.building import Builder
-from tvist_urscript.errors import ScriptError, syntax_error
+from tvist_urscript.errors import ScriptError, no_program, syntax_error
 from tvist_urscript.lines import Lines
 
 GRAMMAR = r"""
@@ -135,13 +135,11 @@ def _unfit(text: str, error: UnexpectedInput) -> ScriptError:
     if isinstance(error, UnexpectedCharacters):
         character = text[error.pos_in_stream or 0]
         why = 'a text has no closing "' if character == '"' else f"unexpected character {character!r}"
-        return ScriptError(error.line, error.column, syntax_error(error.line, why))
+        return no_program(error, why)
     if isinstance(error, UnexpectedToken) and str(error.token):  # the end of the text is a token without any
         token: Token = error.token
         what = "end of the line" if str(token) == "\n" else f"'{_shortened(token)}'"
-        assert token.line is not None
-        assert token.column is not None
-        return ScriptError(token.line, token.column, syntax_error(token.line, f"unexpected {what}"))
+        return no_program(token, f"unexpected {what}")
     lines = text.split("\n")
     line, column = len(lines), len(lines[-1]) + 1
     return ScriptError(line, column, syntax_error(line, "the text ends before the program does"))
