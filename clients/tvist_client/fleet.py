@@ -5,7 +5,6 @@ One session without a namespace sees the robots of all namespaces. Of each robot
 """
 
 import asyncio
-import re
 from collections.abc import Collection
 from functools import partial
 
@@ -20,6 +19,7 @@ from tvist_client.readiness import RELIEVE, readiness
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
+from tvist_client.transports.zenoh import natural
 from tvist_protocol import keys
 from tvist_protocol.codec import decode, decode_reply, encode
 from tvist_protocol.commands import Stop
@@ -34,7 +34,6 @@ SETTLE_S = 0.3
 """Time for tokens to arrive after the session has opened [s]; over a slow network, `look` sees late ones, too."""
 LISTEN_S = 1.3
 """Time in which every robot in real time publishes its telemetry at least once [s]."""
-_DIGITS = re.compile(r"(\d+)")
 
 
 class FleetRobot(msgspec.Struct, frozen=True):
@@ -235,4 +234,4 @@ def _unlock(place: Place) -> str:
 
 
 def _by_number(place: Place) -> list[list[int | str]]:
-    return [[int(part) if part.isdigit() else part for part in _DIGITS.split(text)] for text in place]
+    return [natural(text) for text in place]

@@ -11,13 +11,13 @@ import msgspec
 
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.commands import Command, Setpoint
-from tvist_protocol.encodable import explain_unencodable
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import (
     EXPLAINED_BYTES,
     FAULTS,
     explain_bytes,
     explain_refusal,
+    explain_unencodable,
     explain_unknown_type,
 )
 from tvist_protocol.info import Info
@@ -58,11 +58,7 @@ class _Untyped(msgspec.Struct, tag_field="type", tag=""):
 
 
 class _Reader(Generic[_Some]):
-    """Decodes and validates the messages of one key.
-
-    Args:
-        types: Structs of the messages; their `type` tells them apart.
-    """
+    """Decodes and validates the messages of one key."""
 
     def __init__(self, *types: type[msgspec.Struct]) -> None:
         self.types: Mapping[str, type[msgspec.Struct]] = {str(t.__struct_config__.tag): t for t in types}
@@ -157,9 +153,6 @@ def _refuse_long_fault(data: bytes) -> None:
     """Refuse an invalid long calibration from its bytes.
 
     To explain an error of a whole message, its map would be built, which may take a hundred times as long.
-
-    Raises:
-        ProtocolError: The calibration is invalid.
     """
     decode_envelope(data)  # refuses bytes that are no MessagePack map
     try:

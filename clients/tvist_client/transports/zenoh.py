@@ -305,10 +305,11 @@ async def _robots(session: zenoh.Session) -> list[str]:
         keys.ANY_ALIVE, Callback(on_reply, partial(wake, loop, ended.set), indirect=False), timeout=INFO_S
     )
     await ended.wait()
-    return sorted(names, key=_by_number)
+    return sorted(names, key=natural)
 
 
-def _by_number(name: str) -> list[int | str]:
+def natural(name: str) -> list[int | str]:
+    """Return what names are sorted by: their numbers count as such."""
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 

@@ -55,26 +55,12 @@ class Mistaken(Estimator):
 
     def __init__(self, right: Estimator, error: float) -> None:
         self._right, self._factor = right, 1.0 + error
+        self.modes, self.f_d_min, self.zeta_max = right.modes, right.f_d_min * self._factor, right.zeta_max
 
     def __repr__(self) -> str:
         return f"{self._right!r} with frequencies times {self._factor:g}"
 
-    @property
-    def modes(self) -> int:
-        """Number of modes, equal to the other estimator's."""
-        return self._right.modes
-
-    @property
-    def f_d_min(self) -> float:
-        """Lowest frequency of the other estimator, with the error [Hz]."""
-        return self._right.f_d_min * self._factor
-
-    @property
-    def zeta_max(self) -> float:
-        """Highest damping ratio of the other estimator [-]."""
-        return self._right.zeta_max
-
-    def _part(self) -> None:
+    def _unshare(self) -> None:
         self._right = self._right.fork()
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
