@@ -268,14 +268,14 @@ class Served:
         def answer():
             answered = self.robot.request("", data)
             if answered is not None:
-                reply(answered)
+                reply(lambda: answered)
             else:
                 self._unanswered.append(reply)  # what nobody holds Zenoh ends
 
         self.post(answer)
 
     def info(self, reply):
-        self.post(lambda: reply(self.robot.info()))
+        self.post(lambda: reply(self.robot.info))
 
     def setpoint(self, data):
         self.post(lambda: self.robot.put_setpoint("", data))
