@@ -19,7 +19,7 @@ from tvist_controller.programs.arguments import (
     shown,
     within,
 )
-from tvist_controller.programs.force_mode_moves import TURN, ForceModeMoves, approach
+from tvist_controller.programs.force_mode_moves import ForceModeMoves
 from tvist_controller.programs.functions.family import Family, Parts
 from tvist_controller.programs.journey import Turns
 from tvist_controller.refusal import SLOWEST, check_joints
@@ -76,39 +76,42 @@ class MotionFunctions(Family):
         if v > self._velocity and t == 0.0:
             why = f"v of movej is {v:.4g} rad/s: the joints turn with at most {self._velocity:.4g}"
             self._access.emit("warning", code="limit_velocity", why=why)
-        segment = JointSegment(
-            q=posture,
-            velocity=_within(v, "velocity", self._velocity),
-            acceleration=_within(a, "acceleration", self._acceleration),
-            duration=t or None,
-            blend=r,
+        return self._follow(
+            JointSegment(
+                q=posture,
+                velocity=_within(v, "velocity", self._velocity),
+                acceleration=_within(a, "acceleration", self._acceleration),
+                duration=t or None,
+                blend=r,
+            )
         )
-        yield from self._follow(segment)
 
     @costs(60)
     def movel(
         self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, t: Duration = 0, r: Blend = 0
     ) -> Turns:
         """Move the tool on a straight line to a pose, or to the one at joint positions."""
-        segment = LineSegment(
-            pose=self._pose("pose", pose),
-            velocity=_within(v, "velocity"),
-            acceleration=_within(a, "acceleration"),
-            duration=t or None,
-            blend=r,
+        return self._follow(
+            LineSegment(
+                pose=self._pose("pose", pose),
+                velocity=_within(v, "velocity"),
+                acceleration=_within(a, "acceleration"),
+                duration=t or None,
+                blend=r,
+            )
         )
-        yield from self._follow(segment)
 
     @costs(60)
     def movep(self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, r: Blend = 0) -> Turns:
         """Move the tool on a straight line at a constant speed, also in the blend at its end."""
-        segment = ProcessSegment(
-            pose=self._pose("pose", pose),
-            velocity=_within(v, "velocity"),
-            acceleration=_within(a, "acceleration"),
-            blend=r,
+        return self._follow(
+            ProcessSegment(
+                pose=self._pose("pose", pose),
+                velocity=_within(v, "velocity"),
+                acceleration=_within(a, "acceleration"),
+                blend=r,
+            )
         )
-        yield from self._follow(segment)
 
     @costs(100)
     def movec(
@@ -121,25 +124,26 @@ class MotionFunctions(Family):
         mode: Bit = 0,
     ) -> Turns:
         """Move the tool on an arc through the position of one pose to another."""
-        segment = ArcSegment(
-            via=self._pose("pose_via", pose_via),
-            pose=self._pose("pose_to", pose_to),
-            orientation="tangent" if mode else "interpolated",
-            velocity=_within(v, "velocity"),
-            acceleration=_within(a, "acceleration"),
-            blend=r,
+        return self._follow(
+            ArcSegment(
+                via=self._pose("pose_via", pose_via),
+                pose=self._pose("pose_to", pose_to),
+                orientation="tangent" if mode else "interpolated",
+                velocity=_within(v, "velocity"),
+                acceleration=_within(a, "acceleration"),
+                blend=r,
+            )
         )
-        yield from self._follow(segment)
 
     @costs(180)
     def optimovej(self, goal: object, a: PartOfLargest = 0.3, v: PartOfLargest = 0.3, r: Blend = 0) -> Turns:
         """Move the joints with shares of the arm's largest acceleration and velocity."""
-        yield from self.movej(goal, a * self._acceleration, v * self._velocity, 0, r)
+        return self.movej(goal, a * self._acceleration, v * self._velocity, 0, r)
 
     @costs(60)
     def optimovel(self, goal: object, a: PartOfLargest = 0.3, v: PartOfLargest = 0.3, r: Blend = 0) -> Turns:
         """Move the tool on a line with shares of the largest acceleration and speed, which the joints limit further."""
-        yield from self.movel(goal, a * MAX_TOOL[1], v * MAX_TOOL[0], 0, r)
+        return self.movel(goal, a * MAX_TOOL[1], v * MAX_TOOL[0], 0, r)
 
     def _follow(self, segment: Segment) -> Turns:
         if self._arm.lost:
@@ -173,40 +177,22 @@ class MotionFunctions(Family):
     @costs(200)
     def servoc(self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, r: Blend = 0) -> Turns:
         """Move the tool towards a pose at a speed; the next call may replace the pose in motion."""
-        goal = self._pose("pose", pose)
-        acceleration, velocity = _within(a, "acceleration"), _within(v, "velocity")
-        radius = max(r, CLOSE)
-        guidance = self._access.guidance
-        angular = acceleration / TURN
-
-        def course() -> tuple[Floats, float]:
-            away = self._kinematics.difference(self._kinematics.tool_pose(self._reference), goal)
-            far = max(float(np.linalg.norm(away[:3])), TURN * float(np.linalg.norm(away[3:])))
-            return approach(away, far, velocity, acceleration), far
-
-        def start(shaped: bool) -> int:
-            return guidance.move_tool(course()[0], acceleration, angular, shaped=shaped)
-
-        def wait() -> Turns:
-            yield
-            while course()[1] > radius:
-                yield from self._arm.regain()
-                self._arm.steer(start)
-                yield
-
-        yield from self._arm.guide(start, wait)
+        goal = ProcessSegment(
+            pose=self._pose("pose", pose),
+            velocity=_within(v, "velocity"),
+            acceleration=_within(a, "acceleration"),
+        )
+        return self._led.lead(goal, goal.velocity, goal.acceleration, max(r, CLOSE))
 
     @costs(100)
     def speedj(self, qd: Joints, a: Positive = 1.4, t: Duration | None = None) -> Turns:
         """Approach velocities of the joints, and keep them; return after a time, or when they are reached."""
         most, wanted = self._access.description.limits.velocity, np.array(qd)
         wanted *= min(1.0, *(limit / max(abs(one), 1e-12) for one, limit in zip(wanted, most, strict=True)))
-        acceleration = _within(a, "acceleration", self._acceleration)
-
-        def start(shaped: bool) -> int:
-            return self._access.guidance.move_joints(wanted, acceleration, shaped=shaped)
-
-        yield from self._arm.guide(start, self._wait(t))
+        acceleration, guidance = _within(a, "acceleration", self._acceleration), self._access.guidance
+        return self._arm.guide(
+            lambda shaped: guidance.move_joints(wanted, acceleration, shaped=shaped), self._wait(t)
+        )
 
     @costs(120)
     def speedl(
@@ -217,26 +203,24 @@ class MotionFunctions(Family):
         aRot: AngularRate | None = None,
     ) -> Turns:
         """Approach a velocity of the tool in the base frame, and keep it; see `speedj`."""
-        twist, acceleration = np.array(xd), _within(a, "acceleration")
+        twist, acceleration, guidance = np.array(xd), _within(a, "acceleration"), self._access.guidance
         angular = acceleration if aRot is None else aRot
-
-        def start(shaped: bool) -> int:
-            return self._access.guidance.move_tool(twist, acceleration, angular, shaped=shaped)
-
-        yield from self._arm.guide(start, self._wait(t))
+        return self._arm.guide(
+            lambda shaped: guidance.move_tool(twist, acceleration, angular, shaped=shaped), self._wait(t)
+        )
 
     @costs(150)
     def stopj(self, a: Positive = 2) -> Turns:
         """Stop with a deceleration of the joints."""
         deceleration = _within(a, "acceleration", self._acceleration)
-        yield from self._arm.halt(lambda: self._access.guidance.stop_joints(deceleration))
+        return self._arm.halt(lambda: self._access.guidance.stop_joints(deceleration))
 
     @costs(150)
     def stopl(self, a: ToolRate = 1.2, aRot: AngularRate | None = None) -> Turns:
         """Stop with a deceleration of the tool."""
         deceleration = _within(a, "acceleration")
         angular = deceleration if aRot is None else aRot
-        yield from self._arm.halt(lambda: self._access.guidance.stop_tool(deceleration, angular))
+        return self._arm.halt(lambda: self._access.guidance.stop_tool(deceleration, angular))
 
     # ------------------------------------------------------------------ arguments
 
