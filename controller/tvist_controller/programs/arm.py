@@ -72,10 +72,8 @@ class ProgramArm:
         journey.add(segment)
         if journey.begun:
             self.waypoint = segment
-        if segment.blend == 0.0:
-            yield from self.finish()
-        elif journey.full:
-            yield from self._until(journey, lambda: not journey.full)
+        journey.closed = segment.blend == 0.0
+        yield from self._carry_out(journey)
 
     def begin(self) -> None:
         """Begin the moves of this thread that wait for a further one, which may still come under way."""
@@ -89,13 +87,15 @@ class ProgramArm:
         journey = self._present()
         if journey is not None:
             journey.closed = True
-            yield from self._until(journey, lambda: False)
+            yield from self._carry_out(journey)
 
-    def _until(self, journey: Journey, done: Callable[[], bool]) -> Turns:
-        """Carry out a journey until it is over or something is done."""
+    def _carry_out(self, journey: Journey) -> Turns:
+        """Carry out a journey until it is over, or takes a further move."""
+        if not (journey.closed or journey.full):
+            return
         with self._moving():
             self._begin(journey)
-            while not (journey.over or done() or self._led(journey)):
+            while not (journey.over or self._led(journey)) and (journey.closed or journey.full):
                 yield
         if self._led(journey):
             assert self.lead is not None, "who makes moves can lead them"
