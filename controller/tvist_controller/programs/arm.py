@@ -116,7 +116,8 @@ class ProgramArm:
         if journey is None or not journey.over:
             return journey
         del self._journeys[self._thread()]
-        journey.raise_fault()
+        if journey.fault is not None:
+            raise journey.fault
         return None
 
     def _begin(self, journey: Journey) -> None:
@@ -167,16 +168,15 @@ class ProgramArm:
         yield from self.finish()
         with self._moving():
             yield from self.regain()
-            while self.stopping or self._rate_limit.waits:
+            while self._stopping("speed_j") or self._rate_limit.waits:
                 yield
             self.steer(start)
             yield from wait()
 
-    @property
-    def stopping(self) -> bool:
-        """Whether a guided motion has to wait: for a stop under way, or in a protective stop of this tick."""
+    def _stopping(self, command: str) -> bool:
+        """Whether a motion as that of a command waits for a stop under way, or in a protective stop of this tick."""
         activity = self._motion.activity
-        return (activity.moving or activity.protective) and after(activity, "speed_j") is None
+        return (activity.moving or activity.protective) and after(activity, command) is None
 
     def regain(self) -> Turns:
         """Wait for the end of a stop, and for force mode if the program has lost it and a thread begins it again.
@@ -184,8 +184,8 @@ class ProgramArm:
         A `Fault` says that none does.
         """
         left = AGAIN
-        while self.stopping or (self.lost and left > 0):
-            left -= not (self.stopping or self._asked)
+        while (stopping := self._stopping("speed_j")) or (self.lost and left > 0):
+            left -= not (stopping or self._asked)
             yield
         if self.lost:
             raise Fault(LOST)
@@ -198,14 +198,10 @@ class ProgramArm:
     def give_way(self, start: Callable[[], int]) -> Turns:
         """Let the arm give way to forces, or change how; `start` begins that and returns its number."""
         yield from self.finish()
-        motion = self._motion
         self._asked += 1
         try:
-            while (
-                (motion.activity.moving or motion.activity.protective)
-                and after(motion.activity, "force_mode") is None
-            ) or self._rate_limit.waits:
-                if motion.activity is Activity.STREAMING:
+            while self._stopping("force_mode") or self._rate_limit.waits:
+                if self._motion.activity is Activity.STREAMING:
                     raise Fault(STREAMED)
                 yield
             self._own = True

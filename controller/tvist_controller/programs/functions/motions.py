@@ -228,11 +228,6 @@ class MotionFunctions(Family):
     def _reference(self) -> Floats:
         return self._access.guidance.reference
 
-    @property
-    def _here(self) -> list[float]:
-        found: list[float] = self._reference.tolist()
-        return found
-
     def _wait(self, t: float | None) -> Callable[[], Iterator[None]]:
         """How a call waits for a time, or if none is given until the velocity is reached."""
         if t:
@@ -265,12 +260,11 @@ class MotionFunctions(Family):
     @property
     def _near(self) -> Sequence[float]:
         """Posture from which the next move begins."""
+        here: list[float] = self._reference.tolist()
         end = self._arm.end
         if end is None:
-            return self._here
-        if isinstance(end, JointSegment):
-            return end.q
-        return self._kinematics.posture(end.pose, self._here)
+            return here
+        return end.q if isinstance(end, JointSegment) else self._kinematics.posture(end.pose, here)
 
 
 def _within(value: float, name: str, most: float = np.inf) -> float:
