@@ -50,7 +50,6 @@ class ProgramArm:
         """The one that is under way."""
         self._guided: int | None = None
         self._abandoned = False
-        self._own = False
         self._asked = 0
         """Number of threads that wait for the arm to give way."""
         self._gives: object | None = None
@@ -159,11 +158,11 @@ class ProgramArm:
 
     # ------------------------------------------------------------------ guided motions
 
-    def guide(self, start: Callable[[bool], int | None], wait: Callable[[], Iterator[None]]) -> Turns:
+    def guide(self, start: Callable[[bool], int | None], wait: Iterator[None]) -> Turns:
         """Begin or change a guided motion, which goes on when the call returns.
 
         `start` begins it, shaped or not, and returns its number, or None if there is nothing to move;
-        `wait` lets time pass until the call returns.
+        `wait` then lets time pass until the call returns.
         """
         yield from self.finish()
         with self._moving():
@@ -171,7 +170,7 @@ class ProgramArm:
             while self._stopping("speed_j") or self._rate_limit.waits:
                 yield
             self.steer(start)
-            yield from wait()
+            yield from wait
 
     def _stopping(self, command: str) -> bool:
         """Whether a motion as that of a command waits for a stop under way, or in a protective stop of this tick."""
@@ -204,11 +203,9 @@ class ProgramArm:
                 if self._motion.activity is Activity.STREAMING:
                     raise Fault(STREAMED)
                 yield
-            self._own = True
-            with refusals_as_faults():
-                self._guided = start()
+            self._replace(start)
         finally:
-            self._own, self._asked = False, self._asked - 1
+            self._asked -= 1
         self._gives = self._thread()[0]
 
     def hold_again(self, *, by_hand: bool) -> None:
@@ -226,13 +223,18 @@ class ProgramArm:
             motion.activity is Activity.REST
             or (motion.activity is Activity.GUIDED and motion.cycle.mode.shaped)
         )
-        self._journey, self._own = None, True
+        self._journey = None
+        self._replace(lambda: start(shaped))
+        self.driver = None if self._guided is None else self._thread()
+
+    def _replace(self, start: Callable[[], int | None]) -> None:
+        """Begin a guided motion in place of the present one, which `hear` then does not miss."""
+        guided, self._guided = self._guided, None
         try:
             with refusals_as_faults():
-                self._guided = start(shaped)
-            self.driver = None if self._guided is None else self._thread()
+                guided = start()
         finally:
-            self._own = False
+            self._guided = guided
 
     def in_motion(self, seconds: float) -> Iterator[None]:
         """Let a time pass that is the motion's own: it lasts longer at a lower speed [s]. At least a tick passes."""
@@ -270,19 +272,16 @@ class ProgramArm:
         guidance = self._access.guidance
         if self._motion.activity.moving:
             self._rate_limit.charge()
-        self._own = True  # so that `hear` does not take this stop for one that ends the program
-        try:
-            if wholly or guidance.compliant is None:
-                stop()
-            else:
-                guidance.stand(BRAKING)
-        finally:
-            self._own = self._abandoned = False
-            self.driver = None
-            if guidance.compliant is None:
-                self._guided = None
-            if self._journey is not None:
-                self._journey.number = None
+        guided, self._guided = self._guided, None  # so that `hear` does not miss it
+        self.driver, self._abandoned = None, False
+        if self._journey is not None:
+            self._journey.number = None
+        if wholly or guidance.compliant is None:
+            stop()
+        else:
+            guidance.stand(BRAKING)
+        if guidance.compliant is not None:
+            self._guided = guided
 
     # ------------------------------------------------------------------ threads and events
 
@@ -322,14 +321,17 @@ class ProgramArm:
         self._abandoned, self._rate_limit.planning = False, 0
 
     def hear(self, event: Event) -> bool:
-        """Handle an event of the robot; return whether it ended a motion of the program against its will."""
+        """Handle an event of the robot; return whether it ended a motion of the program against its will.
+
+        The numbers of motions that the program itself ends are forgotten before.
+        """
         journey = self._journey
         moving = None if journey is None else journey.number
         if event.kind == "protective_stop":
             self._guided = self.driver = None
             if journey is not None and moving is not None:
                 journey.stop()
-        if event.id is None or self._own or event.id not in {moving, self._guided}:
+        if event.id is None or event.id not in {moving, self._guided}:
             return False
         stopped = event.kind == "motion_stopped" and event.code != "plant_failure"
         if event.id == moving and journey is not None:

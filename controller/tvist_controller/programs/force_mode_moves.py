@@ -72,7 +72,7 @@ class ForceModeMoves:
                 self._arm.steer(start)
                 yield
 
-        return self._arm.guide(start, wait)
+        return self._arm.guide(start, wait())
 
     def _way(self, segment: Segment) -> tuple[Floats, float]:
         """Way to the end of a move, and its length, in joints or of the tool."""

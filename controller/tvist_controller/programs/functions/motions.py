@@ -1,6 +1,6 @@
 """Functions that move the arm."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Final
 
 import numpy as np
@@ -13,7 +13,6 @@ from tvist_controller.programs.arguments import (
     Positive,
     Vector6,
     above_zero,
-    is_pose,
     numbers,
     pose,
     shown,
@@ -27,7 +26,7 @@ from tvist_controller.trajectory import Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, Segment
 from tvist_protocol.transitions import Activity
-from tvist_urscript import Array, Fault, costs
+from tvist_urscript import Array, Fault, Pose, costs
 
 LONGEST: Final = 3600.0
 """Longest duration of a move [s]."""
@@ -172,7 +171,7 @@ class MotionFunctions(Family):
                 return None  # clients repeat where the arm is: no motion of a tick for each
             return self._access.guidance.servo(posture, lookahead_time, gain, shaped=shaped)
 
-        yield from self._arm.guide(start, lambda: iter([None] * max(round(t / PERIOD), 1)))
+        return self._arm.guide(start, iter([None] * max(round(t / PERIOD), 1)))
 
     @costs(200)
     def servoc(self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, r: Blend = 0) -> Turns:
@@ -228,21 +227,18 @@ class MotionFunctions(Family):
     def _reference(self) -> Floats:
         return self._access.guidance.reference
 
-    def _wait(self, t: float | None) -> Callable[[], Iterator[None]]:
-        """How a call waits for a time, or if none is given until the velocity is reached."""
+    def _wait(self, t: float | None) -> Iterator[None]:
+        """Wait for a time, or if none is given until the velocity is reached."""
         if t:
-            return lambda: self._arm.in_motion(t)
-
-        def until_reached() -> Iterator[None]:
+            yield from self._arm.in_motion(t)
+            return
+        yield
+        while isinstance(speed := self._access.guidance.guided, Speed) and speed.duration > 0.0:
             yield
-            while isinstance(speed := self._access.guidance.guided, Speed) and speed.duration > 0.0:
-                yield
-
-        return until_reached
 
     def _posture(self, name: str, value: object) -> tuple[float, ...]:
         """Joint positions within their range, from these or from a pose."""
-        if is_pose(value):
+        if isinstance(value, Pose):
             return self._kinematics.posture(pose(name, value), self._near)
         q = numbers(name, value, self._access.description.joints)
         with refusals_as_faults():
@@ -251,7 +247,7 @@ class MotionFunctions(Family):
 
     def _pose(self, name: str, value: object) -> tuple[float, float, float, float, float, float]:
         """A pose of the tool, from this or from joint positions."""
-        if is_pose(value):
+        if isinstance(value, Pose):
             return pose(name, value)
         if not isinstance(value, Array):
             raise Fault(f"{name} is {shown(value)}: it must be a pose or a list of joint positions")

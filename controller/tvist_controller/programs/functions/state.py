@@ -18,7 +18,6 @@ from tvist_controller.programs.arguments import (
     a_list,
     a_pose,
     integer,
-    is_pose,
     numbers,
 )
 from tvist_controller.programs.functions.family import Family, Parts, reads
@@ -250,7 +249,7 @@ class PoseFunctions(Family):
     @costs(200)
     def is_within_safety_limits(self, pose: object, qNear: Joints | None = None) -> bool:
         """Return whether the arm can be at a pose or at joint positions: within their range, without a collision."""
-        if is_pose(pose):
+        if isinstance(pose, Pose):
             q = self._solution(arguments.pose("pose", pose), self._near(qNear))
         else:
             q = numbers("pose", pose, self._access.description.joints)
