@@ -21,15 +21,6 @@ SETTLING = 4.0
 """Ticks in which the rest of the way is gone at the end."""
 
 
-def approach(away: Floats, far: float, velocity: float, acceleration: float) -> Floats:
-    """Velocity that lets a motion come to rest at a target; the way to it is `away`, its length `far`.
-
-    It is at most the velocity that is given, and decelerates with the acceleration that is.
-    """
-    speed = min(velocity, math.sqrt(2.0 * acceleration * far), far / (SETTLING * PERIOD))
-    return away * (speed / far) if far > 0.0 else away
-
-
 class ForceModeMoves:
     """Leads one robot."""
 
@@ -54,13 +45,14 @@ class ForceModeMoves:
     def lead(self, segment: Segment, velocity: float, most: float, near: float) -> Turns:
         """Lead the joints or the tool to the end of a move, until the rest of the way is no longer than `near`.
 
-        The tool accelerates with `most`.
+        The tool accelerates with `most`; both decelerate as the move does, so that they come to rest at its end.
         """
-        guidance = self._access.guidance
+        guidance, deceleration = self._access.guidance, segment.acceleration
 
         def start(shaped: bool) -> int:
             away, far = self._way(segment)
-            rates = approach(away, far, velocity, segment.acceleration)
+            speed = min(velocity, math.sqrt(2.0 * deceleration * far), far / (SETTLING * PERIOD))
+            rates = away * (speed / far) if far > 0.0 else away
             if isinstance(segment, JointSegment):
                 return guidance.move_joints(rates, guidance.limits.acceleration, shaped=shaped)
             return guidance.move_tool(rates, most, most / TURN, shaped=shaped)
