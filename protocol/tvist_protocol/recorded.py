@@ -12,6 +12,7 @@ in a list or a field stands for a number that is not finite, which JSON cannot e
 import math
 import re
 from collections.abc import Mapping
+from glob import escape
 from pathlib import PurePath
 from typing import Any, Generic, TypeVar, get_args
 
@@ -48,14 +49,14 @@ THIS_BEHAVIOUR = 7
 FROM_TICK = "from_tick"
 """Entry of that metadata in a segment after the first one of a recording: its first tick."""
 
-_SEGMENT = re.compile(r"(.+)-(\d+)-(\d+)(\.[^.]*)?", re.DOTALL)
+_SEGMENT = re.compile(r"(.+)-(\d+)-part(\d+)(\.[^.]*)?", re.DOTALL)
 
 _Some = TypeVar("_Some", bound=Recorded)
 _ENCODER = msgspec.json.Encoder()
 
 
 def segment_name(name: str, run: int, number: int | None) -> str:
-    """Return the name of a segment of a recording: `run-2-0001.mcap` for `run.mcap`.
+    """Return the name of a segment of a recording: `run-2-part0001.mcap` for `run.mcap`.
 
     Args:
         name: Name of the recording.
@@ -63,7 +64,9 @@ def segment_name(name: str, run: int, number: int | None) -> str:
         number: Number of the segment, from 1; None for a pattern that all of them match.
     """
     path = PurePath(name)
-    return f"{path.stem}-{run}-{'*' if number is None else f'{number:04}'}{path.suffix}"
+    if number is None:
+        return f"{escape(path.stem)}-{run}-part*{escape(path.suffix)}"
+    return f"{path.stem}-{run}-part{number:04}{path.suffix}"
 
 
 def segment_of(name: str) -> tuple[str, int, int] | None:

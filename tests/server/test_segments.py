@@ -96,7 +96,7 @@ def test_a_recording_holds_the_last_ticks_in_segments_of_a_quarter_of_them_each(
     recorder = record_all(path, ticks)
     last = (ticks - 1) // 25 + 1
     assert names(path.parent) == run_names(path, 1, range(max(last - 4, 1), last + 1))
-    assert recorder.place == path.with_name("run-1-*.mcap")
+    assert recorder.place == path.with_name("run-1-part*.mcap")
     for named in (recorder.place, path.parent, path):
         content = read(named)
         assert content.complete
@@ -180,11 +180,26 @@ def test_files_of_several_recordings_are_not_read_as_one(path):
         for reader in (read, read_log):
             with pytest.raises(
                 RecordingError,
-                match=r"names 3 recordings, run-1-\*\.mcap, run-2-\*\.mcap, run\.mcap: give one",
+                match=r"names 3 recordings, run-1-part\*\.mcap, run-2-part\*\.mcap, run\.mcap: give one",
             ):
                 reader(named)
     with pytest.raises(RecordingError, match=r"x-\*\.mcap names no recording"):
         read(path.with_name("x-*.mcap"))
+
+
+def test_a_recording_without_one_of_its_middle_segments_is_refused(path):
+    record(path, 100)
+    (path.parent / names(path.parent)[1]).unlink()
+    with pytest.raises(RecordingError, match="lacks segment"):
+        read(path)
+
+
+@pytest.mark.parametrize("name", ["run[1].mcap", "run*.mcap", "log.2026-11-29"])
+def test_any_name_of_a_recording_names_its_segments(path, name):
+    record(path.with_name(name), 30)
+    record(path.with_name(name), 30)
+    (place,) = {segment_name(name, 2, None)}
+    assert ticks_of(path.with_name(name)) == ticks_of(path.with_name(place))
 
 
 def record(path, ticks, killed=False):
@@ -224,7 +239,8 @@ def test_a_recording_of_an_earlier_run_stays_and_the_name_alone_is_that_of_the_l
 
 def test_the_five_newest_are_kept_and_files_of_other_names_stay(path):
     strange = [
-        path.with_name(name) for name in ("run.1.mcap", "run-1.mcap", "run-x-0001.mcap", "run-01-0001.mcap")
+        path.with_name(name)
+        for name in ("run.1.mcap", "run-1.mcap", "run-x-part0001.mcap", "run-01-part0001.mcap")
     ]
     for place in strange:
         place.write_bytes(b"mine")
@@ -336,10 +352,10 @@ def test_replay_says_that_the_beginning_is_forgotten(path):
 @pytest.mark.parametrize(
     ("name", "segment"),
     [
-        ("run.mcap", "run-2-0003.mcap"),
-        ("run", "run-2-0003"),
-        (".mcap", ".mcap-2-0003"),
-        ("a.b.c", "a.b-2-0003.c"),
+        ("run.mcap", "run-2-part0003.mcap"),
+        ("run", "run-2-part0003"),
+        (".mcap", ".mcap-2-part0003"),
+        ("a.b.c", "a.b-2-part0003.c"),
     ],
 )
 def test_the_name_of_a_segment_tells_recording_run_and_number(name, segment):

@@ -42,7 +42,7 @@ async def test_a_server_that_ends_leaves_complete_files_with_the_last_second(tmp
     assert content.complete
     assert ticks[0] == 751
     assert ticks[-1] >= TICKS
-    assert sorted(tmp_path.iterdir()) == [tmp_path / f"run-1-{number:04}.mcap" for number in range(7, 12)]
+    assert sorted(tmp_path.iterdir()) == [tmp_path / f"run-1-part{number:04}.mcap" for number in range(7, 12)]
 
 
 async def test_after_a_kill_what_was_written_is_readable_without_a_gap(tmp_path):

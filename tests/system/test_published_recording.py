@@ -46,7 +46,7 @@ def path(tmp_path):
         written.write(msgspec.structs.replace(STATE, tick=tick, timestamp=tick * 0.002, actual_q=q))
         written.write(msgspec.structs.replace(TRUTH, tick=tick, timestamp=tick * 0.002, motor_q=q))
     written.close()
-    return path.with_name("run-1-*.mcap")
+    return path.with_name("run-1-part*.mcap")
 
 
 @pytest.mark.realtime

@@ -156,8 +156,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     file of its own, FILE-NAME.mcap."""
     keep: str | None = None
     """Let the recording keep the last 90s, 10min or 2h, and at most a quarter more, and forget what was before [it
-    keeps all]. It then consists of complete files, FILE-1-0001.mcap, FILE-1-0002.mcap and so on, at the next start
-    FILE-2-0001.mcap and so on; those of the five latest runs before stay."""
+    keeps all]. It then consists of complete files, FILE-1-part0001.mcap, FILE-1-part0002.mcap and so on, at the next
+    start FILE-2-part0001.mcap and so on; those of the five latest runs before stay."""
     dump: str | None = None
     """Folder to save the last second before a failure of the simulated arm to [the system's temporary folder]."""
     truth: bool = False

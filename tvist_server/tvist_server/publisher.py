@@ -61,7 +61,13 @@ class Publisher(Sink):
     def _publish(self, message: Message) -> None:
         topic = TOPICS[type(message)]
         takers = [gateway for gateway in self._gateways if topic in gateway.takes]
-        data = encode(message) if takers else b""  # once for all gateways
+        if not takers:
+            return
+        try:
+            data = encode(message)  # once for all gateways
+        except Exception:
+            log.exception("a message of the topic %s is not published", topic)
+            return
         for gateway in takers:
             try:
                 gateway.publish(topic, message, data)

@@ -110,7 +110,9 @@ class Reception(Desk):
             admitted.command, TakeControl | HandOver | TakeClock
         ):
             client = admitted.command.client
-            admitted, answer = self._with_session(admitted, client), self._unless_gone(client, answer)
+            admitted = self._with_session(admitted, client)
+            if isinstance(admitted, Admitted):
+                answer = self._unless_gone(client, answer)
         if isinstance(admitted, Refused):
             with self._lock:
                 self.commands_refused += 1

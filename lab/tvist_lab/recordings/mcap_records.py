@@ -119,32 +119,38 @@ def files_of(path: Path) -> tuple[Path, ...]:
     """Return the files of the recording that a path names, in order.
 
     Args:
-        path: A file; a folder; a pattern, such as `run-2-*.mcap`; or, if there is no such file, the name of a recording
-            with segments, for those of its latest run.
+        path: A file; a folder; a pattern, such as `run-2-part*.mcap`; or, if there is no such file, the name of a
+            recording with segments, for those of its latest run.
 
     Raises:
-        RecordingError: These are files of several recordings, or none; the message names them.
+        RecordingError: These are files of several recordings, or none, or a segment between two is missing; the message
+            names them.
     """
     if path.is_dir():
         found = list(path.glob("*.mcap"))
     elif path.exists():
         return (path,)
-    elif any(char in path.name for char in WILD):
-        found = list(path.parent.glob(path.name))
     else:
         segments = [(segment_of(file.name), file) for file in path.parent.glob("*")]
         runs = {segment[1] for segment, _ in segments if segment is not None and segment[0] == path.name}
         found = [
             file for segment, file in segments if segment and segment[:2] == (path.name, max(runs, default=0))
         ]
-        if not found:
+        if not found and not any(char in path.name for char in WILD):
             return (path,)
+        found = found or list(path.parent.glob(path.name))
     names = sorted({_run_of(file) for file in found})
     if len(names) != 1:
         several = f"{len(names)} recordings, {', '.join(names)}: give one of them"
         there = several if names else "no recording: no MCAP file is there"
         raise RecordingError(f"{path} names {there}")
-    return tuple(sorted(found, key=lambda file: (len(file.name), file.name)))
+    files = tuple(sorted(found, key=lambda file: (len(file.name), file.name)))
+    numbers = [segment[2] for file in files if (segment := segment_of(file.name)) is not None]
+    if missing := sorted({*range(numbers[0], numbers[-1])} - {*numbers}) if numbers else []:
+        raise RecordingError(
+            f"{path} lacks segment {missing[0]} of {names[0]}: give the files before or behind it"
+        )
+    return files
 
 
 def _run_of(file: Path) -> str:

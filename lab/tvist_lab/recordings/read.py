@@ -23,7 +23,7 @@ def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs 
     UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
 
     Args:
-        path: The file; or a folder, or a pattern such as `run-2-*.mcap`, with the segments of one recording.
+        path: The file; or a folder, or a pattern such as `run-2-part*.mcap`, with the segments of one recording.
         columns: How a CSV, or a table of another program, names what is needed, as in `time=t:ms,q=joint_{}:deg`; see
             `named_columns.named`.
         needs: What a log must have.

@@ -198,7 +198,7 @@ def _publishers(
     priorities: dict[Topic, zenoh.Priority] = {
         "state": every_tick,
         "event": event,
-        "telemetry": zenoh.Priority.DATA,
+        "telemetry": zenoh.Priority.DATA_HIGH,  # in real time nothing has the priority of answers, see `REALTIME`
         "io": event,
     }
     if truth:

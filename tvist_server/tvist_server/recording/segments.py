@@ -1,8 +1,8 @@
 """Files of a recording: one that grows or, if only the last ticks are kept, segments of which the oldest are deleted.
 
-A recording `run.mcap` that keeps the last ticks is `run-1-0001.mcap`, `run-1-0002.mcap` and so on, that of the next run
-begins with `run-2-0001.mcap`. So a service that starts again and again with the same options needs nobody to clear the
-way. Each segment is a complete file, and none but the last loses anything when the process is killed.
+A recording `run.mcap` that keeps the last ticks is `run-1-part0001.mcap`, `run-1-part0002.mcap` and so on, that of the
+next run begins with `run-2-part0001.mcap`. So a service that starts again and again with the same options needs nobody
+to clear the way. Each segment is a complete file, and none but the last loses anything when the process is killed.
 """
 
 import os
@@ -165,7 +165,7 @@ def _new_run(path: Path) -> int:
     runs: dict[int, list[Path]] = {}
     for place in path.parent.iterdir():
         found = segment_of(place.name)
-        if found is not None and found[0] == path.name:
+        if found is not None and found[0] == path.name and place.is_file():
             runs.setdefault(found[1], []).append(place)
     kept = [run for run in sorted(runs) if not all(map(_is_empty, runs[run]))]
     for run in runs.keys() - kept[-MOST:]:
