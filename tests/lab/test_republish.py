@@ -110,7 +110,7 @@ def test_info_has_the_name_and_the_present_tick(path, network):
     asyncio.run(playback.run())
     answers = []
     network.desk.info(answers.append)
-    info = decode(Info, answers[0])
+    info = decode(Info, answers[0]())
     assert (info.name, info.tick, info.control, info.clock) == ("ghost", 6, None, "realtime")
     assert info.limits == INFO.limits
 

@@ -9,8 +9,8 @@ class Estimator(Forked, ABC):
     """Damped frequency and damping ratio of each mode as functions of q, sec. 3.3 of the paper.
 
     Attributes:
-        modes: Number of modes estimated, >= 1. f_d_min: Lower bound of every mode's damped frequency over
-        every q [Hz], > 0. It determines the longest possible
+        modes: Number of modes estimated, >= 1.
+        f_d_min: Lower bound of every mode's damped frequency over every q [Hz], > 0. It determines the longest possible
             delay.
         zeta_max: Upper bound of every mode's damping ratio over every q [-], < 1.
         clipped: Whether a mode of the last estimate was outside `f_d_min` or `zeta_max` and was clamped to it, so
