@@ -24,7 +24,8 @@ from tvist_controller.api.robot import Host, LoopbackHost
 from tvist_lab.in_process import free_setup
 from tvist_plant.plant import PERIOD
 from tvist_protocol import keys
-from tvist_protocol.codec import decode_state
+from tvist_protocol.codec import decode
+from tvist_protocol.stream import State
 from tvist_server.gateways.network import REALTIME, open_router
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
 from tvist_server.rtde.codec import PackageKind, PackageReader, package
@@ -67,7 +68,7 @@ def observers(endpoint: str, robot: str, count: str) -> None:
     sessions = [open_session(endpoint) for _ in range(int(count))]
 
     def read(sample: zenoh.Sample) -> None:
-        decode_state(sample.payload.to_bytes())
+        decode(State, sample.payload.to_bytes())
 
     for session in sessions:
         session.declare_subscriber(f"{keys.PREFIX}/{robot}/state", Callback(read, indirect=False))
@@ -158,7 +159,7 @@ def bare_tick(endpoint: str) -> None:
     The answer is the processor time of all threads for each tick [µs].
     """
     session = open_router([endpoint], [], REALTIME, None)
-    publisher = session.declare_publisher(keys.state(ROBOT))
+    publisher = session.declare_publisher(keys.key(ROBOT, "state"))
     robot, states = LoopbackHost(free_setup(truth=False, shaper="zv")), list[bytes]()
     robot.subscribe("state", states.append)()
     robot.subscribe("state", len)

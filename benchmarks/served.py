@@ -12,7 +12,7 @@ from tvist_lab.bench.one_robot import cpu_seconds, punctuality
 from tvist_lab.served import free_endpoint, free_port, served
 from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RobotMode
-from tvist_server.moving.registers import ALONE
+from tvist_server.moving.program import ALONE
 from tvist_server.ur_ports import UrPorts
 
 IN_PROCESS = "the line in process"

@@ -1,6 +1,7 @@
-"""`python -m tools.figures`: draws `elastic.png` and `mean_delay.png`, two figures of the documents.
+"""`python -m tools.figures`: draws `elastic.png`, `mean_delay.png` and `tails.png`, three figures of the documents.
 
-Both show a motion of a UR5e through several filters: elastic feed-forward, and a varying mean delay.
+Two show a motion of a UR5e through several filters: elastic feed-forward, and a varying mean delay. The third shows how
+both arms of the paper's experiment settle.
 """
 
 from pathlib import Path
@@ -22,8 +23,25 @@ from tvist_controller.api.line import (
 )
 from tvist_controller.api.robot import truth_of
 from tvist_lab.figures import FigureFiles
-from tvist_lab.figures.style import ALPHA, OF_ALPHA, OF_SHAPED, OF_THIRD, OF_UNSHAPED, dashed, legend, panels
+from tvist_lab.figures.style import (
+    ALPHA,
+    INK,
+    OF_ALPHA,
+    OF_SHAPED,
+    OF_THIRD,
+    OF_UNSHAPED,
+    dashed,
+    decades,
+    legend,
+    panels,
+    title,
+)
+from tvist_lab.in_process import free_setup
+from tvist_lab.metrics import motions
+from tvist_lab.metrics.settling import REPEATABILITY, distance
 from tvist_lab.recordings import Floats
+from tvist_lab.studies.paper.experiment import simulate
+from tvist_lab.studies.paper.published import ARMS, MOTIONS, published
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
 from tvist_shaping import BUILT_IN
@@ -142,9 +160,45 @@ def _shape(tvist: Filter, start: Floats, end: Floats) -> tuple[Floats, Floats]:
     return np.array(delays), np.array(references)
 
 
+def tails_figure() -> Figure:
+    """Both arms of the paper's experiment come to rest: E after the stop, unshaped above, shaped below.
+
+    A thick line lasts from t_enter to t_cycle in the paper's Table 2, a dotted one is at its overshoot.
+    """
+    figure, axes = panels(2, 4.8, columns=len(MOTIONS), share_y=True)
+    places = [(motion, kind) for kind in ("unshaped", "shaped") for motion in MOTIONS]
+    for name, style in zip(ARMS, (OF_SHAPED, OF_UNSHAPED), strict=True):
+        done = simulate(free_setup(robot=name), runs=1, seed=0)
+        for panel, key in zip(axes, places, strict=True):
+            recording = done.first[key]
+            motion = motions(recording)[0]
+            time = recording.time[motion.start : motion.end] - recording.time[motion.shaped_stop]
+            E = 1e3 * distance(recording, motion)
+            panel.plot(1e3 * time, np.maximum(E, 1e-4), color=style.color, linewidth=1.1, label=name)
+    paper, limit = published(), 1e3 * REPEATABILITY
+    for panel, (name, kind) in zip(axes, places, strict=True):
+        row = paper["table_2"][name][kind]
+        cycle = row["cycle_ms"] - row["delay_ms"] - 1e3 * paper["reference_duration_s"][name]
+        span, overshoot = (cycle - row["stabilisation_ms"], cycle), 1e3 * row["overshoot_m"]
+        title(panel, f"{name} {kind}")
+        dashed(panel, limit)
+        panel.plot(
+            span, [limit] * 2, "|-", color=INK, linewidth=2.6, markersize=9.0, label="Paper, outside 0.03 mm"
+        )
+        if overshoot > limit:
+            panel.plot(span, [overshoot] * 2, ":", color=INK, linewidth=1.2, label="Paper, overshoot")
+        panel.set(yscale="log", xlim=(-120.0, 1400.0), ylim=(1e-3, 3.0))
+        decades(panel, "y")
+    axes[0].set_ylabel("Distance $E$ (mm)")
+    axes[-2].set_xlabel("Time after the shaped stop (ms)")
+    legend(figure, axes[0])
+    return figure
+
+
 def main() -> None:
-    """Write both files."""
-    for name, figure in (("elastic", elastic_figure()), ("mean_delay", mean_delay_figure())):
+    """Write all files."""
+    drawn = {"elastic": elastic_figure(), "mean_delay": mean_delay_figure(), "tails": tails_figure()}
+    for name, figure in drawn.items():
         print(FigureFiles(IMAGES, "png").write(figure, name))
 
 

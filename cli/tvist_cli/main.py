@@ -48,7 +48,7 @@ GROUPS = {
     },
     "Studies": {
         "evaluate": "Compare the vibration of any moves unshaped and shaped.",
-        "shaperbench": "Rank shapers, your own included, on thirteen simulated arms.",
+        "shaperbench": "Rank shapers, your own included, on fifteen simulated arms.",
         "study": f"Run a study, one's own from a file or one of {', '.join(STUDY)}.",
     },
     "Make and manage": {

@@ -13,7 +13,8 @@ from tvist_cli.output import err, say
 from tvist_cli.scripts import named, placed
 from tvist_cli.serving import compile_if_new, introduction, say_recorded, say_who_can_reach
 from tvist_protocol.errors import harmless
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
 
 if TYPE_CHECKING:
     from tvist_lab.programs.baseline import Run
@@ -153,7 +154,7 @@ class Job:
         from tvist_server.recording import RecorderError
 
         errors: list[str] = []
-        with told(ConfigError, InputError, code=2):
+        with told(StartError, InputError, code=2):
             setup = config.setup()
             compile_if_new()
             with told(RecorderError):
@@ -179,7 +180,7 @@ class Job:
         from tvist_server.recording import RecorderError
 
         ending = Ending()
-        with told(ConfigError, InputError, code=2), told(GatewayError, RecorderError), ending.at_once():
+        with told(StartError, InputError, code=2), told(GatewayError, RecorderError), ending.at_once():
             served = ProgramServer(config, self.text, self.inputs, ending, self.timeout, compile_if_new)
         server = served.server
 

@@ -11,8 +11,8 @@ from msgspec.structs import FieldInfo, fields
 from tvist_cli.failure import Failure, told
 from tvist_cli.misuse import lower
 from tvist_protocol.schema import field_docs
-from tvist_server.config import ConfigError, ServeConfig
-from tvist_server.config_file import from_mapping, read_toml
+from tvist_server.config import ServeConfig, from_mapping
+from tvist_server.option_values import StartError, read_start_file
 
 Command = TypeVar("Command", bound=Callable[..., object])
 _BOXES = {
@@ -63,13 +63,13 @@ def configuration(given: Mapping[str, Any], file: str | None, **defaults: object
         UserFileError: The file has the wrong kind of content.
     """
     source = "configuration" if file is None else f"configuration {file}"
-    with told(ConfigError, code=2):
+    with told(StartError, code=2):
         return from_mapping(defaults | content_of(file) | dict(_plain(given)), source)
 
 
 def content_of(file: str | None) -> dict[str, object]:
     """Return the unchecked content of a configuration file; nothing if there is none."""
-    return {} if file is None else read_toml(file)
+    return {} if file is None else read_start_file(file, "configuration", dict[str, object])
 
 
 def _option(field: FieldInfo) -> inspect.Parameter:

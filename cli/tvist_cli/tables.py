@@ -24,34 +24,43 @@ METHOD_TERMS = {
 
 
 def print_paper(result: dict[str, Any]) -> None:
-    """Print the results of `tvist paper` and `tvist demo`."""
+    """Print the results of `tvist paper` and `tvist demo`: the tables of each arm, and the origins of its figures."""
+    from tvist_lab.studies.paper.origins import MEANINGS
+    from tvist_lab.studies.paper.tables import beside
+
+    arms = [result, *result.get("others", ())]
+    for one in arms:
+        _print_arm(one)
+    words({**TERMS, **METHOD_TERMS})
+    headings, *rows = beside(arms)
+    table("origin of each figure", headings, rows)
+    words(MEANINGS)
+    for note in dict.fromkeys(note for one in arms for note in one["notes"]):
+        out.print(note)
+
+
+def _print_arm(result: dict[str, Any]) -> None:
     from tvist_lab.studies.paper.published import published
     from tvist_lab.studies.paper.tables import methods, table_2
 
-    theirs = published()["configurations"]
+    theirs, robot = published()["configurations"], result["robot"]
     table(
-        "Table 1, lowest mode with 5 kg",
+        f"{robot}: Table 1, lowest mode with 5 kg",
         ("pose", "f_d Hz, paper", "identified", "true", "ζ, paper", "identified", "true"),
         [_mode(name, theirs[name], row) for name, row in result["table_1"].items()],
     )
     runs = "one run" if result["runs"] == 1 else f"mean of {result['runs']} runs"
     table(
-        f"Table 2, {runs} beside the paper's 10",
+        f"{robot}: Table 2, {runs} beside the paper's 10",
         ("motion", "delay ms", "stabil. ms", "cycle ms", "overshoot m", "RV m/s²"),
         [(f"{motion} {what}", *figures) for motion, what, *figures in table_2(result["table_2"], 3)],
     )
-    words(TERMS)
     for motion in result["baselines"]:
         table(
-            f"{motion}: every method from the start of the unshaped reference (← still first)",
+            f"{robot}, {motion}: every method from the start of the unshaped reference (← still first)",
             ("method", "delay ms", "RV m/s²", "peak m/s²", "less %", "still ms", "q̈/limit"),
             methods(result, motion, "{} ←"),
         )
-    words(METHOD_TERMS)
-    for note in result["notes"]:
-        out.print(note)
-    if result["notes"]:
-        out.print()
 
 
 def _mode(name: str, paper: dict[str, Any], row: dict[str, float]) -> tuple[str, ...]:

@@ -111,7 +111,7 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
     from tvist_controller.refusal import RefusalError
     from tvist_lab.compared import run_beside
     from tvist_plant.description import DescriptionError, load
-    from tvist_server.config import ConfigError
+    from tvist_server.option_values import StartError
     from tvist_view.beside import Run
     from tvist_view.described import pairs
     from tvist_view.look import Look
@@ -122,7 +122,7 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
         raise Failure(f"compare has {len(shapers)} shapers: give two or three", code=2)
     compile_if_new()
     tracks, runs = [], []
-    with told(DescriptionError, ConfigError, RefusalError, code=2), progress(len(shapers), "runs") as advance:
+    with told(DescriptionError, StartError, RefusalError, code=2), progress(len(shapers), "runs") as advance:
         poses = load(robot).poses
         named = pairs(list(poses))
         if not named:

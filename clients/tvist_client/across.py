@@ -2,7 +2,6 @@
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from functools import partial
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -16,7 +15,7 @@ from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
 from tvist_client.transports.session import close_session, open_session
 from tvist_protocol import keys
-from tvist_protocol.codec import decode_state
+from tvist_protocol.codec import decode
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.stream import State
 
@@ -31,9 +30,9 @@ class Place(NamedTuple):
         """Namespace and name as one path, `hall-3/ur5e-1`."""
         return keys.within(self.namespace, self.robot)
 
-    def key(self, leaf: Callable[[str], str]) -> str:
-        """Key of the robot, such as its `keys.command`."""
-        return keys.within(self.namespace, leaf(self.robot))
+    def key(self, leaf: keys.Leaf) -> str:
+        """Key of the robot that ends in `leaf`."""
+        return keys.within(self.namespace, keys.key(self.robot, leaf))
 
 
 def place_of(text: str) -> Place:
@@ -98,15 +97,14 @@ class ManyStates(Across):
     def __init__(
         self, selector: str, endpoint: str = ENDPOINT, *, security: Folder | None = None, namespace: str = ""
     ) -> None:
-        leaf = f"/{keys.state('r').rpartition('/')[2]}"
-        if not selector.endswith(leaf):
+        if not selector.endswith("/state"):
             raise MisuseError(
-                f"{selector} is not a key of states: it must end in {leaf}, such as tvist/*{leaf}"
+                f"{selector} is not a key of states: it must end in /state, such as tvist/*/state"
             )
         try:
             zenoh.KeyExpr(selector)
         except zenoh.ZError as error:
-            raise MisuseError(f"{selector} is not a key: write tvist/*{leaf}, or tvist/NAME{leaf}") from error
+            raise MisuseError(f"{selector} is not a key: write tvist/*/state, or tvist/NAME/state") from error
         super().__init__(endpoint, security=security, namespace=namespace)
         self._key = keys.within(self._within, selector)
         self._newest: dict[Place, tuple[bytes, int, float]] = {}
@@ -119,7 +117,7 @@ class ManyStates(Across):
         found: dict[Place, Newest] = {}
         for place, (data, received, at) in sorted(self._newest.items()):
             try:
-                found[place] = Newest(decode_state(data), received, at)
+                found[place] = Newest(decode(State, data), received, at)
             except ProtocolError:  # another version's
                 continue
             self._newest[place] = (data, 0, at)

@@ -1,6 +1,7 @@
 """A robot as every client sees it: its description, its messages, its time."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TypeVar
 
 from tvist_client.command import Answer, Leased
@@ -10,16 +11,7 @@ from tvist_client.feed import Feed, Stream
 from tvist_client.motion import Motion, MotionsByNumber
 from tvist_client.transports.base import Transport
 from tvist_client.values import whole
-from tvist_protocol.codec import (
-    decode_event,
-    decode_info,
-    decode_io,
-    decode_reply,
-    decode_state,
-    decode_telemetry,
-    decode_truth,
-    encode,
-)
+from tvist_protocol.codec import decode, decode_reply, encode
 from tvist_protocol.commands import Command, Stop
 from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.info import Clock, Info
@@ -52,11 +44,11 @@ class Connection(Questions):
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
         self._clock: Clock | None = None
-        self._states: Feed[State] = Feed(transport, "state", decode_state, once_a_tick=True)
-        self._events: Feed[Event] = Feed(transport, "event", decode_event, once_a_tick=False)
-        self._truths: Feed[Truth] = Feed(transport, "truth", decode_truth, once_a_tick=True)
-        self._telemetries: Feed[Telemetry] = Feed(transport, "telemetry", decode_telemetry, once_a_tick=False)
-        self._ios: Feed[Io] = Feed(transport, "io", decode_io, once_a_tick=False)
+        self._states: Feed[State] = Feed(transport, "state", State, once_a_tick=True)
+        self._events: Feed[Event] = Feed(transport, "event", Event, once_a_tick=False)
+        self._truths: Feed[Truth] = Feed(transport, "truth", Truth, once_a_tick=True)
+        self._telemetries: Feed[Telemetry] = Feed(transport, "telemetry", Telemetry, once_a_tick=False)
+        self._ios: Feed[Io] = Feed(transport, "io", Io, once_a_tick=False)
         self._feeds = (self._states, self._events, self._truths, self._telemetries, self._ios)
         self.arm: Leased | None = None
         """The arm, while this client has control."""
@@ -121,7 +113,7 @@ class Connection(Questions):
         """
         data = await self._transport.info()
         try:
-            info = understood(decode_info, data)
+            info = understood(partial(decode, Info), data)
         except UnexpectedReplyError:
             if isinstance(reply := understood(decode_reply, data), Refused):
                 raise RefusedError(reply) from None

@@ -5,25 +5,20 @@ import logging
 import weakref
 from collections import deque
 from collections.abc import AsyncIterator, Callable
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from tvist_client.errors import AnswerTimeoutError, ArgumentError, ClientError, NotConnectedError
 from tvist_client.transports.base import Topic, Transport
 from tvist_client.values import whole
+from tvist_protocol.codec import decode
 from tvist_protocol.errors import ProtocolError, quoted
+from tvist_protocol.io import Io
+from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 log = logging.getLogger(__name__)
 
 
-class Ticked(Protocol):
-    """A message that contains its tick."""
-
-    @property
-    def tick(self) -> int:
-        """Number of the control period."""
-
-
-M = TypeVar("M", bound=Ticked)
+M = TypeVar("M", bound=State | Event | Truth | Telemetry | Io)
 Item = TypeVar("Item")
 
 
@@ -82,16 +77,14 @@ class Feed(Generic[M]):
     Where there is one message per tick (`once_a_tick`), one that is not newer than the last is dropped as a repetition.
     """
 
-    def __init__(
-        self, transport: Transport, topic: Topic, decode: Callable[[bytes], M], *, once_a_tick: bool
-    ) -> None:
+    def __init__(self, transport: Transport, topic: Topic, kind: type[M], *, once_a_tick: bool) -> None:
         self.latest: M | None = None
         """Newest message since the subscription; None before the first."""
         self.malformed = 0
         """Number of messages dropped because they do not follow this protocol."""
         self._transport = transport
         self._topic: Topic = topic
-        self._decode = decode
+        self._kind = kind
         self._once_a_tick = once_a_tick
         self._subscribed = False
         self._finished = False
@@ -160,7 +153,7 @@ class Feed(Generic[M]):
 
     def _on_message(self, data: bytes) -> None:
         try:
-            message = self._decode(data)
+            message = decode(self._kind, data)
         except ProtocolError as error:
             if not self.malformed:
                 log.warning("an invalid %s: %s", self._topic, error)

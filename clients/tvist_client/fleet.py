@@ -5,8 +5,7 @@ One session without a namespace sees the robots of all namespaces. Of each robot
 """
 
 import asyncio
-import re
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from functools import partial
 
 import msgspec
@@ -20,8 +19,9 @@ from tvist_client.readiness import RELIEVE, readiness
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
+from tvist_client.transports.zenoh import natural
 from tvist_protocol import keys
-from tvist_protocol.codec import decode_info, decode_reply, decode_telemetry, encode
+from tvist_protocol.codec import decode, decode_reply, encode
 from tvist_protocol.commands import Stop
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Info
@@ -34,7 +34,6 @@ SETTLE_S = 0.3
 """Time for tokens to arrive after the session has opened [s]; over a slow network, `look` sees late ones, too."""
 LISTEN_S = 1.3
 """Time in which every robot in real time publishes its telemetry at least once [s]."""
-_DIGITS = re.compile(r"(\d+)")
 
 
 class FleetRobot(msgspec.Struct, frozen=True):
@@ -119,7 +118,7 @@ class Fleet(Across):
     async def look(self) -> list[FleetRobot]:
         """Ask every robot what it is and how it is; natural order."""
         places = sorted(self.places, key=_by_number)
-        answers = await asyncio.gather(*(self._ask(place, keys.info, None) for place in places))
+        answers = await asyncio.gather(*(self._ask(place, "info", None) for place in places))
         return [self._row(place, answer) for place, answer in zip(places, answers, strict=True)]
 
     async def stop(self, places: Collection[Place]) -> list[StopReport]:
@@ -129,7 +128,7 @@ class Fleet(Across):
             places: Robots, there or not.
         """
         wanted, data = sorted(places, key=_by_number), encode(Stop())
-        answers = await asyncio.gather(*(self._ask(place, keys.command, data) for place in wanted))
+        answers = await asyncio.gather(*(self._ask(place, "command", data) for place in wanted))
         return [_stopped(place, answer) for place, answer in zip(wanted, answers, strict=True)]
 
     # ------------------------------------------------------------------ what arrives, in Zenoh's threads
@@ -147,15 +146,13 @@ class Fleet(Across):
 
     def _hear(self, place: Place, data: bytes) -> None:
         try:
-            self._told[place] = (self._loop.time(), decode_telemetry(data))
+            self._told[place] = (self._loop.time(), decode(Telemetry, data))
         except ProtocolError:  # another version's; its silence is reported
             return
 
     # ------------------------------------------------------------------ one robot
 
-    async def _ask(
-        self, place: Place, leaf: Callable[[str], str], data: bytes | None
-    ) -> bytes | NotConnectedError:
+    async def _ask(self, place: Place, leaf: keys.Leaf, data: bytes | None) -> bytes | NotConnectedError:
         """Return a robot's answer, or why there is none: the others are not kept waiting by an error."""
         answer: asyncio.Future[bytes | NotConnectedError] = self._loop.create_future()
 
@@ -214,7 +211,7 @@ def _info(answer: bytes | NotConnectedError) -> tuple[Info | None, str]:
     if isinstance(answer, NotConnectedError):
         return None, str(answer)
     try:
-        return understood(decode_info, answer), ""
+        return understood(partial(decode, Info), answer), ""
     except ClientError as error:
         return None, str(error)
 
@@ -237,4 +234,4 @@ def _unlock(place: Place) -> str:
 
 
 def _by_number(place: Place) -> list[list[int | str]]:
-    return [[int(part) if part.isdigit() else part for part in _DIGITS.split(text)] for text in place]
+    return [natural(text) for text in place]

@@ -21,9 +21,9 @@ def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
         changes: Fields of `ServeConfig` to change.
 
     Raises:
-        ConfigError: A change names no field, or has an invalid value.
+        StartError: A change names no field, or has an invalid value.
     """
-    from tvist_server.config_file import from_mapping
+    from tvist_server.config import from_mapping
 
     if config is None:
         return from_mapping({"clock": "free", "truth": True, **changes}, "setup").setup()

@@ -16,10 +16,9 @@ from tvist_protocol.info import Info
 from tvist_protocol.recorded import TICK_NS
 from tvist_protocol.replies import Refused
 from tvist_protocol.stream import State, Truth
-from tvist_server.gateways.base import Answer, Desk, Gateway
+from tvist_server.gateways.base import TOPICS, Answer, Desk, Gateway
 from tvist_server.gateways.exposure import guarded
 from tvist_server.gateways.network import Network
-from tvist_server.publisher import TOPICS
 
 TICK = TICK_NS * 1e-9
 """Duration of a tick [s]."""
@@ -57,9 +56,9 @@ class PlaybackDesk(Desk):
     def setpoint(self, data: bytes) -> None:
         """Ignore a set-point: nobody has control."""
 
-    def info(self, answer: Callable[[bytes], None]) -> None:
+    def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
         """Answer with the description of the robot and the present tick."""
-        answer(encode(msgspec.structs.replace(self._info, tick=self.tick)))
+        answer(lambda: encode(msgspec.structs.replace(self._info, tick=self.tick)))
 
     def client_seen(self, client: str, session: str = "") -> None:
         """Ignore a client: none gets control."""
@@ -90,7 +89,7 @@ class Playback:
     Raises:
         RecordingError: The recording does not describe its robot.
         ProtocolError: The name is not allowed.
-        ExposureError: The robot would be reachable in an unintended way.
+        StartError: The robot would be reachable in an unintended way.
         GatewayError: The server cannot listen on an endpoint.
     """
 

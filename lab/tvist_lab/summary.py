@@ -8,6 +8,7 @@ from typing import Any
 
 from tvist_lab.recordings import Recording, mcap_file
 from tvist_lab.recordings.description import meaning_of, ordered
+from tvist_lab.recordings.mcap_records import files_of
 
 
 def summary(path: str | os.PathLike[str], recording: Recording) -> dict[str, Any]:
@@ -29,7 +30,7 @@ def summary(path: str | os.PathLike[str], recording: Recording) -> dict[str, Any
     info = recording.info
     return {
         "file": str(path),
-        "bytes": path.stat().st_size if path.is_file() else None,
+        "bytes": sum(file.stat().st_size for file in files_of(path)),
         "robot": content.robot if content else info and info.name,
         "model": info and info.model,
         "version": info and info.version,

@@ -12,7 +12,7 @@ from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Channel:
     """One key.
 
@@ -28,8 +28,8 @@ class Channel:
     key: str
     kind: Literal["put", "queryable", "liveliness"]
     by: Literal["server", "client"]
-    messages: tuple[type[Struct], ...] = ()
-    answers: tuple[type[Struct], ...] = ()
+    messages: tuple[type[Struct], ...]
+    answers: tuple[type[Struct], ...]
     meaning: str
 
 
@@ -40,77 +40,28 @@ MESSAGES: tuple[type[Struct], ...] = (*COMMANDS, Setpoint, *REPLIES, *STREAMS, I
 """Every message of the protocol."""
 
 CHANNELS = (
-    Channel(
-        key="tvist/{robot}/state",
-        kind="put",
-        by="server",
-        messages=(State,),
-        meaning="state of controller and arm, 500 Hz; dropped rather than sent late in real time, never in lockstep",
-    ),
-    Channel(
-        key="tvist/{robot}/truth",
-        kind="put",
-        by="server",
-        messages=(Truth,),
-        meaning="values that a real robot cannot measure, 500 Hz; only with `serve --truth`",
-    ),
-    Channel(
-        key="tvist/{robot}/event",
-        kind="put",
-        by="server",
-        messages=(Event,),
-        meaning="an event, with its tick",
-    ),
-    Channel(
-        key="tvist/{robot}/telemetry",
-        kind="put",
-        by="server",
-        messages=(Telemetry,),
-        meaning="timing and counters of the server, 1 Hz",
-    ),
-    Channel(
-        key="tvist/{robot}/io",
-        kind="put",
-        by="server",
-        messages=(Io,),
-        meaning="inputs, outputs, registers and tool; sent before the state of a tick with a change, and at 1 Hz",
-    ),
-    Channel(
-        key="tvist/{robot}/command",
-        kind="queryable",
-        by="client",
-        messages=COMMANDS,
-        answers=REPLIES,
-        meaning="a command as the query's payload; always answered",
-    ),
-    Channel(
-        key="tvist/{robot}/setpoint",
-        kind="put",
-        by="client",
-        messages=(Setpoint,),
-        meaning="a stream of set-points; errors are counted, not answered",
-    ),
-    Channel(
-        key="tvist/{robot}/info",
-        kind="queryable",
-        by="client",
-        answers=(Info, Refused),
-        meaning="description and current settings of the robot, `refused` while it starts; the query has no payload",
-    ),
-    Channel(
-        key="tvist/{robot}/alive",
-        kind="liveliness",
-        by="server",
-        meaning="exists from when the robot is ready until its server ends",
-    ),
-    Channel(
-        key="tvist/{robot}/client/{client}",
-        kind="liveliness",
-        by="client",
-        meaning="optional; if it exists when control is taken, the lease ends at once when it disappears. "
-        "`/<session>`, Zenoh's id of the client's session, may follow, to distinguish clients of the same name",
-    ),
-)
+    Channel("tvist/{robot}/state", "put", "server", (State,), (),
+        "state of controller and arm, 500 Hz; dropped rather than sent late in real time, never in lockstep"),
+    Channel("tvist/{robot}/truth", "put", "server", (Truth,), (),
+        "values that a real robot cannot measure, 500 Hz; only with `serve --truth`"),
+    Channel("tvist/{robot}/event", "put", "server", (Event,), (), "an event, with its tick"),
+    Channel("tvist/{robot}/telemetry", "put", "server", (Telemetry,), (),
+        "timing and counters of the server, 1 Hz"),
+    Channel("tvist/{robot}/io", "put", "server", (Io,), (),
+        "inputs, outputs, registers and tool; sent before the state of a tick with a change, and at 1 Hz"),
+    Channel("tvist/{robot}/command", "queryable", "client", COMMANDS, REPLIES,
+        "a command as the query's payload; always answered"),
+    Channel("tvist/{robot}/setpoint", "put", "client", (Setpoint,), (),
+        "a stream of set-points; errors are counted, not answered"),
+    Channel("tvist/{robot}/info", "queryable", "client", (), (Info, Refused),
+        "description and current settings of the robot, `refused` while it starts; the query has no payload"),
+    Channel("tvist/{robot}/alive", "liveliness", "server", (), (),
+        "exists from when the robot is ready until its server ends"),
+    Channel("tvist/{robot}/client/{client}", "liveliness", "client", (), (),
+        "optional; if it exists when control is taken, the lease ends at once when it disappears. "
+        "`/<session>`, Zenoh's id of the client's session, may follow, to distinguish "
+        "clients of the same name"),
+)  # fmt: skip
 
 
 def tag(message: type[Struct]) -> str:

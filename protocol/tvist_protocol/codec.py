@@ -11,13 +11,13 @@ import msgspec
 
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.commands import Command, Setpoint
-from tvist_protocol.encodable import explain_unencodable
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import (
     EXPLAINED_BYTES,
     FAULTS,
     explain_bytes,
     explain_refusal,
+    explain_unencodable,
     explain_unknown_type,
 )
 from tvist_protocol.info import Info
@@ -58,11 +58,7 @@ class _Untyped(msgspec.Struct, tag_field="type", tag=""):
 
 
 class _Reader(Generic[_Some]):
-    """Decodes and validates the messages of one key.
-
-    Args:
-        types: Structs of the messages; their `type` tells them apart.
-    """
+    """Decodes and validates the messages of one key."""
 
     def __init__(self, *types: type[msgspec.Struct]) -> None:
         self.types: Mapping[str, type[msgspec.Struct]] = {str(t.__struct_config__.tag): t for t in types}
@@ -87,19 +83,12 @@ _ENVELOPE: msgspec.msgpack.Decoder[Envelope] = msgspec.msgpack.Decoder(Envelope)
 _CALIBRATED: msgspec.msgpack.Decoder[_Calibrated] = msgspec.msgpack.Decoder(_Calibrated)
 _ENCODER = msgspec.msgpack.Encoder()
 _COMMAND: _Reader[Command] = _Reader(*get_args(Command))
-_SETPOINT: _Reader[Setpoint] = _Reader(Setpoint)
 _REPLY: _Reader[Reply] = _Reader(*get_args(Reply))
-_STATE: _Reader[State] = _Reader(State)
-_EVENT: _Reader[Event] = _Reader(Event)
-_TRUTH: _Reader[Truth] = _Reader(Truth)
-_TELEMETRY: _Reader[Telemetry] = _Reader(Telemetry)
-_IO: _Reader[Io] = _Reader(Io)
-_INFO: _Reader[Info] = _Reader(Info)
-_READER_OF: dict[type[msgspec.Struct], _Reader[Any]] = {
-    kind: reader
-    for reader in (_COMMAND, _SETPOINT, _REPLY, _STATE, _EVENT, _TRUTH, _TELEMETRY, _IO, _INFO)
-    for kind in reader.types.values()
+_ONLY: dict[type[msgspec.Struct], _Reader[Any]] = {
+    kind: _Reader(kind) for kind in (Setpoint, State, Event, Truth, Telemetry, Io, Info)
 }
+"""Readers of the keys that have one kind of messages."""
+_READER_OF = _ONLY | {kind: reader for reader in (_COMMAND, _REPLY) for kind in reader.types.values()}
 
 
 def encode(message: Message) -> bytes:
@@ -164,9 +153,6 @@ def _refuse_long_fault(data: bytes) -> None:
     """Refuse an invalid long calibration from its bytes.
 
     To explain an error of a whole message, its map would be built, which may take a hundred times as long.
-
-    Raises:
-        ProtocolError: The calibration is invalid.
     """
     decode_envelope(data)  # refuses bytes that are no MessagePack map
     try:
@@ -177,41 +163,12 @@ def _refuse_long_fault(data: bytes) -> None:
         raise explain_bytes(error) from error
 
 
-def decode_setpoint(data: bytes) -> Setpoint:
-    """Decode a set-point of a stream."""
-    return _SETPOINT.read(data)
-
-
 def decode_reply(data: bytes) -> Reply:
     """Decode the answer to a command."""
     return _REPLY.read(data)
 
 
-def decode_state(data: bytes) -> State:
-    """Decode a state, of which there is one for each tick."""
-    return _STATE.read(data)
-
-
-def decode_event(data: bytes) -> Event:
-    """Decode an event."""
-    return _EVENT.read(data)
-
-
-def decode_truth(data: bytes) -> Truth:
-    """Decode a truth message: what a simulation knows and a real robot cannot measure."""
-    return _TRUTH.read(data)
-
-
-def decode_telemetry(data: bytes) -> Telemetry:
-    """Decode a telemetry message: timing and load of the server."""
-    return _TELEMETRY.read(data)
-
-
-def decode_io(data: bytes) -> Io:
-    """Decode inputs, outputs and registers."""
-    return _IO.read(data)
-
-
-def decode_info(data: bytes) -> Info:
-    """Decode the description of a robot, which answers a query of the info key."""
-    return _INFO.read(data)
+def decode(kind: type[_SomeMessage], data: bytes) -> _SomeMessage:
+    """Decode a message of a key that has one kind of messages: `decode(State, data)`."""
+    message: _SomeMessage = _ONLY[kind].read(data)
+    return message

@@ -222,58 +222,14 @@ class RestartSafety(Leased, frozen=True, kw_only=True, tag="restart_safety"):
 
 
 Command = (
-    TakeControl
-    | KeepAlive
-    | ReleaseControl
-    | HandOver
-    | TakeClock
-    | ReleaseClock
-    | MoveJ
-    | MoveL
-    | MoveC
-    | MovePath
-    | ServoJ
-    | SpeedJ
-    | SpeedL
-    | StopJ
-    | StopL
-    | ForceMode
-    | Freedrive
-    | EndForceMode
-    | ZeroFtsensor
-    | SetExternalWrench
-    | ServoStart
-    | ServoStop
-    | Stop
-    | Pause
-    | Resume
-    | SetShaper
-    | SetEstimator
-    | SetPayload
-    | Forget
-    | SetSpeed
-    | SetIo
-    | SetRegisters
-    | SetTcp
-    | InverseKinematics
-    | ForwardKinematics
-    | ProgramLoad
-    | ProgramRun
-    | ProgramPlay
-    | ProgramPause
-    | ProgramStop
-    | ProgramClosePopup
-    | ProgramInterpret
-    | ProgramSkip
-    | PowerOn
-    | PowerOff
-    | UnlockProtectiveStop
-    | RestartSafety
-    | SimulationReset
-    | SimulationStep
-    | SimulationInject
-    | SimulationSetInputs
-)
+    TakeControl | KeepAlive | ReleaseControl | HandOver | TakeClock | ReleaseClock | MoveJ | MoveL
+    | MoveC | MovePath | ServoJ | SpeedJ | SpeedL | StopJ | StopL | ForceMode | Freedrive | EndForceMode
+    | ZeroFtsensor | SetExternalWrench | ServoStart | ServoStop | Stop | Pause | Resume | SetShaper
+    | SetEstimator | SetPayload | Forget | SetSpeed | SetIo | SetRegisters | SetTcp | InverseKinematics
+    | ForwardKinematics | ProgramLoad | ProgramRun | ProgramPlay | ProgramPause | ProgramStop
+    | ProgramClosePopup | ProgramInterpret | ProgramSkip | PowerOn | PowerOff | UnlockProtectiveStop
+    | RestartSafety | SimulationReset | SimulationStep | SimulationInject | SimulationSetInputs
+)  # fmt: skip
 
 
 class Setpoint(Leased, frozen=True, kw_only=True, tag="setpoint"):

@@ -12,11 +12,7 @@ T = TypeVar("T")
 
 
 def checked(content: object, kind: type[T]) -> T:
-    """Return decoded content, of maps, lists and plain values, as the expected type.
-
-    Raises:
-        ProtocolError: A key is unknown or missing, or a value of another kind or out of range.
-    """
+    """Return decoded content, of maps, lists and plain values, as the expected type."""
     try:
         return msgspec.convert(content, kind)
     except msgspec.ValidationError as error:
@@ -24,11 +20,7 @@ def checked(content: object, kind: type[T]) -> T:
 
 
 def parse_json(data: bytes) -> Any:
-    """Return the content of JSON text.
-
-    Raises:
-        ProtocolError: The content is not valid JSON; the message gives line and column.
-    """
+    """Return the content of JSON text."""
     try:
         return json.loads(data.decode(), parse_constant=_no_number)
     except UnicodeDecodeError as error:

@@ -1,4 +1,4 @@
-"""What is wrong with a message that came in, or with a file, said to a program and to a person.
+"""What is wrong with a message or a file, said to a program and to a person.
 
 msgspec finds the fault and says it in one text; here the text becomes code, field, sentence and limit. Only a
 message at fault pays for it: it is decoded a second time, untyped, to name the value. A long one is not: a quarter of
@@ -7,8 +7,9 @@ a megabyte of empty maps would take a hundred ticks of a robot's time.
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
+from enum import Enum
 from typing import Any
 
 import msgspec
@@ -24,6 +25,9 @@ numbers beyond 64 bits, nesting beyond the stack, lengths beyond memory."""
 EXPLAINED_BYTES = 4096
 """Longest message whose values are named [bytes]."""
 
+_DEPTH = 32
+"""Levels that are searched: a value that is nested deeper contains itself."""
+
 Types = Mapping[str, type[msgspec.Struct]]
 """The messages that were possible, by `type`."""
 
@@ -35,15 +39,7 @@ class _Head(msgspec.Struct):
 
 
 class _Fault:
-    """Place of a fault that msgspec found, and the value there.
-
-    Args:
-        path: Path as msgspec writes it.
-        content: The decoded message or file: maps, lists and plain values.
-        kind: Type that was expected of it; None if it is unknown.
-        whole: Its name in messages, for a fault of the content as a whole.
-        types: The messages that were expected, by `type`.
-    """
+    """Place of a fault that msgspec found, and the value there."""
 
     def __init__(self, path: str, content: Any, kind: object, whole: str, types: Types) -> None:
         self.place = Place(content, kind, path)
@@ -60,10 +56,7 @@ class _Fault:
 def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -> ProtocolError:
     """Return the error of a message that is valid MessagePack but not one of the expected messages.
 
-    Args:
-        error: The error of msgspec.
-        data: The message; of one longer than `EXPLAINED_BYTES` no value but its type is named.
-        types: The messages that were expected.
+    Of one longer than `EXPLAINED_BYTES`, only its type is named.
     """
     message = _untyped(data, Any if len(data) <= EXPLAINED_BYTES else _Head)
     name = message.get("type") if isinstance(message, dict) else None
@@ -71,13 +64,7 @@ def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -
 
 
 def explain_content(error: msgspec.ValidationError, content: Any, kind: object) -> ProtocolError:
-    """Return the error of a file or a map whose content has another type than expected.
-
-    Args:
-        error: The error of `msgspec.convert`.
-        content: Maps, lists and plain values.
-        kind: The type that was expected.
-    """
+    """Return the error of a file or a map whose content has another type than expected."""
     return _explain(error, content, kind, "the content", {})
 
 
@@ -204,3 +191,53 @@ def _untyped(data: bytes, kind: Any) -> Any:
         return msgspec.to_builtins(msgspec.msgpack.decode(data, type=kind))
     except FAULTS:
         return ABSENT
+
+
+def explain_unencodable(message: msgspec.Struct, error: Exception) -> ProtocolError:
+    """Return the error of a message that cannot be written as MessagePack, with the field and its value."""
+    where, value = next(_unencodable(message, "", _DEPTH), ("", message))
+    kind = f"{type(value).__module__}.{type(value).__qualname__}".removeprefix("builtins.")
+    match value:
+        case int():
+            return ProtocolError("out_of_range", where, f"{where} does not fit into 64 bits")
+        case str():
+            why = f"{where} contains text that is not UTF-8"
+        case msgspec.Struct():
+            why = f"{kind} cannot be written: {short(str(error))}"
+        case _:
+            why = f"{where} is a {kind}: give Python's own numbers, lists and strings (float(x), x.tolist())"
+    return ProtocolError("malformed", where, why)
+
+
+def _unencodable(value: object, where: str, depth: int) -> Iterator[tuple[str, object]]:
+    if depth == 0 or not _is_plain(value):
+        yield where, value
+        return
+    for at, entry in _entries(value, where):
+        yield from _unencodable(entry, at, depth - 1)
+
+
+def _entries(value: object, where: str) -> Iterator[tuple[str, object]]:
+    match value:
+        case msgspec.Struct():
+            for name in value.__struct_fields__:
+                yield f"{where}.{name}".removeprefix("."), getattr(value, name)
+        case list() | tuple():
+            for index, entry in enumerate(value):
+                yield f"{where}[{index}]", entry
+        case dict():
+            for key, entry in value.items():
+                yield where, key
+                yield f"{where}.{short(str(key))}", entry
+
+
+def _is_plain(value: object) -> bool:
+    if type(value) is int:
+        return -(2**63) <= value < 2**64
+    if type(value) is str:
+        return not any("\ud800" <= character <= "\udfff" for character in value)
+    return (
+        value is None
+        or type(value) in {bool, float, list, tuple, dict}
+        or isinstance(value, Enum | msgspec.Struct)
+    )

@@ -21,14 +21,7 @@ SENT = {"commands", "setpoint", "parts"}
 
 
 def generated(folder: Path) -> dict[Path, bytes]:
-    """Return the content that every generated file should have, by its path.
-
-    Args:
-        folder: `protocol/`, whose two pages and golden JSON are read.
-
-    Raises:
-        ValueError: A page and its tables do not have the same names.
-    """
+    """Return the content that every generated file should have, by its path."""
     files = {folder / "schemas" / f"{tag(kind)}.json": _json(json_schema(kind)) for kind in MESSAGES}
     files |= {source.with_suffix(".msgpack"): _msgpack(source) for source in golden(folder)}
     parts = tables()
@@ -50,11 +43,7 @@ def golden(folder: Path) -> list[Path]:
 
 
 def filled(text: str, parts: dict[str, str]) -> str:
-    """Return a text with each part between its markers `<!-- generated: name -->` and `<!-- end -->`.
-
-    Raises:
-        ValueError: A part has no markers, or markers have no part.
-    """
+    """Return a text with each part between its markers `<!-- generated: name -->` and `<!-- end -->`."""
     marked = re.compile(r"(<!-- generated: (?P<name>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
     names = [found["name"] for found in marked.finditer(text)]
     if sorted(names) != sorted(parts):

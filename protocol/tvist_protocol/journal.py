@@ -60,23 +60,13 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
 
 
 def entry_of(tick: int, message: Command | Setpoint, client: str | None = None) -> Entry:
-    """Make the journal's entry for a message.
-
-    Args:
-        tick: Number of the first control period computed after it.
-        message: Decoded message.
-        client: Client that sent it, if known.
-    """
+    """Make the journal's entry for a message."""
     kind: EntryKind = "setpoint" if type(message) is Setpoint else "command"
     return Entry(tick=tick, kind=kind, client=client, message=msgspec.to_builtins(message))
 
 
 def lesson_of(entry: Entry) -> PayloadLesson:
-    """Return the lesson of an entry.
-
-    Raises:
-        ProtocolError: The entry contains none, or an invalid one.
-    """
+    """Return the lesson of an entry."""
     try:
         lesson: PayloadLesson = msgspec.convert(entry.message, PayloadLesson)
     except msgspec.ValidationError as error:
@@ -86,11 +76,7 @@ def lesson_of(entry: Entry) -> PayloadLesson:
 
 
 def message_of(entry: Entry) -> Command | Setpoint:
-    """Return the message of an entry, equal to the original one.
-
-    Raises:
-        ProtocolError: The entry contains no message, or an invalid one.
-    """
+    """Return the message of an entry, equal to the original one."""
     where = f"the journal's {entry.kind} before tick {entry.tick}"
     if entry.message is None:
         raise ProtocolError("missing_field", "message", f"{where} has no message")

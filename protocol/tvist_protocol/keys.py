@@ -5,6 +5,7 @@ a server compares them with its own.
 """
 
 import re
+from typing import Literal
 
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import (
@@ -16,6 +17,9 @@ from tvist_protocol.values import (
 )
 
 PREFIX = "tvist"
+Leaf = Literal["state", "truth", "event", "telemetry", "io", "command", "setpoint", "info", "alive", "client"]
+"""What follows a robot's name in its keys; a client's name follows `client`."""
+
 ANY_ALIVE = f"{PREFIX}/*/alive"
 """Selects the liveliness tokens of all robots: how a client finds them."""
 
@@ -73,49 +77,9 @@ def check_client_name(name: str) -> str:
     return _checked("client", name, _CLIENT)
 
 
-def state(robot: str) -> str:
-    """Return the key of the states, 500 a second."""
-    return _key(robot, "state")
-
-
-def truth(robot: str) -> str:
-    """Return the key of the truth messages, which only a simulation has."""
-    return _key(robot, "truth")
-
-
-def event(robot: str) -> str:
-    """Return the key of the events."""
-    return _key(robot, "event")
-
-
-def telemetry(robot: str) -> str:
-    """Return the key of the telemetry of the server, once a second."""
-    return _key(robot, "telemetry")
-
-
-def io(robot: str) -> str:
-    """Return the key of inputs, outputs and registers, which are published when they change."""
-    return _key(robot, "io")
-
-
-def command(robot: str) -> str:
-    """Return the key of the queryable for commands."""
-    return _key(robot, "command")
-
-
-def setpoint(robot: str) -> str:
-    """Return the key for the set-points of clients."""
-    return _key(robot, "setpoint")
-
-
-def info(robot: str) -> str:
-    """Return the key of the queryable that describes the robot."""
-    return _key(robot, "info")
-
-
-def alive(robot: str) -> str:
-    """Return the key of the server's liveliness token, which tells that the robot is there."""
-    return _key(robot, "alive")
+def key(robot: str, leaf: Leaf) -> str:
+    """Return a key of a robot; `channels.CHANNELS` says what each is for."""
+    return f"{PREFIX}/{check_robot_name(robot)}/{leaf}"
 
 
 def client(robot: str, name: str, session: str = "") -> str:
@@ -129,13 +93,13 @@ def client(robot: str, name: str, session: str = "") -> str:
     Raises:
         ProtocolError: A name or the id is invalid; code `out_of_range`.
     """
-    key = f"{_key(robot, 'client')}/{check_client_name(name)}"
-    return f"{key}/{_checked('session', session, _SESSION)}" if session else key
+    own = f"{key(robot, 'client')}/{check_client_name(name)}"
+    return f"{own}/{_checked('session', session, _SESSION)}" if session else own
 
 
 def any_client(robot: str) -> str:
     """Return the selector of the liveliness tokens of all clients of a robot."""
-    return f"{_key(robot, 'client')}/**"
+    return f"{key(robot, 'client')}/**"
 
 
 def client_name(robot: str, key: str) -> str | None:
@@ -150,15 +114,11 @@ def client_session(robot: str, key: str) -> str:
     return "" if found is None else found[1]
 
 
-def _client(robot: str, key: str) -> tuple[str, str] | None:
-    prefix = f"{_key(robot, 'client')}/"
-    name, slash, session = key.removeprefix(prefix).partition("/")
+def _client(robot: str, own: str) -> tuple[str, str] | None:
+    prefix = f"{key(robot, 'client')}/"
+    name, slash, session = own.removeprefix(prefix).partition("/")
     sound = _CLIENT.match(name) and bool(_SESSION.match(session)) == bool(slash)
-    return (name, session) if key.startswith(prefix) and sound else None
-
-
-def _key(robot: str, leaf: str) -> str:
-    return f"{PREFIX}/{check_robot_name(robot)}/{leaf}"
+    return (name, session) if own.startswith(prefix) and sound else None
 
 
 def _checked(what: str, name: str, pattern: re.Pattern[str]) -> str:

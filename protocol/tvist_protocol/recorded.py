@@ -10,7 +10,10 @@ in a list or a field stands for a number that is not finite, which JSON cannot e
 """
 
 import math
+import re
 from collections.abc import Mapping
+from glob import escape
+from pathlib import PurePath
 from typing import Any, Generic, TypeVar, get_args
 
 import msgspec
@@ -33,8 +36,6 @@ METADATA = "tvist"
 """Name of the metadata written first: `format`, and `info` and `start` as JSON."""
 END_METADATA = "tvist.end"
 """Name of the metadata written last: for each channel, how many messages were dropped."""
-RING = "ring"
-"""Entry of that metadata in a recording that forgets its beginning: how many ticks it keeps at least."""
 BEHAVIOUR = "behaviour"
 """Entry of that metadata: the number of the robot's behaviour, see `THIS_BEHAVIOUR`; 1 where it is missing."""
 THIS_BEHAVIOUR = 7
@@ -46,22 +47,36 @@ THIS_BEHAVIOUR = 7
 7: all kinematics of the rigid arm come from one chain of links.
 """
 FROM_TICK = "from_tick"
-"""Entry of that metadata in a recording that has forgotten its beginning: its first tick."""
+"""Entry of that metadata in a segment after the first one of a recording: its first tick."""
+
+_SEGMENT = re.compile(r"(.+)-(\d+)-part(\d+)(\.[^.]*)?", re.DOTALL)
 
 _Some = TypeVar("_Some", bound=Recorded)
 _ENCODER = msgspec.json.Encoder()
 
 
-def earlier_name(name: str, run: int | None = None) -> str:
-    """Return the name of the file with the older part of a ring: `run.earlier.mcap` for `run.mcap`.
+def segment_name(name: str, run: int, number: int | None) -> str:
+    """Return the name of a segment of a recording: `run-2-part0001.mcap` for `run.mcap`.
 
     Args:
         name: Name of the recording.
-        run: Number of an earlier run, whose recording is kept as `run.earlier-3.mcap`.
+        run: Number of the run, from 1.
+        number: Number of the segment, from 1; None for a pattern that all of them match.
     """
-    word = "earlier" if run is None else f"earlier-{run}"
-    stem, dot, ending = name.rpartition(".")
-    return f"{stem}.{word}.{ending}" if dot and stem else f"{name}.{word}"
+    path = PurePath(name)
+    if number is None:
+        return f"{escape(path.stem)}-{run}-part*{escape(path.suffix)}"
+    return f"{path.stem}-{run}-part{number:04}{path.suffix}"
+
+
+def segment_of(name: str) -> tuple[str, int, int] | None:
+    """Return of which recording, run and number a file is a segment, by its name; None if it is none."""
+    found = _SEGMENT.fullmatch(name)
+    if found is None:
+        return None
+    stem, run, number, ending = found.groups("")
+    segment = stem + ending, int(run), int(number)
+    return segment if segment_name(*segment) == name else None
 
 
 def topics(robot: str) -> dict[type[msgspec.Struct], str]:
@@ -71,11 +86,11 @@ def topics(robot: str) -> dict[type[msgspec.Struct], str]:
         ProtocolError: The name is not allowed in a key.
     """
     return {
-        State: keys.state(robot),
-        Event: keys.event(robot),
-        Truth: keys.truth(robot),
-        Io: keys.io(robot),
-        Entry: keys.state(robot).removesuffix("state") + tag(Entry),
+        State: keys.key(robot, "state"),
+        Event: keys.key(robot, "event"),
+        Truth: keys.key(robot, "truth"),
+        Io: keys.key(robot, "io"),
+        Entry: f"{keys.PREFIX}/{robot}/{tag(Entry)}",
     }
 
 

@@ -7,34 +7,12 @@ from msgspec import Struct
 from tvist_protocol.values import Joints, Pose
 
 Code = Literal[
-    "malformed",
-    "unknown_type",
-    "unknown_field",
-    "missing_field",
-    "out_of_range",
-    "no_control",
-    "stale_token",
-    "busy",
-    "wrong_mode",
-    "limit_position",
-    "limit_velocity",
-    "limit_acceleration",
-    "limit_torque",
-    "limit_force",
-    "no_solution",
-    "singular",
-    "blend_skipped",
-    "collision",
-    "unknown_shaper",
-    "unknown_estimator",
-    "unknown_calibration",
-    "unknown_fault",
-    "plant_failure",
-    "payload_mismatch",
-    "unsupported_version",
-    "script_error",
-    "starting",
-]
+    "malformed", "unknown_type", "unknown_field", "missing_field", "out_of_range", "no_control",
+    "stale_token", "busy", "wrong_mode", "limit_position", "limit_velocity", "limit_acceleration",
+    "limit_torque", "limit_force", "no_solution", "singular", "blend_skipped", "collision",
+    "unknown_shaper", "unknown_estimator", "unknown_calibration", "unknown_fault", "plant_failure",
+    "payload_mismatch", "unsupported_version", "script_error", "starting",
+]  # fmt: skip
 """Reason of a refusal or of an event."""
 
 CODE_MEANINGS: dict[Code, str] = {

@@ -22,14 +22,9 @@ def json_schema(message: type[msgspec.Struct]) -> dict[str, Any]:
 def components(
     messages: tuple[type[msgspec.Struct], ...], reference: str
 ) -> tuple[tuple[dict[str, Any], ...], dict[str, Any]]:
-    """Return the JSON Schemas of several messages, and of what they share.
+    """Return references to messages, and the JSON Schemas of these and what they share, by name.
 
-    Args:
-        messages: The message types.
-        reference: How one schema refers to another, with `{name}` in it.
-
-    Returns:
-        A reference to each message, and all schemas by the name of their type.
+    The text of a reference has `{name}` in it.
     """
     roots, parts = msgspec.json.schema_components(messages, ref_template=reference)
     described = {kind.__name__: field_docs(kind) for kind in _structs(messages)}

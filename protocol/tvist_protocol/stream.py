@@ -11,21 +11,10 @@ from msgspec import Struct
 from tvist_protocol.replies import Code
 
 EventKind = Literal[
-    "motion_started",
-    "motion_done",
-    "motion_stopped",
-    "stream_stopped",
-    "lease_lost",
-    "protective_stop",
-    "safety_stop",
-    "shaper_changed",
-    "learnt",
-    "warning",
-    "program_started",
-    "program_stopped",
-    "text",
-    "popup",
-]
+    "motion_started", "motion_done", "motion_stopped", "stream_stopped", "lease_lost",
+    "protective_stop", "safety_stop", "shaper_changed", "learnt", "warning", "program_started",
+    "program_stopped", "text", "popup",
+]  # fmt: skip
 
 PopupKind = Literal["message", "warning", "error"]
 """How serious a popup is."""

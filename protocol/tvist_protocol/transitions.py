@@ -50,11 +50,7 @@ class Activity(StrEnum):
     """Whether the activity is a protective stop."""
 
     def safety_mode(self, *, reduced: bool) -> SafetyMode:
-        """Return the safety mode as numbered by RTDE, unless the safety system has a more serious one.
-
-        Args:
-            reduced: Whether the speed is reduced.
-        """
+        """Return the safety mode as numbered by RTDE, unless the safety system has a more serious one."""
         if self.protective:
             return SafetyMode.PROTECTIVE_STOP
         return SafetyMode.REDUCED if reduced else SafetyMode.NORMAL
@@ -182,12 +178,7 @@ _AFTER = {(row.trigger, source): row.target for row in TRANSITIONS for source in
 
 
 def after(activity: Activity, trigger: str) -> Activity | None:
-    """Return the activity that a trigger leads to; None if the table has no row.
-
-    Args:
-        activity: Current activity.
-        trigger: A command's `type`, or one of `HAPPENINGS`.
-    """
+    """Return the activity that a trigger leads to; None if the table has no row."""
     target = _AFTER.get((trigger, activity))
     return target if isinstance(target, Activity) else None
 
@@ -196,9 +187,6 @@ def diagram(states: type[StrEnum]) -> str:
     """Return the part of the table for these states as a Mermaid state diagram.
 
     Transitions back to the same state are left out; those common to all motions that can be stopped are drawn once.
-
-    Args:
-        states: `Activity`, `Control` or `Stepping`.
     """
     arrows: dict[tuple[str, str], list[str]] = {}
     for row in TRANSITIONS:

@@ -42,10 +42,12 @@ FORMAT = 2
 
 kernels: "list[KernelCache]" = []
 """Those of all functions that this process has imported so far."""
+OTHERS = 16
+"""Files of a kernel's other sources that stay, since several installations share the folder."""
 SHIPPED = "tvist_compiled"
 """Package, if it is installed, whose folder holds machine code that somebody else compiled."""
 unkept: dict[str, str] = {}
-"""Why machine code could not be kept in any folder, by the folder that was tried last."""
+"""Why machine code could not be kept, by the folder."""
 _said: set[str] = set()
 """Warnings that were given."""
 
@@ -55,12 +57,7 @@ class DistrustWarning(UserWarning):
 
 
 class KernelCache(_Cache):
-    """The machine code of one kernel, for numba's dispatcher.
-
-    Args:
-        function: The kernel's Python source.
-        dispatcher: numba's dispatcher of it, for `load_all`.
-    """
+    """The machine code of one kernel, for numba's dispatcher."""
 
     def __init__(self, function: Callable[..., Any], dispatcher: Any = None) -> None:
         self._function, self._dispatcher = function, dispatcher
@@ -75,20 +72,10 @@ class KernelCache(_Cache):
         """Hash of what the machine code depends on among our sources; computed when a kernel is first called."""
         return _short(digest(self._function.__module__) + self._function.__code__.co_code.hex())
 
-    @cached_property
-    def places(self) -> list[Path]:
-        """The folders in which machine code is looked for, in this order."""
-        shipped = top(SHIPPED)
-        return self._own if shipped is None else [*self._own, shipped.parent]
-
-    @cached_property
-    def _own(self) -> list[Path]:
-        return folders(Path(self._function.__code__.co_filename).parent)
-
     @property
     def cache_path(self) -> str:
-        """The folder in which machine code is looked for first."""
-        return str(self._own[0])
+        """The folder in which machine code is kept, for numba."""
+        return str(own_folder())
 
     def holds(self) -> bool:
         """Return whether there is machine code of this kernel for this processor, for any types."""
@@ -98,7 +85,7 @@ class KernelCache(_Cache):
         """Return the kernel for types of arguments; None if there is none on disk, or the file is damaged."""
         for machine in _machines(target_context) if self._enabled else ():
             name = self._file(sig, machine)
-            for folder in self.places:
+            for folder in places():
                 if (code := _code(folder / name)) is not None:
                     return from_bytes(target_context, code)
         return None
@@ -118,22 +105,18 @@ class KernelCache(_Cache):
         return True
 
     def save_overload(self, sig: object, data: Any) -> None:
-        """Write a kernel into the first folder that can be written in; if there is none, note it in `unkept`."""
+        """Write a kernel into its folder; if that is impossible, note it in `unkept`."""
         if not self._enabled or not self._content.check_cachable(data):
             return
         code = to_bytes(data)
-        name = self._file(sig, _machines(data.target_context)[0])
-        failed: dict[str, str] = {}
-        for folder in self._own:
-            try:
-                _write(folder / name, hashlib.sha256(code).digest() + code)
-            except OSError as error:
-                failed = {str(folder): error.strerror or str(error)}
-                continue
-            _cache_log("[cache] data saved to %r", str(folder / name))
-            self._forget_older(folder, name)
+        file = own_folder() / self._file(sig, _machines(data.target_context)[0])
+        try:
+            _write(file, hashlib.sha256(code).digest() + code)
+        except OSError as error:
+            unkept[str(file.parent)] = error.strerror or str(error)
             return
-        unkept.update(failed)
+        _cache_log("[cache] data saved to %r", str(file))
+        self._forget_older(file)
 
     def enable(self) -> None:
         """Use the disk again."""
@@ -145,20 +128,18 @@ class KernelCache(_Cache):
 
     def flush(self) -> None:
         """Remove this kernel's machine code for all sources, processors and types."""
-        for folder in self._own:
-            with contextlib.suppress(OSError):
-                _remove(trust.real_folder(folder).glob(f"{self.name}.*.kernel"))
+        with contextlib.suppress(OSError):
+            _remove(trust.real_folder(own_folder()).glob(f"{self.name}.*.kernel"))
 
     def _file(self, sig: object, machine: str) -> str:
         return f"{self.name}.{self.sources}-{machine}-{_short(str(sig))}.kernel"
 
-    def _forget_older(self, folder: Path, name: str) -> None:
-        """Remove what this kernel was before its sources changed, on this machine."""
-        machine = name.split("-")[-2]
-        older = (
-            file for file in folder.glob(f"{self.name}.*-{machine}-*.kernel") if self.sources not in file.name
-        )
-        _remove(older)
+    def _forget_older(self, written: Path) -> None:
+        """Remove what this kernel was before its sources changed, on this machine; others may use the latest."""
+        same = written.parent.glob(f"{self.name}.*-{written.name.split('-')[-2]}-*.kernel")
+        with contextlib.suppress(OSError):  # another process removes some
+            others = [file for file in same if self.sources not in file.name]
+            _remove(sorted(others, key=lambda file: file.stat().st_mtime_ns)[:-OTHERS])
 
 
 class _Content(CompileResultCacheImpl):
@@ -186,7 +167,7 @@ def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
         place = real(folder) if files else None
         return [] if place is None else [place / file for file in files if _may_be_loaded(place / file)]
 
-    found = {kernel: [file for folder in kernel.places for file in there(kernel, folder)] for kernel in some}
+    found = {kernel: [file for folder in places() for file in there(kernel, folder)] for kernel in some}
     return {kernel: files for kernel, files in found.items() if files}
 
 
@@ -222,25 +203,17 @@ def _may_be_loaded(file: Path) -> bool:
     return False
 
 
-def folders(sources: Path) -> list[Path]:
-    """Return the folders to look for the machine code of a folder's kernels, and to write it, in this order.
+def own_folder() -> Path:
+    """Return the folder in which machine code is kept: NUMBA_CACHE_DIR, or a folder in the user's cache."""
+    return Path(
+        config.CACHE_DIR or Path(AppDirs(appname="tvist", appauthor=False).user_cache_dir) / "kernels"
+    )
 
-    Args:
-        sources: Folder of the modules with the kernels.
-    """
-    below = f"{sources.name}-{_short(str(sources))}"
-    user = Path(AppDirs(appname="tvist", appauthor=False).user_cache_dir) / "kernels" / below
-    if not config.CACHE_DIR:  # NUMBA_CACHE_DIR
-        return [sources / "__pycache__", user]
-    named = Path(config.CACHE_DIR) / below
-    try:
-        trust.real_folder(named)
-    except trust.DistrustError as error:
-        _warn(f"{error}, or give NUMBA_CACHE_DIR another folder; until then {user.parent} is used instead")
-        return [user]
-    except OSError:  # there is nothing to read; what is to be kept meets it again
-        pass
-    return [named]
+
+def places() -> list[Path]:
+    """Return the folders in which machine code is looked for, in this order."""
+    shipped = top(SHIPPED)
+    return [own_folder(), *([] if shipped is None else [shipped.parent])]
 
 
 def _machines(target_context: Any) -> list[str]:
@@ -275,20 +248,17 @@ def _trusting(folder: Path) -> Iterator[None]:
     try:
         yield
     except trust.DistrustError as error:
-        _warn(f"{error}, or delete {folder}; until then another folder is used")
+        why = f"{error}, or delete {folder}; until then they are compiled again"
+        # Once; processes that help leave it to the one that they help.
+        if why not in _said and multiprocessing.parent_process() is None:
+            _said.add(why)
+            warnings.warn(
+                f"compiled kernels are not loaded where somebody else can have put them: {why}",
+                DistrustWarning,
+                stacklevel=2,
+            )
     except OSError:
         pass
-
-
-def _warn(why: str) -> None:
-    """Say once that machine code is not used; processes that help leave it to the one that they help."""
-    if why not in _said and multiprocessing.parent_process() is None:
-        _said.add(why)
-        warnings.warn(
-            f"compiled kernels are not loaded where somebody else can have put them: {why}",
-            DistrustWarning,
-            stacklevel=2,
-        )
 
 
 def _write(file: Path, content: bytes) -> None:
@@ -301,11 +271,11 @@ def _write(file: Path, content: bytes) -> None:
             stream.write(content)
         os.replace(draft, file)  # noqa: PTH105  whole, or not at all
     except OSError:
-        _remove(iter([draft]))
+        _remove([draft])
         raise
 
 
-def _remove(files: Iterator[Path]) -> None:
+def _remove(files: Iterable[Path]) -> None:
     for file in files:
         with contextlib.suppress(OSError):  # another process did, or may not be disturbed
             file.unlink()

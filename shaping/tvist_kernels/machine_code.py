@@ -18,11 +18,7 @@ from numba.core.serialize import dumps
 
 
 def to_bytes(result: Any) -> bytes:
-    """Return what `from_bytes` makes a kernel of.
-
-    Args:
-        result: numba's `CompileResult`.
-    """
+    """Return what `from_bytes` makes a kernel of."""
     (name, _, (code, intermediate)), descriptor, environment, signature, *rest = result._reduce()  # noqa: SLF001
     shared = result.library._get_module_for_linking()  # noqa: SLF001
     symbols = [*shared.functions, *shared.global_variables]
@@ -40,12 +36,7 @@ def to_bytes(result: Any) -> bytes:
 
 
 def from_bytes(target: Any, content: bytes) -> Any:
-    """Return a kernel, as numba's `CompileResult`.
-
-    Args:
-        target: numba's context of the processor.
-        content: What `to_bytes` has made, from a source that is trusted: it can run anything.
-    """
+    """Return a kernel, numba's `CompileResult`; the content has to be trusted, since it can run anything."""
     name, code, intermediate, defined, needed, rest = pickle.loads(content)  # noqa: S301  ours, or root's
     _offer_memory()
     if any(binding.address_of_symbol(symbol) is None for symbol in needed):

@@ -1,6 +1,5 @@
 """Time-varying input shaping: a filter that removes vibration from a reference in real time."""
 
-from tvist_shaping.aimed import AimedFilter
 from tvist_shaping.base import Filter
 from tvist_shaping.catalogue import SHAPERS, shaper
 from tvist_shaping.delay_line import DelayLine
@@ -39,7 +38,7 @@ from tvist_shaping.named import BUILT_IN, DESIGNS, Registry, make_filter
 from tvist_shaping.own import check_shaper, shaper_of
 from tvist_shaping.sensitivity import band, residual
 from tvist_shaping.shaper import Shaper
-from tvist_shaping.steady import Design, ProductDesign, ShortDesign, SteadyFilter
+from tvist_shaping.steady import AimedFilter, Design, ProductDesign, ShortDesign, SteadyFilter
 from tvist_shaping.unity import um_zv, um_zvd
 
 __all__ = [

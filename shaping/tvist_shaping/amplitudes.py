@@ -19,16 +19,6 @@ def ripple(humps: int, V: float) -> Floats:
 
     For one hump the amplitudes are ((1+V)/4, (1-V)/2, (1+V)/4). For two and three humps they are the shapers of
     Singhose, Porter, Tuttle and Singer (J. Dyn. Sys. Meas. Control 119, 1997); without humps they are those of zv.
-
-    Args:
-        humps: Number of humps, 0 to 10.
-        V: Height of the humps [-], 1e-4 to 0.5.
-
-    Returns:
-        Amplitudes [-], shape (humps + 2,), with sum 1, positive and symmetric.
-
-    Raises:
-        DesignError: An argument is out of range.
     """
     if not 0 <= humps <= 10:
         raise DesignError("humps", humps, "0 to 10")
@@ -56,16 +46,6 @@ def modified(n: int, t: float) -> Floats:
     = t (n-2)/(n-2t-1) and i = 0 … n-2: the first zero is at the design frequency, the others are above it. In w =
     exp(2πi f t/(n-1)f_d) the residual is a polynomial whose zeros are equally spaced in angle, from 2πt/(n-1) round
     to its mirror image.
-
-    Args:
-        n: Number of impulses, 3 to 30.
-        t: Duration in periods [-], 0 < t < (n-1)/2.
-
-    Returns:
-        Amplitudes [-], shape (n,), with sum 1, non-negative and symmetric.
-
-    Raises:
-        DesignError: An argument is out of range, or an amplitude would be negative.
     """
     if not 3 <= n <= 30:
         raise DesignError("n", n, "3 to 30 impulses")

@@ -1,14 +1,13 @@
 """Base of all filters: a delay line, an estimator, and weights that depend on the modes."""
 
-import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Literal, Self, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping._types import Floats
+from tvist_shaping._types import Floats, Forked
 from tvist_shaping.delay_line import DelayLine
 from tvist_shaping.errors import FilterError, ShaperFailureError, ShapingError
 from tvist_shaping.estimators.base import Estimator
@@ -21,7 +20,7 @@ Posture = Callable[[Floats], Floats]
 """Function from a sample, shape (width,), to the joint angles that it represents, shape (joints,) [rad]."""
 
 
-class Filter(ABC):
+class Filter(Forked, ABC):
     """Time-varying shaping of a sampled reference, one filter for all joints.
 
     A sample consists of the joint angles, or of the parameter of a path that the joints follow (see `reset`). In the
@@ -59,18 +58,7 @@ class Filter(ABC):
     fault: str | None
 
     def __init__(self, name: str, estimator: Estimator, joints: int, period: float, capacity: int) -> None:
-        """Initialize the common parts of all filters; a derived class then calls `reset`.
-
-        Args:
-            name: Name of the filter.
-            estimator: The estimator.
-            joints: Number of joints of the arm, >= 1.
-            period: Time between two samples h [s], > 0.
-            capacity: Number of samples to keep.
-
-        Raises:
-            FilterError: An argument is out of range.
-        """
+        """Initialize the common parts of all filters; a derived class then calls `reset`."""
         if joints < 1:
             raise FilterError("joints", joints, "at least 1")
         if not 0.0 < period < np.inf:
@@ -148,7 +136,7 @@ class Filter(ABC):
         self._q_star[:] = sample
         self._start()
 
-    def aim(self, q: npt.ArrayLike | None) -> None:  # noqa: B027  most filters ignore this
+    def aim(self, q: npt.ArrayLike | None) -> None:
         """Set where the motion that begins now will end; the reference must be at rest.
 
         Args:
@@ -188,21 +176,7 @@ class Filter(ABC):
             raise ShapingError(f"q_ref has shape {samples.shape}, but must be (T, {self.width})")
         return np.array([self.filter(sample) for sample in samples]).reshape(samples.shape)
 
-    def fork(self) -> Self:
-        """Return an independent copy of the present state.
-
-        For equal samples it gives the same bits as this filter, and its use does not change this filter. So a copy
-        can be run ahead to predict the output of this filter.
-
-        Returns:
-            The copy, with its own estimator; use it in the same thread as the original.
-        """
-        other = copy.copy(self)
-        other._part()  # noqa: SLF001  one of its own kind
-        return other
-
-    def _part(self) -> None:
-        """Replace everything that is modified in place by copies, since a new copy of the filter still shares it."""
+    def _unshare(self) -> None:
         self.estimator, self._line = self.estimator.fork(), self._line.fork()
         self._q_star = self._q_star.copy()
 
@@ -233,11 +207,7 @@ class Filter(ABC):
         self._line, self._q_star = DelayLine(width, self._line.capacity), np.zeros(width)
 
     def _check_made(self) -> None:
-        """Refuse a shaper that fails at once, since there are no weights yet to continue with.
-
-        Raises:
-            ShaperFailureError: The shaper fails.
-        """
+        """Refuse a shaper that fails at once, since there are no weights yet to continue with."""
         if self.fault is not None:
             raise ShaperFailureError(self.name, self.fault)
 

@@ -6,14 +6,11 @@ so a delay may change at every tick without a transient, and it reproduces cubic
 fractional delays is Laakso et al., 1996).
 """
 
-import copy
-from typing import Self
-
 import numpy as np
 import numpy.typing as npt
 
 from tvist_shaping._compiled import compiled
-from tvist_shaping._types import Floats
+from tvist_shaping._types import Floats, Forked
 from tvist_shaping.errors import DelayError, ShapingError
 
 _MARGIN = 3
@@ -24,16 +21,8 @@ _MARGIN = 3
 def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats, out: Floats) -> int:
     """Compute a weighted sum of delayed samples; the formula is in `DelayLine.gather`.
 
-    Args:
-        buffer: Ring buffer of samples, shape (capacity, joints).
-        newest: Row of the newest sample; older ones precede it, modulo capacity.
-        A: Amplitudes [-], shape (N,).
-        delays: Delays [ticks], shape (N,).
-        first: Scratch, shape (joints,).
-        out: Result, shape (joints,).
-
-    Returns:
-        Index of the first delay that exceeds the buffer, or -1; `out` is written only in the latter case.
+    The buffer is a ring of samples, shape (capacity, joints), whose row `newest` is the newest one. `out` is
+    written only if -1 is returned, otherwise the index of the first delay that exceeds the buffer.
     """
     capacity, joints = buffer.shape
     for j in range(A.shape[0]):
@@ -74,7 +63,7 @@ def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats
     return -1
 
 
-class DelayLine:
+class DelayLine(Forked):
     """The latest samples of a reference, which can be read at any fractional delay.
 
     Attributes:
@@ -152,12 +141,7 @@ class DelayLine:
         self._bits = bits
 
     def pushed(self, samples: Floats, head: int) -> None:
-        """Note samples that a kernel has appended already.
-
-        Args:
-            samples: The samples, shape (k, joints), k >= 1.
-            head: Row of the newest one.
-        """
+        """Note samples that a kernel has appended already."""
         rows = [sample.tobytes() for sample in samples[-self.capacity :]]
         equal = 0
         for bits in reversed(rows):
@@ -190,12 +174,6 @@ class DelayLine:
         self._bits = other._bits  # noqa: SLF001  one of its own kind
         self.still = other.still if other.still < other.capacity else max(other.still, self.capacity)
 
-    def fork(self) -> Self:
-        """Return an independent copy with the same samples."""
-        other = copy.copy(self)
-        other._part()  # noqa: SLF001  one of its own kind
-        return other
-
     def gather(self, A: Floats, delays: Floats, out: Floats) -> None:
         """Convolve the reference with impulses, eq. (10) of the paper.
 
@@ -218,7 +196,7 @@ class DelayLine:
         if refused >= 0:
             raise DelayError(float(delays[refused]), self.max_delay)
 
-    def _part(self) -> None:
+    def _unshare(self) -> None:
         self.ring, self.scratch = self.ring.copy(), np.empty_like(self.scratch)
 
     def _sample(self, q: npt.ArrayLike) -> Floats:

@@ -36,15 +36,7 @@ class HumpShaper:
     """The equations for a given number and height of humps."""
 
     def __init__(self, humps: int, V: float) -> None:
-        """Set up the equations.
-
-        Args:
-            humps: Number of humps, at least 1.
-            V: Height of the humps [-].
-
-        Raises:
-            DesignError: An argument is out of range, see `ripple`.
-        """
+        """Set up the equations."""
         self.humps, self.V, self.N = humps, V, humps + 2
         degree = humps + 1
         # Zeros and humps of Chebyshev's polynomial, which are those of the undamped shaper.
@@ -100,15 +92,7 @@ class HumpShaper:
 
 
 def exact(humps: int, V: float) -> Tabulated:
-    """Return the shaper with humps of height V, up to its highest possible damping.
-
-    Args:
-        humps: Number of humps, 1 to 10.
-        V: Height of the humps [-], 1e-4 to 0.5.
-
-    Raises:
-        DesignError: An argument is out of range.
-    """
+    """Return the shaper with humps of height V, up to its highest possible damping."""
     shaper = HumpShaper(humps, V)
     return Tabulated(
         shaper.follow, shaper.start, shaper.limit(), f"take ei_of({humps}, {V:g}), which leaves less"

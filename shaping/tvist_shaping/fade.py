@@ -14,15 +14,13 @@ velocity limit, but it slows down by itself; its speed is then limited such that
 there is no room, s waits; when the reference is at rest, o and n agree and there is nothing left to fade.
 """
 
-import copy
 import math
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from tvist_shaping._compiled import compiled
-from tvist_shaping._types import Floats
+from tvist_shaping._types import Floats, Forked
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import FilterError
 
@@ -60,19 +58,13 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     period: float,
     lag: tuple[float, float],
 ) -> tuple[float, float, float]:
-    """Compute one tick of a fade.
+    """Compute one tick of a fade, and return its s, ṡ and s̈; s is 1 when the fade is complete.
 
-    Args:
-        old: The old filter's output at the last three ticks, the present one last [rad], shape (3, joints).
-        new: The new filter's output, in the same form.
-        out: The fade's output, in the same form; its last row is written.
-        progress: State of the previous tick: s [-], 0 to 1; ṡ [1/s], >= 0; requested rate of change of ṡ, s̈ [1/s²].
-        limits: Limits for every joint: velocity [rad/s], acceleration [rad/s²], and jerk of the motion [rad/s³].
-        period: Tick [s].
-        lag: Excess of the new filter's mean delay over the old one's [s], and its rate of change [-].
-
-    Returns:
-        s, ṡ and s̈ of this tick; s is 1 when the fade is complete.
+    `old` and `new` are the filters' outputs at the last three ticks, the present one last [rad], shape (3,
+    joints), and `out` the fade's, whose last row is written. `progress` is what the previous tick returned: s
+    [-], ṡ [1/s] and the requested rate of change of ṡ [1/s²]. `limits` are those of every joint: velocity
+    [rad/s], acceleration [rad/s²] and jerk of the motion [rad/s³]. `lag` is the excess of the new filter's
+    mean delay [s], and its rate of change [-].
     """
     share, rate, slope = progress
     velocity, acceleration, jerk = limits
@@ -175,7 +167,7 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     return s, (s - share) / period, slope
 
 
-class Fade:
+class Fade(Forked):
     """Shapes like one filter at the beginning, like another at the end, and keeps a motion's limits in between.
 
     As long as the reference keeps limits of velocity, acceleration and jerk, the output keeps those of velocity and
@@ -230,14 +222,11 @@ class Fade:
         """Whether the last output was entirely the new filter's, as all later ones will be."""
         return self.share == 1.0
 
-    def fork(self) -> Self:
-        """Return an independent copy of the present state, with copies of both filters; see `Filter.fork`."""
-        other = copy.copy(self)
-        other.old, other.new = self.old.fork(), self.new.fork()
-        if self.new.estimator is self.old.estimator:  # both use its state
-            other.new.estimator = other.old.estimator
-        other._history = self._history.copy()  # noqa: SLF001  one of its own kind
-        return other
+    def _unshare(self) -> None:
+        shared = self.new.estimator is self.old.estimator  # both use its state
+        self.old, self.new, self._history = self.old.fork(), self.new.fork(), self._history.copy()
+        if shared:
+            self.new.estimator = self.old.estimator
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
         """Shape one sample.

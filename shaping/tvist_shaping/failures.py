@@ -15,13 +15,7 @@ _HERE: Final = Path(__file__).parent
 
 
 def failure(error: BaseException, f_d: Floats, zeta: Floats) -> str:
-    """Describe an error and its modes, as a phrase to follow a shaper's name.
-
-    Args:
-        error: Exception that the function raised.
-        f_d: Damped frequencies passed to the function [Hz], shape (modes,).
-        zeta: Damping ratios passed to the function [-], shape (modes,).
-    """
+    """Describe an error and its modes, as a phrase to follow a shaper's name."""
     asked = ", ".join(f"f_d = {f:g} Hz and ζ = {z:g}" for f, z in zip(f_d, zeta, strict=True))
     return f"{words(error)} for {asked}"
 

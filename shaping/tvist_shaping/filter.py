@@ -36,24 +36,13 @@ class TvistFilter(Filter):
 
     Attributes:
         shaper: The shaper.
-        estimator: The estimator.
-        joints: Number of joints of the arm.
-        period: Sampling period h [s].
         max_delay: Longest delay for which samples are kept [s].
-        f_d: Damped frequencies of the last tick [Hz], shape (modes,).
-        zeta: Damping ratios of the last tick [-], shape (modes,).
         clipped: Whether one of them was clamped to the estimator's `f_d_min` or `zeta_max`. Delays are never clipped,
             since the constructor refuses combinations that could exceed max_delay.
-        impulses: Impulses of the last tick.
     """
 
     shaper: Shaper
-    estimator: Estimator
-    joints: int
-    period: float
     max_delay: float
-    f_d: Floats
-    zeta: Floats
 
     def __init__(
         self,
@@ -258,6 +247,6 @@ class TvistFilter(Filter):
             out[i] = self.filter(samples[i])
         return out
 
-    def _part(self) -> None:
-        super()._part()
+    def _unshare(self) -> None:
+        super()._unshare()
         self._work, self._eased = self._work.copy(), self._eased.copy()

@@ -1,4 +1,10 @@
-"""What the TVIST filter computes in a tick, compiled."""
+"""What the TVIST filter computes in a tick, compiled.
+
+`ring`, `head` and `scratch` are those of a `DelayLine`; `train` has the amplitudes without damping [-] and
+the times in damped periods [-], shape (2, N); `impulses` receives amplitudes [-], times [s] and times in
+ticks, shape (3, N); `joints` to `ranges` are the `Coefficients` of a `Polynomial`; `longest` is the longest
+delay [s].
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -20,14 +26,8 @@ def eased(
 ) -> None:
     """Advance a critically damped low-pass of second order by one tick; its rates of change are limited.
 
-    Args:
-        f_d: Damped frequencies [Hz], shape (modes,).
-        zeta: Damping ratios [-], shape (modes,).
-        ease: Its natural frequency [1/s].
-        quickest: See `QUICKEST`.
-        period: Tick [s].
-        state: Damped frequencies and damping ratios that follow them, and their rates of change, shape (4, modes);
-            changed.
+    `state` has frequencies [Hz] and damping ratios [-] that follow the given ones, and their rates of change,
+    shape (4, modes); `ease` is the natural frequency [1/s], and `quickest` limits the rates, see `QUICKEST`.
     """
     for k in range(f_d.shape[0]):
         for row in range(2):
@@ -54,21 +54,7 @@ def shape(
 ) -> bool:
     """Compute the impulses of a mode, and apply them to a delay line.
 
-    Args:
-        f_d: Damped frequency [Hz], shape (1,).
-        zeta: Damping ratio [-], shape (1,).
-        zeta_max: Exclusive upper limit of ζ [-].
-        longest: Longest delay [s].
-        period: Tick [s].
-        train: Amplitudes without damping [-] and times in damped periods [-], shape (2, N).
-        impulses: Result: amplitudes [-], times [s] and times in ticks, shape (3, N).
-        ring: `DelayLine.ring`.
-        head: `DelayLine.head`.
-        scratch: `DelayLine.scratch`.
-        out: Result: the shaped sample, shape (joints,).
-
-    Returns:
-        Whether the mode is in range and the delays are short enough; otherwise `out` is not changed.
+    Return whether the mode is in range and the delays are short enough; otherwise `out` is not changed.
     """
     f, z = f_d[0], zeta[0]
     if not (LOWEST <= f <= HIGHEST and 0.0 <= z < zeta_max):
@@ -99,28 +85,10 @@ def weigh(
     q_star: Floats,
     modes: Floats,
 ) -> int:
-    """Estimate the paper's mode at the last shaped sample, and apply its impulses to a delay line.
+    """Estimate the paper's mode at the joint angles q of the last shaped sample, and apply its impulses.
 
-    Args:
-        q: Joint angles that this sample represents, shape (n,) [rad].
-        joints: Indices of the joints that the estimator knows, shape (k,).
-        centre: Its centre [rad], shape (k,).
-        multiples: Multiples of the angles in each term, shape (rows, k).
-        coefficients: Coefficients of f_d and ζ, shape (2, terms).
-        ranges: Range of f_d and range of ζ, shape (2, 2).
-        zeta_max: Exclusive upper limit of ζ [-].
-        longest: Longest delay [s].
-        period: Tick [s].
-        train: Amplitudes without damping [-] and times in damped periods [-], shape (2, N).
-        impulses: Result: impulses of the mode, shape (3, N).
-        ring: `DelayLine.ring`.
-        head: `DelayLine.head`.
-        scratch: `DelayLine.scratch`.
-        q_star: The sample, replaced by the next one if the mode is in range, shape (width,).
-        modes: Result: the mode, shape (2, 1).
-
-    Returns:
-        1 if the estimate was clamped, 0 if not; the same minus 2 if the mode is out of range.
+    The next sample replaces q_star if the mode, which `modes` receives, is in range. Return 1 if the estimate
+    was clamped, 0 if not; the same minus 2 if the mode is out of range.
     """
     clamped = evaluate(q, joints, centre, multiples, coefficients, ranges, modes)
     found = 1 if clamped else 0
@@ -152,27 +120,7 @@ def shape_all(
 ) -> tuple[int, bool]:
     """Shape many samples with the paper's estimator, one by one.
 
-    Args:
-        samples: References, shape (T, joints) [rad].
-        joints: See `weigh`, as for the next thirteen, of which `ring` is changed.
-        centre: Centre.
-        multiples: Multiples of the angles.
-        coefficients: Coefficients.
-        ranges: Ranges.
-        zeta_max: Upper limit of ζ.
-        longest: Longest delay.
-        period: Tick.
-        train: Impulses without damping.
-        impulses: Impulses of the last mode.
-        ring: Ring of the delay line.
-        head: Its head.
-        scratch: Its scratch.
-        q_star: Last shaped sample.
-        modes: The last mode.
-        out: Result: shaped samples, shape (T, joints) [rad].
-
-    Returns:
-        Number of samples shaped before the first mode out of range, and whether the last estimate was clamped.
+    Return how many were shaped before the first mode out of range, and whether the last estimate was clamped.
     """
     found = 0
     for i in range(samples.shape[0]):

@@ -137,18 +137,10 @@ class Programme(NamedTuple):
 def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops over rows and weights
     f_d: Floats, zeta: Floats, length: float, mean: float, period: float, programme: Programme
 ) -> bool:
-    """Compute the weights for given modes and length.
+    """Compute the weights for given modes, length [s] and mean delay [s].
 
-    Args:
-        f_d: Damped frequencies [Hz], shape (modes,).
-        zeta: Damping ratios [-], shape (modes,).
-        length: T [s].
-        mean: Mean delay D [s].
-        period: h₀ [s].
-        programme: The programme; its `dual`, `taps` and `remains` are changed.
-
-    Returns:
-        Whether it was solved; otherwise the taps are the best that were found.
+    `dual`, `taps` and `remains` of the programme receive them. Return whether it was solved; otherwise the
+    taps are the best that were found.
     """
     spread, weight, dual, taps, remains, rows, columns, hessian = programme
     R, N, modes = dual.shape[0], taps.shape[0], f_d.shape[0]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -119,18 +118,10 @@ class _Weights(Design):
     def __repr__(self) -> str:
         return f"{self.name!r}"
 
-    def fork(self) -> Self:
-        """Return this object itself, since it has no state."""
-        return self
-
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Compute the taps for these modes; see `Design.start`."""
+        """Compute the taps for these modes."""
         taps[:] = self._shaper.weights(f_d, zeta)
         return True
-
-    def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:  # noqa: ARG002
-        """Compute the taps for these modes; see `Design.go_on`."""
-        return self.start(f_d, zeta, taps)
 
     def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float:
         """See `Filter.mean_delay_of`."""

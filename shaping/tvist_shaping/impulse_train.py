@@ -73,17 +73,7 @@ UNSHAPED = Impulses(np.ones(1), np.zeros(1))
 
 
 def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = "") -> None:
-    """Refuse a mode outside a shaper's range.
-
-    Args:
-        f_d: Damped frequency [Hz].
-        zeta: Damping ratio [-].
-        zeta_max: Exclusive upper limit of ζ [-].
-        instead: What to use for a higher ζ, in words.
-
-    Raises:
-        ShaperRangeError: f_d is not within 1e-6 to 1e6 Hz, or not 0 <= ζ < zeta_max.
-    """
+    """Refuse a mode outside a shaper's range, with what to use for a higher ζ, in words."""
     if not F_D_RANGE[0] <= f_d <= F_D_RANGE[1]:
         raise ShaperRangeError("f_d", f_d, f"{F_D_RANGE[0]:g} to {F_D_RANGE[1]:g} Hz")
     if not 0.0 <= zeta < zeta_max:

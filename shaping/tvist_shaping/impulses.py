@@ -29,13 +29,7 @@ V = 0.05
 def decay(a: Floats, periods: Floats, f_d: float, zeta: float, A: Floats, tau: Floats) -> None:
     """Apply damping to the amplitudes of an undamped shaper: each decays as the mode does until then.
 
-    Args:
-        a: Amplitudes without damping [-], shape (N,), sum positive.
-        periods: Times in damped periods [-], shape (N,), ascending from 0.
-        f_d: Damped frequency of the mode [Hz], checked.
-        zeta: Damping ratio of the mode [-], checked.
-        A: Result: A_j = a_j exp(-2π ζ/√(1-ζ²) τ_j f_d), normalised [-], shape (N,).
-        tau: Result: τ_j [s], shape (N,).
+    A_j = a_j exp(-2π ζ/√(1-ζ²) τ_j f_d), normalised [-], and τ_j [s], for a mode that is checked.
     """
     rate = -2.0 * math.pi * zeta / math.sqrt(1.0 - zeta * zeta)
     total = 0.0
@@ -72,11 +66,7 @@ class Train(NamedTuple):
         return Impulses._by_construction(A, tau)  # noqa: SLF001  both come from this package
 
     def at(self, f_d: float, zeta: float) -> Impulses:
-        """Return the impulses of a mode.
-
-        Raises:
-            ShaperRangeError: See `check_mode`.
-        """
+        """Return the impulses of a mode."""
         check_mode(f_d, zeta)
         return self.of(f_d, zeta)
 

@@ -3,23 +3,23 @@
 import re
 from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
+from functools import partial
 from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
 
 from tvist_shaping._types import Floats
-from tvist_shaping.aimed import AimedFilter, TargetDesign
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.catalogue import SHAPERS
+from tvist_shaping.designs import ConstantDesign, SmoothedDesign, TargetDesign, running_means
 from tvist_shaping.errors import DesignError, UnknownShaperError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.filter import TvistFilter
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.fir_shaper import FirShaper
 from tvist_shaping.shaper import Shaper
-from tvist_shaping.smoothing import SmoothedDesign, SmoothingFilter, running_means
-from tvist_shaping.steady import Design, ShortDesign, SteadyFilter
+from tvist_shaping.steady import AimedFilter, Design, ShortDesign, SteadyFilter
 
 AnyShaper: TypeAlias = Shaper | FirShaper
 """Types that a user's own shaper may have."""
@@ -48,29 +48,14 @@ def _brief(mean_delay: float, residual: float, third: float, name: str, slower: 
     return ShortDesign(mean_delay * slower, wanted=wanted, name=name)
 
 
-def _auto(slower: float) -> Design:
-    return _brief(0.030, 0.035, 0.06, "auto", slower)
-
-
-def _short(slower: float) -> Design:
-    return _brief(0.028, 0.05, 0.08, "short", slower)
-
-
-def _auto_target(slower: float) -> Design:
-    return TargetDesign(_brief(0.026, 0.035, 0.06, AIMED, slower), slower)
-
-
-def _elastic_auto(slower: float) -> Design:
-    return SmoothedDesign(_auto(slower), running_means(8, 8), ELASTIC_AUTO)
-
-
+_auto = partial(_brief, 0.030, 0.035, 0.06, "auto")
 AIMED, ELASTIC_AUTO = "auto-target", "elastic-auto"
 DESIGNS: Mapping[str, Callable[[float], Design]] = MappingProxyType(
     {
         "auto": _auto,
-        "short": _short,
-        AIMED: _auto_target,
-        ELASTIC_AUTO: _elastic_auto,
+        "short": partial(_brief, 0.028, 0.05, 0.08, "short"),
+        AIMED: lambda slower: TargetDesign(_brief(0.026, 0.035, 0.06, AIMED, slower), slower),
+        ELASTIC_AUTO: lambda slower: SmoothedDesign(_auto(slower), running_means(8, 8), ELASTIC_AUTO),
     }
 )
 """Designs with constant mean delay against an arm's four lowest modes: one with a smaller residual, one that is
@@ -201,7 +186,8 @@ class Registry:
         feed_forward, smoothing = self.feed_forward_of(name), _smoothing(name)
         if smoothing:
             weights = running_means(*means_of(smoothing[1]))
-            return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
+            design = ConstantDesign(name, weights, estimator.modes)
+            return SteadyFilter(design, estimator, joints=joints, feed_forward=feed_forward)
         if name in DESIGNS:
             kind = AimedFilter if name == AIMED else SteadyFilter
             slower = max(
@@ -222,11 +208,7 @@ def means_of(length: int) -> tuple[int, int]:
 
 
 def _smoothing(name: str) -> tuple[FeedForward, int] | None:
-    """Return feed-forward and length [ms] of a filter that only smooths; None for any other name.
-
-    Raises:
-        DesignError: Its name says a length that no such filter has.
-    """
+    """Return feed-forward and length [ms] of a filter that only smooths; None for any other name."""
     if name in SMOOTHED:
         return SMOOTHED[name], SMOOTHING
     found = _LENGTH.fullmatch(name)

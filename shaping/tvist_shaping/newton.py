@@ -16,18 +16,7 @@ SOLVED = 1e-12
 
 
 def solve(equations: Callable[[Floats], Floats], start: Floats) -> Floats:
-    """Solve a system with as many equations as unknowns.
-
-    Args:
-        equations: (M, m) -> (M, m): residuals of the m equations at each of M points.
-        start: Initial guess, shape (m,); it must be close enough for Newton's method.
-
-    Returns:
-        A solution, shape (m,), with residuals of at most 1e-12.
-
-    Raises:
-        ConvergenceError: No solution was found.
-    """
+    """Solve m equations, whose residuals at M points are of shape (M, m), from a close guess."""
     x, m = np.array(start, dtype=float), len(start)
     with np.errstate(all="ignore"):  # divergence is detected below
         for _ in range(60):

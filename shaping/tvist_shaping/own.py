@@ -77,17 +77,7 @@ def check_shaper(shaper: Shaper | FirShaper) -> None:
 def check_range(
     shaper: Shaper | FirShaper, f_d: tuple[float, float], zeta: tuple[float, float], whose: str
 ) -> None:
-    """Try a shaper with all modes that an arm may have.
-
-    Args:
-        shaper: The shaper.
-        f_d: Lowest and highest damped frequency [Hz].
-        zeta: Lowest and highest damping ratio [-].
-        whose: Whose modes these are, for the message.
-
-    Raises:
-        ShaperFailureError: Its function fails for one of them.
-    """
+    """Try a shaper with all modes that an arm may have, from the lowest to the highest f_d [Hz] and ζ [-]."""
     for one in np.geomspace(*f_d, 25).tolist():
         for other in np.linspace(*zeta, 10).tolist():
             try:
@@ -105,10 +95,6 @@ def longest(shaper: Shaper, f_d_min: float) -> float:
     """Return the largest time of the last impulse of one mode [s], for the modes from a frequency on that it supports.
 
     It is shorter than `duration_periods` says if the times are not proportional to 1/f_d, as those from a table.
-
-    Args:
-        shaper: The shaper.
-        f_d_min: Lowest damped frequency [Hz].
     """
     undeclared = replace(shaper, duration_periods=np.inf, peak=np.inf)
     return _tried(undeclared, np.geomspace(f_d_min, max(f_d_min, TRIED_F_D[1]), _F_D.size))[2]
@@ -118,9 +104,6 @@ def _tried(shaper: Shaper | FirShaper, tried: Floats = _F_D) -> tuple[float, flo
     """Return the longest duration in damped periods, the largest sum of magnitudes, and the longest duration [s].
 
     They are those of the modes for which the function works.
-
-    Raises:
-        ShaperFailureError: The function works nowhere, or violates the shaper's declaration.
     """
     zeta_max = shaper.zeta_max if isinstance(shaper, Shaper) else 1.0
     undeclared = shaper if isinstance(shaper, Shaper) else replace(shaper, peak=1e300)
@@ -152,11 +135,7 @@ def _tried(shaper: Shaper | FirShaper, tried: Floats = _F_D) -> tuple[float, flo
 
 
 def _evaluated(shaper: Shaper | FirShaper, f_d: float, zeta: float) -> Impulses:
-    """Return the impulses for a mode; for a FIR filter of several, the others are above it.
-
-    Raises:
-        ShaperFailureError: The function fails.
-    """
+    """Return the impulses for a mode; for a FIR filter of several, the others are above it."""
     count = 1 if isinstance(shaper, Shaper) else shaper.modes
     modes = np.array([f_d * _APART**mode for mode in range(count)]), np.full(count, zeta)
     try:

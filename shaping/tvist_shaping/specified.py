@@ -33,20 +33,7 @@ STRIDE = 0.02
 
 
 def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
-    """Return the shortest train without damping.
-
-    Args:
-        low: Lower end of the band [any unit of frequency], > 0.
-        high: Upper end of the band [same unit], at least low.
-        V: Residual vibration permitted in the band [-], 1e-4 to 0.5.
-
-    Returns:
-        Amplitudes [-], positive, with sum 1, and times [inverse of that unit], each of shape (N,).
-
-    Raises:
-        DesignError: V is out of range, or the band is too wide for 12 impulses.
-        ConvergenceError: No train was found.
-    """
+    """Return the shortest train without damping: amplitudes [-], and times [inverse of the band's unit]."""
     if not 0.0 < low <= high < math.inf:
         raise DesignError("band", low, "above 0, its lower end not above its upper")
     ratio = high / low

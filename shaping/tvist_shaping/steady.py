@@ -10,14 +10,13 @@ Taps are designed every few ticks and averaged by three consecutive running mean
 mean of tap vectors with equal sum and mean delay has the same sum and mean delay.
 """
 
-import copy
 import math
 from abc import ABC, abstractmethod
-from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
-from tvist_shaping._types import Floats
+from tvist_shaping._types import Floats, Forked
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.errors import FilterError
 from tvist_shaping.estimators.base import Estimator
@@ -33,7 +32,7 @@ EXCESS = 0.005
 """Share by which the acceleration may exceed the reference's [-]: the largest in random motions at their limits."""
 
 
-class Design(ABC):
+class Design(Forked, ABC):
     """Design that computes taps from modes."""
 
     name: str
@@ -46,28 +45,25 @@ class Design(ABC):
     """Tick [s]."""
     peak: float = 1.0
     """Upper bound of the sum of the taps' magnitudes, 1 if none is negative [-]."""
-
-    @abstractmethod
-    def fork(self) -> Self:
-        """Return a copy for another filter with the state of this one, so that it continues from here."""
+    constant: bool = False
+    """Whether the taps are the same for all modes, which are then only estimated in order to be reported."""
 
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Compute the taps for a reference that has always been at rest; arguments and result as in `go_on`."""
-
-    @abstractmethod
-    def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:
-        """Compute the taps some time after the last ones.
+        """Compute the taps for a reference that has always been at rest.
 
         Args:
             f_d: Damped frequencies [Hz], shape (modes,).
             zeta: Damping ratios [-], shape (modes,).
-            seconds: Time since the last ones [s].
             taps: Result, shape (taps,), with sum 1.
 
         Returns:
             Whether the taps are as required; False if a delay was clipped.
         """
+
+    def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:  # noqa: ARG002
+        """Compute the taps some time after the last ones [s]: by default, as `start` for these modes."""
+        return self.start(f_d, zeta, taps)
 
     def at_target(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Compute the taps for the modes at the known end of a motion, for its whole length: by default, as `start`."""
@@ -100,21 +96,12 @@ class ProductDesign(Design):
         _check_times(mean_delay, longest, period)
         self.name, self.modes, self.mean_delay = "product", modes, mean_delay
         self.period, self.taps = period, math.ceil(longest / period) + 3
-        self._longest = longest
 
     def __repr__(self) -> str:
         return f"ProductDesign(mean_delay={self.mean_delay:g}, modes={self.modes})"
 
-    def fork(self) -> Self:
-        """Return this design itself, since it has no state."""
-        return self
-
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Compute the taps as `go_on` does, since this design has no state."""
-        return product_taps(f_d, zeta, self.mean_delay, self.period, taps)
-
-    def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:  # noqa: ARG002
-        """Compute the taps for these modes; see `Design.go_on`."""
+        """Compute the taps for these modes."""
         return product_taps(f_d, zeta, self.mean_delay, self.period, taps)
 
 
@@ -152,14 +139,8 @@ class ShortDesign(Design):
     def __repr__(self) -> str:
         return f"ShortDesign(mean_delay={self.mean_delay:g}, wanted={self.wanted!r})"
 
-    def fork(self) -> Self:
-        """Return a copy with the present length and the present solution of the programme."""
-        other = copy.copy(self)
-        other._part()  # noqa: SLF001  one of its own kind
-        return other
-
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Compute taps of the shortest length with a permitted residual; arguments and result as in `go_on`."""
+        """Compute taps of the shortest length with a permitted residual."""
         shortest, longest = self.wanted.shortest, self.wanted.longest
         self._programme.dual[:] = 0.0
         for _ in range(11):  # the residual decreases with the length, so bisect
@@ -176,14 +157,14 @@ class ShortDesign(Design):
         return self._solved and self._excess() <= 0.0
 
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:
-        """Compute taps whose length follows the residual; see `Design.go_on`."""
+        """Compute taps whose length follows the residual."""
         self._solve(f_d, zeta, taps)
         excess = self._excess()
         change = seconds * min(max(GAIN * excess, -QUICKEST), QUICKEST)
         self._length = min(max(self._length + change, self.wanted.shortest), self.wanted.longest)
         return self._solved and (self._length < self.wanted.longest or excess <= 0.0)
 
-    def _part(self) -> None:
+    def _unshare(self) -> None:
         self._programme = self._programme.fork()
 
     def _solve(self, f_d: Floats, zeta: Floats, taps: Floats) -> None:
@@ -201,7 +182,7 @@ class ShortDesign(Design):
 
 
 class SteadyFilter(Filter):
-    """Time-varying shaping with a constant mean delay.
+    """Time-varying shaping by taps: with a constant mean delay, or by constant taps.
 
     An estimator's `f_d_min` may be far below the modes anywhere in the workspace. A design is therefore not refused
     for being too short at that frequency. If it is too short for the actual modes, `clipped` reports this at that
@@ -245,9 +226,10 @@ class SteadyFilter(Filter):
                 "take an estimator of that many modes, or another design",
             )  # fmt: skip
         super().__init__(design.name, estimator, joints, design.period, design.taps + 4)
-        self.design, self.excess, self.feed_forward = design, self.spared, feed_forward
+        self.design, self.feed_forward = design, feed_forward
+        self.excess = 0.0 if design.constant else self.spared
         self._reach = design.taps
-        self._smooth = smooth
+        self._smooth = 1 if design.constant else smooth
         self._delays = np.arange(design.taps, dtype=float)
         self._designed, self._taps = np.zeros((2, design.taps))
         self._past, self._sums = np.zeros((3, smooth, design.taps)), np.zeros((3, design.taps))
@@ -278,8 +260,8 @@ class SteadyFilter(Filter):
         """See `Filter.peak`: the design's own."""
         return self.design.peak
 
-    def _part(self) -> None:
-        super()._part()
+    def _unshare(self) -> None:
+        super()._unshare()
         self.design = self.design.fork()
         self._designed, self._taps = self._designed.copy(), self._taps.copy()
         self._past, self._sums = self._past.copy(), self._sums.copy()
@@ -288,20 +270,17 @@ class SteadyFilter(Filter):
         self._ask(self.estimator.settle(self._angles(self._q_star)), None)
         self._past[:] = self._designed
         self._sums[:] = self._designed * self._smooth
-        self._take(self._designed)
+        self._taps[:], self._length = self._designed, length(self._designed)
         self._row, self._tick = 0, 0
 
     def _weigh(self) -> None:
         if self._tick % EVERY == 0:
             self._ask(self._modes(), EVERY * self.period)
         self._tick += 1
-        self._length = average(self._designed, self._past, self._sums, self._row, self._taps)
-        self._row = (self._row + 1) % self._smooth
+        if not self.design.constant:
+            self._length = average(self._designed, self._past, self._sums, self._row, self._taps)
+            self._row = (self._row + 1) % self._smooth
         self._line.gather(self._taps, self._delays, self._q_star)
-
-    def _take(self, taps: Floats) -> None:
-        """Use taps from now on."""
-        self._taps[:], self._length = taps, length(taps)
 
     def _ask(self, modes: tuple[Floats, Floats], seconds: float | None) -> None:
         """Compute taps for these modes, some time after the last ones; None for a start at rest."""
@@ -316,6 +295,39 @@ class SteadyFilter(Filter):
         else:
             self.fault = None
         self.clipped = not done or self.estimator.clipped
+
+
+class AimedFilter(SteadyFilter):
+    """Filter for motions with a known end, since the vibration after a motion has the modes of the arm at its end.
+
+    Constant weights cannot exceed the limits of the reference, need no averaging, and do not lag behind the arm.
+    During the motion, while the arm is elsewhere, they fit less well. If no end is known, as in a stream, the filter
+    behaves like a `SteadyFilter`.
+    """
+
+    spared = 0.0
+    _aimed = False
+
+    def aim(self, q: npt.ArrayLike | None) -> None:
+        """Use the weights for the end of a motion; the reference must be at rest. See `Filter.aim`."""
+        if q is None:
+            self._start()
+            return
+        self.f_d, self.zeta = self.estimator.settle(self._angles(np.asarray(q, dtype=float)))
+        done = self.design.at_target(self.f_d, self.zeta, self._taps)
+        self._length = length(self._taps)
+        self.fault, self.clipped = None, not done or self.estimator.clipped
+        self._aimed = True
+
+    def _start(self) -> None:
+        self._aimed = False
+        super()._start()
+
+    def _weigh(self) -> None:
+        if self._aimed:
+            self._line.gather(self._taps, self._delays, self._q_star)
+        else:
+            super()._weigh()
 
 
 def _check_times(mean_delay: float, longest: float, period: float) -> None:

@@ -41,17 +41,11 @@ class Tabulated:
         instead: str,
         duration_periods: float | None = None,
     ) -> None:
-        """Solve at the nodes, and compute the polynomials; when first evaluated, if the longest duration is given.
+        """Compute the polynomials, when first evaluated if the longest duration is given [periods].
 
-        Args:
-            follow: (ζ, the unknowns at a slightly lower ζ) -> the unknowns, A [-] and times in damped periods [-].
-            start: Unknowns without damping.
-            zeta_max: Highest damping ratio [-].
-            instead: What to use beyond it, in words.
-            duration_periods: Longest duration over all ζ, if it is known [-].
-
-        Raises:
-            ConvergenceError: There is no solution up to zeta_max.
+        `follow` takes ζ and the unknowns at a slightly lower ζ, and returns the unknowns, A [-] and times in
+        damped periods [-]; `start` has the unknowns without damping. `instead` says what to use beyond
+        `zeta_max`.
         """
         self._follow, self._start, self.zeta_max, self._instead = follow, start, zeta_max, instead
         self.duration_periods = self.longest() if duration_periods is None else duration_periods
@@ -88,18 +82,7 @@ class Tabulated:
         return (terms.T @ np.array(values)) * np.where(k == 0, 1.0, 2.0)[:, None] / number, last
 
     def __call__(self, f_d: float, zeta: float) -> Impulses:
-        """Evaluate the impulses.
-
-        Args:
-            f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
-            zeta: Damping ratio of the mode [-], 0 <= ζ < zeta_max.
-
-        Returns:
-            A [-] and τ [s].
-
-        Raises:
-            ShaperRangeError: f_d or ζ is outside the range above.
-        """
+        """Evaluate the impulses of a mode, whose damping ratio is below `zeta_max`."""
         check_mode(f_d, zeta, self.zeta_max, self._instead)
         A, periods = self._at(zeta)
         return Impulses._by_construction(A, periods / f_d)  # noqa: SLF001  solved, and of sum 1

@@ -18,12 +18,7 @@ MATTERS = 1e-12
 
 @compiled
 def mean_delay(f_d: Floats, zeta: Floats) -> float:
-    """Mean delay Σ A_j τ_j of the product of the modes' zero-vibration shapers [s].
-
-    Args:
-        f_d: Damped frequencies [Hz], shape (modes,).
-        zeta: Damping ratios [-], shape (modes,).
-    """
+    """Mean delay Σ A_j τ_j of the product of the modes' zero-vibration shapers [s]."""
     total = 0.0
     for k in range(f_d.shape[0]):
         K = math.exp(-math.pi * zeta[k] / math.sqrt(1.0 - zeta[k] * zeta[k]))
@@ -33,18 +28,10 @@ def mean_delay(f_d: Floats, zeta: Floats) -> float:
 
 @compiled
 def product_taps(f_d: Floats, zeta: Floats, mean: float, period: float, taps: Floats) -> bool:
-    """Compute the product of the modes' zero-vibration shapers, delayed to a given mean delay.
+    """Compute the product of the modes' zero-vibration shapers, delayed to a given mean delay [s].
 
-    Args:
-        f_d: Damped frequencies [Hz], shape (modes,).
-        zeta: Damping ratios [-], shape (modes,).
-        mean: Requested mean delay [s].
-        period: Tick [s].
-        taps: Result, shape (N,).
-
-    Returns:
-        False if the product's own mean delay is longer, and is then kept, or if the last impulse is beyond the last
-        tap, and is moved to it; otherwise True.
+    Return False if the product's own mean delay is longer, and is then kept, or if the last impulse is beyond
+    the last tap, and is moved to it.
     """
     modes, N = f_d.shape[0], taps.shape[0]
     own = mean_delay(f_d, zeta)
@@ -74,17 +61,10 @@ def product_taps(f_d: Floats, zeta: Floats, mean: float, period: float, taps: Fl
 
 @compiled
 def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> int:
-    """Update three consecutive running means, over the last tap vectors of each.
+    """Update three consecutive running means, over the last tap vectors of each; the third has sum 1.
 
-    Args:
-        taps: The newest vector, shape (N,).
-        past: Inputs of each mean, shape (3, ticks, N); one row of each is replaced.
-        sums: Sums of these inputs, shape (3, N); changed.
-        row: Oldest row of each.
-        out: The third mean, shape (N,), with sum 1.
-
-    Returns:
-        Number of taps up to the last one that matters, as `length` does.
+    `past` has the inputs of each mean, shape (3, ticks, N), whose row `row` is replaced, and `sums` their
+    sums. Return the number of taps up to the last one that matters, as `length` does.
     """
     ticks, N = past.shape[1], taps.shape[0]
     for n in range(N):

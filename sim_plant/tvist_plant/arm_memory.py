@@ -23,7 +23,7 @@ class ArmMemory(NamedTuple):
     """Parts of the memory of an arm with N links and n motors, all of them views."""
 
     state: Floats
-    """Rows of `ArmState`, shape (5, N+n)."""
+    """Rows of `ArmState`, shape (6, N+n)."""
     commands: Floats
     """Rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n)."""
     dynamics: Floats
@@ -32,7 +32,7 @@ class ArmMemory(NamedTuple):
     springs: Floats
     """Stiffness [N m/rad] and damping [N m s/rad] of each link and motor by itself, shape (2, N+n)."""
     joints: Floats
-    """Rows of `JointParameters`, shape (19, n)."""
+    """Rows of `JointParameters`, shape (23, n)."""
     chain: Floats
     """Parameters of the links, see `chain_of`, shape (N+1, 22)."""
     bodies: Floats
@@ -52,7 +52,7 @@ class ArmMemory(NamedTuple):
 def shapes(N: int, n: int) -> ArmMemory:
     """Shapes of the parts."""
     sizes = (
-        (5, N + n), (2, 3, n), (2, N + 1, N), (2, N + n), (ROWS, n), (N + 1, WIDTH), (N + 1, SCRATCH),
+        (6, N + n), (2, 3, n), (2, N + 1, N), (2, N + n), (ROWS, n), (N + 1, WIDTH), (N + 1, SCRATCH),
         (N,), (N,), (n,), (N, N), (N + n,),
     )  # fmt: skip
     return ArmMemory(*sizes)  # type: ignore[arg-type]
@@ -69,7 +69,7 @@ def memory_for(N: int, n: int) -> Floats:
 def parts(memory: Floats) -> ArmMemory:
     """Return the parts of a memory by name, as views."""
     N, n = int(memory[LINKS]), int(memory[JOINTS])
-    a = HEAD + 5 * (N + n)
+    a = HEAD + 6 * (N + n)
     b = a + 6 * n
     c = b + 2 * (N + 1) * N
     d = c + 2 * (N + n)
@@ -78,7 +78,7 @@ def parts(memory: Floats) -> ArmMemory:
     g = f + (N + 1) * SCRATCH
     h = g + 2 * N + n
     return ArmMemory(
-        memory[HEAD:a].reshape(5, N + n),
+        memory[HEAD:a].reshape(6, N + n),
         memory[a:b].reshape(2, 3, n),
         memory[b:c].reshape(2, N + 1, N),
         memory[c:d].reshape(2, N + n),

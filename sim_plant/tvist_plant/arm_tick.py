@@ -5,7 +5,7 @@ import math
 from tvist_plant._compiled import compiled, compiled_for_long
 from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, NOW, ArmMemory, parts
 from tvist_plant.chain import collect_inertia, collect_torques, sweep
-from tvist_plant.integrator import advance, balance, rows
+from tvist_plant.integrator import advance, balance
 from tvist_plant.joint_parameters import of_joint
 from tvist_plant.model import Floats
 
@@ -37,7 +37,7 @@ def evaluate(
     """
     arm = parts(memory)
     links, n = arm.qdd.shape[0], arm.joints.shape[1]
-    y, v, _, _, _ = rows(arm.state, n)
+    y, v = arm.state[0], arm.state[1]
     q, qd, M, qdd = y[:links], v[:links], arm.dynamics[NOW, :links], arm.qdd
     bias = arm.dynamics[NOW, links]
     for i in range(links):
@@ -63,7 +63,7 @@ def read(arm: ArmMemory, step: float, out: Floats) -> None:
     angle rests between two steps.
     """
     links, n, qdd = arm.qdd.shape[0], arm.joints.shape[1], arm.qdd
-    y, v, _, _, _ = rows(arm.state, n)
+    y, v = arm.state[0], arm.state[1]
     for j in range(n):
         l = int(of_joint(arm.joints, j).link)
         if not abs(y[l] - arm.readings[j]) < step:  # True for NaN

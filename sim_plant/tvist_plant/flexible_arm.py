@@ -14,7 +14,7 @@ from tvist_plant.arm_tick import evaluate, move, play, tick
 from tvist_plant.chain import BODY, body_of, chain_of
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand, LinearPart, Nonlinear
-from tvist_plant.imperfections import GearLaw, Imperfections, imperfect_model
+from tvist_plant.imperfections import STICTION, GearLaw, Imperfections, imperfect_model
 from tvist_plant.integrator import rows
 from tvist_plant.joint_parameters import packed
 from tvist_plant.model import FlexibleModel, Floats
@@ -28,7 +28,9 @@ SUBSTEPS_OF_A_PERIOD = 4
 0.09; most of that is the ripple of the gears.
 """
 SUBSTEPS_IF_IMPERFECT = 8
-"""Substeps per period of an arm with imperfections, which are integrated explicitly."""
+"""Substeps per period of an arm with imperfections, which are integrated explicitly; stiction alone needs no more than
+an arm without any: with four the flange's acceleration is within 0.02 m/s² of that with 64.
+"""
 
 
 class FlexibleArm(SimulatedArm):
@@ -38,9 +40,10 @@ class FlexibleArm(SimulatedArm):
         description: The robot.
         payload: Carried payload.
         imperfections: Properties of the arm that no controller knows, beside those in its file. They are integrated
-            explicitly, so they need 8 substeps for the accuracy that the rest has with 4.
+            explicitly, so all but stiction need 8 substeps for the accuracy that the rest has with 4.
         period: Control period [s].
-        substeps: Number of the integrator's steps per period; None for 4, or 8 if the file has imperfections.
+        substeps: Number of the integrator's steps per period; None for 4, or 8 if the file has imperfections
+            other than stiction.
         carries: What it truly carries when it is said to carry a payload; None for that payload.
     """
 
@@ -56,7 +59,7 @@ class FlexibleArm(SimulatedArm):
     ) -> None:
         self.description = description
         self.period = period
-        usual = SUBSTEPS_IF_IMPERFECT if description.imperfections else SUBSTEPS_OF_A_PERIOD
+        usual = SUBSTEPS_IF_IMPERFECT if description.imperfections.keys() - STICTION else SUBSTEPS_OF_A_PERIOD
         self._substeps = usual if substeps is None else substeps
         self._imperfections = Imperfections.of(description, imperfections)
         self._law = GearLaw.of(self._imperfections, description)
@@ -95,7 +98,7 @@ class FlexibleArm(SimulatedArm):
         arm.chain[:] = chain_of(self._flexible.model, self._flexible.flange)
         arm.springs[:] = np.diag(linear.stiffness), np.diag(linear.damping)
         arm.joints[:] = packed(self._flexible.joints, linear, self._nonlinear, self._law, self._phase)
-        y, v, _, self._s, self._z = rows(arm.state, n)
+        y, v, _, self._s, *_ = rows(arm.state, n)
         self._q, self._qd, self._motor, self._speed = y[:links], v[:links], y[links:], v[links:]
         self._arm = arm
 

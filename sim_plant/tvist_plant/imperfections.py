@@ -12,6 +12,13 @@ A gear twisted by δ transmits the torque
     K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968);
     0 up to |δ| = b                       with backlash: the laws above hold for the twist beyond b.
 
+A motor that hardly turns sticks: it is held by a torque d, which grows like a spring while it turns by θ, up to the
+break-away torque, and exists only near standstill. Sliding friction F(v) acts beside it.
+
+    dd/dθ = σ K (1 - d sgn(θ̇)/most),    most = (F_s + μ_s |τ_g|) exp(-(θ̇/v_s)²)     (Dahl 1968; Stribeck 1902)
+
+τ_g is the torque in its gear, and K the gear's stiffness. This F_s and v_s are those of `stiction`.
+
 The damper of a gear acts within its backlash, too, as oil and teeth do. A yielding base stands on two springs about the
 world's x and y axes, and carries a ring with mass under the arm. A tilted arm stands on a slope that nobody told its
 controller about: the world, in which the truth is given, is upright, and the arm is turned.
@@ -27,6 +34,8 @@ import pinocchio as pin
 from tvist_plant.model import FLANGE, FlexibleModel, Floats, flexible_model
 from tvist_plant.robot_tables import Payload, RobotDescription
 
+STICTION = frozenset({"stiction", "stiction_load", "stiction_speed", "stiction_stiffness"})
+"""The keys of the stiction of motors."""
 TOUCH = 1e-6
 """Torque below which a gear at rest lies between the flanks of its backlash [N m]."""
 STEEPEST = math.pi / 6
@@ -79,6 +88,14 @@ class Imperfections:
     """K₁ divided by K, above 0 and at most 1 [-]."""
     soft_torque: float = 0.1
     """K₁ δ₁ divided by the joint's torque limit, at least 0 [-]."""
+    stiction: tuple[float, ...] = ()
+    """F_s of the torque d that holds each motor near standstill, at least 0; empty for none [N m]."""
+    stiction_load: float = 0.0
+    """μ_s: by how much d may be larger per torque in the gear, at least 0 [-]."""
+    stiction_speed: float = 0.03
+    """v_s: speed over which d falls, above 0 [rad/s]."""
+    stiction_stiffness: float = 27.0
+    """σ: stiffness of d before it breaks away, divided by the gear's, above 0 [-]."""
     base: YieldingBase | None = None
     """The yielding base; None for a rigid one."""
     torsion: float | None = None
@@ -97,6 +114,11 @@ class Imperfections:
         _check("hysteresis_torque", self.hysteresis_torque, 0.0, math.inf, above=True)
         _check("soft", self.soft, 0.0, 1.0, above=True)
         _check("soft_torque", self.soft_torque, 0.0, math.inf)
+        for joint, torque in enumerate(self.stiction):
+            _check(f"stiction[{joint}]", torque, 0.0, math.inf)
+        _check("stiction_load", self.stiction_load, 0.0, math.inf)
+        for name in ("stiction_speed", "stiction_stiffness"):
+            _check(name, getattr(self, name), 0.0, math.inf, above=True)
         if self.torsion is not None:
             _check("torsion", self.torsion, 0.0, math.inf, above=True)
         for joint, width in enumerate(self.backlash):
@@ -138,20 +160,30 @@ class GearLaw:
     """K, shape (n,) [N m/rad]."""
     backlash: Floats
     """b, shape (n,) [rad]."""
+    stiction: Floats
+    """F_s of the stiction, shape (n,) [N m]."""
+    stiction_load: float
+    """μ_s [-]."""
+    stiction_speed: float
+    """v_s of the stiction [rad/s]."""
+    stiction_stiffness: Floats
+    """σ K, shape (n,) [N m/rad]."""
 
     @classmethod
     def of(cls, imperfections: Imperfections, description: RobotDescription) -> "GearLaw":
         """Scale the imperfections by the arm's gears and torque limits.
 
         Raises:
-            ValueError: The arm has another number of joints than there are widths of backlash.
+            ValueError: The arm has another number of joints than there are widths of backlash, or values of stiction.
         """
         limit = np.array(description.limits.torque)
-        backlash = np.array(imperfections.backlash or np.zeros(description.joints))
-        if len(backlash) != description.joints:
-            raise ValueError(
-                f"backlash has {len(backlash)} values: must have {description.joints}, one per joint"
-            )
+        of_joints = {}
+        for name in ("backlash", "stiction"):
+            of_joints[name] = values = np.array(getattr(imperfections, name) or np.zeros(description.joints))
+            if len(values) != description.joints:
+                raise ValueError(
+                    f"{name} has {len(values)} values: must have {description.joints}, one per joint"
+                )
         K = np.array(description.drives.gear_stiffness)
         return cls(
             breakaway=imperfections.breakaway,
@@ -161,7 +193,10 @@ class GearLaw:
             hysteresis=imperfections.hysteresis * K,
             hysteresis_torque=imperfections.hysteresis_torque * limit,
             stiffness=K,
-            backlash=backlash,
+            stiction_load=imperfections.stiction_load,
+            stiction_speed=imperfections.stiction_speed,
+            stiction_stiffness=imperfections.stiction_stiffness * K,
+            **of_joints,
         )
 
     def twist(self, torque: Floats) -> Floats:

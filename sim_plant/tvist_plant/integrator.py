@@ -23,6 +23,7 @@ from tvist_plant._compiled import compiled
 from tvist_plant.arm_memory import LAST, NOW, PERIOD, SUBSTEPS, ArmMemory
 from tvist_plant.joint_parameters import JointParameters, of_joint
 from tvist_plant.model import Floats
+from tvist_plant.stiction import relaxed, stiction_after
 
 
 @compiled
@@ -73,12 +74,17 @@ class ArmState(NamedTuple):
     """Integrators of the drives, shape (n,) [rad s]."""
     z: Floats
     """Torque of each gear's hysteresis, shape (n,) [N m]."""
+    d: Floats
+    """Stiction of each motor, shape (n,) [N m]."""
+    load: Floats
+    """Torque in the gear of each motor that has stiction in the middle of the last substep, shape (n,) [N m]."""
 
 
 @compiled
 def rows(state: Floats, n: int) -> ArmState:
-    """Return the rows of a state, shape (5, N+n), by name, as views."""
-    return ArmState(state[0], state[1], state[2], state[3, :n], state[4, :n])
+    """Return the rows of a state, shape (6, N+n), by name, as views."""
+    last = state[5]
+    return ArmState(state[0], state[1], state[2], state[3, :n], state[4, :n], last[:n], last[n : 2 * n])
 
 
 @compiled
@@ -101,13 +107,6 @@ def set_points(commands: Floats, j: int, share: float) -> tuple[float, float, fl
 
 
 @compiled
-def relaxed(z: float, twist: float, stiffness: float, most: float) -> float:
-    """Dahl's friction force z after a further twist in one direction: the exact solution of its equation."""
-    end = most if twist > 0.0 else -most
-    return float(end + (z - end) * math.exp(-stiffness * abs(twist) / most))
-
-
-@compiled
 def softened(joint: JointParameters, twist: float) -> float:
     """Difference of a gear's torque from K δ, because it has backlash, or is softer near zero [N m]."""
     loose = min(max(twist, -joint.backlash), joint.backlash)
@@ -122,6 +121,13 @@ def dragged(joint: JointParameters, z: float, twist: float) -> float:
     if joint.hysteresis > 0.0:
         return relaxed(z, twist, joint.hysteresis, joint.hysteresis_torque)
     return z
+
+
+@compiled
+def stuck(joint: JointParameters, d: float, way: float, speed: float, load: float) -> float:
+    """Stiction of the motor of a joint after it has turned [N m]."""
+    law = joint.stiction, joint.stiction_load, joint.stiction_speed, joint.stiction_stiffness
+    return stiction_after(d, way, speed, load, *law)
 
 
 @compiled
@@ -154,17 +160,21 @@ def factorise(arm: ArmMemory, h: float) -> None:
 
 
 @compiled
-def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0915 - one kernel: its branches are the loops over rows and joints
+def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are the loops over rows and joints
     """Advance the state in place by one period; afterwards the LAST entries contain those of the present tick.
 
     Commands and dynamics have LAST entries; the head has the single numbers at the front of the arm's memory.
     """
     n, links = arm.joints.shape[1], arm.qdd.shape[0]
     size, period, substeps = links + n, head[PERIOD], int(head[SUBSTEPS])
-    y, v, a, s, z = rows(arm.state, n)
+    y, v, a, s, z, d, load = rows(arm.state, n)
     bias, last_bias = arm.dynamics[NOW, links], arm.dynamics[LAST, links]
     springs, f = arm.springs, arm.force
     h = period / substeps
+    sticks = False  # found once, since the arms whose motors do not stick have to stay as fast as without
+    for j in range(n):
+        joint = of_joint(arm.joints, j)
+        sticks = sticks or joint.stiction > 0.0 or joint.stiction_load > 0.0
     factorise(arm, h)
     for step in range(substeps):
         middle = (step + 0.5) / substeps
@@ -197,6 +207,11 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0915 - one 
             f[m] = torque + joint.velocity_gain * qd_r + joint.position_gain * q_r + slack - wave
             f[m] += joint.integral_gain * (s[j] + 0.5 * h * q_r) + more
             f[l] += wave - more
+            if sticks:
+                turning = v[l] + 0.5 * h * a[l] - speed
+                spring = joint.gear_stiffness * (y[l] - y[m] + 0.5 * h * turning)
+                load[j] = spring + joint.gear_damping * turning - wave + more
+                f[m] -= stuck(joint, d[j], 0.5 * h * speed, speed, load[j])
         for i in range(size):
             a[i] = f[i] - springs[1, i] * v[i] - springs[0, i] * (y[i] + 0.5 * h * v[i])
         for j in range(n):
@@ -214,6 +229,9 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0915 - one 
             a[m] = (a[m] - coupling(joint, h) * a[l]) / of_motor(joint, springs, m, h)
             q_r, _, _ = set_points(arm.commands, j, middle)
             s[j] += h * (q_r - (y[m] + 0.5 * h * (v[m] + 0.5 * h * a[m])))
+            if sticks:
+                speed = v[m] + 0.5 * h * a[m]
+                d[j] = stuck(joint, d[j], h * speed, speed, load[j])
             if joint.hysteresis > 0.0:
                 z[j] = dragged(joint, z[j], h * (v[l] - v[m] + 0.5 * h * (a[l] - a[m])))
         for i in range(size):
@@ -230,7 +248,7 @@ def balance(arm: ArmMemory, moment: Floats) -> None:
     The former become the arm's `qdd`; the latter, `moment`, have shape (n,) [N m].
     """
     n, links, qdd = arm.joints.shape[1], arm.qdd.shape[0], arm.qdd
-    y, v, _, s, z = rows(arm.state, n)
+    y, v, s, z = arm.state[0], arm.state[1], arm.state[3], arm.state[4]
     command, M, springs, S = arm.commands[NOW], arm.dynamics[NOW], arm.springs, arm.factor
     for i in range(links):
         qdd[i] = -M[links, i] - springs[0, i] * y[i] - springs[1, i] * v[i]

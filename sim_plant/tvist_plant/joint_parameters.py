@@ -54,6 +54,14 @@ class JointParameters(NamedTuple):
     """z_max [N m]."""
     backlash: float
     """b [rad]."""
+    stiction: float
+    """F_s of the stiction [N m]."""
+    stiction_load: float
+    """μ_s [-]."""
+    stiction_speed: float
+    """v_s of the stiction [rad/s]."""
+    stiction_stiffness: float
+    """σ K [N m/rad]."""
 
 
 ROWS = len(JointParameters._fields)
@@ -68,14 +76,15 @@ def of_joint(parameters: Floats, j: int) -> JointParameters:
         parameters[4, j], parameters[5, j], parameters[6, j], parameters[7, j],
         parameters[8, j], parameters[9, j], parameters[10, j], parameters[11, j],
         parameters[12, j], parameters[13, j], parameters[14, j], parameters[15, j],
-        parameters[16, j], parameters[17, j], parameters[18, j],
+        parameters[16, j], parameters[17, j], parameters[18, j], parameters[19, j],
+        parameters[20, j], parameters[21, j], parameters[22, j],
     )  # fmt: skip
 
 
 def packed(
     joints: Integers, linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: Floats
 ) -> Floats:
-    """Return one array of all parameters, one row each in the order of `JointParameters`, shape (19, n).
+    """Return one array of all parameters, one row each in the order of `JointParameters`, shape (23, n).
 
     The joints are given by their indices among the links, each gear's error by its phase [rad], both of shape
     (n,).
@@ -100,5 +109,9 @@ def packed(
         "hysteresis": law.hysteresis,
         "hysteresis_torque": law.hysteresis_torque,
         "backlash": law.backlash,
+        "stiction": law.stiction,
+        "stiction_load": law.stiction_load,
+        "stiction_speed": law.stiction_speed,
+        "stiction_stiffness": law.stiction_stiffness,
     }
     return np.array([np.full(len(gear_phase), rows[name]) for name in JointParameters._fields])

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import fields
 from typing import Any, Final
 
 import msgspec
@@ -163,7 +164,9 @@ def _imperfections(description: RobotDescription) -> Iterator[str]:
     try:
         made = Imperfections.of(description)
         for name in sorted(_keys(given) - _keys(msgspec.to_builtins(made))):
-            yield f"imperfections.{name:.200} is not a key of a robot file"
+            table = getattr(made, name.rpartition(".")[0], made)
+            keys = ", ".join(one.name for one in fields(table))
+            yield f"imperfections.{name:.200} is not a key of a robot file: must be one of {keys}"
         GearLaw.of(made, description)
         imperfect_model(description, description.payload, made)
     except msgspec.ValidationError as error:

@@ -222,7 +222,9 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
     link_flexibility: LinkFlexibility = LinkFlexibility()
     sensors: Sensors = Sensors()
     imperfections: dict[str, Any] = {}
-    """Fields of `imperfections.Imperfections`, which the simulated arm has and no controller knows."""
+    """Fields of `imperfections.Imperfections`, which the simulated arm has. Of these, a controller knows the stiction
+    alone.
+    """
     collision: Collision = Collision()
     meshes: tuple[Mesh, ...] = ()
     poses: dict[str, tuple[Number, ...]] = {}

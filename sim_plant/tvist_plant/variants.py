@@ -52,6 +52,17 @@ MASS: Final = 0.15
 CENTRE: Final = 0.015
 """Largest deviation of its carried centre of mass along each axis of the flange [m]."""
 
+HEAVIER: Final[Mapping[str, float | tuple[float, ...]]] = {
+    "coulomb_friction": (1.21, 1.3, 1.02, 1.22, 1.29, 1.06),
+    "stiction": (1.56, 1.49, 1.63, 2.32, 2.14, 2.04),
+    "stiction_load": 1.85,
+    "stiction_speed": 1.48,
+    "stiction_stiffness": 0.79,
+}
+"""Friction of an arm that sticks more than its controller knows, over what that knows, drawn once: F_s and μ_s within
+1.3 to 2.5, F_c within 1 to 1.4, v_s and σ within 0.7 to 1.5 [-].
+"""
+
 Factors = Callable[[float, tuple[int, ...]], Any]
 """Makes factors of a shape from a share."""
 
@@ -140,6 +151,21 @@ def _sharper(share: float, description: RobotDescription, _seed: int) -> RobotDe
         description,
         drives=structs.replace(drives, friction_width=share * drives.friction_width, linear_friction=False),
     )
+
+
+def rubbed(
+    factors: Mapping[str, float | tuple[float, ...]], description: RobotDescription, _seed: int = 0
+) -> RobotDescription:
+    """Return an arm whose motors stick, with its friction multiplied by factors, such as `HEAVIER`."""
+    own = {"coulomb_friction": description.drives.coulomb_friction, **description.imperfections}
+    new = {name: (np.array(value) * factors.get(name, 1.0)).tolist() for name, value in own.items()}
+    drives = structs.replace(description.drives, coulomb_friction=tuple(new.pop("coulomb_friction")))
+    return structs.replace(description, drives=drives, imperfections=new)
+
+
+def in_file(file: RobotDescription, _description: RobotDescription, _seed: int) -> RobotDescription:
+    """Return an arm that is as a robot file says, whatever its controller knows."""
+    return file
 
 
 def _unlike(description: RobotDescription, seed: int) -> RobotDescription:

@@ -21,7 +21,7 @@ from typing import Any
 
 from tvist_controller.sources.own_plants import load_plant
 from tvist_plant.variants import Variant
-from tvist_server.config_file import from_mapping
+from tvist_server.config import from_mapping
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
 from tvist_server.robot import ServedRobot

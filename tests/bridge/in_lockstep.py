@@ -19,10 +19,9 @@ from tvist_protocol.io import Registers, SetRegisters
 from tvist_protocol.programs import ProgramRun
 from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.stream import Event
-from tvist_server.moving import registers as r
-from tvist_server.moving.program import MARGIN, program
+from tvist_server.moving import program as r
+from tvist_server.moving.program import MARGIN, Window, program
 from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
-from tvist_server.moving.window import Window
 
 TICK = 1e3 * PERIOD
 """Control period [ms]."""

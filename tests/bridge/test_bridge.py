@@ -13,7 +13,7 @@ from tvist_lab.study.measures import WORTH
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
-from tvist_server.moving import registers
+from tvist_server.moving import program as registers
 
 PAYLOAD = paper_payload(UR5E)
 NEAR = Q1 + np.array([0.15, 0.0, 0.0, 0.1, 0.1, 0.1])  # what needs more than 90 % of a torque is late

@@ -16,7 +16,7 @@ from tests.places import own_address
 from tvist_client import MotionStoppedError, RefusedError
 from tvist_client.blocking import Robot
 from tvist_protocol.modes import RobotMode
-from tvist_server.moving.registers import State
+from tvist_server.moving.program import State
 
 MOMENTS, SEED = 10, 7
 """Number of faults, which take turns, and the seed of their moments and of what the robot hides."""

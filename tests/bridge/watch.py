@@ -10,7 +10,7 @@ import numpy as np
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RuntimeState
-from tvist_server.moving.registers import NUMBER, STATE, State
+from tvist_server.moving.program import NUMBER, STATE, State
 from tvist_server.rtde.client import Row, RtdeClient
 from tvist_server.rtde.wire import Field, Wire
 

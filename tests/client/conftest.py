@@ -11,7 +11,8 @@ from blockbuster import blockbuster_ctx
 from tests.places import free_endpoint
 
 from tvist_client import LoopbackTransport, Robot
-from tvist_protocol.codec import decode_command, decode_setpoint, encode
+from tvist_protocol.codec import decode, decode_command, encode
+from tvist_protocol.commands import Setpoint
 from tvist_protocol.info import Info, Limits
 from tvist_protocol.replies import Accepted, Done, Posture, Refused, ToolPose
 from tvist_protocol.stream import Event, State, Telemetry, Truth
@@ -104,7 +105,7 @@ class FakeRobot:
         )
 
     def put_setpoint(self, _client, data):
-        setpoint = decode_setpoint(data)
+        setpoint = decode(Setpoint, data)
         self.setpoints.append((self.tick, setpoint.sequence, setpoint.q))
         self.notes.put(f"setpoint {setpoint.sequence}")
 
@@ -267,14 +268,14 @@ class Served:
         def answer():
             answered = self.robot.request("", data)
             if answered is not None:
-                reply(answered)
+                reply(lambda: answered)
             else:
                 self._unanswered.append(reply)  # what nobody holds Zenoh ends
 
         self.post(answer)
 
     def info(self, reply):
-        self.post(lambda: reply(self.robot.info()))
+        self.post(lambda: reply(self.robot.info))
 
     def setpoint(self, data):
         self.post(lambda: self.robot.put_setpoint("", data))

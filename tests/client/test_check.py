@@ -15,8 +15,8 @@ from tvist_client import check as checking
 from tvist_client.__main__ import main
 from tvist_client.check import check
 from tvist_client.fleet import Fleet
-from tvist_protocol.codec import decode_info, encode
-from tvist_protocol.info import StopReason
+from tvist_protocol.codec import decode, encode
+from tvist_protocol.info import Info, StopReason
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Done, Refused
 
@@ -66,7 +66,7 @@ def test_what_a_robot_says_of_itself_gives_a_terminal_no_commands(realtime, endp
     described = realtime.robot.info
 
     def hostile():
-        return encode(msgspec.structs.replace(decode_info(described()), model="\x1b]0;owned\x07"))
+        return encode(msgspec.structs.replace(decode(Info, described()), model="\x1b]0;owned\x07"))
 
     monkeypatch.setattr(realtime.robot, "info", hostile)
     assert main(["check", endpoint]) == 0

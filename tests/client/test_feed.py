@@ -9,8 +9,8 @@ import pytest
 from tvist_client import AnswerTimeoutError, ArgumentError, NotConnectedError
 from tvist_client.feed import Feed, Stream
 from tvist_client.transports.inbox import MAX_WAITING, Inbox
-from tvist_protocol.codec import decode_event, decode_state, encode
-from tvist_protocol.stream import Event
+from tvist_protocol.codec import encode
+from tvist_protocol.stream import Event, State
 
 
 class Source:
@@ -34,7 +34,7 @@ def source():
 
 @pytest.fixture
 def states(source):
-    return Feed(source, "state", decode_state, once_a_tick=True)
+    return Feed(source, "state", State, once_a_tick=True)
 
 
 async def test_nothing_is_subscribed_to_before_somebody_listens(source, states):
@@ -133,7 +133,7 @@ async def test_an_iterator_nobody_holds_is_forgotten(source, states, fake):
 
 
 async def test_events_of_one_tick_are_all_told(source):
-    events = Feed(source, "event", decode_event, once_a_tick=False)
+    events = Feed(source, "event", Event, once_a_tick=False)
     stream = events.stream(10)
     for _ in range(3):
         source.put(encode(Event(tick=1, kind="warning")))

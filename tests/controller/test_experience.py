@@ -11,10 +11,11 @@ from tvist_controller.setup import paper_payload
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
 from tvist_plant.description import load
-from tvist_protocol.codec import decode_state, encode
+from tvist_protocol.codec import decode, encode
 from tvist_protocol.commands import Forget, MoveJ, Stop, TakeControl
 from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
+from tvist_protocol.stream import State
 
 ROBOT = load("ur5e")
 Q1, Q2 = ROBOT.poses["Q1"], ROBOT.poses["Q2"]
@@ -41,7 +42,7 @@ class Served:
         self.setup = replace(setup, description=setup.description.clean(), **changes)
         self.host = LoopbackHost(self.setup, experience=student and Experience(student.study))
         self.states, self.events = [], []
-        self.host.subscribe("state", lambda data: self.states.append(decode_state(data)))
+        self.host.subscribe("state", lambda data: self.states.append(decode(State, data)))
         self.host.subscribe("event", self.events.append)
         self.token = self.ask(TakeControl(client="tester"))["token"]
         self.tick(5)

@@ -394,7 +394,7 @@ def test_whatever_comes_in_between_force_control_keeps_to_its_limits_and_tells_h
     sequence, lockstep
 ):
     robot, plant = feeling(clock="free" if lockstep else "realtime", lease_s=3600.0)
-    control, motion = robot.controller.force_control, robot.controller.motion
+    guidance, motion = robot.controller.guidance, robot.controller.motion
     limits, started, reference = UR5E_IN_AIR.limits, None, [robot.states[-1].reference_q] * 2
     for (kind, given_), ticks in [*sequence, ((m.StopJ, {}), 1500)]:
         placements = robot.controller.cycle.placements
@@ -415,7 +415,7 @@ def test_whatever_comes_in_between_force_control_keeps_to_its_limits_and_tells_h
             steps = np.diff(reference, axis=0) / H
             assert np.abs(steps).max() <= min(limits.velocity) * (1.0 + 1e-6)
             assert np.abs(np.diff(steps, axis=0)).max() / H <= min(limits.acceleration) * (1.0 + 1e-6) + 1e-6
-            gives = control.compliant is not None
+            gives = guidance.compliant is not None
             if gives:
                 assert motion.activity is Activity.GUIDED
                 assert (state.robot_mode, state.safety_mode) == (7, 1)
@@ -427,4 +427,4 @@ def test_whatever_comes_in_between_force_control_keeps_to_its_limits_and_tells_h
             started = number
     ends = [event for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]
     assert len(ends) == robot.kinds().count("motion_started")
-    assert control.compliant is None
+    assert guidance.compliant is None

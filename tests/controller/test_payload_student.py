@@ -1,6 +1,7 @@
 """A robot that follows its payload finds it after a motion, lets a right one be, and forgets it on command."""
 
 from dataclasses import replace
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -18,10 +19,11 @@ from tvist_controller.sources.calibrations import load
 from tvist_controller.sources.mode_source import first_source
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
-from tvist_protocol.codec import decode_event
+from tvist_protocol.codec import decode
 from tvist_protocol.commands import Forget, SetPayload
 from tvist_protocol.simulation import SimulationReset
-from tvist_server.config import ConfigError
+from tvist_protocol.stream import Event
+from tvist_server.option_values import StartError
 
 MODAL = load("ur5e_modal")
 
@@ -46,7 +48,7 @@ class Following(Served):
         return self.host.controller.assumed.assumed
 
     def told(self, kind):
-        return [event for event in map(decode_event, self.events) if event.kind == kind]
+        return [event for event in map(partial(decode, Event), self.events) if event.kind == kind]
 
 
 class Keeping:
@@ -168,7 +170,7 @@ def test_where_motions_do_not_tell_it_the_warning_still_comes(monkeypatch):
 
 
 def test_an_arm_that_carries_no_weight_cannot_follow_it():
-    with pytest.raises(ConfigError, match="no joint of a one-joint arm carries weight"):
+    with pytest.raises(StartError, match="no joint of a one-joint arm carries weight"):
         free_setup(robot="one-joint", adapt="payload")
 
 

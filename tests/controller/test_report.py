@@ -7,9 +7,10 @@ import pytest
 from tvist_controller.instruments import state_layout
 from tvist_controller.loopback import LoopbackHost
 from tvist_lab.in_process import free_setup
-from tvist_protocol.codec import decode_state, encode
+from tvist_protocol.codec import decode, encode
 from tvist_protocol.commands import MoveJ, ServoStart, Setpoint, TakeControl
 from tvist_protocol.simulation import SimulationStep
+from tvist_protocol.stream import State
 
 TICKS = (0, 1, 127, 128, 255, 256, 65535, 65536, 2**32 - 1, 2**32, 2**40)
 """Numbers on either side of every change of their encoded size."""
@@ -40,7 +41,7 @@ class Told:
 def assert_same(report):
     written = report.encoded
     assert written == encode(report.state)
-    assert decode_state(written) == report.state
+    assert decode(State, written) == report.state
 
 
 @pytest.mark.parametrize("shaper", ["none", "zv", "auto", "elastic"])

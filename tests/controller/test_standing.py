@@ -3,8 +3,10 @@
 import pytest
 
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_protocol.codec import decode_io, decode_state
+from tvist_protocol.codec import decode
+from tvist_protocol.io import Io
 from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.stream import State
 
 from .robots import UR5E, Robot
 
@@ -42,8 +44,8 @@ def test_who_subscribes_in_process_is_told_at_once_and_the_run_stays_the_same():
     told = []
     asked, unasked = LoopbackHost(free_setup()), LoopbackHost(free_setup())
     for _ in range(3):  # to ask often changes as little as to ask once
-        asked.subscribe("state", lambda data: told.append(decode_state(data)))
-    asked.subscribe("io", lambda data: told.append(decode_io(data)))
+        asked.subscribe("state", lambda data: told.append(decode(State, data)))
+    asked.subscribe("io", lambda data: told.append(decode(Io, data)))
     assert [message.tick for message in told] == [0, 0, 0, 1]
     for host in (asked, unasked):
         host.controller.tick()

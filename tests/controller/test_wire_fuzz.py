@@ -18,10 +18,11 @@ from tests.examples import share
 from tests.protocol.test_fuzz import changed, damaged, fields, keys, values
 
 from tvist_controller.loopback import LoopbackHost
-from tvist_protocol.codec import decode_reply, decode_state, encode
+from tvist_protocol.codec import decode, decode_reply, encode
 from tvist_protocol.commands import ReleaseControl, Stop, TakeControl
 from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.simulation import SimulationReset
+from tvist_protocol.stream import State
 
 from .robots import Q1, setup
 
@@ -129,7 +130,7 @@ class Server:
 
     @staticmethod
     def _on_state(data):
-        state = decode_state(data)
+        state = decode(State, data)
         assert all(map(math.isfinite, (*state.target_q, *state.actual_q, *state.actual_moment)))
 
 

@@ -16,7 +16,7 @@ from tvist_plant.description import fingerprint, load, robots
 UR = ("ur3e", "ur10e", "ur16e", "ur20", "ur30", "ur5e")
 
 
-@pytest.mark.parametrize("name", [*UR, "ur5-light"])
+@pytest.mark.parametrize("name", [*UR, "ur5-light", "ur5e_stiction"])
 def test_an_arm_has_a_calibration_of_its_own_springs(name):
     arm = load(name)
     own = [one for one in map(load_calibration, available()) if one.robot == arm.robot.model and one.modal]

@@ -3,7 +3,8 @@
 import pytest
 
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
 
 
 def test_changes_are_made_to_the_default_and_to_a_configuration_alike():
@@ -26,5 +27,5 @@ async def test_a_configuration_of_a_served_robot_answers_in_process_too():
 
 @pytest.mark.parametrize("config", [None, ServeConfig()])
 def test_a_change_of_nothing_there_is_refused(config):
-    with pytest.raises(ConfigError, match="'shapr': did you mean 'shaper'"):
+    with pytest.raises(StartError, match="'shapr': did you mean 'shaper'"):
         free_setup(config, shapr="zv")

@@ -178,7 +178,7 @@ def test_what_is_no_mcap_file_is_refused(path, content, says):
 def test_a_file_that_cannot_be_opened_is_refused(tmp_path):
     with pytest.raises(RecordingFileError, match="No such file"):
         read(tmp_path / "none.mcap")
-    with pytest.raises(RecordingFileError, match="Is a directory"):
+    with pytest.raises(RecordingError, match="names no recording: no MCAP file is there"):
         read(tmp_path)
 
 

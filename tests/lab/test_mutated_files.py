@@ -334,20 +334,21 @@ def _read_moves(path):
 
 def _read_config(path):
     from tvist_plant.user_file import UserFileError
-    from tvist_server.config import ConfigError
-    from tvist_server.config_file import from_mapping, read_toml
+    from tvist_server.config import from_mapping
+    from tvist_server.option_values import StartError, read_start_file
 
-    return lambda path: from_mapping(read_toml(str(path)), f"configuration {path}"), (
-        ConfigError,
-        UserFileError,
-    )
+    def read(path):
+        return from_mapping(read_start_file(path, "configuration", dict), f"configuration {path}")
+
+    return read, (StartError, UserFileError)
 
 
 def _read_state(path):
     from tvist_plant.user_file import UserFileError
-    from tvist_server.initial import InitialStateError, read_state
+    from tvist_server.option_values import StartError, read_start_file
+    from tvist_server.start_files import InitialState
 
-    return lambda path: read_state(str(path)), (InitialStateError, UserFileError)
+    return lambda path: read_start_file(path, "state", InitialState), (StartError, UserFileError)
 
 
 def _read_sweep(path):

@@ -17,7 +17,7 @@ from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.io import SetRegisters, SimulationSetInputs
-from tvist_server.config import ConfigError
+from tvist_server.option_values import StartError
 
 THERE, BACK = "[-1.2, -1.5, -2.0, -0.8, 1.6, 0]", "[-1.6, -1.7, -2.2, -0.8, 1.6, 0]"
 MOVES = (f"movej({THERE}, a=3, v=2)", "sleep(0.5)", f"movej({BACK}, a=3, v=2)", f"movej({THERE}, a=3, v=2)")
@@ -232,7 +232,7 @@ def test_of_an_arm_without_truth_nobody_knows_how_its_tool_shakes():
 
 
 def test_an_arm_that_gives_the_tick_is_not_moved_faster():
-    with pytest.raises(ConfigError, match="the plant OwnArm gives the tick"):
+    with pytest.raises(StartError, match="the plant OwnArm gives the tick"):
         run(MOVES[0], plant=OwnPlant("mine.py:OwnArm", "", OwnArm), truth=False)
 
 
@@ -246,7 +246,7 @@ def test_the_recording_begins_where_an_arm_stands(tmp_path):
 
 
 def test_a_plant_that_cannot_be_made_is_an_error_of_the_configuration():
-    with pytest.raises(ConfigError, match="which is no plant"):
+    with pytest.raises(StartError, match="which is no plant"):
         run(MOVES[0], plant=OwnPlant("mine.py:nothing", "", lambda *_: None), truth=False)
 
 

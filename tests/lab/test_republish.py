@@ -13,7 +13,7 @@ from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.republish import Playback, PlaybackDesk, played
 from tvist_protocol import Event, Info, Io, State, Truth
-from tvist_protocol.codec import decode_info, encode
+from tvist_protocol.codec import decode, encode
 from tvist_protocol.commands import Stop, TakeControl
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.journal import Entry
@@ -110,7 +110,7 @@ def test_info_has_the_name_and_the_present_tick(path, network):
     asyncio.run(playback.run())
     answers = []
     network.desk.info(answers.append)
-    info = decode_info(answers[0])
+    info = decode(Info, answers[0]())
     assert (info.name, info.tick, info.control, info.clock) == ("ghost", 6, None, "realtime")
     assert info.limits == INFO.limits
 

@@ -7,13 +7,24 @@ import textwrap
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from tools.tables.pages import page_of
 
 from tvist_lab.metrics import best_tool_acceleration
 from tvist_lab.studies.leaderboard import leaderboard
-from tvist_lab.studies.shaperbench import WANTED, bends, check_causal, draw, inspect, jobs, path_error
+from tvist_lab.studies.shaperbench import (
+    STICKING,
+    STICKS,
+    WANTED,
+    bends,
+    check_causal,
+    draw,
+    inspect,
+    jobs,
+    path_error,
+)
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import bench
@@ -25,11 +36,14 @@ from tvist_lab.study.moves import Move
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.shaping import ShaperFaultError
 from tvist_lab.study.work import Job, measure, measure_each
+from tvist_plant.arm_memory import SUBSTEPS
+from tvist_plant.description import load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.integrator import relaxed
 from tvist_plant.plant import PERIOD
+from tvist_plant.variants import HEAVIER
 from tvist_plant.world.mujoco_arm import MujocoArm
 
 HONEST = """
@@ -262,7 +276,7 @@ class TestDishonesty:
 class TestElastic:
     def test_the_drives_get_the_stage_with_its_tick_on_every_arm(self, ur5e, modal, task):
         class Bare(Named):
-            elastic = Stepping.elastic
+            driven = Stepping.driven
 
         def made(kind, *arms):
             case = Case(ur5e, task.move, arms=tuple(ARMS[place] for place in arms))
@@ -357,6 +371,21 @@ class TestArms:
         alpha = best_tool_acceleration(line.follow(at_rest, at_rest).simulate(made, 1))
         assert np.abs(alpha).max() < 1e-6
 
+    def test_the_arms_whose_motors_stick_are_their_file_and_a_rougher_one(self):
+        """Four substeps are enough for them, and all that differs from the file is friction."""
+        description = load(STICKS)
+        known, rougher = (arm.make(description, description.payload, 3) for arm in STICKING)
+        assert known.description == description
+        assert known.memory[SUBSTEPS] == rougher.memory[SUBSTEPS] == 4
+        found = rougher.description
+        for name in ("stiction", "stiction_load", "stiction_speed", "stiction_stiffness"):
+            given = np.array(description.imperfections[name])
+            np.testing.assert_allclose(found.imperfections[name], given * np.array(HEAVIER[name]))
+        coulomb = np.array(description.drives.coulomb_friction) * HEAVIER["coulomb_friction"]
+        np.testing.assert_allclose(found.drives.coulomb_friction, coulomb)
+        same = msgspec.structs.replace(found.drives, coulomb_friction=description.drives.coulomb_friction)
+        assert (same, found.links) == (description.drives, description.links)
+
     def test_every_seed_scatters_stiffness_and_gains_its_own_way(self, ur5e):
         (scattered,) = (arm for arm in ARMS if arm.name == "scattered")
         first, again, other = (scattered.make(ur5e, ur5e.payload, seed).description for seed in (1, 1, 2))
@@ -427,7 +456,7 @@ class TestScores:
         reference = Path(__file__).parents[2] / "docs" / "reference"
         published = json.loads((reference / "leaderboard.json").read_text(encoding="utf-8"))
         _, first, *_ = (reference / "shaperbench.md").read_text(encoding="utf-8").split("\n\n")
-        now = [one.name for one in bench(ur5e, modal, None, None)] + [arm.name for arm in ARMS]
+        now = [one.name for one in bench(ur5e, modal, None, None)] + [arm.name for arm in (*ARMS, *STICKING)]
         there = [row["name"] for row in published["shapers"]] + list(published["arms"])
         assert first.startswith("Measured on 20")
         assert set(re.findall(r"`(\w+(?:-\w+)*)`", first)) == set(now) - set(there)

@@ -15,6 +15,7 @@ IMPERFECT = {
     "hysteresis": Imperfections(hysteresis=0.3),
     "soft": Imperfections(soft=0.75),
     "base": Imperfections(base=YieldingBase()),
+    "stiction": Imperfections(stiction=(1.0,) * 6, stiction_load=0.02),
     "all": Imperfections(breakaway=1.5, hysteresis=0.3, soft=0.75, base=YieldingBase()),
 }
 

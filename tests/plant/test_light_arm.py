@@ -116,6 +116,13 @@ def test_the_file_s_imperfections_are_the_plant_s_and_more_may_be_added():
     [
         ("hysteresis = -1", "hysteresis is -1.0: must be at least 0"),
         ("hysteresi = 1", "imperfections.hysteresi is not a key"),
+        ("hysteresi = 1", "must be one of breakaway, .*, stiction, stiction_load, stiction_speed"),
+        ("stiction = [0.5, 0.5, 0.5, 0.1, 0.1, -0.1]", r"stiction\[5\] is -0.1: must be at least 0"),
+        ("stiction = [0.5]", "imperfections: stiction has 1 values: must have 6, one per joint"),
+        ("stiction_load = -0.01", "stiction_load is -0.01: must be at least 0"),
+        ("stiction_speed = 0", "stiction_speed is 0.0: must be above 0"),
+        ("stiction_stiffness = inf", "stiction_stiffness is inf: must be above 0, and finite"),
+        ("stictions = [0.5]", "imperfections.stictions is not a key"),
         ("hysteresis = 'a'", "imperfections.hysteresis is text, 'a': must be a number"),
         ("rotor = 0", "rotor is 0.0: must be above 0"),
         ("base = {stiff = 1}", "imperfections.base.stiff is not a key"),

@@ -14,8 +14,9 @@ from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import Measurement, PlantError
-from tvist_protocol.codec import decode_state
+from tvist_protocol.codec import decode
 from tvist_protocol.errors import RefusedError
+from tvist_protocol.stream import State
 
 TARGET = [0.4, -2.9, 0.3, -1.4, 0.0, 0.1]
 
@@ -44,7 +45,7 @@ def quiet_setup():
 def moved(plant):
     """States of a hosted robot's motion and its ring-down."""
     host, states = LoopbackHost(quiet_setup(), plant), []
-    host.subscribe("state", lambda data: states.append(decode_state(data)))
+    host.subscribe("state", lambda data: states.append(decode(State, data)))
     with Robot.over(LoopbackTransport(host)) as robot, robot.control("test") as arm:
         arm.move_j(TARGET)
         robot.advance(200)

@@ -19,10 +19,11 @@ from tvist_protocol import (
     StepSetpoint,
     TvistError,
     check,
-    decode_state,
+    decode,
     encode,
 )
 from tvist_protocol.generate import FOLDER
+from tvist_protocol.stream import State
 
 LEASE = "t"
 HALF = "\ud800"
@@ -108,7 +109,7 @@ def test_what_is_no_message_is_not_checked_as_one():
 
 
 def test_a_named_mode_travels_as_its_number():
-    state = decode_state((FOLDER / "fixtures" / "v1" / "state.msgpack").read_bytes())
+    state = decode(State, (FOLDER / "fixtures" / "v1" / "state.msgpack").read_bytes())
     idle = check(msgspec.structs.replace(state, robot_mode=RobotMode.IDLE))
     assert idle.robot_mode == 5
     assert type(idle.robot_mode) is int

@@ -1,6 +1,7 @@
 """Whatever the bytes, a decoder gives a message or a ProtocolError, and nothing else."""
 
 import json
+from functools import partial
 
 import jsonschema
 import msgpack
@@ -9,33 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_protocol import (
-    ProtocolError,
-    decode_command,
-    decode_event,
-    decode_info,
-    decode_reply,
-    decode_setpoint,
-    decode_state,
-    decode_telemetry,
-    decode_truth,
-    encode,
-    refusal,
-)
+from tvist_protocol import ProtocolError, decode, decode_command, decode_reply, encode, refusal
 from tvist_protocol.channels import COMMANDS, tag
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.generate import FOLDER, golden
+from tvist_protocol.info import Info
 from tvist_protocol.schema import json_schema
+from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 DECODERS = (
     decode_command,
-    decode_setpoint,
     decode_reply,
-    decode_state,
-    decode_event,
-    decode_truth,
-    decode_telemetry,
-    decode_info,
+    *(partial(decode, kind) for kind in (Setpoint, State, Event, Truth, Telemetry, Info)),
 )
 GOLDEN = [path.with_suffix(".msgpack").read_bytes() for path in golden(FOLDER)]
 CLIENTS = [json.loads(path.read_bytes()) for path in golden(FOLDER)]
@@ -70,10 +56,10 @@ near = st.one_of(
 )
 
 
-def decoded(decode, data):
+def decoded(read, data):
     """The message, or None where it was refused as it should be."""
     try:
-        return decode(data)
+        return read(data)
     except ProtocolError as error:
         refused = refusal(error)
     assert refused.code in PROTOCOL_CODES
@@ -82,18 +68,18 @@ def decoded(decode, data):
     return None
 
 
-@pytest.mark.parametrize("decode", DECODERS)
+@pytest.mark.parametrize("read", DECODERS)
 @given(data=st.binary(max_size=200))
 @examples(60)
-def test_random_bytes(decode, data):
-    decoded(decode, data)
+def test_random_bytes(read, data):
+    decoded(read, data)
 
 
 @given(value=values | st.dictionaries(fields | keys, values, max_size=6))
 @examples(200)
 def test_random_messagepack(value):
-    for decode in DECODERS:
-        decoded(decode, msgpack.packb(value))
+    for read in DECODERS:
+        decoded(read, msgpack.packb(value))
 
 
 @st.composite
@@ -109,8 +95,8 @@ def damaged(draw):
 @given(data=damaged())
 @examples(400)
 def test_golden_messages_with_damaged_bytes(data):
-    for decode in DECODERS:
-        decoded(decode, data)
+    for read in DECODERS:
+        decoded(read, data)
 
 
 @st.composite
@@ -141,8 +127,8 @@ def children(place):
 @examples(400)
 def test_what_a_decoder_accepts_the_schema_accepts_and_it_survives_a_round_trip(value):
     data = msgpack.packb(value)
-    for decode in (decode_command, decode_setpoint):
-        message = decoded(decode, data)
+    for read in (decode_command, partial(decode, Setpoint)):
+        message = decoded(read, data)
         if message is not None:
             SCHEMAS[tag(type(message))].validate(value)
-            assert decode(encode(message)) == message
+            assert read(encode(message)) == message

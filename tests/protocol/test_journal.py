@@ -5,7 +5,7 @@ from typing import get_args
 import msgspec
 import pytest
 
-from tvist_protocol import Command, MoveJ, ProtocolError, Setpoint, decode_command, decode_setpoint
+from tvist_protocol import Command, MoveJ, ProtocolError, Setpoint, decode, decode_command
 from tvist_protocol.channels import tag
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.journal import Entry, entry_of, message_of
@@ -21,7 +21,7 @@ def golden_messages():
         if name in COMMAND_TAGS:
             yield pytest.param(decode_command(data), id=path.stem)
         elif name == "setpoint":
-            yield pytest.param(decode_setpoint(data), id=path.stem)
+            yield pytest.param(decode(Setpoint, data), id=path.stem)
 
 
 @pytest.mark.parametrize("message", list(golden_messages()))

@@ -8,9 +8,8 @@ from tvist_controller.programs.library import known_signatures
 from tvist_controller.programs.player import GUIDED
 from tvist_protocol.io import Registers, SetRegisters
 from tvist_protocol.programs import ProgramRun
-from tvist_server.moving import registers as r
-from tvist_server.moving.program import MARGIN, program
-from tvist_server.moving.window import Window
+from tvist_server.moving import program as r
+from tvist_server.moving.program import MARGIN, Window, program
 from tvist_urscript import EVALUATIONS, Array, Machine, compile_script
 
 H, RUN = 0.002, 71

@@ -7,7 +7,8 @@ import pytest
 
 from tvist_controller.cell.description import GripperModel, Part, Tool, Wire
 from tvist_controller.setup import Setup
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
 
 EXAMPLE = Path(__file__).parents[2] / "clients" / "examples" / "cell.toml"
 PAGE = (EXAMPLE.parents[2] / "docs" / "how-to" / "serve-a-cell.md").read_text(encoding="utf-8")
@@ -38,14 +39,14 @@ def test_a_wrong_file_is_refused_with_key_value_and_limit(tmp_path, right, wrong
     assert right in GOOD
     file = tmp_path / "cell.toml"
     file.write_text(GOOD.replace(right, wrong, 1), encoding="utf-8")
-    with pytest.raises(ConfigError) as refused:
+    with pytest.raises(StartError) as refused:
         ServeConfig(cell=str(file)).setup()
     assert said in str(refused.value)
     assert str(file) in str(refused.value)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(ConfigError, match="No such file"):
+    with pytest.raises(StartError, match="No such file"):
         ServeConfig(cell=str(tmp_path / "cell.toml")).setup()
 
 

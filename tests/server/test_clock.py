@@ -10,7 +10,6 @@ import pytest
 from tvist_plant.plant import PlantError
 from tvist_server import punctual
 from tvist_server.clock import Lockstep, Mailbox, Realtime
-from tvist_server.courier import Courier
 
 pytestmark = pytest.mark.realtime
 
@@ -45,21 +44,19 @@ class FakeHost:
 
 
 def served(robots, **options):
-    """Robots driven in real time until each has ticked enough; the calls of what hands on."""
-    calls = []
-    clock = Realtime(robots, lambda: calls.append(None), PERIOD, **options)
+    """Robots driven in real time until each has ticked enough."""
+    clock = Realtime(robots, PERIOD, **options)
     clock.start()
     for robot in robots:
         assert robot.host.reached.wait(WAIT)
     clock.close()
-    return clock, calls
+    return clock
 
 
 @pytest.mark.parametrize("number", [1, 2, 7])
 def test_one_thread_ticks_all_robots_and_says_how_late_each_was(number):
     robots = [Mailbox(FakeHost()) for _ in range(number)]
-    clock, calls = served(robots)
-    assert calls
+    clock = served(robots)
     assert {name for robot in robots for name in robot.host.threads} == {"tvist-tick"}
     for robot in robots:
         assert clock.punctuality(robot).ticks == robot.host.ticks >= 5
@@ -71,7 +68,7 @@ def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
     robot, seen = Mailbox(FakeHost()), []
     for number in range(100):
         robot.post(lambda number=number: seen.append((number, robot.host.ticks)))
-    clock = Realtime([robot], lambda: None, PERIOD)
+    clock = Realtime([robot], PERIOD)
     clock.start()
     assert robot.host.reached.wait(WAIT)
     robot.post(lambda: seen.append("last"))
@@ -92,7 +89,7 @@ def test_a_job_that_posts_another_does_not_keep_the_tick_waiting():
 def test_an_arm_that_does_not_begin_its_tick_keeps_no_client_waiting_and_is_told_of_once():
     paces = [True, False, False, True, False]
     robot = Mailbox(FakeHost(), pace=lambda timeout: paces.pop(0) if paces else time.sleep(timeout))
-    clock = Realtime([robot], lambda: None, PERIOD)
+    clock = Realtime([robot], PERIOD)
     clock.start()
     answered = threading.Event()
     while paces:
@@ -110,7 +107,7 @@ def test_an_arm_that_fails_while_it_begins_its_tick_has_it_from_the_clock_and_st
 
     host, failures = FakeHost(), []
     host.fail = failures.append
-    clock = Realtime([Mailbox(host, pace=fails)], lambda: None, PERIOD)
+    clock = Realtime([Mailbox(host, pace=fails)], PERIOD)
     clock.start()
     assert host.reached.wait(WAIT)
     clock.close()
@@ -127,7 +124,7 @@ class Failing(FakeHost):
 def test_a_tick_or_job_that_fails_ends_its_robot_alone_whose_clients_are_still_answered(caplog, failing):
     other, robot, answered = Mailbox(FakeHost()), Mailbox(Failing()), threading.Event()
     robot.host.error = ArithmeticError if failing == "tick" else None
-    clock = Realtime([other, robot], lambda: None, PERIOD)
+    clock = Realtime([other, robot], PERIOD)
     if failing == "job":
         robot.post(lambda: 1 / 0)
     clock.start()
@@ -145,7 +142,7 @@ def test_a_tick_or_job_that_fails_ends_its_robot_alone_whose_clients_are_still_a
 def test_what_ends_the_thread_ends_all_robots_and_says_so(caplog, error):
     robots = [Mailbox(FakeHost()), Mailbox(Failing())]
     robots[1].host.error = error
-    clock = Realtime(robots, lambda: None, PERIOD)
+    clock = Realtime(robots, PERIOD)
     clock.start()
     clock._thread.join(WAIT)
     assert all("see the log" in robot.host.failure for robot in robots)
@@ -162,7 +159,7 @@ def test_an_arm_whose_call_never_returns_does_not_keep_the_server_from_ending(ca
             begun.set()
             go_on.wait(WAIT)
 
-    clock = Realtime([Mailbox(Hanging())], lambda: None, PERIOD)
+    clock = Realtime([Mailbox(Hanging())], PERIOD)
     clock.start()
     assert begun.wait(WAIT)
     clock.close()
@@ -186,28 +183,34 @@ def test_real_time_priority_is_asked_for_by_the_tick_thread_itself(monkeypatch):
     assert len(asked) == 1
 
 
-def test_threads_with_the_messages_of_every_tick_get_the_priority_next_to_it(monkeypatch):
+@pytest.fixture
+def recorder():
+    """A thread that takes the messages of every tick."""
+    ended = threading.Event()
+    thread = threading.Thread(target=ended.wait, name=punctual.RECORDER)
+    thread.start()
+    yield thread
+    ended.set()
+
+
+def test_a_thread_with_the_messages_of_every_tick_gets_the_priority_next_to_it(monkeypatch, recorder):
     """Otherwise the tick waits for whatever program takes the processor from one that holds the interpreter's lock."""
-    asked, courier = [], Courier([])
+    asked = []
     monkeypatch.setattr(
         os, "sched_setscheduler", lambda which, _, asks: asked.append((which, asks.sched_priority))
     )
-    courier.start()
     served([Mailbox(FakeHost())], priority=True)
-    courier.close()
-    assert asked == [(0, punctual.PRIORITY), (courier._thread.native_id, punctual.PRIORITY - 1)]
+    assert asked == [(0, punctual.PRIORITY), (recorder.native_id, punctual.PRIORITY - 1)]
 
 
+@pytest.mark.usefixtures("recorder")
 def test_a_thread_that_has_just_ended_takes_no_priority_from_the_tick(monkeypatch):
     def ask(which, *_):
         if which != 0:
             raise ProcessLookupError(3, "No such process")
 
-    courier = Courier([])
-    courier.start()
     monkeypatch.setattr(os, "sched_setscheduler", ask)
     assert punctual.take_priority()
-    courier.close()
 
 
 def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypatch, caplog):
@@ -269,7 +272,7 @@ def test_an_overload_is_told_to_the_robot_s_clients_when_it_begins_and_when_it_e
 
     monkeypatch.setattr("tvist_server.clock.time", SimpleNamespace(monotonic=lambda: passed[0], sleep=sleep))
     robot = Mailbox(Slow())
-    clock = Realtime([robot], lambda: None, PERIOD)
+    clock = Realtime([robot], PERIOD)
     clock.start()
     assert told.wait(WAIT)
     clock.close()

@@ -12,9 +12,9 @@ from tvist_controller.setup import Setup, paper_payload
 from tvist_controller.sources import calibrations
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.calibration import calibration_to_json
-from tvist_server.config import ConfigError, ServeConfig
-from tvist_server.config_file import from_mapping, read_toml
+from tvist_server.config import ServeConfig, from_mapping
 from tvist_server.moving.servo_lag import ServoLag
+from tvist_server.option_values import StartError, read_start_file
 
 
 def config(**values) -> ServeConfig:
@@ -22,7 +22,7 @@ def config(**values) -> ServeConfig:
 
 
 def sentence(action, *arguments):
-    with pytest.raises(ConfigError) as caught:
+    with pytest.raises(StartError) as caught:
         action(*arguments)
     text = str(caught.value)
     assert "\n" not in text
@@ -184,10 +184,10 @@ def test_a_broken_calibration_file_is_named(tmp_path, content):
 
 
 def test_a_file_that_cannot_be_read_or_is_no_toml(tmp_path):
-    assert "nowhere.toml" in sentence(read_toml, "nowhere.toml")
+    assert "nowhere.toml" in sentence(read_start_file, "nowhere.toml", "configuration", dict)
     broken = tmp_path / "broken.toml"
     broken.write_text("name = ")
-    assert "broken.toml" in sentence(read_toml, str(broken))
+    assert "broken.toml" in sentence(read_start_file, broken, "configuration", dict)
 
 
 @pytest.mark.parametrize("key", ["robot", "state", "calibration"])
@@ -199,7 +199,7 @@ def test_a_file_that_is_none_is_not_taken_for_a_wrong_value(key, tmp_path):
 def test_a_file_is_read(tmp_path):
     path = tmp_path / "tvist.toml"
     path.write_text('shaper = "ei"\nseed = 7\nlisten = ["tcp/0.0.0.0:7447"]\n')
-    read = from_mapping(read_toml(str(path)), str(path))
+    read = from_mapping(read_start_file(path, "configuration", dict), str(path))
     assert (read.shaper, read.seed, read.listen) == ("ei", 7, ("tcp/0.0.0.0:7447",))
 
 

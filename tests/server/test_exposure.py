@@ -7,7 +7,8 @@ import pytest
 from tvist_protocol.codec import MAX_BYTES
 from tvist_server.gateways.access import access_control, open_access, router_access
 from tvist_server.gateways.endpoints import is_local
-from tvist_server.gateways.exposure import ExposureError, guarded
+from tvist_server.gateways.exposure import guarded
+from tvist_server.option_values import StartError
 
 LOCAL = [
     "tcp/127.0.0.1:7447", "tcp/127.1.2.3:7447", "tcp/[::1]:7447", "udp/127.0.0.1:7447", "ws/127.0.0.1:7447",
@@ -31,7 +32,7 @@ def test_what_only_this_machine_reaches_needs_nothing(endpoint):
 @pytest.mark.parametrize("endpoint", EXPOSED)
 def test_whatever_else_is_refused_with_both_ways_out(endpoint):
     assert not is_local(endpoint)
-    with pytest.raises(ExposureError) as refused:
+    with pytest.raises(StartError) as refused:
         guarded(["tcp/127.0.0.1:7447", endpoint], ["ur5e"], security=None, insecure=False)
     for words in (f"listen is {endpoint}", "--security DIR", "--insecure"):
         assert words in str(refused.value)
@@ -43,9 +44,7 @@ def test_whatever_else_is_refused_with_both_ways_out(endpoint):
 @pytest.mark.parametrize("insecure", [True, False])
 def test_what_is_no_endpoint_is_told_the_form_of_one(endpoint, insecure):
     assert not is_local(endpoint)
-    with pytest.raises(
-        ExposureError, match=r"must have the form tcp/ADDRESS:PORT, such as tcp/127.0.0.1:7447"
-    ):
+    with pytest.raises(StartError, match=r"must have the form tcp/ADDRESS:PORT, such as tcp/127.0.0.1:7447"):
         guarded([endpoint], ["ur5e"], security=None, insecure=insecure)
 
 
@@ -79,7 +78,7 @@ def test_insecure_lets_everybody_in_and_still_limits_the_size_of_a_message():
 @pytest.mark.parametrize("insecure", [False, True])
 @pytest.mark.parametrize("endpoint", ["tls/127.0.0.1:7447", "tls/0.0.0.0:7447", "quic/127.0.0.1:7447"])
 def test_an_encrypted_endpoint_needs_certificates(endpoint, insecure):
-    with pytest.raises(ExposureError, match="--security DIR"):
+    with pytest.raises(StartError, match="--security DIR"):
         guarded([endpoint], ["ur5e"], security=None, insecure=insecure)
 
 

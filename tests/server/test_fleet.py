@@ -4,9 +4,8 @@ import importlib.resources
 
 import pytest
 
-from tvist_server.config import ConfigError
-from tvist_server.config_file import from_mapping
-from tvist_server.fleet import MOST, members, recording_of
+from tvist_server.config import from_mapping
+from tvist_server.option_values import MOST, StartError, members, recording_of
 
 
 def names(text):
@@ -52,7 +51,7 @@ def test_as_many_as_there_may_be():
     ],
 )
 def test_what_is_wrong_is_one_sentence_and_a_fault_of_the_configuration(text, named):
-    with pytest.raises(ConfigError) as caught:
+    with pytest.raises(StartError) as caught:
         from_mapping({"robots": text}, "tvist.toml").setups()
     sentence = str(caught.value)
     assert sentence.startswith("robots ")
@@ -62,12 +61,12 @@ def test_what_is_wrong_is_one_sentence_and_a_fault_of_the_configuration(text, na
 
 @pytest.mark.parametrize("key", ["name", "robot"])
 def test_robots_exclude_what_is_said_of_one(key):
-    with pytest.raises(ConfigError, match=f"tvist.toml: robots and {key} exclude each other"):
+    with pytest.raises(StartError, match=f"tvist.toml: robots and {key} exclude each other"):
         from_mapping({"robots": "ur5e*2", key: "ur5e"}, "tvist.toml")
 
 
 def test_a_robot_that_is_not_there_is_named():
-    with pytest.raises(ConfigError, match="nope"):
+    with pytest.raises(StartError, match="nope"):
         from_mapping({"robots": "ur5e,nope"}, "tvist.toml").setups()
 
 

@@ -13,9 +13,8 @@ from tvist_controller.programs.checking import check_program
 from tvist_protocol.commands import UnlockProtectiveStop
 from tvist_protocol.programs import ProgramPause, ProgramPlay
 from tvist_protocol.simulation import SimulationInject
-from tvist_server.moving import registers as r
-from tvist_server.moving.program import CLOSE, program
-from tvist_server.moving.window import Window
+from tvist_server.moving import program as r
+from tvist_server.moving.program import CLOSE, Window, program
 
 BACK = 1.1 * CLOSE / H**2
 """Acceleration with which the rest of a distance from the set-points is made up for [rad/s²]."""

@@ -21,7 +21,8 @@ from tvist_plant.plant import Plant
 from tvist_plant.variants import hidden, hidden_payload
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
 from tvist_server.recording.recorder import Recorder
 
 SEED = 314159
@@ -88,7 +89,7 @@ def test_several_hidden_robots_are_different_ones():
     config = ServeConfig(robots="ur5e*2", hidden=5)
     assert [one.hidden for one in config.setups()] == [5, 6]
     assert free_setup(hidden=5, truth=False).hidden == 5
-    with pytest.raises(ConfigError, match="hidden is 5, but truth is on"):
+    with pytest.raises(StartError, match="hidden is 5, but truth is on"):
         free_setup(hidden=5)
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from tvist_kernels.cache import KernelCache
 from tvist_protocol import commands as c
-from tvist_server.config_file import from_mapping
+from tvist_server.config import from_mapping
 from tvist_server.robot import ServedRobot
 
 setup = from_mapping({"clock": "realtime"}, "configuration").setup()

@@ -21,34 +21,32 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.foreign import called
 from tvist_plant.plant import PERIOD, Measurement, Sight
 from tvist_protocol import commands as c
-from tvist_protocol.codec import decode_state, encode
+from tvist_protocol.codec import decode, encode
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.stream import State
 from tvist_server.gateways.ur.primary.packages import robot_state
-from tvist_server.moving import registers as r
-from tvist_server.moving.commanded_robot import CommandedRobot
-from tvist_server.moving.configuration import Configuration, found, narrowed
-from tvist_server.moving.connection import CommandingConnection
-from tvist_server.moving.dialogue import NoAnswerError, ask
-from tvist_server.moving.halts import halt_by_modes, halt_by_program
-from tvist_server.moving.moved_robot import MovedRobot
-from tvist_server.moving.pace import MOST, SILENT, Pace
-from tvist_server.moving.registers import Ended
-from tvist_server.moving.run import HEEDS, Run
-from tvist_server.moving.start_checks import (
+from tvist_server.moving import program as r
+from tvist_server.moving.checks import (
     Wanted,
     answers_trouble,
+    halt_by_modes,
+    halt_by_program,
     mounting_trouble,
     state_trouble,
     tells_gravity,
     version_trouble,
 )
-from tvist_server.moving.upload import Upload
-from tvist_server.rtde.client import RtdeError
+from tvist_server.moving.interfaces import Configuration, NoAnswerError, ask, found, narrowed
+from tvist_server.moving.moved_robot import MOST, SILENT, MovedRobot, Pace
+from tvist_server.moving.program import Ended
+from tvist_server.moving.run import HEEDS, Run, Upload
+from tvist_server.rtde.client import RtdeClient, RtdeError
 from tvist_server.rtde.codec import PackageKind, package
-from tvist_server.rtde.commanding import CommandingClient
 from tvist_server.rtde.wire import Field, Wire
+from tvist_server.watching.connection import Connection
 from tvist_server.watching.place import place_of
 from tvist_server.watching.variables import NEEDED, OPTIONAL
+from tvist_server.watching.watched_robot import WatchedRobot
 
 Q = np.array([0.3, -1.2, 1.5, -1.8, -1.5, 0.2])
 GOOD = Sight(
@@ -60,7 +58,7 @@ WANTED = Wanted(UR5E, Payload(mass=5.0))
 
 
 def client():
-    return CommandingClient({"timestamp": Field(Wire.DOUBLE)}, {}, {"n": Wire.INT32, "q": Wire.DOUBLE})
+    return RtdeClient({"timestamp": Field(Wire.DOUBLE)}, {}, {"n": Wire.INT32, "q": Wire.DOUBLE})
 
 
 def set_up(commanding, types, outputs=b"DOUBLE"):
@@ -394,7 +392,7 @@ def test_it_brakes_within_an_eighth_of_a_second_and_within_the_limits(monkeypatc
 def test_a_program_is_sent_only_if_the_robot_is_free_at_the_last_moment(monkeypatch):
     sent = []
     connection = contextlib.nullcontext(SimpleNamespace(sendall=sent.append))
-    monkeypatch.setattr("tvist_server.moving.upload.asked", lambda *_: {})
+    monkeypatch.setattr("tvist_server.moving.run.asked", lambda *_: {})
     monkeypatch.setattr("socket.create_connection", lambda *_: connection)
     upload = Upload(place_of("ur://robot"), "def nothing():\nend\n", lambda: "a program runs on it")
     upload.thread.join(10.0)
@@ -425,7 +423,7 @@ class Far:
         for module in ("watching.connection", "watching.watched_robot", "moving.moved_robot", "moving.run"):
             patch.setattr(f"tvist_server.{module}.time", times)
         patch.setattr("tvist_server.moving.run.Upload", self.upload)
-        patch.setattr(CommandedRobot, "_new_connection", lambda _: self.connected())
+        patch.setattr(WatchedRobot, "_new_connection", lambda _: self.connected())
 
     def passed(self, duration=1e-7):
         self.now += duration
@@ -433,13 +431,11 @@ class Far:
 
     def connected(self):
         self.run, self.number, self.q = 0, 0, tuple(Q)
-        client, link = CommandingClient(FIELDS, {}, r.INPUTS), object.__new__(CommandingConnection)
+        client, link = RtdeClient(FIELDS, {}, r.INPUTS), object.__new__(Connection)
         wires = r.INPUTS.values(), [field.wire for field in FIELDS.values()]
         set_up(client, *(",".join(wire.name for wire in one).encode() for one in wires))
         client.receive(package(PackageKind.START, b"\x01"))
-        vars(link).update(
-            client=client, _commanding=client, _socket=self, _selector=self, _place=FAR, texts=[]
-        )
+        vars(link).update(client=client, _socket=self, _selector=self, _place=FAR, texts=[])
         vars(link).update(_heard=self.now, _newest=-1, _connected=True, _rest=b"")
         return link
 
@@ -493,7 +489,7 @@ def test_what_is_wrong_in_rows_is_said_and_no_set_point_leaves_the_limits(monkey
     assert any(said in why for why in told)
     assert len(told) < 60
     assert all(why.isprintable() for why in told)
-    assert all(decode_state(encode(state)) for state in robot.states)  # which bounds each number
+    assert all(decode(State, encode(state)) for state in robot.states)  # which bounds each number
     sent = np.reshape(far.written, (-1, 4, 6))
     assert (np.abs(sent) <= UR5E.limits.position).all()
     assert 1e-4 < np.abs(np.diff(sent, axis=1)).max() <= 0.5 * PERIOD * (1 + 1e-9)
@@ -501,7 +497,7 @@ def test_what_is_wrong_in_rows_is_said_and_no_set_point_leaves_the_limits(monkey
 
 def test_a_conversation_has_one_deadline_however_slowly_it_is_answered(monkeypatch):
     times = iter(np.arange(0.0, 9.0, 0.1))
-    monkeypatch.setattr("tvist_server.moving.dialogue.time", SimpleNamespace(monotonic=lambda: next(times)))
+    monkeypatch.setattr("tvist_server.moving.interfaces.time", SimpleNamespace(monotonic=lambda: next(times)))
     slow = SimpleNamespace(sendall=len, settimeout=float, recv=lambda _: b"x")
     monkeypatch.setattr("socket.create_connection", lambda *_: contextlib.nullcontext(slow))
     with pytest.raises(NoAnswerError, match="no answer within 2 s"):

@@ -22,8 +22,8 @@ from tvist_protocol.recorded import topics
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.values import Frequency
-from tvist_server.config import ConfigError
-from tvist_server.config_file import from_mapping, read_toml
+from tvist_server.config import from_mapping
+from tvist_server.option_values import StartError, read_start_file
 from tvist_server.recording.writer import RecordingWriter, heading
 from tvist_shaping import FirShaper, Impulses, Shaper, zv
 from tvist_shaping.own import TRIED_F_D
@@ -150,7 +150,7 @@ class TestStart:
     def test_a_configuration_takes_it(self, file, tmp_path):
         path = tmp_path / "robot.toml"
         path.write_text(f'shaper = "{file}:thirds"\n')
-        made = from_mapping(read_toml(str(path)), "configuration").setup()
+        made = from_mapping(read_start_file(path, "configuration", dict), "configuration").setup()
         assert made.shaper == "thirds"
         assert made.registry.names()[-1] == "thirds"
 
@@ -172,7 +172,7 @@ class TestStart:
             assert config.setup().shaper == name
             return
         with pytest.raises(
-            ConfigError, match=r"must support the modes of this arm, .* Hz with ζ = .*clip"
+            StartError, match=r"must support the modes of this arm, .* Hz with ζ = .*clip"
         ) as error:
             config.setup()
         assert said in str(error.value)
@@ -201,11 +201,11 @@ class TestStart:
         (tmp_path / "other.py").write_text(MINE + "# other\n")
         path = tmp_path / "state.toml"
         path.write_text(f'shaper = "{tmp_path}/other.py:mine"\n')
-        with pytest.raises(ConfigError, match="must be a name that no other shaper has"):
+        with pytest.raises(StartError, match="must be a name that no other shaper has"):
             from_mapping({"shaper": f"{file}:mine", "state": str(path)}, "configuration").setup()
 
     def test_one_that_cannot_be_loaded_is_a_wrong_configuration(self, file):
-        with pytest.raises(ConfigError, match="does not contain nobody"):
+        with pytest.raises(StartError, match="does not contain nobody"):
             from_mapping({"shaper": f"{file}:nobody"}, "configuration").setup()
 
     def test_one_that_lasts_too_long_for_this_robot_does_not_start(self, file):

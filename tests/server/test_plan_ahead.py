@@ -35,7 +35,7 @@ class Served:
         self.jobs, self.came = deque(), threading.Condition()
         self.ahead = PlanAhead(self.host, Planner(start), self.post, complete)
         self.ahead.start()
-        self.reception = Reception(self.host, self.post, self.ahead.submit, lambda call: call())
+        self.reception = Reception(self.host, self.post, self.ahead.submit)
         self.replies = []
         self.token = self.ask(c.TakeControl(client="anna", lease_s=3600.0)).token
 

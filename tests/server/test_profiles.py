@@ -13,8 +13,7 @@ from tvist_controller.kinematics.postures import is_of_ur_form
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_plant.description import load
 from tvist_protocol import commands as c
-from tvist_server.config import ServeConfig
-from tvist_server.config_file import from_mapping
+from tvist_server.config import ServeConfig, from_mapping
 from tvist_server.profiles import UR_START
 
 

@@ -10,11 +10,12 @@ from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.host import Host
 from tvist_controller.programs.checking import check_program
 from tvist_plant.user_file import UserFileError
-from tvist_protocol.codec import decode_info
+from tvist_protocol.codec import decode
+from tvist_protocol.info import Info
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad, ProgramStop
 from tvist_protocol.replies import Done, Refused
-from tvist_server.config import ConfigError
-from tvist_server.config_file import from_mapping
+from tvist_server.config import from_mapping
+from tvist_server.option_values import StartError
 from tvist_server.polyscope import program, with_external_control
 from tvist_server.polyscope_nodes import EXTERNAL_CONTROL, Nodes
 from tvist_server.program_folder import ProgramFolder
@@ -251,10 +252,10 @@ def test_a_load_gets_the_text_of_the_file_and_other_commands_stay_as_they_are(fo
 
 def test_the_files_are_programs_of_the_robot_s_description(folder):
     host = Host(Robot().controller)
-    programs = decode_info(folder.listed(host.info())).programs
+    programs = decode(Info, folder.listed(host.info())).programs
     assert {"pick.script", "place.urp", "Q1.urp"} <= set(programs)
     folder.path = folder.path / "nowhere"
-    assert decode_info(folder.listed(host.info())).programs == decode_info(host.info()).programs
+    assert decode(Info, folder.listed(host.info())).programs == decode(Info, host.info()).programs
 
 
 def test_the_robot_takes_the_program_of_the_folder(folder):
@@ -272,6 +273,6 @@ def test_a_robot_has_the_folder_of_its_name_if_there_is_one(folder):
 
 def test_a_folder_that_does_not_exist_is_an_error_of_the_configuration(tmp_path):
     nowhere = from_mapping({"programs": str(tmp_path / "nowhere")}, "tvist.toml")
-    with pytest.raises(ConfigError, match=r"programs is .*nowhere.*: must be a folder"):
+    with pytest.raises(StartError, match=r"programs is .*nowhere.*: must be a folder"):
         nowhere.program_folder("ur5e")
     assert from_mapping({}, "tvist.toml").program_folder("ur5e") is None

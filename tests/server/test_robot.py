@@ -44,7 +44,6 @@ def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_las
     def send(command):
         robot.reception.request(encode(command), replies.append)
         robot.driven.jobs.do_waiting()
-        robot.hand_on()
         return replies[-1]
 
     token = send(c.TakeControl(client="a")).token
@@ -54,7 +53,6 @@ def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_las
     assert send(ProgramPlay(token=token)) == Done()
     robot.tell_telemetry(NoLateness())
     robot.driven.jobs.do_waiting()
-    robot.hand_on()
     assert [(io.program, io.program_state) for io in gateway.told[1:]] == [("paper.urp", "PLAYING")]
 
 
@@ -83,8 +81,6 @@ def test_a_robot_that_is_stepped_does_not_say_a_state_twice(tmp_path):
     for now in (1, 2):
         robot.request(SimulationStep(token=token, ticks=1))
         robot.repeat()
-        robot.hand_on()
         assert told == list(range(1, now + 1))
     robot.repeat()
-    robot.hand_on()
     assert told == [1, 2, 2]

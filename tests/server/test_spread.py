@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_server.config import ConfigError
-from tvist_server.config_file import from_mapping
+from tvist_server.config import from_mapping
 from tvist_server.gateways.access import open_access, with_robots_behind
+from tvist_server.option_values import StartError
 from tvist_server.spread import check_together, shares
 
 
@@ -43,19 +43,19 @@ def test_each_robot_is_served_by_one_process_and_their_numbers_differ_by_one_at_
 def test_what_excludes_several_processes_is_one_sentence(content, named):
     config = from_mapping(content, "configuration")
     robots = 1 if config.robots is None else 2
-    with pytest.raises(ConfigError, match=named):
+    with pytest.raises(StartError, match=named):
         check_together(config, robots)
 
 
 @pytest.mark.parametrize("workers", [0, 257, "two"])
 def test_a_number_of_processes_that_is_none_is_refused(workers):
-    with pytest.raises(ConfigError, match="workers"):
+    with pytest.raises(StartError, match="workers"):
         from_mapping({"workers": workers}, "configuration")
 
 
 def test_more_processes_serve_more_robots():
     assert len(from_mapping({"robots": "ur5e*65", "workers": 2}, "configuration").setups()) == 65
-    with pytest.raises(ConfigError, match="1 to 64"):
+    with pytest.raises(StartError, match="1 to 64"):
         from_mapping({"robots": "ur5e*65"}, "configuration").setups()
 
 

@@ -33,7 +33,7 @@ class Network:
 
     def __init__(self):
         self.host, self.jobs, self.replies = Host(Controller(setup(clock="lockstep")), Sink()), Jobs(), []
-        self.reception = Reception(self.host, self.jobs.post, self.carry_out, lambda call: call())
+        self.reception = Reception(self.host, self.jobs.post, self.carry_out)
 
     def carry_out(self, admitted, reply):
         self.jobs.post(lambda: reply(self.host.carry_out(admitted)), admitted.client)

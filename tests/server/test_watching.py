@@ -10,7 +10,7 @@ from tvist_server.rtde.client import RtdeClient, RtdeError
 from tvist_server.rtde.codec import PackageKind, package
 from tvist_server.rtde.wire import Field, Wire
 from tvist_server.watching.place import place_of
-from tvist_server.watching.row_count import RowCount
+from tvist_server.watching.variables import RowCount
 
 NEEDED = {"timestamp": Field(Wire.DOUBLE), "q": Field(Wire.VECTOR3D)}
 OPTIONAL = {"payload": Field(Wire.DOUBLE)}

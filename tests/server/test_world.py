@@ -18,7 +18,8 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.values import Payload
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
 
 CELL = """
 world = "{world}"
@@ -124,13 +125,13 @@ def test_a_world_is_named_in_one_place_and_tells_the_truth():
     ],
 )
 def test_what_excludes_a_world_is_said(given, said):
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(StartError, match=said):
         ServeConfig(**given).setup()
 
 
 def test_parts_and_a_world_exclude_each_other(tmp_path):
     part = '\n[[parts]]\nname = "box"\nmass = 1.0\nsize = [0.1, 0.05, 0.1]\npose = [0, 0, 1, 0, 0, 0]\n'
-    with pytest.raises(ConfigError, match="in which bodies are gripped: leave parts out"):
+    with pytest.raises(StartError, match="in which bodies are gripped: leave parts out"):
         config(tmp_path, cell=CELL + part).setup()
 
 
@@ -139,7 +140,7 @@ def test_an_arm_that_would_stand_in_a_wall_is_one_sentence(tmp_path):
         '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>'
     )
     with pytest.raises(
-        ConfigError, match=r"world .*wall.xml: .* stands .* mm inside shape 0: choose a posture"
+        StartError, match=r"world .*wall.xml: .* stands .* mm inside shape 0: choose a posture"
     ):
         ran(ServeConfig(world=str(tmp_path / "wall.xml"), clock="free").setup(), "def a():\nend")
 

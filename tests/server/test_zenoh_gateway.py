@@ -58,9 +58,9 @@ class NotingDesk:
 
     def _answer(self, reply, data):
         if self.hold:
-            self.held.append(lambda: reply(data))
+            self.held.append(lambda: reply(lambda: data))
         else:
-            threading.Thread(target=reply, args=(data,)).start()
+            threading.Thread(target=reply, args=(lambda: data,)).start()
 
 
 def connect(endpoint):
@@ -366,9 +366,9 @@ FORGETFUL = """
 import sys, time, zenoh
 from tvist_server.gateways.network import Network
 class Desk:
-    def request(self, data, reply): reply(b"")
+    def request(self, data, reply): reply(bytes)
     def setpoint(self, data): pass
-    def info(self, reply): reply(b"")
+    def info(self, reply): reply(bytes)
     def client_seen(self, name, session=""): pass
     def client_gone(self, name, session=""): pass
     def session_gone(self, session): pass

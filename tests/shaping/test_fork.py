@@ -5,11 +5,10 @@ import pytest
 
 from tvist_lab.study.recipes import Mistaken
 from tvist_shaping import Fade, Fixed, Polynomial, TvistFilter, shaper
-from tvist_shaping.aimed import AimedFilter
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 from tvist_shaping.fir import FirDesign
-from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
+from tvist_shaping.steady import AimedFilter, ProductDesign, ShortDesign, SteadyFilter
 
 H = 0.002
 JOINTS = 2

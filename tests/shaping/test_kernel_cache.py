@@ -5,6 +5,7 @@ import hashlib
 import os
 import pickle
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from numba.core.registry import cpu_target
 
 from tvist_kernels import cache as kernel_cache
-from tvist_kernels.cache import DistrustWarning, KernelCache
+from tvist_kernels.cache import OTHERS, DistrustWarning, KernelCache
 
 CALLEE = """
 from tvist_kernels.compiling import compiled
@@ -84,7 +85,7 @@ def test_a_second_process_compiles_nothing_and_one_on_another_processor_all(pack
     assert call(package, **other) == ["False", "3.0", "1", "0"]
     assert call(package, **other) == ["True", "3.0", "0", "0"]
     assert call(package) == ["True", "3.0", "0", "0"]
-    for file in package.rglob("*.kernel"):
+    for file in package.parent.rglob("*.kernel"):
         file.write_bytes(file.read_bytes()[:-1] + b"?")
     assert call(package) == ["True", "3.0", "1", "0"]
 
@@ -115,7 +116,8 @@ def test_what_a_distribution_brings_along_runs_unless_somebody_else_can_write_it
 def test_to_load_a_kernel_nothing_is_imported_that_compiling_needs_unless_another_is_compiled(package):
     unused = "; print([name for name in ('scipy.linalg', 'cffi', 'numba.np.linalg') if name in sys.modules])"
     call(package)
-    environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
+    home = {"XDG_CACHE_HOME": str(package.parent / "home"), "NUMBA_CACHE_DIR": ""}
+    environment = {**os.environ, "PYTHONPATH": str(package.parent), **home}
     run = [sys.executable, "-c", CALL + unused.removeprefix("; "), "[1.0]"]
     said = subprocess.run(run, env=environment, capture_output=True, text=True, check=True).stdout
     assert said.split("\n")[-2] == "[]"
@@ -136,11 +138,25 @@ def test_a_change_of_what_a_kernel_calls_or_uses_in_another_file_compiles_it_aga
         file.write_text(file.read_text().replace(old, new))
         os.utime(file, ns=(stamp, stamp))  # contents count, times do not
         assert call(package) == ["False", value, "1", "0"]
-        assert len(list(package.rglob("*outer*.kernel"))) == 1  # what it was before is gone
 
 
-def test_where_the_sources_cannot_be_written_the_users_cache_folder_is_and_else_it_is_noted(package):
-    (package / "__pycache__").write_text("a file where the folder would be")  # root may write anywhere
+def test_another_installation_with_the_same_sources_compiles_nothing_and_old_sources_are_forgotten(package):
+    elsewhere, home = package.parent / "elsewhere", {"XDG_CACHE_HOME": str(package.parent / "home")}
+    shutil.copytree(package, elsewhere / package.name)
+    assert call(package) == ["False", "3.0", "1", "0"]
+    assert call(elsewhere / package.name, **home) == ["True", "3.0", "0", "0"]
+    (now,) = (package.parent / "home").rglob("*outer*.kernel")
+    old = [now.with_name(re.sub(r"\.[0-9a-f]{16}-", f".{k:016x}-", now.name)) for k in range(40)]
+    for age, file in enumerate(old):
+        file.write_bytes(b"")
+        os.utime(file, (age, age))
+    (package / "constants.py").write_text("FACTOR = 4.0\n")
+    assert call(package) == ["False", "5.0", "1", "0"]
+    assert call(elsewhere / package.name, **home) == ["True", "3.0", "0", "0"]
+    assert [file.exists() for file in old] == [False] * (41 - OTHERS) + [True] * (OTHERS - 1)
+
+
+def test_kernels_are_kept_in_the_users_cache_folder_or_the_one_that_is_named_and_else_it_is_noted(package):
     assert call(package) == ["False", "3.0", "1", "0"]
     assert len(list((package.parent / "home").rglob("*outer*.kernel"))) == 1
     assert call(package) == ["True", "3.0", "0", "0"]
@@ -153,7 +169,7 @@ def test_processes_that_compile_at_once_keep_what_each_compiled(package):
     for process in at_once:
         process.communicate()
     assert call(package, "[1.0, 2]") == ["True", "3.0", "5.0", "0", "0"]
-    assert not list(package.rglob("*.draft"))
+    assert not list(package.parent.rglob("*.draft"))
 
 
 class Code:
@@ -212,22 +228,20 @@ TRUSTED = {
 }
 
 
-@pytest.fixture(params=["NUMBA_CACHE_DIR", "__pycache__"])
-def kernel(request, tmp_path, monkeypatch):
+@pytest.fixture
+def kernel(tmp_path, monkeypatch):
     """A cache, a file of its kernel in a folder three levels down, and what exists once the file has run."""
     place, mark = tmp_path / "far" / "top" / "kernels", tmp_path / "mark"
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    monkeypatch.setattr(kernel_cache.config, "CACHE_DIR", str(place) if "NUMBA" in request.param else "")
+    monkeypatch.setattr(kernel_cache.config, "CACHE_DIR", str(place))
     monkeypatch.setattr(kernel_cache, "_said", set())
 
     def function(x):
         return x
 
-    function.__code__ = function.__code__.replace(co_filename=str(place / "module.py"))
     cache = KernelCache(function)
     (machine, _) = kernel_cache._machines(cpu_target.target_context)
-    file = kernel_cache.folders(place)[0] / cache._file("types", machine)
-    file.parent.mkdir(parents=True)
+    file = place / cache._file("types", machine)
+    place.mkdir(parents=True)
     code = pickle.dumps(Code(mark))
     file.write_bytes(hashlib.sha256(code).digest() + code)
     return cache, file, mark
@@ -260,7 +274,6 @@ def test_code_where_others_can_write_does_not_run_and_one_sentence_says_so(kerne
 
 def test_a_folder_where_others_can_write_is_nobody_s_concern_as_long_as_no_code_is_there(kernel):
     cache, file, _ = kernel
-    assert cache.places  # of a folder that becomes so later
     file.unlink()
     file.parent.chmod(0o775)
     assert not cache.holds()  # a warning would be an error
@@ -322,19 +335,15 @@ def test_code_of_this_user_or_root_runs_where_nobody_else_can_write(kernel, chan
     assert mark.exists()
 
 
-@pytest.mark.parametrize("kernel", ["NUMBA_CACHE_DIR"], indirect=True)
 def test_nothing_is_written_where_others_can_write_nor_so_that_they_can(kernel, tmp_path):
     _, file, _ = kernel
     file.parent.chmod(0o777)
     before = os.umask(0)
     try:
-        with pytest.warns(DistrustWarning):
-            (own,) = kernel_cache.folders(file.parents[1])
-        kernel_cache._write(own / "a.kernel", b"")
+        kernel_cache._write(tmp_path / "home" / "own" / "a.kernel", b"")
         with pytest.raises(OSError, match="chmod go-w"):
             kernel_cache._write(file.with_name("b.kernel"), b"")
     finally:
         os.umask(before)
-    assert own.is_relative_to(tmp_path / "home")
     assert [one for one in (tmp_path / "home").rglob("*") if one.stat().st_mode & 0o022] == []
     assert list(file.parent.iterdir()) == [file]

@@ -5,10 +5,9 @@ import pytest
 from scipy.linalg import expm
 
 from tvist_shaping import SHAPERS, Estimator, Fade, FilterError, Fixed, ShapingError, TvistFilter, residual
-from tvist_shaping.aimed import AimedFilter
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.impulse_train import Impulses
-from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
+from tvist_shaping.steady import AimedFilter, ProductDesign, ShortDesign, SteadyFilter
 from tvist_shaping.taps import mean_delay
 
 H = 0.002

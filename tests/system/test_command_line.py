@@ -468,9 +468,17 @@ def test_the_demonstration_replays_equal_and_its_recording_gives_the_same_figure
 
 
 def test_the_paper_in_one_run_prints_its_tables(tmp_path):
-    said = tvist("paper", "--runs", 1, "--no-baselines", "--json").assert_done().json
-    assert {"seed", "runs", "shaper", "estimator", "table_1", "table_2", "baselines"} <= said.keys()
-    assert (said["seed"], said["runs"], said["shaper"]) == (0, 1, "zv")
+    both = tvist("paper", "--runs", 1, "--no-baselines", "--json").assert_done().json
+    one = (
+        tvist("paper", "--robot", "ur5e_stiction", "--runs", 1, "--no-baselines", "--json").assert_done().json
+    )
+    for said in (both, one):
+        keys = {"robot", "seed", "runs", "shaper", "estimator", "table_1", "table_2", "baselines", "origins"}
+        assert keys <= said.keys()
+        assert (said["seed"], said["runs"], said["shaper"]) == (0, 1, "zv")
+    assert (both["robot"], one["robot"], one["others"]) == ("UR5e", "UR5e_stiction", [])
+    (second,) = both["others"]
+    assert second == {name: value for name, value in one.items() if name != "others"}
 
 
 def test_the_bench_tells_how_fast_a_robot_is_computed():

@@ -22,7 +22,7 @@ CASES = {
     "tvist run --check one.script wav": {"wave.script"},
     "tvist serve --shaper zvd": {"zvd", "zvdd", "zvddd"},
     "tvist serve --shaper ow": {"own.py"},
-    "tvist serve --robot ur5": {"ur5-light", "ur5e"},
+    "tvist serve --robot ur5": {"ur5-light", "ur5e", "ur5e_stiction"},
     "tvist serve --robot a": {"arm.toml"},
     "tvist serve --profile u": {"ursim"},
     "tvist move Q": {"Q1", "Q2", "Q3"},

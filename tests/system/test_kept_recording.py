@@ -9,7 +9,7 @@ from tests.conformance.served import Served, refused_to_start
 
 from tvist_client.robot import Robot
 from tvist_lab.recordings.mcap_file import RecordingFileError, read
-from tvist_protocol.recorded import earlier_name
+from tvist_protocol.recorded import segment_name
 
 TICKS = 1300
 PATIENCE = 30.0
@@ -37,18 +37,19 @@ async def advance_and_send(number, path):
     return content, ticks
 
 
-async def test_a_server_that_ends_leaves_one_file_with_the_last_second(tmp_path):
+async def test_a_server_that_ends_leaves_complete_files_with_the_last_second(tmp_path):
     content, ticks = await advance_and_send(signal.SIGTERM, tmp_path / "run.mcap")
     assert content.complete
-    assert ticks[0] == 501
+    assert ticks[0] == 751
     assert ticks[-1] >= TICKS
-    assert [place.name for place in tmp_path.iterdir()] == ["run.mcap"]
+    assert sorted(tmp_path.iterdir()) == [tmp_path / f"run-1-part{number:04}.mcap" for number in range(7, 12)]
 
 
 async def test_after_a_kill_what_was_written_is_readable_without_a_gap(tmp_path):
     content, ticks = await advance_and_send(signal.SIGKILL, tmp_path / "run.mcap")
     assert not content.complete
-    assert len(ticks) <= 1000
+    assert len(ticks) <= 625
+    assert [read(place).complete for place in content.files] == [True] * (len(content.files) - 1) + [False]
 
 
 @pytest.mark.parametrize("options", [(), ("--robots", "ur5e*2"), ("--robots", "ur5e*2", "--workers", "2")])
@@ -71,7 +72,7 @@ async def test_a_service_that_is_killed_and_started_again_loses_no_recording(opt
                     until_written(tmp_path / name)
             served.end(number)
     for name in robots:
-        killed, ended = read(tmp_path / earlier_name(name, 1)), read(tmp_path / name)
+        killed, ended = read(tmp_path / segment_name(name, 1, None)), read(tmp_path / name)
         # Processes of --workers end in order when the first one is killed.
         assert (killed.complete, ended.complete) == ("--workers" in options, True)
         seen = [state.tick for state in killed.states]

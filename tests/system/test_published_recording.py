@@ -11,8 +11,8 @@ from tvist_lab.recordings.mcap_file import read
 from tvist_protocol import Event, Info, Io, State, Truth
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.generate import FOLDER
-from tvist_protocol.recorded import earlier_name, topics
-from tvist_server.recording.ring import Ring
+from tvist_protocol.recorded import topics
+from tvist_server.recording.segments import Segments
 from tvist_server.recording.writer import heading
 
 TICKS = 700
@@ -36,17 +36,17 @@ class PublishedRecording(Served):
 def path(tmp_path):
     """A recording that keeps the last ticks, and whose process was killed."""
     path = tmp_path / "run.mcap"
-    ring = Ring(path, topics(INFO.name), heading(INFO, {"seed": 1}), overwrite=False, keep=300)
+    of, nothing = topics(INFO.name), dict.fromkeys(topics(INFO.name), 0)
+    written = Segments(path, of, heading(INFO, {"seed": 1}), nothing, overwrite=False, keep=300)
     for tick in range(1, TICKS):
         q = [tick * 1e-3] * 6
-        ring.write(msgspec.structs.replace(IO, tick=tick))
+        written.write(msgspec.structs.replace(IO, tick=tick))
         if tick % 50 == 0:
-            ring.write(Event(tick=tick, kind="warning", why=str(tick)))
-        ring.write(msgspec.structs.replace(STATE, tick=tick, timestamp=tick * 0.002, actual_q=q))
-        ring.write(msgspec.structs.replace(TRUTH, tick=tick, timestamp=tick * 0.002, motor_q=q))
-    ring.close()
-    assert path.with_name(earlier_name(path.name)).exists()
-    return path
+            written.write(Event(tick=tick, kind="warning", why=str(tick)))
+        written.write(msgspec.structs.replace(STATE, tick=tick, timestamp=tick * 0.002, actual_q=q))
+        written.write(msgspec.structs.replace(TRUTH, tick=tick, timestamp=tick * 0.002, motor_q=q))
+    written.close()
+    return path.with_name("run-1-part*.mcap")
 
 
 @pytest.mark.realtime

@@ -222,7 +222,8 @@ def test_shaperbench_names_a_cheat_and_does_not_rank_it(here):
     assert "peeks at the future" in rows["peeks"]["fault"]
     assert json.loads((here / "board.json").read_text(encoding="utf-8")) == ended.json
     assert set(rows["zv"]["by_arm"]) == set(ended.json["arms"])
-    assert len(ended.json["arms"]) == 13
+    assert len(ended.json["arms"]) == 15
+    assert list(ended.json["arms"])[-2:] == ["stiction", "more_stiction"]
 
 
 def test_a_plant_that_is_named_twice_counts_once():

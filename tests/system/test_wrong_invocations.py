@@ -222,7 +222,7 @@ def test_misuse_is_a_sentence_and_exit_code_2(called, arguments, words):
         (("stop", "--endpoint", NOWHERE), ["no server answers", NOWHERE]),
         (("log", "analyze", "nope.mcap"), ["nope.mcap", "No such file"]),
         (("log", "export", "nope.mcap", "--to", "csv"), ["nope.mcap", "No such file"]),
-        (("log", "analyze", "."), [".", "directory"]),
+        (("log", "analyze", "."), [".", "no MCAP file"]),
         (("serve", "--state", "."), ["state .", "directory"]),
         (("serve", "--robot", "."), ["robot file .", "directory"]),
         (("log", "replay", "nope.mcap"), ["nope.mcap"]),

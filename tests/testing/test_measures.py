@@ -11,9 +11,10 @@ from msgspec.structs import replace
 
 from tvist_lab.metrics import motions, peak_after_stop
 from tvist_lab.recordings.recorded_columns import recording_of_messages
-from tvist_protocol import decode_state, decode_truth
+from tvist_protocol import decode
 from tvist_protocol.generate import FOLDER as PROTOCOL
 from tvist_protocol.modes import RuntimeState
+from tvist_protocol.stream import State, Truth
 from tvist_testing import assert_residual_vibration_below, assert_settles_within, assert_within_limits
 from tvist_testing.history import History
 from tvist_testing.measures import settling, vibration
@@ -45,8 +46,8 @@ def test_a_tool_that_is_still_outside_at_the_end_has_not_settled():
 
 @given(st.lists(st.integers(-4, 4), min_size=30, max_size=30), st.sets(st.integers(1, 30)))
 def test_a_tick_is_measured_at_one_point_in_whatever_order_state_and_truth_come(delays, lost):
-    state = decode_state((PROTOCOL / "fixtures" / "v1" / "state.msgpack").read_bytes())
-    truth = decode_truth((PROTOCOL / "fixtures" / "v1" / "truth.msgpack").read_bytes())
+    state = decode(State, (PROTOCOL / "fixtures" / "v1" / "state.msgpack").read_bytes())
+    truth = decode(Truth, (PROTOCOL / "fixtures" / "v1" / "truth.msgpack").read_bytes())
     ticks = range(1, 31)
     states = [(float(tick), replace(state, tick=tick, runtime_state=RuntimeState.STOPPED)) for tick in ticks]
     truths = [

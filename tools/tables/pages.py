@@ -7,10 +7,10 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from tools.tables.markdown import best_in_bold, in_markdown, markdown_table
-from tools.tables.origins import MEANINGS, origins
 from tvist_lab.studies import leaderboard, robustness
 from tvist_lab.studies.arms.about import REDUCED, SIZE, frequencies
-from tvist_lab.studies.paper.tables import FIGURES, METHODS, methods, table_2
+from tvist_lab.studies.paper.origins import MEANINGS
+from tvist_lab.studies.paper.tables import FIGURES, METHODS, beside, methods, table_2
 from tvist_lab.study.held_out import said
 from tvist_lab.study.tables import Shown
 
@@ -37,16 +37,27 @@ def _robots(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _paper(result: dict[str, Any]) -> dict[str, Any]:
-    headings = [column.title for column in METHODS]
+    headings, arms = [column.title for column in METHODS], [result, *result["others"]]
+    of_origins, *rows = beside(arms)
     return {
-        "second": markdown_table(("motion", "", *FIGURES), table_2(result["table_2"], 2)),
+        "arms": arms,
+        "second": [markdown_table(("motion", "", *FIGURES), table_2(one["table_2"], 2)) for one in arms],
         "methods_of": {
             motion: markdown_table(headings, methods(result, motion, "**{}**"))
             for motion in result["baselines"]
         },
         "meanings": MEANINGS,
-        "origins": markdown_table(("figure", "paper", "here", "origin", "remark"), origins(result)),
+        "origins": markdown_table(of_origins, rows),
     }
+
+
+def _stiction(result: dict[str, Any]) -> dict[str, Any]:
+    rows: dict[str, dict[str, str]] = {}
+    for one in result["summary"]:
+        less = one["reduction_percent"]
+        rows.setdefault(one["controller"], {})[one["shaper"]] = f"{less['median']:.1f} / {less['p5']:.1f}"
+    heading = ("known friction", *next(iter(rows.values())))
+    return {"table": markdown_table(heading, [(name, *cells.values()) for name, cells in rows.items()])}
 
 
 def _robustness(result: dict[str, Any]) -> dict[str, Any]:
@@ -85,6 +96,12 @@ class Page:
 PAGES = {
     "paper": Page("docs/reference/paper.md", "tvist paper --runs 10 --seed 0", _paper),
     "robots": Page("docs/reference/robots.md", "tvist robots --measure --vary 50", _robots),
+    "stiction": Page(
+        "docs/reference/stiction.md",
+        "tvist study tools/tables/stiction.py",
+        _stiction,
+        "--output build/stiction",
+    ),
     "robustness": Page(
         "docs/reference/robustness.md",
         "tvist study robustness --against zv auto auto-target smoothing elastic elastic-16 elastic-auto "

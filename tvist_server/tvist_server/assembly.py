@@ -9,10 +9,9 @@ from tvist_controller.instruments.report import Sink
 from tvist_controller.setup import Setup
 from tvist_plant.plant import PERIOD
 from tvist_server.clock import Clock, Lockstep, Realtime
-from tvist_server.config import ConfigError, ServeConfig
-from tvist_server.courier import Courier
-from tvist_server.fleet import recording_of
-from tvist_server.gateways.exposure import ExposureError, check_endpoints, guarded, guarded_interfaces
+from tvist_server.config import ServeConfig
+from tvist_server.gateways.exposure import check_endpoints, guarded, guarded_interfaces
+from tvist_server.option_values import StartError, recording_of
 from tvist_server.robot import ServedRobot
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ def made_robot(
     """Return a robot that is about to be served; see `Server`.
 
     Raises:
-        ConfigError: It cannot be.
+        StartError: It cannot be.
     """
     path = None
     if config.record is not None:
@@ -34,48 +33,38 @@ def made_robot(
     try:
         return ServedRobot(setup, path, dump, observe, programs, config.allowed_hosts(), keep)
     except ValueError as error:
-        raise ConfigError(str(error)) from error
+        raise StartError(str(error)) from error
 
 
 def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on, and the settings that protect them.
 
-    Args:
-        config: Configuration.
-        names: Names of the robots that are reached there.
-
     Raises:
-        ConfigError: An endpoint is none, or other machines could reach an unprotected one.
+        StartError: An endpoint is none, or other machines could reach an unprotected one.
     """
-    try:
-        check_endpoints("connect", config.connect)
-        # A router checks the certificates of those who reach the robot through it.
-        return guarded(
-            config.endpoints,
-            names,
-            security=None if config.connect else config.security,
-            insecure=config.insecure,
-            namespace=config.namespace or "",
-        )
-    except ExposureError as error:
-        raise ConfigError(str(error)) from error
+    check_endpoints("connect", config.connect)
+    # A router checks the certificates of those who reach the robot through it.
+    return guarded(
+        config.endpoints,
+        names,
+        security=None if config.connect else config.security,
+        insecure=config.insecure,
+        namespace=config.namespace or "",
+    )
 
 
 def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrInterfaces":
     """Return UR's interfaces of a robot, whose number gives their address.
 
     Raises:
-        ConfigError: Other machines could reach them unprotected, or they cannot be there.
+        StartError: Other machines could reach them unprotected, or they cannot be there.
     """
     from tvist_server.gateways.ur.interfaces import UrInterfaces
     from tvist_server.gateways.ur.rtde.inputs import matching
 
     address, ports = config.interfaces(number)
-    try:
-        guarded_interfaces(address, insecure=config.insecure)
-        reserved = matching(config.reserve_inputs)
-    except (ExposureError, ValueError) as error:
-        raise ConfigError(str(error)) from error
+    guarded_interfaces(address, insecure=config.insecure)
+    reserved = matching(config.reserve_inputs)
     setup, lockstep = robot.setup, config.clock != "realtime"
     return UrInterfaces(
         robot.reception,
@@ -94,34 +83,26 @@ def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
     """Check that an arm that gives the tick is alone, and that nothing else is to give it.
 
     Raises:
-        ConfigError: It is not.
+        StartError: It is not.
     """
     if not any(robot.driven.pace for robot in robots):
         return
     if config.clock != "realtime" or config.speed != 1.0:
         wanted = f"clock is {config.clock}" if config.clock != "realtime" else f"speed is {config.speed:g}"
-        raise ConfigError(f"{wanted}, but the plant {config.plant} gives the tick: leave it out")
+        raise StartError(f"{wanted}, but the plant {config.plant} gives the tick: leave it out")
     if len(robots) > 1:
-        raise ConfigError(
+        raise StartError(
             f"plant is {config.plant}, which gives the tick, and there are {len(robots)} robots: serve each by a "
             "process of its own (workers), or alone"
         )
 
 
-def drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Courier], list[Clock]]:
-    """Create couriers and clocks: one of each for all robots in real time, one of each per robot in lockstep.
+def make_clocks(config: ServeConfig, robots: Sequence[ServedRobot]) -> list[Clock]:
+    """Create one clock for all robots in real time, one for each robot in lockstep.
 
-    In lockstep no message may be lost, so a courier waits for a slow client, and must not delay other robots.
+    In lockstep no message may be lost, so a robot waits for its slow clients, and must not delay other robots.
     """
     if config.clock == "realtime":
-        courier, driven = Courier([robot.publisher for robot in robots]), [robot.driven for robot in robots]
-        clock = Realtime(
-            driven,
-            courier.wake,
-            PERIOD,
-            config.speed,
-            priority=config.realtime_priority,
-        )
-        return [courier], [clock]
-    couriers = [Courier([robot.publisher]) for robot in robots]
-    return couriers, [Lockstep(robot.driven, robot.repeat) for robot in robots]
+        driven = [robot.driven for robot in robots]
+        return [Realtime(driven, PERIOD, config.speed, priority=config.realtime_priority)]
+    return [Lockstep(robot.driven, robot.repeat) for robot in robots]

@@ -24,12 +24,10 @@ log = logging.getLogger(__name__)
 
 LONGEST_SLEEP = 0.1
 """Longest sleep of the tick thread before it checks whether it should end [s]."""
-HAND_ON_EVERY = 0.0009
-"""Longest time for which robots that tick one after another keep their messages [s]. To hand them on costs two thread
-switches, about as much as a tick, so they are handed on together before the thread sleeps.
-"""
 LONGEST_TICK = 1.5
-"""Longest wait at the end for a tick in progress [s]: a call of somebody's own arm may never return."""
+"""Longest wait at the end for a tick in progress [s]: a call of somebody's own arm may never return, and in lockstep
+a client may have stopped reading.
+"""
 REPEAT_EVERY = 1.0
 """Time after which a robot in lockstep publishes its last state again, if there was no step meanwhile [s]."""
 SET_TIMER_SLACK = 29
@@ -123,7 +121,7 @@ class Clock(ABC):
     def close(self) -> None:
         """End the thread: a step ends before its next tick; in real time, all waiting jobs are done first.
 
-        A thread that an arm never lets go is left to the end of the process.
+        A thread that an arm, or a client that has stopped reading, does not let go is left to the end of the process.
         """
         self._running = False
         for robot in self._robots:
@@ -132,7 +130,9 @@ class Clock(ABC):
         if self._thread.is_alive():
             self._thread.join(LONGEST_TICK)
             if self._thread.is_alive():
-                log.error("a tick, or a call of the arm, has not returned for %g s", LONGEST_TICK)
+                log.error(
+                    "a tick, a call of the arm or a wait for a client has not returned for %g s", LONGEST_TICK
+                )
 
     @abstractmethod
     def punctuality(self, robot: Mailbox) -> Punctuality | None:
@@ -183,7 +183,6 @@ class Realtime(Clock):
 
     Args:
         robots: Robots to tick.
-        hand_on: Called after ticks to hand on the robots' messages.
         period: Tick [s].
         speed: Simulation speed relative to real time [-].
         priority: Whether to ask the system for real-time priority.
@@ -192,14 +191,12 @@ class Realtime(Clock):
     def __init__(
         self,
         robots: Sequence[Mailbox],
-        hand_on: Do,
         period: float,
         speed: float = 1.0,
         *,
         priority: bool = False,
     ) -> None:
         super().__init__(robots)
-        self._hand_on = hand_on
         self._period = period / speed
         self._overloads = [Overload(robot.interval or self._period) for robot in robots]
         for robot, overload in zip(robots, self._overloads, strict=True):
@@ -224,11 +221,11 @@ class Realtime(Clock):
         finally:
             self._asked.set()
         robots, overloads, now, sleep = self._robots, self._overloads, time.monotonic, time.sleep
-        pace, silent, handed_on = robots[0].pace, False, now()
+        pace, silent = robots[0].pace, False
         schedule: Schedule | Followed = (
-            Schedule(len(robots), self._period, handed_on)
+            Schedule(len(robots), self._period, now())
             if pace is None
-            else Followed(robots[0].interval or self._period, handed_on, counts=robots[0].interval is None)
+            else Followed(robots[0].interval or self._period, now(), counts=robots[0].interval is None)
         )
         while self._running:
             if pace is not None:
@@ -250,15 +247,9 @@ class Realtime(Clock):
             if told is not None:
                 robot.host.warn(told)
             robot.turn()
-            ended = now()
-            robot.lateness.worked(ended - begun)
-            # All have had their turn, or messages have waited since the last time or since the thread woke up.
-            if schedule.due > ended or ended - max(handed_on, schedule.due) >= HAND_ON_EVERY:
-                handed_on = ended
-                self._hand_on()
+            robot.lateness.worked(now() - begun)
         for robot in robots:
             robot.guarded(robot.jobs.do_waiting)
-        self._hand_on()
 
     def _begins(self, robot: Mailbox, pace: Callable[[float], bool]) -> bool:
         """Wait until the arm begins its next tick; one that fails there has it from this clock, and stops."""
@@ -276,7 +267,6 @@ class Realtime(Clock):
             robot.host.warn(
                 "the arm does not begin its next tick: time stands still, and it obeys no command"
             )
-        self._hand_on()
         return True
 
     def _ask(self) -> None:

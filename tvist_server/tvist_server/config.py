@@ -2,6 +2,7 @@
 
 import dataclasses
 import ipaddress
+import tempfile
 from functools import partial
 from pathlib import Path
 from typing import Annotated, TypeVar
@@ -15,18 +16,25 @@ from tvist_controller.sources.own_plants import OwnPlant, load_plant, load_world
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.calibration import Calibration
+from tvist_protocol.content import checked
+from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Namespace, Payload, RobotName, Seed
 from tvist_server.allowed_hosts import AllowedHosts
-from tvist_server.cell_file import read_cell
-from tvist_server.durations import ticks_of
-from tvist_server.fleet import MOST, members
-from tvist_server.initial import calibration_for, numbers_of, posture, read_state, shaped_by
 from tvist_server.moving.moved_robot import MovedRobot
 from tvist_server.moving.servo_lag import ServoLag
+from tvist_server.option_values import (
+    MOST,
+    StartError,
+    members,
+    numbers_of,
+    posture,
+    read_start_file,
+    ticks_of,
+)
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder
-from tvist_server.temporary import temporary_folder
+from tvist_server.start_files import InitialState, calibration_for, read_cell, shaped_by
 from tvist_server.ur_ports import InterfaceName, UrPorts
 from tvist_server.watching.place import is_place, place_of
 from tvist_server.watching.watched_robot import WatchedRobot
@@ -40,11 +48,12 @@ TOOL_IN_WORLD = 1.0
 _REAL = ("enable_motion", "speed_cap", "tcp", "servo_lag")
 MOST_LAG, LEAST_GAIN = 0.15, 50.0
 """Largest time and smallest gain of a `servoj` that can be compensated [s, 1/s²]."""
+_INSTEAD = {
+    "name": "leave name out, since several robots are named after their files",
+    "robot": "add it to the list of robots",
+}
+"""What to do with a key that excludes `robots`."""
 T = TypeVar("T")
-
-
-class ConfigError(ValueError):
-    """A configuration is invalid; the message names the key, the value and what is allowed."""
 
 
 class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -146,9 +155,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """MCAP file to record into. It must not exist, unless --keep is given. With several robots, each records into a
     file of its own, FILE-NAME.mcap."""
     keep: str | None = None
-    """Let the recording keep the last 90s, 10min or 2h, and at most twice as much, and forget what was before [it keeps
-    all]. At a start, what an earlier run has left in FILE.mcap becomes FILE.earlier-1.mcap, FILE.earlier-2.mcap and so
-    on; the five latest stay."""
+    """Let the recording keep the last 90s, 10min or 2h, and at most a quarter more, and forget what was before [it
+    keeps all]. It then consists of complete files, FILE-1-part0001.mcap, FILE-1-part0002.mcap and so on, at the next
+    start FILE-2-part0001.mcap and so on; those of the five latest runs before stay."""
     dump: str | None = None
     """Folder to save the last second before a failure of the simulated arm to [the system's temporary folder]."""
     truth: bool = False
@@ -185,15 +194,12 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         """Return the initial setup of every robot's controller.
 
         Raises:
-            ConfigError: See `setup`.
+            StartError: See `setup`.
             UserFileError: See `setup`.
         """
         if self.robots is None:
             return [self.setup()]
-        try:
-            found = members(self.robots, MOST * self.workers)
-        except ValueError as error:
-            raise ConfigError(str(error)) from error
+        found = members(self.robots, MOST * self.workers)
         # Each robot starts as it would alone, apart from the noise.
         starts: dict[str, Setup] = {}
         for member in found:
@@ -213,70 +219,60 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         """Return the folder with a robot's programs; None if there is none.
 
         Raises:
-            ConfigError: `programs` is not a folder.
+            StartError: `programs` is not a folder.
         """
         if self.programs is None:
             return None
         if not Path(self.programs).is_dir():
-            raise ConfigError(f"programs is {self.programs!r}: must be a folder that exists")
+            raise StartError(f"programs is {self.programs!r}: must be a folder that exists")
         return ProgramFolder.of(Path(self.programs), name)
 
     def dump_folder(self) -> Path:
         """Return the folder for the last second before a failure.
 
         Raises:
-            ConfigError: `dump` is not a folder, so that this second would be lost.
+            StartError: `dump` is not a folder, so that this second would be lost.
         """
         if self.dump is None:
-            return temporary_folder()
+            try:
+                return Path(tempfile.gettempdir())
+            except (
+                FileNotFoundError
+            ):  # as in a container without any; what is then saved there says that it is lost
+                return Path.cwd()
         if not Path(self.dump).is_dir():
-            raise ConfigError(f"dump is {self.dump!r}: must be a folder that exists")
+            raise StartError(f"dump is {self.dump!r}: must be a folder that exists")
         return Path(self.dump)
 
     def keep_ticks(self) -> int | None:
         """Return the number of ticks that a recording keeps at least; None if it keeps all.
 
         Raises:
-            ConfigError: `keep` is no duration, or nothing is recorded.
+            StartError: `keep` is no duration, or nothing is recorded.
         """
         if self.keep is None:
             return None
         if self.record is None:
-            raise ConfigError(f"keep is {self.keep}, but nothing is recorded: give record, too")
-        try:
-            return ticks_of(self.keep, "keep")
-        except ValueError as error:
-            raise ConfigError(str(error)) from error
+            raise StartError(f"keep is {self.keep}, but nothing is recorded: give record, too")
+        return ticks_of(self.keep, "keep")
 
     def allowed_hosts(self) -> AllowedHosts:
-        """Return the machines that programs may connect to.
-
-        Raises:
-            ConfigError: `ur_allow` has what names no machine.
-        """
-        try:
-            return AllowedHosts(self.ur_allow)
-        except ValueError as error:
-            raise ConfigError(str(error)) from error
+        """Return the machines that programs may connect to."""
+        return AllowedHosts(self.ur_allow)
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
-        """Return the address of a robot's UR interfaces, and the port of each, also of a cell's gripper.
-
-        Args:
-            number: Index of the robot, 0 for the first.
+        """Return address and ports of UR's interfaces, and of a gripper, of the robot with this index.
 
         Raises:
-            ConfigError: `ur_address` is not an IP address, or too few addresses follow it.
+            StartError: `ur_address` is not an IP address, or too few addresses follow it.
         """
         try:
             first = ipaddress.ip_address(self.ur_address)
             address = first + number
         except ValueError as error:
-            raise ConfigError(
-                f"ur_address is {self.ur_address!r}: must be an IP address ({error})"
-            ) from error
+            raise StartError(f"ur_address is {self.ur_address!r}: must be an IP address ({error})") from error
         if number and first.is_unspecified:
-            raise ConfigError(f"ur_address is {self.ur_address}: several robots need one address each")
+            raise StartError(f"ur_address is {self.ur_address}: several robots need one address each")
         ports = self.ur_ports.open()
         if self.cell is not None and self.ur_ports.gripper:
             ports["gripper"] = self.ur_ports.gripper
@@ -295,12 +291,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         return " and ".join(places) + (f" in namespace {self.namespace}" if self.namespace else "")
 
     def command_line(self, command: str, name: str) -> str:
-        """Return the command line that reaches a robot from this machine.
-
-        Args:
-            command: Name of the command, such as `unlock`.
-            name: Name of the robot.
-        """
+        """Return the command line that reaches a robot from this machine."""
         words = ["tvist", command]
         first = (*self.endpoints, *self.connect)[0]
         if first != DEFAULT_ENDPOINT:
@@ -314,7 +305,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         """Return the initial setup of one robot's controller.
 
         Raises:
-            ConfigError: A value contradicts another one, or names something that does not exist.
+            StartError: A value contradicts another one, or names something that does not exist.
             UserFileError: A file that is named has the wrong kind of content.
         """
         try:
@@ -346,17 +337,17 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             )
             setup = shaped_by(setup, "none" if watched else _either(self.shaper, profile.shaper))
             if self.state is not None:
-                setup = read_state(self.state).on(setup)
+                setup = read_start_file(self.state, "state", InitialState).on(setup)
             setup.check(placed=not real)
         except user_file.UserFileError:
             raise
         except ValueError as error:
-            raise ConfigError(str(error)) from error
+            raise StartError(str(error)) from error
         if not self.overload:
             try:
                 check_rating(setup.payload, description)
             except ValueError as error:
-                raise ConfigError(f"{error}: give --overload to insist") from error
+                raise StartError(f"{error}: give --overload to insist") from error
         return setup
 
     def _check_real(self, *, real: bool) -> None:
@@ -465,6 +456,22 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if self.payload is None and mass == 0.0 and self._scene(cell) is not None:
             mass = min(TOOL_IN_WORLD, description.limits.payload)
         return paper_payload(description, mass)
+
+
+def from_mapping(content: object, source: str) -> ServeConfig:
+    """Check a mapping of values and convert it; messages name its source.
+
+    Raises:
+        StartError: A key is unknown, a value is out of range, or one key excludes another.
+    """
+    if isinstance(content, dict) and content.get("robots") is not None:
+        for key, instead in _INSTEAD.items():
+            if content.get(key) is not None:
+                raise StartError(f"{source}: robots and {key} exclude each other: {instead}")
+    try:
+        return checked(content, ServeConfig)
+    except ProtocolError as error:
+        raise StartError(f"{source}: {error.why}") from error
 
 
 def _either(given: T | None, default: T) -> T:

@@ -33,7 +33,7 @@ from tvist_protocol.kinematics import ForwardKinematics
 from tvist_protocol.motions import MoveL
 from tvist_protocol.replies import Accepted, Refused, Reply, ToolPose
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
-from tvist_server.config_file import from_mapping
+from tvist_server.config import from_mapping
 from tvist_server.gateways.starting import Tell
 from tvist_server.punctual import processors
 
@@ -70,9 +70,7 @@ def warm_up() -> None:
 def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> None:
     """Compile every kernel that a served robot calls, unless its machine code is on disk already.
 
-    Args:
-        processes: Number of processes that compile at once; None for one on each processor of this process.
-        tell: Called now and then with the progress.
+    So many processes compile at once; None: one on each processor of this process.
 
     Raises:
         KernelsError: Some could not be compiled or kept.

@@ -11,8 +11,8 @@ log = logging.getLogger(__name__)
 
 PRIORITY = 50
 """Real-time priority of the tick thread: the middle of the range 1 to 99."""
-EVERY_TICK = ("tvist-publisher", "recorder")
-"""Names of the threads that take the messages of every tick."""
+RECORDER = "recorder"
+"""Name of the threads that take the messages of every tick."""
 
 
 def processors() -> int:
@@ -32,7 +32,7 @@ def waited_us() -> float:
 def take_priority() -> bool:
     """Give the calling thread real-time priority (SCHED_FIFO); return whether it has it now.
 
-    Those of `EVERY_TICK` come next. If another program took the processor from one that holds the interpreter's lock,
+    The recorders come next. If another program took the processor from one that holds the interpreter's lock,
     the calling thread would wait for that program. What may take long, such as planning, stays behind other programs.
     """
     if sys.platform != "linux":
@@ -43,7 +43,7 @@ def take_priority() -> bool:
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
         os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
         for thread in threading.enumerate():
-            if thread.name in EVERY_TICK and thread.native_id is not None:
+            if thread.name == RECORDER and thread.native_id is not None:
                 with contextlib.suppress(ProcessLookupError):  # it has just ended
                     os.sched_setscheduler(thread.native_id, policy, os.sched_param(PRIORITY - 1))
     except OSError as error:

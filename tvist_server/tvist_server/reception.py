@@ -30,7 +30,6 @@ class Reception(Desk):
         host: The controller; only its thread-safe methods are called here.
         post: Queues a job for the controller's thread.
         carry_out: Carries out commands that were admitted.
-        hand_on: Queues calls that answer clients, in the controller's thread.
         complete_info: Adds to an encoded `info` what the controller does not know, in the thread that answers clients.
     """
 
@@ -39,10 +38,9 @@ class Reception(Desk):
         host: Host,
         post: Post,
         carry_out: CarryOut,
-        hand_on: Callable[[Callable[[], None]], None],
         complete_info: Callable[[bytes], bytes] | None = None,
     ) -> None:
-        self._host, self._post, self._carry_out, self._hand_on = host, post, carry_out, hand_on
+        self._host, self._post, self._carry_out = host, post, carry_out
         self._complete_info = complete_info
         self._lock = threading.Lock()
         self._presence = Presence()
@@ -64,12 +62,12 @@ class Reception(Desk):
         admitted = admit_command(command, standing.lease, standing.clock)
         self._hand_in(admitted if isinstance(admitted, Refused) else admitted._replace(origin=origin), answer)
 
-    def info(self, answer: Callable[[bytes], None]) -> None:
+    def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
         """Answer with a description of the robot."""
 
         def tell() -> None:
             data, complete = self._host.info(), self._complete_info
-            self._hand_on(lambda: answer(data if complete is None else complete(data)))
+            answer(lambda: data if complete is None else complete(data))
 
         self._post(tell)
 
@@ -108,21 +106,19 @@ class Reception(Desk):
             self.client_gone(client, session)
 
     def _hand_in(self, admitted: Admitted | Refused, answer: Answer) -> None:
-        def hand_on(reply: Reply) -> None:
-            self._hand_on(lambda: answer(reply))
-
-        answered: Answer = hand_on
         if isinstance(admitted, Admitted) and isinstance(
             admitted.command, TakeControl | HandOver | TakeClock
         ):
             client = admitted.command.client
-            admitted, answered = self._with_session(admitted, client), self._unless_gone(client, hand_on)
+            admitted = self._with_session(admitted, client)
+            if isinstance(admitted, Admitted):
+                answer = self._unless_gone(client, answer)
         if isinstance(admitted, Refused):
             with self._lock:
                 self.commands_refused += 1
             answer(admitted)
         else:
-            self._carry_out(admitted, answered)
+            self._carry_out(admitted, answer)
 
     def _with_session(self, admitted: Admitted, client: str) -> Admitted | Refused:
         try:

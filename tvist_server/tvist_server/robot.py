@@ -94,8 +94,8 @@ class ServedRobot:
                 on_moved=self.warn,
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins())
-        self.publisher = Publisher(lossless=lockstep)
-        """Queue of its messages, which a courier empties."""
+        self.publisher = Publisher()
+        """Passes its messages to the gateways."""
         self._looked_at = self.controller.report.tick
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
@@ -130,21 +130,15 @@ class ServedRobot:
             self._host,
             self.driven.post,
             carry_out,
-            self.publisher.answer,
             None if programs is None else programs.listed,
         )
         """Desk that gateways pass messages to."""
         self._gateways: Sequence[Gateway] = ()
 
-    def open(self, gateways: Sequence[Gateway], wake: Callable[[], None] | None = None) -> None:
-        """Set this robot's gateways, which get its messages and are closed with it.
-
-        Args:
-            gateways: Gateways of this robot only.
-            wake: Called for every message, if no thread hands them on regularly.
-        """
+    def open(self, gateways: Sequence[Gateway]) -> None:
+        """Set this robot's own gateways, which get its messages and are closed with it."""
         self._gateways = gateways
-        self.publisher.open(gateways, wake)
+        self.publisher.open(gateways)
 
     def request(self, command: Command) -> Reply:
         """Carry out a command of this process, in the controller's thread or before the clock starts.
@@ -152,10 +146,6 @@ class ServedRobot:
         What is done before the first tick does not depend on how fast this machine is.
         """
         return self._host.request(encode(command), LOCAL)
-
-    def hand_on(self) -> None:
-        """Hand on the messages that wait for the gateways."""
-        self.publisher.hand_on()
 
     def repeat(self) -> None:
         """Publish the state again for new clients, unless time has passed; in the controller's thread."""
@@ -204,8 +194,7 @@ class ServedRobot:
             await gateway.shut()
 
     def hurry(self) -> None:
-        """Stop planning and waiting for clients, since the robot is about to end."""
-        self.publisher.hurry()
+        """Stop planning, since the robot is about to end."""
         if self._plan_ahead is not None:
             self._plan_ahead.end()
 
@@ -264,7 +253,7 @@ class ServedRobot:
             late_p99_us=on_time.p99_us,
             late_max_us=on_time.max_us,
             missed_ticks=counters.missed_ticks,
-            dropped_states=self.publisher.dropped + sum(gateway.dropped for gateway in gateways),
+            dropped_states=sum(gateway.dropped for gateway in gateways),
             recorder_dropped=self.recorder.dropped if self.recorder is not None else 0,
             setpoints_received=counters.setpoints_received + refused,
             setpoints_refused=counters.setpoints_refused + refused,
@@ -288,8 +277,7 @@ class ServedRobot:
     def discard_recording(self) -> None:
         """Remove a recording that never began: the empty file would only block the next attempt."""
         if self.recorder is not None:
-            self.recorder.close()
-            self.recorder.path.unlink(missing_ok=True)
+            self.recorder.discard()
 
     def _hear(self, news: SocketNews) -> None:
         """Tell the controller what happened to a socket of a program."""

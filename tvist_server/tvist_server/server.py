@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from tvist_controller.controller import Controller
 from tvist_controller.instruments.report import Sink
-from tvist_server.assembly import check_paces, drivers, made_robot, protected, ur_interfaces
+from tvist_server.assembly import check_paces, made_robot, make_clocks, protected, ur_interfaces
 from tvist_server.clock import Realtime
 from tvist_server.config import ServeConfig
 from tvist_server.ending import Ending
@@ -60,7 +60,7 @@ class Server:
             hear meanwhile that the robots are starting.
 
     Raises:
-        ConfigError: The configuration is invalid.
+        StartError: The configuration is invalid.
         RecordingError: A recording cannot be written.
         GatewayError: The server cannot listen on an endpoint.
     """
@@ -90,8 +90,7 @@ class Server:
         self.metrics: Metrics | None = None
         """Figures for Prometheus; None if they are not published."""
         self.left = True
-        """Whether the network is closed after `close`. Zenoh or a courier may still wait for a client that has stopped
-        reading."""
+        """Whether the network is closed after `close`. Zenoh may still wait for a client that has stopped reading."""
         lockstep, starting = config.clock != "realtime", Starting()
         self._network = Network(
             listen,
@@ -113,15 +112,12 @@ class Server:
             for setup in setups:
                 self.robots.append(made_robot(setup, config, observe, several=several))
             check_paces(config, self.robots)
-            self._couriers, self._clocks = drivers(config, self.robots)
+            self._clocks = make_clocks(config, self.robots)
             self._interfaces: list[UrInterfaces] = []
             self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
             """Address and ports of each robot's UR interfaces; empty if they are not open."""
-            for here, (number, robot) in enumerate(zip(share.numbers, self.robots, strict=True)):
-                # In real time the clock wakes the courier; in lockstep each message does.
-                robot.open(
-                    self._gateways(robot, config, number), self._couriers[here].wake if lockstep else None
-                )
+            for number, robot in zip(share.numbers, self.robots, strict=True):
+                robot.open(self._gateways(robot, config, number))
         except BaseException:  # a signal, too
             self.discard()
             raise
@@ -186,8 +182,6 @@ class Server:
         # longer than a tick, and another thread may hold the lock when the tick thread wakes up.
         sys.setswitchinterval(1e-4)
         self._console.start()
-        for courier in self._couriers:
-            courier.start()
         for robot in self.robots:
             robot.start()
         for clock in self._clocks:
@@ -196,7 +190,6 @@ class Server:
 
     def close(self) -> None:
         """Shut down in order: stop the clocks, close the recordings, deliver pending messages to clients that read."""
-        # In lockstep a tick may be waiting for a client that has stopped reading; the clock could not end before that.
         for robot in self.robots:
             robot.hurry()
         # A planning thread waits for jobs of the tick thread, so it ends while that thread still runs.
@@ -209,7 +202,7 @@ class Server:
         leaving = Thread(target=self._leave, name="tvist-leave", daemon=True)
         leaving.start()
         leaving.join(LEAVE)
-        self.left = not leaving.is_alive() and all(courier.ended for courier in self._couriers)
+        self.left = not leaving.is_alive()
         gc.unfreeze()
 
     def _leave(self) -> None:
@@ -217,8 +210,6 @@ class Server:
         try:
             for robot in self.robots:
                 robot.leave_arm()
-            for courier in self._couriers:
-                courier.close()
             for robot in self.robots:
                 robot.close()
             self._console.close()

@@ -4,7 +4,8 @@ import multiprocessing
 from dataclasses import dataclass
 from itertools import pairwise
 
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
 
 LOCAL = "unixsock-stream/"
 """Beginning of the endpoints that only the server's own processes may use if there are several."""
@@ -21,12 +22,7 @@ class Share:
 
 
 def shares(robots: int, workers: int) -> list[range]:
-    """Return the robots of each process: neighbours, and nowhere more than one more than elsewhere.
-
-    Args:
-        robots: Number of robots.
-        workers: Number of processes, at most `robots`.
-    """
+    """Return the robots of each process: neighbours, and nowhere more than one more than elsewhere."""
     bounds = [worker * robots // workers for worker in range(workers + 1)]
     return [range(first, last) for first, last in pairwise(bounds)]
 
@@ -34,39 +30,35 @@ def shares(robots: int, workers: int) -> list[range]:
 def check_together(config: ServeConfig, robots: int) -> None:
     """Check durations and folders, and what the options of network and processes ask of each other.
 
-    Args:
-        config: Configuration.
-        robots: Number of robots that it names.
-
     Raises:
-        ConfigError: They exclude each other, or one of them is wrong.
+        StartError: They exclude each other, or one of them is wrong.
     """
     config.keep_ticks()
     config.dump_folder()
     config.program_folder(config.name)
     config.allowed_hosts()
     if config.connect and config.endpoints and config.security is not None:
-        raise ConfigError(
+        raise StartError(
             "connect, listen and security exclude each other: the router checks certificates, so leave listen out"
         )
     if config.workers == 1:
         return
     if config.workers > robots:
-        raise ConfigError(f"workers is {config.workers}: must be at most the number of robots, {robots}")
+        raise StartError(f"workers is {config.workers}: must be at most the number of robots, {robots}")
     if "fork" not in multiprocessing.get_all_start_methods():
-        raise ConfigError(f"workers is {config.workers}: this system cannot fork processes, so give 1")
+        raise StartError(f"workers is {config.workers}: this system cannot fork processes, so give 1")
     if config.connect and config.endpoints:
-        raise ConfigError(
+        raise StartError(
             "connect, listen and workers exclude each other: each process connects to the router, so leave listen out"
         )
     if config.connect and config.metrics is not None:
-        raise ConfigError(
+        raise StartError(
             "connect, metrics and workers exclude each other: run a server for each process, with metrics on ports of "
             "their own"
         )
     for endpoint in config.endpoints:
         if endpoint.startswith(LOCAL):
-            raise ConfigError(
+            raise StartError(
                 f"listen is {endpoint}, and workers is {config.workers}: Unix sockets are for the server's own "
                 "processes, so listen on tcp/ or tls/"
             )

@@ -13,13 +13,14 @@ from zenoh.handlers import Callback
 
 from tvist_plant.user_file import UserFileError
 from tvist_protocol import keys
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
 from tvist_server.ending import Ending, limit_shutdown
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.distant_metrics import DistantMetrics
 from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.starting import Starting
+from tvist_server.option_values import StartError
 from tvist_server.recording import RecorderError
 from tvist_server.server import Recording, Server
 from tvist_server.spread import Share
@@ -98,13 +99,6 @@ def meet_clients(
 
     The conversation: it says `Made`; it is told progress; told that all robots are ready, it says `Ready` once it
     reaches them; told that it is over, it says `Ended`.
-
-    Args:
-        config: Configuration of all robots.
-        names: Names of the robots.
-        listen: Endpoints to listen on.
-        guard: Settings that protect them.
-        first: The first process.
     """
     place, starting = config.namespace or "", Starting()
     try:
@@ -155,11 +149,6 @@ def work(config: ServeConfig, share: Share, first: First) -> None:
     The conversation: told to begin, this process makes its robots and says `Made`; told to go on, it starts them and
     says `Ready`; told to end, it says `Ended`. Signals are the first process's to hear: a terminal sends them to all
     processes.
-
-    Args:
-        config: Configuration of all robots.
-        share: The robots of this process.
-        first: The first process.
     """
     ending = Ending()
     ending.close()  # hears no signals
@@ -167,8 +156,8 @@ def work(config: ServeConfig, share: Share, first: First) -> None:
         return
     try:
         server = Server(config, share=share)
-    except (ConfigError, UserFileError, GatewayError, RecorderError) as error:
-        first.say(Refused(str(error), isinstance(error, ConfigError)))
+    except (StartError, UserFileError, GatewayError, RecorderError) as error:
+        first.say(Refused(str(error), isinstance(error, StartError)))
         return
     first.say(Made(server.ur))
     if not first.told():

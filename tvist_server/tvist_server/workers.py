@@ -22,12 +22,13 @@ from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
 from tvist_controller.setup import Setup
 from tvist_server.assembly import protected
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
 from tvist_server.ending import Ending
 from tvist_server.gateways.access import with_robots_behind
 from tvist_server.gateways.endpoints import protocol
 from tvist_server.gateways.starting import Prepare
 from tvist_server.kernels import warm_up
+from tvist_server.option_values import StartError
 from tvist_server.own_folder import OwnFolder
 from tvist_server.server import Recording
 from tvist_server.spread import LOCAL, Share, check_together, shares
@@ -54,12 +55,8 @@ class _Worker:
 class Workers:
     """The first process: it starts the others, and ends with them.
 
-    Args:
-        config: Configuration of the robots.
-        prepare: What takes long before the robots are made, see `Server`.
-
     Raises:
-        ConfigError: The configuration is invalid.
+        StartError: The configuration is invalid.
         UserFileError: A file that is named has the wrong kind of content.
         GatewayError: The server cannot listen on an endpoint.
         WorkersError: A process cannot serve its robots.
@@ -98,10 +95,6 @@ class Workers:
 
     def run(self, ready: Callable[[], None], ending: Ending) -> None:
         """Serve until a signal comes.
-
-        Args:
-            ready: Function to call once all robots tick and answer.
-            ending: The shutdown requested by signals.
 
         Raises:
             WorkersError: A process has died or a robot has stopped; all others were ended in order.
@@ -216,7 +209,7 @@ class Workers:
         if isinstance(news, Made):
             return news
         if isinstance(news, Refused) and news.misuse:
-            raise ConfigError(news.why)
+            raise StartError(news.why)
         raise WorkersError(self._why(worker, news))
 
     # ------------------------------------------------------------------ life and end

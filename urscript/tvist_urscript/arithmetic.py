@@ -30,12 +30,14 @@ Work: TypeAlias = Callable[[int], None]
 """Function that is told how many elements are about to be computed."""
 
 
-def _sum(a: Number, b: Number) -> Number:
+def total(a: Number, b: Number) -> Number:
+    """Return a + b."""
     c = a + b
     return c if type(c) is float else whole(c)  # type: ignore[arg-type]
 
 
-def _difference(a: Number, b: Number) -> Number:
+def difference(a: Number, b: Number) -> Number:
+    """Return a - b."""
     c = a - b
     return c if type(c) is float else whole(c)  # type: ignore[arg-type]
 
@@ -45,31 +47,15 @@ def _product(a: Number, b: Number) -> Number:
     return c if type(c) is float else whole(c)  # type: ignore[arg-type]
 
 
-def _quotient(a: Number, b: Number) -> Number:
+def quotient(a: Number, b: Number) -> Number:
+    """Return a / b, which is a float."""
     if b == 0:
         raise Fault("division by zero")
     return a / b
 
 
-def add(a: Value, b: Value, work: Work) -> Value:
-    """Return a + b of numbers, of lists of equal length, or of a list and a number.
-
-    Raises:
-        Fault: The operands do not fit.
-    """
-    return _beside(_sum, a, b, "added", work)
-
-
-def subtract(a: Value, b: Value, work: Work) -> Value:
-    """Return a - b of numbers, of lists of equal length, or of a list and a number.
-
-    Raises:
-        Fault: The operands do not fit.
-    """
-    return _beside(_difference, a, b, "subtracted", work)
-
-
-def _beside(of: Callable[[Any, Any], Value], a: Value, b: Value, done: str, work: Work) -> Value:
+def combine(of: Callable[[Any, Any], Value], a: Value, b: Value, done: str, work: Work) -> Value:
+    """Apply a function to numbers, to the elements of lists of equal length, or of a list and a number."""
     if type(a) is Array and type(b) is Array:
         return _elementwise(of, a, b, done, work)
     if type(a) in NUMBERS:
@@ -93,20 +79,16 @@ def _elementwise(of: Callable[[Any, Any], Value], a: Array, b: Array, done: str,
     if len(a.items) != len(b.items):
         raise Fault(f"lists of {len(a.items)} and {len(b.items)} elements cannot be {done}")
     work(len(a.items))
-    if of in _PLAIN and of is not _quotient and only_numbers(a) and only_numbers(b):
+    if of in _PLAIN and of is not quotient and only_numbers(a) and only_numbers(b):
         return _whole(map(_PLAIN[of], a.items, b.items))
     return Array(
-        of(x, y) if type(x) in NUMBERS and type(y) in NUMBERS else _beside(of, x, y, done, work)
+        of(x, y) if type(x) in NUMBERS and type(y) in NUMBERS else combine(of, x, y, done, work)
         for x, y in zip(a.items, b.items, strict=True)
     )
 
 
 def multiply(a: Value, b: Value, work: Work) -> Value:
-    """Return a * b of numbers, of a number and a list, of lists of equal length by elements, of matrices and vectors.
-
-    Raises:
-        Fault: The operands do not fit.
-    """
+    """Return a * b of numbers, a number and a list, equally long lists by elements, matrices and vectors."""
     if type(a) in NUMBERS:
         if type(b) in NUMBERS:
             return _product(a, b)  # type: ignore[arg-type]
@@ -120,41 +102,18 @@ def multiply(a: Value, b: Value, work: Work) -> Value:
     raise Fault(f"{kind(a)} and {kind(b)} cannot be multiplied")
 
 
-def divide(a: Value, b: Value, work: Work) -> Value:
-    """Return a / b of numbers, or of lists as for a + b; quotients are floats.
-
-    Raises:
-        Fault: The operands do not fit, or b is 0.
-    """
-    if type(a) in NUMBERS and type(b) in NUMBERS:
-        return _quotient(a, b)  # type: ignore[arg-type]
-    return _beside(_quotient, a, b, "divided", work)
-
-
-def remainder(a: Value, b: Value, work: Work) -> Value:
-    """Return a % b of numbers, or of lists as for a + b: the remainder with the sign of a.
-
-    Raises:
-        Fault: The operands do not fit, or b is 0.
-    """
-    return _beside(_rest, a, b, "divided", work)
-
-
-def _rest(a: Number, b: Number) -> Number:
+def rest(a: Number, b: Number) -> Number:
+    """Return a % b with the sign of a."""
     if b == 0:
         raise Fault("division by zero")
     if type(a) is int and type(b) is int:
-        rest = abs(a) % abs(b)
-        return rest if a >= 0 else -rest
+        left = abs(a) % abs(b)
+        return left if a >= 0 else -left
     return math.nan if math.isinf(a) else math.fmod(a, b)
 
 
 def negate(a: Value, work: Work) -> Value:
-    """Return -a of a number, or of a list by elements.
-
-    Raises:
-        Fault: It is neither.
-    """
+    """Return -a of a number, or of a list by elements."""
     if type(a) is float:
         return -a
     if type(a) is int:
@@ -169,7 +128,7 @@ def _scaled(
 ) -> Array:
     """Compute `of(x, by)` of each element x of a list and of the lists inside it; `of(by, x)` if it is turned."""
     work(len(a.items))
-    if of in _PLAIN and only_numbers(a) and not (of is _quotient and (turned or by == 0)):
+    if of in _PLAIN and only_numbers(a) and not (of is quotient and (turned or by == 0)):
         plain, numbers = _PLAIN[of], a.items
         return _whole(map(plain, repeat(by), numbers) if turned else map(plain, numbers, repeat(by)))
     return Array(
@@ -209,10 +168,9 @@ def _whole(values: Iterable[Any]) -> Array:
 
 
 def _dot(a: list[Number], b: tuple[Number, ...]) -> Number:
-    total = reduce(
-        operator.add, map(operator.mul, a, b)
-    )  # not sum(), which rounds otherwise in later Pythons
-    return whole(total) if type(total) is int else total
+    # Not sum(), which rounds otherwise in later Pythons.
+    dot = reduce(operator.add, map(operator.mul, a, b))
+    return whole(dot) if type(dot) is int else dot
 
 
 def _numbers(a: Array) -> list[Number]:
@@ -222,11 +180,7 @@ def _numbers(a: Array) -> list[Number]:
 
 
 def matrix(a: Array) -> list[list[Number]] | None:
-    """Return the rows of a list of lists of numbers, None for a list without lists.
-
-    Raises:
-        Fault: The rows have unequal lengths, or an element is no number.
-    """
+    """Return the rows of a list of lists of numbers, None for a list without lists."""
     if LISTS.isdisjoint(map(type, a.items)):
         return None
     rows: list[list[Number]] = []
@@ -238,6 +192,6 @@ def matrix(a: Array) -> list[list[Number]] | None:
 
 
 _PLAIN: dict[Any, Callable[[Any, Any], Any]] = {
-    _sum: operator.add, _difference: operator.sub, _product: operator.mul, _quotient: operator.truediv
+    total: operator.add, difference: operator.sub, _product: operator.mul, quotient: operator.truediv
 }  # fmt: skip
 """What these do with numbers, but for integers beyond 32 bits."""

@@ -1,12 +1,12 @@
 """The tree of a script, built bottom-up while it is parsed: no recursion, whatever a text nests."""
 
 import re
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from lark import Token, Transformer
 
 from tvist_urscript import tree
-from tvist_urscript.errors import ScriptError, syntax_error
+from tvist_urscript.errors import no_program
 from tvist_urscript.values import HIGHEST, LONGEST_TEXT, to_bytes, whole
 
 DEEPEST = 100
@@ -26,8 +26,7 @@ class Builder(Transformer[Token, Any]):
     def start(self, children: Children) -> list[tree.Statement]:
         return children
 
-    def block(self, children: Children) -> list[tree.Statement]:
-        return children
+    block = start
 
     def function(self, children: Children) -> tree.Function:
         kind, name, *parameters, body = children
@@ -68,11 +67,11 @@ class Builder(Transformer[Token, Any]):
         (token,) = children
         found = _LABEL.fullmatch(token)
         if found is None:
-            raise _syntax(token, "a label is a line with $, a number and a name in quotes")
+            raise no_program(token, "a label is a line with $, a number and a name in quotes")
         if len(found[1]) > 10 or int(found[1]) > HIGHEST:
-            raise _syntax(token, f"the number of a label is at most {HIGHEST}")
+            raise no_program(token, f"the number of a label is at most {HIGHEST}")
         if len(to_bytes(found[2])) > LONGEST_TEXT:
-            raise _syntax(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
+            raise no_program(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
         return tree.Label(token.line, token.column, int(found[1]), found[2])
 
     def assign(self, children: Children) -> tree.Assign:
@@ -86,30 +85,23 @@ class Builder(Transformer[Token, Any]):
                 indices.insert(0, tree.Step(inner.line, inner.column, inner.name))
             inner, bracket = inner.value, inner
         if not isinstance(inner, tree.Name):
-            raise _syntax(
-                inner if qualifier else equal,
-                "only a variable, or an element or member of one, can be assigned",
-            )
+            at = inner if qualifier else equal
+            raise no_program(at, "only a variable, or an element or member of one, can be assigned")
         if qualifier and indices:
-            raise _syntax(bracket, f"{qualifier[0]} declares a variable, not an element or a member")
-        node = tree.Assign(
-            inner.line,
-            inner.column,
-            inner,
-            indices,
-            value,
-            str(qualifier[0]) if qualifier else None,  # type: ignore[arg-type]
-        )
+            raise no_program(bracket, f"{qualifier[0]} declares a variable, not an element or a member")
+        declared: Any = str(qualifier[0]) if qualifier else None
+        node = tree.Assign(inner.line, inner.column, inner, indices, value, declared)
         return _deeper(node, indices, [value])
 
-    def either(self, children: Children) -> tree.Logic:
-        return _logic("or", children)
+    def either(self, children: Children, operator: Literal["or", "xor", "and"] = "or") -> tree.Logic:
+        first = children[0]
+        return _deeper(tree.Logic(first.line, first.column, operator, children), children)
 
     def unequal(self, children: Children) -> tree.Logic:
-        return _logic("xor", children)
+        return self.either(children, "xor")
 
     def both(self, children: Children) -> tree.Logic:
-        return _logic("and", children)
+        return self.either(children, "and")
 
     def unary(self, children: Children) -> tree.Expression:
         operator, value = children
@@ -122,7 +114,7 @@ class Builder(Transformer[Token, Any]):
     def plus(self, children: Children) -> tree.Expression:
         operator, value = children
         if not (isinstance(value, tree.Constant) and type(value.value) in (int, float)):
-            raise _syntax(operator, "a plus sign needs a number behind it")
+            raise no_program(operator, "a plus sign needs a number behind it")
         return value
 
     def binary(self, children: Children) -> tree.Binary:
@@ -148,14 +140,14 @@ class Builder(Transformer[Token, Any]):
         except (ValueError, OverflowError):  # Python reads at most 4300 digits
             value = float("inf")
         if value == float("inf"):
-            raise _syntax(token, "a number is too large")
+            raise no_program(token, "a number is too large")
         return tree.Constant(token.line, token.column, value)
 
     def text(self, children: Children) -> tree.Constant:
         (token,) = children
         value = str(token)[1:-1]
         if len(to_bytes(value)) > LONGEST_TEXT:
-            raise _syntax(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
+            raise no_program(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
         return tree.Constant(token.line, token.column, value)
 
     def constant(self, children: Children) -> tree.Constant:
@@ -192,11 +184,6 @@ class Builder(Transformer[Token, Any]):
         return self.listing(children) if len(children) > 2 else children[1]
 
 
-def _logic(operator: str, values: list[tree.Expression]) -> tree.Logic:
-    first = values[0]
-    return _deeper(tree.Logic(first.line, first.column, operator, values), values)  # type: ignore[arg-type]
-
-
 def _deeper(node: T, *parts: list[Any]) -> T:
     deepest = 0
     for part in parts:
@@ -208,13 +195,5 @@ def _deeper(node: T, *parts: list[Any]) -> T:
         node.size += len(node.branches)
     node.depth = deepest + (BLOCK if isinstance(node, tree.If | tree.While | tree.Function) else 1)
     if node.depth > DEEPEST:
-        raise ScriptError(
-            node.line, node.column, syntax_error(node.line, f"more than {DEEPEST} levels are nested here")
-        )
+        raise no_program(node, f"more than {DEEPEST} levels are nested here")
     return node
-
-
-def _syntax(token: Token | tree.Node, why: str) -> ScriptError:
-    assert token.line is not None
-    assert token.column is not None
-    return ScriptError(token.line, token.column, syntax_error(token.line, why))

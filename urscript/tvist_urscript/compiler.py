@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from types import CodeType, MappingProxyType
 
 from tvist_urscript import tree
-from tvist_urscript.errors import ScriptError, syntax_error
+from tvist_urscript.errors import ScriptError, no_program, syntax_error
 from tvist_urscript.failures import FILE
 from tvist_urscript.functions import MOST_FUNCTIONS, Functions
 from tvist_urscript.names import outline, scopes
@@ -42,8 +42,8 @@ def translate(
     known = {**{name: entry[0] for name, entry in PURE.items()}, **signatures}
     errors: dict[tuple[int, int, str], ScriptError] = {}
 
-    def report(line: int, column: int, why: str) -> None:
-        errors.setdefault((line, column, why), ScriptError(line, column, why))
+    def report(at: tree.Node, why: str) -> None:
+        errors.setdefault((at.line, at.column, why), ScriptError(at.line, at.column, why))
 
     try:
         program = program_of(text) if after is None else _statements(text)
@@ -77,11 +77,7 @@ def translate(
 
 
 def program_of(text: str) -> tree.Function:
-    """Return a script's tree: its `def` or `sec`, or its statements as one.
-
-    Raises:
-        ScriptError: The text is no program.
-    """
+    """Return a script's tree: its `def` or `sec`, or its statements as one."""
     statements = _parsed(text)
     head = statements[0]
     if not isinstance(head, tree.Function) or not (
@@ -89,7 +85,7 @@ def program_of(text: str) -> tree.Function:
     ):
         return _together(text, statements)
     if head.kind == "thread":
-        raise ScriptError(head.line, head.column, syntax_error(head.line, "a thread belongs into a program"))
+        raise no_program(head, "a thread belongs into a program")
     if head.parameters:
         name, _ = head.parameters[0]
         raise ScriptError(name.line, name.column, f"the program {head.name} cannot have parameters")

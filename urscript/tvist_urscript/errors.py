@@ -1,5 +1,7 @@
 """What is wrong with a script, and where."""
 
+from typing import Any
+
 
 class ScriptError(Exception):
     """A script cannot be compiled, or a program has failed.
@@ -37,3 +39,8 @@ def name_not_found(name: str) -> str:
 def syntax_error(line: int, why: str) -> str:
     """Return the words by which clients recognize a text that is no program."""
     return f"syntax_error_on_line:{line}:{why}:"
+
+
+def no_program(at: Any, why: str) -> ScriptError:
+    """Return the error of a text that is no program, at a token or a node of its tree."""
+    return ScriptError(at.line, at.column, syntax_error(at.line, why))

@@ -5,8 +5,7 @@ from collections.abc import Callable, Sequence
 
 from tvist_urscript import tree
 from tvist_urscript.errors import name_not_found
-from tvist_urscript.members import Members
-from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
+from tvist_urscript.names import BUILT_IN_ARRAYS, METHOD, Scope
 from tvist_urscript.pieces import DEPTH, MISSING, Position
 from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
@@ -23,10 +22,10 @@ EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
     "!=": (ast.NotEq, "is_unequal"),
 }
 
-Report = Callable[[int, int, str], None]
+Report = Callable[[tree.Node, str], None]
 
 
-class Expressions(Members):
+class Expressions:
     """Translates expressions.
 
     Attributes:
@@ -103,7 +102,7 @@ class Expressions(Members):
         at = Position.of(node)
         variable = self.scope.variable(node.name)
         if variable is None:
-            self.report(node.line, node.column, name_not_found(node.name))
+            self.report(node, name_not_found(node.name))
         return at.name(f"v_{node.name}" if variable == "local" else f"g_{node.name}")
 
     def binary(self, node: tree.Binary) -> ast.expr:
@@ -126,11 +125,7 @@ class Expressions(Members):
         """Translate a list; one of constants is made once."""
         at = Position.of(node)
         if len(node.items) > LONGEST:
-            self.report(
-                node.line,
-                node.column,
-                f"a list of {len(node.items)} elements is too long: the limit is {LONGEST}",
-            )
+            self.report(node, f"a list of {len(node.items)} elements is too long: the limit is {LONGEST}")
             return at.constant(None)
         values = [item.value for item in node.items if isinstance(item, tree.Constant)]
         if len(values) == len(node.items):
@@ -159,15 +154,14 @@ class Expressions(Members):
             return self.pose(node)
         if len(indices) > 2 or (is_p and self.scope.variable("p") is None):
             self.report(
-                value.line,
-                value.column,
+                value,
                 f"p[...] takes six numbers, not {len(indices)}"
                 if is_p
                 else f"an element has one or two indices, not {len(indices)}",
             )
             return at.constant(None)
         if array := self.built_in_array(value):
-            return self.call_built_in(Position.of(value), BUILT_IN_ARRAYS[array][0], indices)
+            return self.call_built_in(value, BUILT_IN_ARRAYS[array][0], indices)
         self.cost += 1
         function = "element" if len(indices) == 1 else "element_of_matrix"
         return at.call(function, self.value(value), *(self.value(index) for index in indices))
@@ -191,18 +185,13 @@ class Expressions(Members):
             return node.name
         return None
 
-    def call_built_in(self, at: Position, name: str, arguments: Sequence[tree.Expression]) -> ast.expr:
+    def call_built_in(self, node: tree.Node, name: str, arguments: Sequence[tree.Expression]) -> ast.expr:
         """Translate an access to an array of the controller, which is a call of a built-in function."""
         if name not in self.signatures:
-            self.report(at.given["lineno"], at.given["col_offset"], name_not_found(name))
-            return at.constant(None)
-        node = tree.Call(
-            at.given["lineno"],
-            at.given["col_offset"],
-            name,
-            [tree.Argument(argument.line, argument.column, None, argument) for argument in arguments],
-        )
-        return self.call(node, built_in=True)
+            self.report(node, name_not_found(name))
+            return Position.of(node).constant(None)
+        given = [tree.Argument(argument.line, argument.column, None, argument) for argument in arguments]
+        return self.call(tree.Call(node.line, node.column, name, given), built_in=True)
 
     def call(self, node: tree.Call, *, built_in: bool = False) -> ast.expr:
         """Translate a call, of a function of the script before one of the controller."""
@@ -213,9 +202,7 @@ class Expressions(Members):
             return self.struct(node)
         if scope is not None:
             if scope.function.kind == "thread":
-                self.report(
-                    node.line, node.column, f"{node.name} is a thread: write `run {node.name}()` to start it"
-                )
+                self.report(node, f"{node.name} is a thread: write `run {node.name}()` to start it")
             parameters = [
                 (parameter.name, MISSING if default is not None else None)
                 for parameter, default in scope.function.parameters
@@ -224,7 +211,7 @@ class Expressions(Members):
             return at.waiting(at.call(scope.code_name, deeper, *self.arguments(node, parameters)))
         signature = self.signatures.get(node.name)
         if signature is None:
-            self.report(node.line, node.column, name_not_found(node.name))
+            self.report(node, name_not_found(node.name))
             for argument in node.arguments:
                 self.value(argument.value)
             return at.constant(None)
@@ -241,9 +228,7 @@ class Expressions(Members):
     def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
         """Put the arguments of a call into the order of the parameters; they are computed in the order of the text.
 
-        Args:
-            node: The call.
-            parameters: For each parameter its name, and the name of its default where it has one.
+        A parameter is its name, and the name of its default where it has one.
         """
         at = Position.of(node)
         given: dict[str, ast.expr] = {}
@@ -255,27 +240,21 @@ class Expressions(Members):
             if name is None:
                 if place >= len(names):
                     limit = f"at most {_counted(len(names))}" if names else "no arguments"
-                    self.report(
-                        argument.line,
-                        argument.column,
-                        f"{node.name} takes {limit}, but {len(node.arguments)} are given",
-                    )
+                    self.report(argument, f"{node.name} takes {limit}, but {len(node.arguments)} are given")
                     return []
                 if place and node.arguments[place - 1].name is not None:
-                    self.report(
-                        argument.line, argument.column, "an argument without a name follows one with a name"
-                    )
+                    self.report(argument, "an argument without a name follows one with a name")
                 name = names[place]
             elif name not in known:
-                self.report(argument.line, argument.column, f"{node.name} has no parameter {name}")
+                self.report(argument, f"{node.name} has no parameter {name}")
                 return []
             if name in given:
-                self.report(argument.line, argument.column, f"{node.name} is given {name} twice")
+                self.report(argument, f"{node.name} is given {name} twice")
             given[name] = value
         for name, default in parameters:
             if name not in given:
                 if default is None:
-                    self.report(node.line, node.column, f"{node.name} needs a value for its parameter {name}")
+                    self.report(node, f"{node.name} needs a value for its parameter {name}")
                     return []
                 given[name] = at.name(default)
         return _arranged(at, given, names)
@@ -286,16 +265,51 @@ class Expressions(Members):
         self.cost += START
         scope = self.scope.find(node.name)
         if scope is None and node.name not in self.signatures:
-            self.report(node.line, node.column, name_not_found(node.name))
+            self.report(node, name_not_found(node.name))
         elif scope is None or scope.function.kind != "thread":
-            self.report(
-                node.line, node.column, f"{node.name} is no thread: `run` starts what `thread` has defined"
-            )
+            self.report(node, f"{node.name} is no thread: `run` starts what `thread` has defined")
         elif node.arguments:
-            self.report(node.line, node.column, f"{node.name} is a thread, which takes no arguments")
+            self.report(node, f"{node.name} is a thread, which takes no arguments")
         else:
             return at.call("run", at.name(scope.code_name))
         return at.constant(None)
+
+    def struct(self, node: tree.Call) -> ast.expr:
+        """Translate `struct(a=1, b=2)`."""
+        at = Position.of(node)
+        names = [argument.name for argument in node.arguments]
+        if not 1 <= len(names) <= LONGEST:
+            self.report(node, f"struct takes from 1 to {LONGEST} members, not {len(names)}")
+        seen: set[str] = set()
+        for argument in node.arguments:
+            if argument.name is None:
+                why = "struct needs a name for each member, as in struct(x=1)"
+                self.report(argument, why)
+            elif argument.name in seen:
+                self.report(argument, f"struct is given {argument.name} twice")
+            else:
+                seen.add(argument.name)
+        self.cost += len(names)
+        values = at.tuple([self.value(argument.value) for argument in node.arguments])
+        return at.call("structured", at.tuple([at.constant(name) for name in names]), values)
+
+    def member(self, node: tree.Member) -> ast.expr:
+        """Translate `a.name`."""
+        self.cost += 1
+        at = Position.of(node)
+        return at.call("member", self.value(node.value), at.constant(node.name))
+
+    def method(self, node: tree.Method) -> ast.expr:
+        """Translate `a.name(arguments)`, of which only the controller knows what it is."""
+        at = Position.of(node)
+        self.cost += 1 + len(node.arguments)
+        value = self.value(node.value)
+        arguments = at.tuple([self.value(argument.value) for argument in node.arguments])
+        if METHOD not in self.signatures:
+            self.report(node, name_not_found(f"{METHOD}{node.name}"))
+            return at.constant(None)
+        self.used.add(METHOD)
+        return at.call(f"b_{METHOD}", value, at.constant(node.name), arguments)
 
 
 def first(node: tree.Expression | tree.Step) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 import re
 from itertools import islice
 from traceback import walk_tb
-from types import CodeType, TracebackType
+from types import CodeType, FrameType, TracebackType
 from typing import Any
 
 from tvist_urscript.errors import Fault, ScriptError
@@ -40,41 +40,35 @@ def failure(error: Exception) -> ScriptError:
 
 def position_of(steps: Any) -> tuple[int, int] | None:
     """Return the position at which a generator waits in compiled code, None where it has not begun or has ended."""
-    found = None
-    while (frame := getattr(steps, "gi_frame", None)) is not None:
-        if frame.f_code.co_filename == FILE and frame.f_lasti >= 0:
-            found = _position(frame.f_code, frame.f_lasti)
-        steps = steps.gi_yieldfrom
-    return found
+    frames = _frames(steps)
+    return _position(frames[-1].f_code, frames[-1].f_lasti) if frames else None
 
 
 def line_of(steps: Any) -> int | None:
     """Return the line of `position_of`, which is found a hundred times as fast."""
-    found = None
-    while (frame := getattr(steps, "gi_frame", None)) is not None:
-        if frame.f_code.co_filename == FILE and frame.f_lasti >= 0:
-            found = frame
-        steps = steps.gi_yieldfrom
-    return None if found is None else found.f_lineno or 1
+    frames = _frames(steps)
+    return frames[-1].f_lineno or 1 if frames else None
 
 
 def all_lines_of(steps: Any) -> set[int]:
     """Return the lines at which a generator, and the functions that it has called, wait in compiled code."""
-    found = set()
-    while (frame := getattr(steps, "gi_frame", None)) is not None:
-        if frame.f_code.co_filename == FILE and frame.f_lasti >= 0:
-            found.add(frame.f_lineno or 1)
-        steps = steps.gi_yieldfrom
-    return found
+    return {frame.f_lineno or 1 for frame in _frames(steps)}
 
 
 def name_of(steps: Any) -> str | None:
     """Return the name of the outermost function in which a generator waits, such as that of a thread."""
+    frames = _frames(steps)
+    return str(frames[0].f_code.co_name.partition("_")[2]) if frames else None
+
+
+def _frames(steps: Any) -> list[FrameType]:
+    """Return the frames of compiled code in which a generator, and the functions that it has called, wait."""
+    found = []
     while (frame := getattr(steps, "gi_frame", None)) is not None:
-        if frame.f_code.co_filename == FILE:
-            return str(frame.f_code.co_name.partition("_")[2])
+        if frame.f_code.co_filename == FILE and frame.f_lasti >= 0:
+            found.append(frame)
         steps = steps.gi_yieldfrom
-    return None
+    return found
 
 
 def _places(traceback: TracebackType | None) -> list[tuple[int, int]]:

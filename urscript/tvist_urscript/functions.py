@@ -32,9 +32,9 @@ class Functions(Statements):
         function = scope.function
         self.scope = scope
         if scope.outer is not None and function.kind == "sec":
-            self.report(function.line, function.column, "only a whole program can be a sec")
+            self.report(function, "only a whole program can be a sec")
         for twice in scope.twice:
-            self.report(twice.line, twice.column, f"{twice.name} is defined twice")
+            self.report(twice, f"{twice.name} is defined twice")
         if scope.outer is not None or (_length(function.body) <= PART and _size(function.body) <= PART_NODES):
             return [self.definition(scope.code_name, function, function.body)]
         at = Position.of(function)
@@ -56,20 +56,13 @@ class Functions(Statements):
         """Translate a function, or a part of the main function, to a function of Python."""
         at = Position.of(function)
         if (length := _length(body)) > MOST_STATEMENTS:
-            self.report(
-                function.line,
-                function.column,
-                f"{length} statements of {function.name} are too many in one function: the limit is {MOST_STATEMENTS}",
-            )
+            many = f"{length} statements of {function.name} are too many in one function"
+            self.report(function, f"{many}: the limit is {MOST_STATEMENTS}")
             return _definition(at, name, [], [])
         size = _size(body) + sum(default.size for _, default in function.parameters if default is not None)
         if size > MOST_NODES:
-            self.report(
-                function.line,
-                function.column,
-                f"{size} operations and names of {function.name} are too many in one function: "
-                f"the limit is {MOST_NODES}",
-            )
+            many = f"{size} operations and names of {function.name} are too many in one function"
+            self.report(function, f"{many}: the limit is {MOST_NODES}")
             return _definition(at, name, [], [])
         self.globals, self.loops = set(), 0
         parameters = self.parameters(function)
@@ -95,21 +88,16 @@ class Functions(Statements):
         names: dict[str, None] = {}
         needed = True
         if (count := len(function.parameters)) > MOST_PARAMETERS:
-            self.report(
-                function.line,
-                function.column,
-                f"{count} parameters of {function.name} are too many: the limit is {MOST_PARAMETERS}",
-            )
+            many = f"{count} parameters of {function.name} are too many"
+            self.report(function, f"{many}: the limit is {MOST_PARAMETERS}")
             return []
         for name, default in function.parameters:
             if function.kind == "thread":
-                self.report(name.line, name.column, f"the thread {function.name} cannot have parameters")
+                self.report(name, f"the thread {function.name} cannot have parameters")
             if f"v_{name.name}" in names:
-                self.report(name.line, name.column, f"the parameter {name.name} is named twice")
+                self.report(name, f"the parameter {name.name} is named twice")
             if default is None and not needed:
-                self.report(
-                    name.line, name.column, f"the parameter {name.name} needs a default as the one before it"
-                )
+                self.report(name, f"the parameter {name.name} needs a default as the one before it")
             needed = needed and default is None
             names[f"v_{name.name}"] = None
         return list(names)

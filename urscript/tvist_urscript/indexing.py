@@ -8,11 +8,7 @@ from tvist_urscript.values import Array, Pose, Struct, Value, integer, kind, num
 
 
 def element(value: Value, index: Any) -> Value:
-    """Return value[index].
-
-    Raises:
-        Fault: The value is no list, or the index is no integer from 0 to its length less 1.
-    """
+    """Return value[index]."""
     items = _array(value).items
     if type(index) is int and 0 <= index < len(items):
         return items[index]
@@ -20,20 +16,12 @@ def element(value: Value, index: Any) -> Value:
 
 
 def element_of_matrix(value: Value, row: Any, column: Any) -> Value:
-    """Return value[row, column].
-
-    Raises:
-        Fault: As `element`.
-    """
+    """Return value[row, column]."""
     return element(element(value, row), column)
 
 
 def member(value: Value, name: str) -> Value:
-    """Return value.name.
-
-    Raises:
-        Fault: The value is no struct, or has no such member.
-    """
+    """Return value.name."""
     return _struct(value).items[_named(name, value)]  # type: ignore[arg-type]
 
 
@@ -41,9 +29,6 @@ def replaced(new: Value, indices: tuple[Any, ...], value: Value, work: Work) -> 
     """Return a copy of a list with another value for the element at these indices.
 
     Copying four elements counts as one evaluation.
-
-    Raises:
-        Fault: As `element`, or a pose would get an element that is no number.
     """
     step = indices[0]
     if type(step) is tuple:  # a member's name

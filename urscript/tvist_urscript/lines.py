@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from lark import Token, UnexpectedInput
 
-from tvist_urscript.errors import ScriptError, syntax_error
+from tvist_urscript.errors import no_program
 
 LONGEST_NAME = 255
 """Longest name [characters]."""
@@ -15,23 +15,9 @@ END = "_NEWLINE"
 _OPENS = frozenset(("LPAR", "LSQB"))
 _CLOSES = frozenset(("RPAR", "RSQB"))
 _GOES_ON = frozenset(
-    (
-        "PLUS",
-        "MINUS",
-        "STAR",
-        "SLASH",
-        "PERCENT",
-        "COMPARISON",
-        "EQUAL",
-        "AND",
-        "OR",
-        "XOR",
-        "NOT",
-        "COMMA",
-        "COLON",
-        "RUN",
-    )
-)
+    ("PLUS", "MINUS", "STAR", "SLASH", "PERCENT", "COMPARISON", "EQUAL", "AND", "OR", "XOR", "NOT",
+     "COMMA", "COLON", "RUN")
+)  # fmt: skip
 """Tokens after which a line break ends no statement, as none is complete."""
 _BEGINS = frozenset(
     ("DEF", "SEC", "THREAD", "IF", "WHILE", "RETURN", "KILL", "JOIN", "BREAK", "CONTINUE", "PASS", "HALT",
@@ -48,11 +34,7 @@ _AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL", "DOT"))
 
 
 class Lines:
-    """Turns the tokens of a text into those of the grammar, where each statement has one end.
-
-    Args:
-        several: Whether several statements may follow each other on a line.
-    """
+    """Turns the tokens of a text into those of the grammar, where each statement has one end."""
 
     always_accept = (END,)
 
@@ -60,11 +42,7 @@ class Lines:
         self._several = several
 
     def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
-        """Drop line breaks inside statements, and add the ends of statements that no line break marks.
-
-        Raises:
-            ScriptError: A name is too long, or brackets are nested too deep.
-        """
+        """Drop line breaks inside statements, and add the ends of statements that no line break marks."""
         brackets = 0
         last = END
         pending: Token | None = None
@@ -85,13 +63,12 @@ class Lines:
             if kind in _OPENS:
                 brackets += 1
                 if brackets > MOST_BRACKETS:
-                    raise _wrong(token, f"more than {MOST_BRACKETS} levels are nested here")
+                    raise no_program(token, f"more than {MOST_BRACKETS} levels are nested here")
             elif kind in _CLOSES and brackets > 0:
                 brackets -= 1
             elif kind == "NAME" and len(token) > LONGEST_NAME:
-                raise _wrong(
-                    token, f"a name of {len(token)} characters is too long, the limit is {LONGEST_NAME}"
-                )
+                why = f"a name of {len(token)} characters is too long, the limit is {LONGEST_NAME}"
+                raise no_program(token, why)
             yield token
             last = kind
             token_before = token
@@ -141,9 +118,3 @@ def _after(token: Token) -> Token:
     """Return an empty end of statement at the end of a token, the last one of the text."""
     line, column = token.end_line, token.end_column
     return Token(END, "", token.end_pos, line, column, line, column)
-
-
-def _wrong(token: Token, why: str) -> ScriptError:
-    assert token.line is not None
-    assert token.column is not None
-    return ScriptError(token.line, token.column, syntax_error(token.line, why))

@@ -89,10 +89,8 @@ def outline(scope: Scope) -> Scope:
 def scopes(program: tree.Function, before: Scope | None = None, number: int = 0) -> list[Scope]:
     """Return the scopes of a program: its outermost level, then its functions in the order of the text.
 
-    Args:
-        program: The program, or statements that are added to a program.
-        before: For added statements, the outermost scope of the program so far.
-        number: Number of the first of these scopes.
+    Statements that are added to a program have the outermost scope of the program before them; `number` is
+    that of the first scope.
     """
     shared: set[str] = set() if before is None else set(before.globals)
     found: list[Scope] = []

@@ -5,10 +5,11 @@ from collections.abc import Callable, Collection, Mapping
 from types import FunctionType
 from typing import Any
 
+from tvist_urscript import arithmetic, indexing
+from tvist_urscript.arithmetic import Work
 from tvist_urscript.library import ANEW, PURE, WEIGHTS
-from tvist_urscript.operators import operators
 from tvist_urscript.script import Script
-from tvist_urscript.values import Array
+from tvist_urscript.values import Array, Pose, Struct
 
 _NUMBERED = re.compile(r"[fc](\d+)_")
 """Names of functions and constants in compiled code, with the number of their scope."""
@@ -17,14 +18,8 @@ _NUMBERED = re.compile(r"[fc](\d+)_")
 class Namespace:
     """The functions, constants and variables of a program and of the statements that are added to it.
 
-    Args:
-        script: The program.
-        functions: The built-in functions that scripts may call, without those of `PURE`.
-        charge: Takes the elements of a list from the program's budget.
-        machine: What compiled code calls of the machine that runs it, by name.
-
-    Raises:
-        ValueError: The program calls a function that is not given.
+    They are what scripts may call beside the functions of `PURE`, what takes the elements of a list from the
+    budget, and what compiled code calls of the machine that runs it.
     """
 
     def __init__(
@@ -35,7 +30,7 @@ class Namespace:
         machine: Mapping[str, Any],
     ) -> None:
         self._functions, self._charge = functions, charge
-        self._names: dict[str, Any] = {"__builtins__": {}, **operators(charge), **machine}
+        self._names: dict[str, Any] = {"__builtins__": {}, **_operators(charge), **machine}
         self.include(script)
         self._own = frozenset(self._names)
         """Names of the program's functions, constants and built-in functions."""
@@ -44,11 +39,7 @@ class Namespace:
         return self._names[name]
 
     def include(self, script: Script) -> None:
-        """Make the functions of a script, and what they use, known to compiled code.
-
-        Raises:
-            ValueError: The script calls a function that is not given.
-        """
+        """Make the functions of a script, and what they use, known to compiled code."""
         self._names |= script.constants
         for name in script.used:
             self._names[f"b_{name}"] = self._built_in(name)
@@ -56,12 +47,7 @@ class Namespace:
             self._names[code.co_name] = FunctionType(code, self._names)
 
     def forget(self, before: int, variables: Collection[str]) -> None:
-        """Forget what was included after the program.
-
-        Args:
-            before: Number of the first scope whose functions are kept.
-            variables: The variables that are kept.
-        """
+        """Forget what was included after the program."""
         for name in self._names.keys() - self._own:
             found = _NUMBERED.match(name)
             of_variable = name.startswith("g_") and name[2:] not in variables
@@ -89,3 +75,49 @@ class Namespace:
             return result
 
         return charged
+
+
+def _operators(work: Work) -> Mapping[str, Callable[..., Any]]:
+    """Return the operators of a machine, which tell it how many elements of lists they work on.
+
+    Two floats, the most frequent case, take the shortest way.
+    """
+
+    def add(a: Any, b: Any) -> Any:
+        if type(a) is float and type(b) is float:
+            return a + b
+        return arithmetic.combine(arithmetic.total, a, b, "added", work)
+
+    def subtract(a: Any, b: Any) -> Any:
+        if type(a) is float and type(b) is float:
+            return a - b
+        return arithmetic.combine(arithmetic.difference, a, b, "subtracted", work)
+
+    def multiply(a: Any, b: Any) -> Any:
+        if type(a) is float and type(b) is float:
+            return a * b
+        return arithmetic.multiply(a, b, work)
+
+    def is_equal(a: Any, b: Any) -> bool:
+        if isinstance(a, Array):
+            work(a.size // 3)
+        return bool(a == b)
+
+    return {
+        "add": add,
+        "subtract": subtract,
+        "multiply": multiply,
+        "divide": lambda a, b: arithmetic.combine(arithmetic.quotient, a, b, "divided", work),
+        "remainder": lambda a, b: arithmetic.combine(arithmetic.rest, a, b, "divided", work),
+        "negate": lambda a: arithmetic.negate(a, work),
+        "is_equal": is_equal,
+        "is_unequal": lambda a, b: not is_equal(a, b),
+        "element": indexing.element,
+        "member": indexing.member,
+        "element_of_matrix": indexing.element_of_matrix,
+        "replaced": lambda new, indices, value: indexing.replaced(new, indices, value, work),
+        "listed": Array,
+        "structured": Struct,
+        "arranged": lambda order, values: [values[place] for place in order],
+        "posed": Pose,
+    }

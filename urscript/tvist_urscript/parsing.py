@@ -8,9 +8,103 @@ from lark.exceptions import VisitError
 
 from tvist_urscript import tree
 from tvist_urscript.building import Builder
-from tvist_urscript.errors import ScriptError, syntax_error
-from tvist_urscript.grammar import GRAMMAR
+from tvist_urscript.errors import ScriptError, no_program, syntax_error
 from tvist_urscript.lines import Lines
+
+GRAMMAR = r"""
+start: (statement _NEWLINE)*
+block: (statement _NEWLINE)*
+
+?statement: function | branches | loop | simple
+
+function: (DEF | SEC | THREAD) NAME "(" (parameter ("," parameter)*)? ")" ":" block "end"
+parameter: NAME ("=" expression)?
+
+branches: IF expression ":" block ("elif" expression ":" block)* ("else" ":" block)? "end"
+loop: WHILE expression ":" block "end"
+
+?simple: assign
+    | expression -> evaluate
+    | RETURN expression? -> return_value
+    | (KILL | JOIN) expression -> handle
+    | (BREAK | CONTINUE | PASS) -> word
+    | (HALT | ENTER_CRITICAL | EXIT_CRITICAL) ("(" ")")? -> word
+    | LABEL -> label
+
+assign: (GLOBAL | LOCAL)? postfix EQUAL expression
+
+?expression: either
+?either: unequal ("or" unequal)*
+?unequal: both ("xor" both)*
+?both: denied ("and" denied)*
+?denied: NOT denied -> unary
+    | comparison
+?comparison: sum
+    | sum COMPARISON sum -> binary
+?sum: term
+    | sum (PLUS | MINUS) term -> binary
+?term: signed
+    | term (STAR | SLASH | PERCENT) signed -> binary
+?signed: MINUS signed -> unary
+    | PLUS signed -> plus
+    | postfix
+?postfix: atom
+    | postfix LSQB expression ("," expression)* "]" -> index
+    | postfix "." NAME -> member
+    | postfix "." NAME "(" (argument ("," argument)*)? ")" -> method
+?atom: NUMBER -> number
+    | TEXT -> text
+    | (TRUE | FALSE | NONE) -> constant
+    | NAME -> name
+    | call
+    | RUN call -> run
+    | LSQB (expression ("," expression)*)? "]" -> listing
+    | LPAR expression ("," expression)* ")" -> parentheses
+
+call: NAME "(" (argument ("," argument)*)? ")"
+?argument: expression -> positional
+    | NAME "=" expression -> named
+
+NAME: /[A-Za-z_][A-Za-z_0-9]*/
+NUMBER: /(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?/
+TEXT: /"[^"\n]*"/
+LABEL: /\$[^\n]*/
+DEF: "def"
+SEC: "sec"
+THREAD: "thread"
+IF: "if"
+WHILE: "while"
+RETURN: "return"
+KILL: "kill"
+JOIN: "join"
+BREAK: "break"
+CONTINUE: "continue"
+PASS: "pass"
+HALT: "halt"
+ENTER_CRITICAL: "enter_critical"
+EXIT_CRITICAL: "exit_critical"
+GLOBAL: "global"
+LOCAL: "local"
+NOT: "not"
+RUN: "run"
+TRUE: "True"
+FALSE: "False"
+NONE: "None"
+COMPARISON: "==" | "!=" | "<=" | ">=" | "<" | ">"
+EQUAL: "="
+PLUS: "+"
+MINUS: "-"
+STAR: "*"
+SLASH: "/"
+PERCENT: "%"
+LPAR: "("
+LSQB: "["
+_NEWLINE: "\n"
+
+%ignore /[ \t\r\f]+/
+%ignore /#[^\n]*/
+"""
+"""For lark; `lines.py` has made every line break that is left the end of a statement."""
 
 
 @cache
@@ -26,15 +120,7 @@ def _parser(*, several: bool) -> Lark:
 
 
 def parse(text: str, *, several: bool = False) -> list[tree.Statement]:
-    """Return the statements of a text on its outermost level.
-
-    Args:
-        text: The text.
-        several: Whether several statements may follow each other on a line, as in UR's interpreter mode.
-
-    Raises:
-        ScriptError: The text is no script; the position is that of the first token that does not fit.
-    """
+    """Return the statements of a text on its outermost level; `several` may follow each other on a line."""
     try:
         return cast("list[tree.Statement]", _parser(several=several).parse(text))
     except VisitError as error:
@@ -49,13 +135,11 @@ def _unfit(text: str, error: UnexpectedInput) -> ScriptError:
     if isinstance(error, UnexpectedCharacters):
         character = text[error.pos_in_stream or 0]
         why = 'a text has no closing "' if character == '"' else f"unexpected character {character!r}"
-        return ScriptError(error.line, error.column, syntax_error(error.line, why))
+        return no_program(error, why)
     if isinstance(error, UnexpectedToken) and str(error.token):  # the end of the text is a token without any
         token: Token = error.token
         what = "end of the line" if str(token) == "\n" else f"'{_shortened(token)}'"
-        assert token.line is not None
-        assert token.column is not None
-        return ScriptError(token.line, token.column, syntax_error(token.line, f"unexpected {what}"))
+        return no_program(token, f"unexpected {what}")
     lines = text.split("\n")
     line, column = len(lines), len(lines[-1]) + 1
     return ScriptError(line, column, syntax_error(line, "the text ends before the program does"))

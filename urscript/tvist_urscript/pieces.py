@@ -73,11 +73,9 @@ class Position:
         return ast.Compare(left, [operator], [right], **self.given)
 
     def charge(self, cost: int, *, check: bool) -> list[ast.stmt]:
-        """Return statements that take a cost from the budget.
+        """Return statements that take a cost from the budget, and that yield it if the budget is spent then.
 
-        Args:
-            cost: Evaluations.
-            check: Whether to yield if the budget is spent then; the machine charges what is yielded to a later tick.
+        Without `check` they never yield. The machine charges what is yielded to a later tick.
         """
         if cost == 0 and not check:
             return []

@@ -37,15 +37,10 @@ class Statements(Expressions):
         self.temporary = count()
 
     def block(self, body: list[tree.Statement], since: int, cost: int = 0) -> tuple[list[ast.stmt], int]:
-        """Translate statements.
+        """Translate statements; return them and the most evaluations since the budget was checked.
 
-        Args:
-            body: The statements.
-            since: Largest number of evaluations since the last check of the budget.
-            cost: Evaluations of the code before, such as the conditions of an `if`, that are still to be charged.
-
-        Returns:
-            The statements of Python, and `since` at their end.
+        Before them it is `since`; `cost` is that of the code before, such as conditions, which is still to be
+        charged.
         """
         result: list[ast.stmt] = []
         piece: list[ast.stmt] = []
@@ -98,24 +93,15 @@ class Statements(Expressions):
         """Return the cost of the present statement, and report it as an error if it exceeds MOST_OPERATIONS."""
         if self.cost > MOST_OPERATIONS:
             self.report(
-                statement.line,
-                statement.column,
+                statement,
                 f"a statement of {self.cost} operations is too long: the limit is {MOST_OPERATIONS}",
             )
         return self.cost
 
     def branches(self, statement: tree.If, test: ast.expr, since: int) -> tuple[list[ast.stmt], int]:
-        """Translate the branches of an `if`.
+        """Translate the branches of an `if`, whose first condition is charged already; see `block`.
 
         Each branch charges the cost of the conditions that are evaluated before it.
-
-        Args:
-            statement: The `if`.
-            test: Its first condition, which is translated and charged already.
-            since: See `block`.
-
-        Returns:
-            The statements of Python, and the largest `since` at the end of any branch.
         """
         at = Position.of(statement)
         chains = [
@@ -150,18 +136,10 @@ class Statements(Expressions):
     def links(
         self, statement: tree.If, chain: list[Branch], test: ast.expr, since: int, cost: int
     ) -> tuple[list[Link], int, int, int]:
-        """Translate the branches of one chain, see LINK.
+        """Translate the branches of one chain, see LINK, whose first condition is charged already.
 
-        Args:
-            statement: The `if`.
-            chain: Condition and statements of each branch.
-            test: The first condition, which is translated and charged already.
-            since: See `block`.
-            cost: See `block`.
-
-        Returns:
-            Position, condition and statements of each branch; the cost to charge if none is taken; the largest `since`
-            at the end of any branch; and `since` if none is taken.
+        Return them, the cost to charge if none is taken, the largest `since` at the end of any, and that if
+        none is.
         """
         links: list[Link] = []
         latest = since
@@ -181,7 +159,7 @@ class Statements(Expressions):
         at = Position.of(statement)
         self.loops += 1
         if self.loops > MOST_LOOPS:
-            self.report(statement.line, statement.column, f"more than {MOST_LOOPS} loops are nested here")
+            self.report(statement, f"more than {MOST_LOOPS} loops are nested here")
         body, _ = self.block(statement.body, 0)
         self.loops -= 1
         return ast.While(test, [*at.charge(cost, check=True), *body], [], **at.given)
@@ -220,9 +198,7 @@ class Statements(Expressions):
             case "break" | "continue":
                 if not self.loops:
                     self.report(
-                        statement.line,
-                        statement.column,
-                        syntax_error(statement.line, f"{statement.word} is outside of a loop"),
+                        statement, syntax_error(statement.line, f"{statement.word} is outside of a loop")
                     )
                 return [ast.Break(**at.given) if statement.word == "break" else ast.Continue(**at.given)]
             case "enter_critical":
@@ -237,9 +213,9 @@ class Statements(Expressions):
         if indices and len(plain) == len(indices) and self.built_in_array(statement.target):
             setter = BUILT_IN_ARRAYS[name][1]
             if not setter:
-                self.report(statement.line, statement.column, f"{name} cannot be assigned")
+                self.report(statement, f"{name} cannot be assigned")
                 return at.statement(at.constant(None))
-            return at.statement(self.call_built_in(at, setter, [*plain, statement.value]))
+            return at.statement(self.call_built_in(statement, setter, [*plain, statement.value]))
         value = self.value(statement.value)
         if indices:
             here = Position(*first(indices[0]))

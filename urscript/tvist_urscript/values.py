@@ -146,22 +146,14 @@ def kind(value: object) -> str:
 
 
 def number(value: Any, what: str) -> int | float:
-    """Return a value that has to be a number.
-
-    Raises:
-        Fault: It is none; the message calls it `what`.
-    """
+    """Return a value that has to be a number."""
     if type(value) is float or type(value) is int:
         return value
     raise Fault(f"{what} has to be a number, not {kind(value)}")
 
 
 def integer(value: Any, what: str) -> int:
-    """Return a value that has to be a whole number; 3.0 is one, since `/` gives floats.
-
-    Raises:
-        Fault: It is none; the message calls it `what`.
-    """
+    """Return a value that has to be a whole number; 3.0 is one, since `/` gives floats."""
     if type(value) is int:
         return value
     if type(value) is float and value.is_integer() and LOWEST <= value <= HIGHEST:
@@ -179,38 +171,22 @@ def _exactly(wanted: type[T], value: Any, what: str, called: str) -> T:
 
 
 def text(value: Any, what: str) -> str:
-    """Return a value that has to be a text.
-
-    Raises:
-        Fault: It is none; the message calls it `what`.
-    """
+    """Return a value that has to be a text."""
     return _exactly(str, value, what, "a text")
 
 
 def array(value: Any, what: str) -> Array:
-    """Return a value that has to be a list; a pose is none.
-
-    Raises:
-        Fault: It is none; the message calls it `what`.
-    """
+    """Return a value that has to be a list; a pose is none."""
     return _exactly(Array, value, what, "a list")
 
 
 def pose(value: Any, what: str) -> Pose:
-    """Return a value that has to be a pose.
-
-    Raises:
-        Fault: It is none; the message calls it `what`.
-    """
+    """Return a value that has to be a pose."""
     return _exactly(Pose, value, what, "a pose")
 
 
 def vector(value: Any, what: str) -> tuple[float, ...]:
-    """Return the elements of a list of numbers or of a pose.
-
-    Raises:
-        Fault: It is neither; the message calls it `what`.
-    """
+    """Return the elements of a list of numbers or of a pose."""
     if not isinstance(value, Array):
         raise Fault(f"{what} has to be a list of numbers, not {kind(value)}")
     if only_numbers(value):
@@ -237,11 +213,7 @@ def whole(value: int) -> int | float:
 
 
 def short(value: str) -> str:
-    """Return a text that is not too long.
-
-    Raises:
-        Fault: It has more than LONGEST_TEXT bytes.
-    """
+    """Return a text that is not too long."""
     size = len(value) if value.isascii() else len(to_bytes(value))
     if size > LONGEST_TEXT:
         raise Fault(f"a text of {size} bytes is too long: the limit is {LONGEST_TEXT}")

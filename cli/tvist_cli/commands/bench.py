@@ -24,7 +24,7 @@ def bench(*, seconds: float = 10.0, shaper: str = "zv", json: bool = False) -> N
         json: Print one JSON object.
     """
     from tvist_lab.bench.speed import speed
-    from tvist_server.config import ConfigError
+    from tvist_server.option_values import StartError
     from tvist_shaping import BUILT_IN
     from tvist_shaping.errors import ShapingError
 
@@ -33,7 +33,7 @@ def bench(*, seconds: float = 10.0, shaper: str = "zv", json: bool = False) -> N
     with told(ShapingError, code=2):
         BUILT_IN.check(shaper := shaper.lower())
     try:
-        with told(ConfigError, code=2):
+        with told(StartError, code=2):
             result = speed(seconds, shaper, lambda what: err.print(f"measuring {what} ..."))
     except KeyboardInterrupt:
         raise interrupted("the measurements so far are lost; the served robots have stopped") from None

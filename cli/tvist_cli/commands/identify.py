@@ -195,8 +195,8 @@ class _Place:
     ) -> None:
         from tvist_controller.setup import check_rating
         from tvist_lab.in_process import free_setup
-        from tvist_server.config import ConfigError
-        from tvist_server.config_file import from_mapping
+        from tvist_server.config import from_mapping
+        from tvist_server.option_values import StartError
 
         self.endpoint, self.robot, self.mass, self.seed = endpoint, robot, mass, seed
         self.security, self.namespace = security, namespace
@@ -211,7 +211,7 @@ class _Place:
                 "seed": seed,
                 "truth": True,
             }
-            with told(ConfigError, code=2):
+            with told(StartError, code=2):
                 self._setup = free_setup(from_mapping(content, "options"))
             with told(ValueError, code=2):
                 check_rating(self._setup.payload, self._setup.description)

@@ -56,7 +56,7 @@ def keys(
         raise Failure("keys needs the package cryptography: pip install 'tvist[server]'") from error
     from tvist_cli.certificates import CertificateError
     from tvist_protocol.keys import check_robot_name
-    from tvist_server.gateways.exposure import ExposureError
+    from tvist_server.option_values import StartError
 
     if not 1 <= days <= 3650:
         raise Failure(f"days is {days}: must be 1 to 3650", code=2)
@@ -72,7 +72,7 @@ def keys(
             }
         )
         hosts = _hosts(host or [])
-    with told(CertificateError, ExposureError, OSError):
+    with told(CertificateError, StartError, OSError):
         ring = _KeyRing(folder, days)
         ring.look(robot, hosts, asked)
         ring.make(robot, hosts, asked)

@@ -30,10 +30,10 @@ def router(
     """
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
-    from tvist_server.gateways.exposure import ExposureError
     from tvist_server.gateways.router import DEFAULT_ENDPOINT, Rate, Router, robots_of
+    from tvist_server.option_values import StartError
 
-    with told(ExposureError, ValueError, code=2):
+    with told(StartError, ValueError, code=2):
         rates = [Rate.read(text) for text in rate or []]
         robots = [place for text in robot or [] for place in robots_of(text)]
         if robots and not rates:

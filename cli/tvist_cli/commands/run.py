@@ -14,7 +14,8 @@ from tvist_cli.robot_options import configuration, content_of, with_robot_option
 from tvist_cli.run_options import NO_FILES, NO_LIMITS, RunFiles, RunLimits, check_positive
 from tvist_cli.scripts import check_scripts, named, read_script
 from tvist_cli.serving import leave
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
 
 OPTIONS = {
     "robot", "profile", "payload", "overload", "adapt", "shaper", "shape_servo", "plant", "hidden", "start",
@@ -177,7 +178,7 @@ def _configuration(given: dict[str, Any], file: str | None, *, lockstep: bool) -
             raise Failure(
                 f"--lockstep and --{option} exclude each other: in lockstep there is no network", code=2
             )
-    with told(ConfigError, code=2):
+    with told(StartError, code=2):
         content = content_of(file)
     for key, instead in (("robots", "tvist run has one robot"), ("clock", "tvist run has --lockstep")):
         if key in content:

@@ -20,7 +20,8 @@ from tvist_cli.serving import (
     say_recorded,
     say_who_can_reach,
 )
-from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
 
 if TYPE_CHECKING:
     from tvist_controller.setup import Setup
@@ -39,8 +40,7 @@ def serve(
     """Run one or more robots on the network until Control+C, SIGTERM, SIGQUIT or the terminal closes.
 
     The first start after an installation or an update compiles what a robot computes at every tick and in its plans for
-    this processor. Machine code is kept beside the sources, or in the user's cache folder where those cannot be
-    written, or in the folder that NUMBA_CACHE_DIR names.
+    this processor. Machine code is kept in the user's cache folder, or in the folder that NUMBA_CACHE_DIR names.
 
     Args:
         compile_only: Only compile, so that no start has to, in as many processes as the number says [one on each
@@ -61,7 +61,7 @@ def serve(
     gc.freeze()
     gc.enable()
     checked = configuration(given, config)
-    with told(ConfigError, code=2):
+    with told(StartError, code=2):
         ending = Ending()
         if checked.workers > 1:
             _several(checked, ending)

@@ -1,4 +1,4 @@
-"""`tvist shaperbench`: rank shapers, your own included, on thirteen simulated arms."""
+"""`tvist shaperbench`: rank shapers, your own included, on fifteen simulated arms."""
 
 from datetime import UTC, datetime
 from itertools import chain
@@ -38,11 +38,12 @@ def shaperbench(
     report: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Rank shapers by how soon thirteen different arms come to rest, and by the vibration until then.
+    """Rank shapers by how soon fifteen different arms come to rest, and by the vibration until then.
 
     Every shaper gets the same random moves with payloads up to the robot's rating, of which the controller assumes 100,
-    110 and 90 %. Thirteen arms follow its reference; all but one differ from the controller's model. A shaper that uses
-    future samples or does not report its full delay is listed but not ranked.
+    110 and 90 %. Fifteen arms follow its reference; all but two differ from the controller's model. The motors of two
+    stick: their controller has the robot file and the calibration of ur5e_stiction. A shaper that uses future samples
+    or does not report its full delay is listed but not ranked.
 
     Args:
         shaper: Python file with a class that has step(q_ref, info) -> q_star, and optionally reset(q) and delay in s;
@@ -52,7 +53,8 @@ def shaperbench(
         against: Names of the shapers and baselines to run, in addition to waiting; default: all.
         hidden: Seeds of hidden robots, each of which is one more arm: its springs, dampers, loops, rotors, friction and
             payload are drawn from its seed.
-        robot: Name of a robot that comes with the package, or path of a robot file.
+        robot: Name of a robot that comes with the package, or path of a robot file; if it is not ur5e, the two arms
+            whose motors stick are left out.
         seed: Seed of moves, payloads, gear errors and parameter scatter.
         calibration: Name of a calibration that comes with the package, or path of a calibration file; it needs a modal
             model [that of the robot].
@@ -82,6 +84,13 @@ def shaperbench(
     faults = [None] * ours + [bench.inspect(one, description, drawn) for one in methods[ours:]]
     sound = [one for one, fault in zip(methods, faults, strict=True) if fault is None]
     jobs = bench.jobs(description, sound, drawn, seed, quick=quick, arms=arms)
+    sticking = bench.STICKING if robot == "ur5e" else ()
+    if sticking:
+        their, known_of_them = modal_for(None, bench.STICKS)
+        like = on_the_bench(their, known_of_them, against, mine)
+        ranked = {one.name for one in sound}
+        chosen = [one for one in like if one.name in ranked]
+        jobs += bench.jobs(their, chosen, drawn, seed, quick=quick, arms=sticking)
     bends = bench.bends(description, sound, drawn)
     work: Any = chain(bench.play(jobs), map(bench.bend, bends))
     found = gathered(work, len(jobs) + len(bends), "motions")
@@ -101,7 +110,7 @@ def shaperbench(
         "seed": seed,
         "robot": description.robot.name,
         "payload_errors": list(bench.PAYLOAD_ERRORS),
-        "arms": {arm.name: arm.label for arm in arms},
+        "arms": {arm.name: arm.label for arm in (*arms, *sticking)},
         "calibration": known.name,
         **leaderboard.leaderboard(methods, faults, list(rows), list(bent)),
     }

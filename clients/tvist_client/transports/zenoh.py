@@ -7,7 +7,7 @@ Python thread has to be joined at the end. The callbacks only convert payloads t
 import asyncio
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
@@ -28,13 +28,6 @@ from tvist_client.transports.session import close_session, open_session
 from tvist_protocol import keys
 
 ENCODING = zenoh.Encoding("application/msgpack")
-KEYS: Mapping[Topic, Callable[[str], str]] = {
-    "state": keys.state,
-    "event": keys.event,
-    "truth": keys.truth,
-    "telemetry": keys.telemetry,
-    "io": keys.io,
-}
 FIND_S = 1.0
 """Time after which the available robots are queried, once there is a link [s]; a robot appears within milliseconds."""
 LATE_S = 3.0
@@ -60,10 +53,10 @@ class ZenohTransport(Transport):
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self._announced: Counter[str] = Counter()
         session.liveliness().declare_subscriber(
-            keys.alive(robot), Callback(self._on_alive, indirect=False), history=True
+            keys.key(robot, "alive"), Callback(self._on_alive, indirect=False), history=True
         )
         self._setpoints = session.declare_publisher(
-            keys.setpoint(robot), encoding=ENCODING, priority=zenoh.Priority.REAL_TIME, express=True
+            keys.key(robot, "setpoint"), encoding=ENCODING, priority=zenoh.Priority.REAL_TIME, express=True
         )
 
     @classmethod
@@ -101,7 +94,7 @@ class ZenohTransport(Transport):
         """Send a command as a query and wait for the reply."""
         losses = self._losses
         try:
-            return await self._get(keys.command(self._robot), data, timeout_s)
+            return await self._get(keys.key(self._robot, "command"), data, timeout_s)
         except NotConnectedError:
             # Access control drops what is not allowed, so that it reaches no one. A robot that has been there all the
             # time, and still answers, denies it.
@@ -121,12 +114,12 @@ class ZenohTransport(Transport):
         self._setpoints.put(data)
 
     async def info(self) -> bytes:
-        return await self._get(keys.info(self._robot), None, INFO_S)
+        return await self._get(keys.key(self._robot, "info"), None, INFO_S)
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
         if self._closed:
             raise self._gone()
-        key = KEYS[topic](self._robot)
+        key = keys.key(self._robot, topic)
         droppable = topic in {"state", "truth"}
 
         def on_sample(sample: zenoh.Sample) -> None:
@@ -312,10 +305,11 @@ async def _robots(session: zenoh.Session) -> list[str]:
         keys.ANY_ALIVE, Callback(on_reply, partial(wake, loop, ended.set), indirect=False), timeout=INFO_S
     )
     await ended.wait()
-    return sorted(names, key=_by_number)
+    return sorted(names, key=natural)
 
 
-def _by_number(name: str) -> list[int | str]:
+def natural(name: str) -> list[int | str]:
+    """Return what names are sorted by: their numbers count as such."""
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 

@@ -20,6 +20,7 @@ from tvist_controller.sources.calibrations import (
     drivetrain,
     elastic_feed_forward,
     estimator_of,
+    known_friction,
     mass_matrix,
     modal_estimator,
 )
@@ -57,6 +58,7 @@ __all__ = [
     "elastic_feed_forward",
     "estimator_of",
     "keeping_motion",
+    "known_friction",
     "load_calibration",
     "mass_matrix",
     "modal_estimator",

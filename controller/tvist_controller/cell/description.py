@@ -27,10 +27,6 @@ HeavyMass = Annotated[float, Meta(gt=0, le=100)]
 Edge = Annotated[float, Meta(gt=0, le=10)]
 
 
-class CellError(ValueError):
-    """A cell is invalid; the message names key, value and limit."""
-
-
 class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """A table of the file."""
 
@@ -149,21 +145,21 @@ class Cell(_Table, frozen=True, kw_only=True):
         for key, things in (("tools", self.tools), ("parts", self.parts)):
             _check_names(key, [one.name for one in things])
         if self.world is not None and self.parts:
-            raise CellError(f"world is {self.world!r}, in which bodies are gripped: leave parts out")
+            raise ValueError(f"world is {self.world!r}, in which bodies are gripped: leave parts out")
         if self.gripper is None:
             if self.parts:
-                raise CellError("parts need a gripper: add the table [gripper]")
+                raise ValueError("parts need a gripper: add the table [gripper]")
             return
         known = [tool.name for tool in self.tools]
         if not known:
-            raise CellError(
+            raise ValueError(
                 "gripper needs a tool that it is part of, whose tcp says where it grips: add [[tools]]"
             )
         if self.gripper.tool is not None and self.gripper.tool not in known:
-            raise CellError(f"gripper.tool is {self.gripper.tool!r}: must be one of {', '.join(known)}")
+            raise ValueError(f"gripper.tool is {self.gripper.tool!r}: must be one of {', '.join(known)}")
         for number, part in enumerate(self.parts):
             if part.size[1] >= self.gripper.stroke:
-                raise CellError(
+                raise ValueError(
                     f"parts[{number}].size[1] is {part.size[1]:g}: must be less than {self.gripper.stroke:g} m, by "
                     f"which a {self.gripper.model} opens"
                 )
@@ -173,18 +169,18 @@ class Cell(_Table, frozen=True, kw_only=True):
         for number, wire in enumerate(self.wires):
             first = wired.setdefault(wire.input, number)
             if first != number:
-                raise CellError(
+                raise ValueError(
                     f"wires[{number}].input is {wire.input!r}, which has a wire: that of wires[{first}]"
                 )
 
     def _check_tools(self) -> None:
         for number, tool in enumerate(self.tools):
             if not is_real_body(tool.inertia):
-                raise CellError(
+                raise ValueError(
                     f"tools[{number}].inertia is {list(tool.inertia)}: no body has these moments of inertia"
                 )
             if (tool.while_on is None) != (number == 0):
-                raise CellError(
+                raise ValueError(
                     "tools[0].while_on must be left out: that tool is on the flange while no other is"
                     if number == 0
                     else f"tools[{number}].while_on is missing: only the first tool is on the flange without an output"
@@ -201,6 +197,6 @@ def _check_names(key: str, names: Sequence[str]) -> None:
     for number, name in enumerate(names):
         first = seen.setdefault(name, number)
         if first != number:
-            raise CellError(f"{key}[{number}].name is {name!r}, which is the name of {key}[{first}], too")
+            raise ValueError(f"{key}[{number}].name is {name!r}, which is the name of {key}[{first}], too")
         if not name.isprintable():
-            raise CellError(f"{key}[{number}].name is {name!r}: must be characters that can be shown")
+            raise ValueError(f"{key}[{number}].name is {name!r}: must be characters that can be shown")

@@ -22,7 +22,7 @@ from tvist_controller.dispatch.rights import (
 from tvist_controller.dispatch.table import COMMANDS
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_protocol.channels import tag
-from tvist_protocol.codec import Envelope, decode_command, decode_envelope, decode_setpoint, refusal
+from tvist_protocol.codec import Envelope, decode, decode_command, decode_envelope, refusal
 from tvist_protocol.commands import Command, ReleaseClock, Setpoint, TakeClock, TakeControl
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import EXPLAINED_BYTES
@@ -81,7 +81,7 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
         return None
     setpoint: Setpoint | Unreadable
     try:
-        setpoint = decode_setpoint(data)
+        setpoint = decode(Setpoint, data)
     except ProtocolError as error:
         token = None
         with contextlib.suppress(ProtocolError):

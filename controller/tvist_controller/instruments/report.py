@@ -11,7 +11,7 @@ from tvist_controller.kinematics.pose import rotation_vector
 from tvist_controller.line.differentiator import Floats, middle_of
 from tvist_controller.line.sample import Sample
 from tvist_plant.plant import PERIOD, Plant, PlantTruth
-from tvist_protocol.codec import decode_state, encode
+from tvist_protocol.codec import decode, encode
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth
@@ -60,7 +60,7 @@ class Report(Struct, gc=False):
     def state(self) -> State:
         """The state; from its encoding, if there is one, which takes half the time of making it."""
         if self.made is None:
-            self.made = self._make() if self.written is None else decode_state(self.written)
+            self.made = self._make() if self.written is None else decode(State, self.written)
         return self.made
 
     @property

@@ -39,7 +39,7 @@ class ControlCycle:
         plant: Plant to control; None for the flexible arm of the description.
         elastic: Elastic feed-forward to use with the filter; None for that of the paper's controller.
         compensate_sag: Whether the drives lead by the twist of the gears under gravity.
-        law: Identified friction to feed forward, see `friction_at`; None for a share of the description's.
+        law: Known friction to feed forward, see `LAWS`; None for a share of the description's.
 
     Raises:
         ValueError: The plant cannot start there, or its measurement has the wrong shape.

@@ -5,7 +5,7 @@ from msgspec import Struct
 
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.line.joint_controllers import LAW, WINDUP, YIELDING, joint_rows
+from tvist_controller.line.joint_controllers import LAW, STICTION, WINDUP, YIELDING, joint_rows
 from tvist_controller.line.line_tick import Q_R, QD_R, STATIC, TORQUE, TORQUE_FF, Q
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
@@ -60,14 +60,16 @@ class DriveFeedForward:
         self.wanted = elastic
 
     def compensate(self, law: Floats | None) -> None:
-        """Feed identified friction forward from the next rest on, since its torque may be another one.
+        """Feed known friction forward from the next rest on, since its torque may be another one.
 
-        Without a law, see `friction_at`, it is a share of the friction in the description.
+        Without a law, see `LAWS`, it is a share of the friction in the description.
         """
         self._law = law
 
     def _rely_on_law(self) -> None:
-        self.rows[LAW:] = 0.0 if self._law is None else self._law
+        self.rows[LAW:] = 0.0
+        if self._law is not None:
+            self.rows[LAW : LAW + len(self._law)] = self._law
 
     def rest(self) -> None:
         """Complete a transition at once if the motors do not lead either, since the reference rests: both are equal."""
@@ -81,7 +83,7 @@ class DriveFeedForward:
     def reset(self, gravity: Floats) -> None:
         """Restart at rest, where a torque balances gravity, shape (n,) [N m]."""
         self._rely_on_law()
-        self.rows[WINDUP] = self.rows[YIELDING] * gravity
+        self.rows[WINDUP], self.rows[STICTION] = self.rows[YIELDING] * gravity, 0.0
         self._begin()
         self._share = self._full
 
@@ -123,7 +125,7 @@ class DriveFeedForward:
         """Begin with what is wanted, with a share of zero."""
         self._elastic, self._share, self._rising = self.wanted, 0, False
         if self._elastic is not None:
-            self._elastic.reset()
+            self._elastic.reset(self.rows[STICTION])
 
     def _fade(self, smooth: bool) -> None:
         """Advance the transition by a tick; one that is under way is completed before it turns back."""
@@ -131,7 +133,8 @@ class DriveFeedForward:
             self._begin()
         rises = smooth and self._elastic is not None and self._elastic is self.wanted
         if self._share == 0 and rises and self._elastic is not None:
-            self._elastic.reset()  # its lead is a history, which must be that of this motion
+            # Its lead is a history, which must be that of this motion.
+            self._elastic.reset(self.rows[STICTION])
         if self._share in {0, FADE}:
             self._rising = rises
         # It never turns back half-way: only a whole rise or fall has the smooth rate that `_blend` adds.

@@ -13,6 +13,7 @@ from tvist_controller.line.elastic_lead import (
     MOST,
     PERIOD,
     ROTOR,
+    STICTION,
     WITH_LAW,
     WITH_TORQUES,
     command_motors,
@@ -48,8 +49,8 @@ class ElasticFeedForward:
         damping_time: Damping divided by stiffness, shape (N,) [s].
         period: Tick [s].
         torques: Whether torques count with the lead; otherwise only positions and velocities do.
-        law: Identified friction, see `friction_at`, shape (5, n). None for a share of the Coulomb friction in
-            the description.
+        law: Known friction, see `LAWS`, shape (9, n), or (5, n) without stiction. None for a share of the Coulomb
+            friction in the description.
     """
 
     def __init__(
@@ -86,7 +87,7 @@ class ElasticFeedForward:
             else drives.friction_feedforward * friction
         )
         if law is not None:
-            lead.drives[LAW:] = law
+            lead.drives[LAW : LAW + len(law)] = law
             friction = law[0] * np.maximum(law[1], 1.0) + law[4] * np.array(description.limits.velocity)
         lead.drives[MOST], lead.drives[LEAST] = TORQUE_SHARE * limits - friction, LEAST_ROOM * limits
         own = rigid.frames[rigid.getFrameId(FLANGE)]
@@ -100,9 +101,10 @@ class ElasticFeedForward:
         self.limited = False
         """Whether the lead's acceleration was limited at the last tick."""
 
-    def reset(self) -> None:
-        """Restart with the lead of the next targets."""
+    def reset(self, stiction: Floats | float = 0.0) -> None:
+        """Restart with the lead of the next targets, and with the stiction of the motors [N m]."""
         self._ticks, self.limited = 0, False
+        self.lead.drives[STICTION] = stiction
 
     @property
     def settled(self) -> bool:

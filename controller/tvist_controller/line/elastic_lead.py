@@ -19,7 +19,7 @@ import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.kinematics.least_squares import put, solve_in_place
-from tvist_controller.line.joint_controllers import LAWS, friction_at
+from tvist_controller.line.joint_controllers import LAWS, friction_at, sticks, stiction_at
 from tvist_kernels.compiling import inlined
 from tvist_plant.chain import SCRATCH, WIDTH, torques
 from tvist_plant.model import Floats
@@ -28,14 +28,14 @@ DAMPED = 0.1
 """λ, in the order of the lever arms that may be taken for none [m]."""
 RECOVERY = 120.0
 """Rate at which the lead returns to the formula after its acceleration was limited, critically damped [1/s]."""
-ROTOR, FRICTION, MOST, LEAST, LAW = range(5)
+ROTOR, FRICTION, MOST, LEAST, STICTION, LAW = range(6)
 """Rows of a drive's parameters: rotor inertia [kg m^2]; Coulomb friction to feed forward [N m], or its slope if it is
-linear [N m s/rad]; torque that motion and lead may need together, and that the lead may always need [N m]; and the
-first row of the identified friction, see `friction_at`.
+linear [N m s/rad]; torque that motion and lead may need together, and that the lead may always need [N m]; stiction of
+the last command [N m]; and the first row of the known friction, see `LAWS`.
 """
 COORDINATES, JOINTS, FLEXES, PERIOD, FRICTION_WIDTH, LINEAR, WITH_TORQUES, WITH_LAW, HEAD = range(9)
 """Places of the single numbers at the front of the memory; their number. The last three are 1 or 0: whether friction is
-linear, whether torques count with the lead, and whether friction was identified, which then counts instead."""
+linear, whether torques count with the lead, and whether friction is known, which then counts instead."""
 
 
 class Lead(NamedTuple):
@@ -52,7 +52,7 @@ class Lead(NamedTuple):
     springs: Floats
     """Stiffness of each spring [N m/rad], and its damping time divided by the tick [-], shape (2, N)."""
     drives: Floats
-    """Rows of `ROTOR` and so on, shape (9, n)."""
+    """Rows of `ROTOR` and so on, shape (14, n)."""
     late: Floats
     """Target of the tick before and the torque that it needs, shape (4, n)."""
     leads: Floats
@@ -253,7 +253,7 @@ def follow(
 
 
 @compiled_for_ticks
-def command_motors(  # noqa: C901  a kernel: its branches are loops
+def command_motors(  # noqa: C901, PLR0912  a kernel: its branches are loops
     memory: Floats,  # see `parts`
     target: Floats,  # see `lead_of`
     ticks: int,  # number of targets before this one; the first three leads are as wanted
@@ -286,7 +286,10 @@ def command_motors(  # noqa: C901  a kernel: its branches are loops
         motors[2, j] = late[2, j] + rise
         speed = motors[1, j] if with_torques else late[1, j]
         if memory[WITH_LAW] > 0.0:
-            motors[3, j] = late[3, j] + friction_at(drives[LAW:], j, speed)
+            law, load = drives[LAW:], late[3, j] - drives[ROTOR, j] * late[2, j]
+            if sticks(law, j):
+                drives[STICTION, j] = stiction_at(law, j, drives[STICTION, j], period, speed, load)
+            motors[3, j] = late[3, j] + friction_at(law, j, speed) + drives[STICTION, j]
         else:
             share = speed if memory[LINEAR] > 0.0 else np.tanh(speed / memory[FRICTION_WIDTH])
             motors[3, j] = late[3, j] + drives[FRICTION, j] * share

@@ -26,7 +26,7 @@ def to_drives(
     period: float,
     chain: Floats,  # links of the rigid arm with its declared payload, shape (n+1, 22)
     bodies: Floats,  # scratch, shape (n+1, 28)
-    joints: Floats,  # parameters of the joint controllers, shape (13, n); their wind-up is changed
+    joints: Floats,  # parameters of the joint controllers, shape (19, n); wind-up and stiction are changed
     signals: Floats,  # result, shape (9, n), see `SIGNALS`
 ) -> None:
     """Compute the drives' commands for the middle one of three shaped references."""

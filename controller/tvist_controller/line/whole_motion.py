@@ -69,6 +69,7 @@ class DrivenLine:
         declared: Payload,
         law: Floats | None = None,
     ) -> None:
+        self._law = law
         self._cycle = ControlCycle(
             description, passes, q=start, declared=declared, carried=declared, seed=0, law=law,
             plant=Still(description.joints),
@@ -81,6 +82,7 @@ class DrivenLine:
         ticks: int,
         resting: int = 0,
         elastic: ElasticFeedForward | None = None,
+        law: Floats | None = None,
     ) -> Driven:
         """Compute what the drives get while a shaped reference runs, from rest.
 
@@ -90,8 +92,10 @@ class DrivenLine:
             ticks: Number of ticks T.
             resting: Number of ticks before the first sample.
             elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
+            law: Friction to feed forward in this motion; None for that of the line.
         """
         cycle = self._cycle
+        cycle.drives.compensate(self._law if law is None else law)
         cycle.use(cycle.tvist, elastic)
         rest, delay = cycle.reset(start).command, cycle.drives.delay
         if elastic is not None:

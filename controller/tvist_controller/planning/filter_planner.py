@@ -11,7 +11,7 @@ from tvist_controller.planning.snapshot import FilterState, Snapshot
 from tvist_controller.planning.surplus import surplus_of
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, paper_payload
-from tvist_controller.sources.calibrations import available, elastic_feed_forward, load
+from tvist_controller.sources.calibrations import available, elastic_feed_forward, known_friction, load
 from tvist_controller.sources.mode_source import ModeSource, modal_source
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.commands import SetEstimator
@@ -41,7 +41,7 @@ class PlannedFilter:
     elastic: ElasticFeedForward | None
     """Elastic feed-forward for the drives; None if the filter does without."""
     law: Floats | None = None
-    """Identified friction of the joints, see `friction_at`; None if it is not known."""
+    """Known friction of the joints, see `known_friction`; None if it is not known."""
 
 
 class FilterPlanner:
@@ -133,7 +133,8 @@ class FilterPlanner:
         """
         known = source if source.knows_payload else self._modal
         try:
-            law = None if known is None else known.friction
+            calibration = None if known is None else known.calibration
+            law = known_friction(tvist, self._setup.description, calibration)
         except EstimatorError as error:
             raise RefusalError("out_of_range", where, str(error)) from error
         if tvist.feed_forward == "rigid":

@@ -138,11 +138,6 @@ def pose(name: str, value: Value, kind: object = Coordinate) -> values.Pose:
     return x, y, z, rx, ry, rz
 
 
-def is_pose(value: Value) -> bool:
-    """Return whether a target is a pose rather than joint positions."""
-    return isinstance(value, Pose)
-
-
 def flag(name: str, value: Value) -> bool:
     """Return a truth value; numbers count as such."""
     if not isinstance(value, bool | int | float):

@@ -50,7 +50,6 @@ class ProgramArm:
         """The one that is under way."""
         self._guided: int | None = None
         self._abandoned = False
-        self._own = False
         self._asked = 0
         """Number of threads that wait for the arm to give way."""
         self._gives: object | None = None
@@ -72,10 +71,8 @@ class ProgramArm:
         journey.add(segment)
         if journey.begun:
             self.waypoint = segment
-        if segment.blend == 0.0:
-            yield from self.finish()
-        elif journey.full:
-            yield from self._until(journey, lambda: not journey.full)
+        journey.closed = segment.blend == 0.0
+        yield from self._carry_out(journey)
 
     def begin(self) -> None:
         """Begin the moves of this thread that wait for a further one, which may still come under way."""
@@ -89,13 +86,15 @@ class ProgramArm:
         journey = self._present()
         if journey is not None:
             journey.closed = True
-            yield from self._until(journey, lambda: False)
+            yield from self._carry_out(journey)
 
-    def _until(self, journey: Journey, done: Callable[[], bool]) -> Turns:
-        """Carry out a journey until it is over or something is done."""
+    def _carry_out(self, journey: Journey) -> Turns:
+        """Carry out a journey until it is over, or takes a further move."""
+        if not (journey.closed or journey.full):
+            return
         with self._moving():
             self._begin(journey)
-            while not (journey.over or done() or self._led(journey)):
+            while not (journey.over or self._led(journey)) and (journey.closed or journey.full):
                 yield
         if self._led(journey):
             assert self.lead is not None, "who makes moves can lead them"
@@ -116,7 +115,8 @@ class ProgramArm:
         if journey is None or not journey.over:
             return journey
         del self._journeys[self._thread()]
-        journey.raise_fault()
+        if journey.fault is not None:
+            raise journey.fault
         return None
 
     def _begin(self, journey: Journey) -> None:
@@ -158,25 +158,24 @@ class ProgramArm:
 
     # ------------------------------------------------------------------ guided motions
 
-    def guide(self, start: Callable[[bool], int | None], wait: Callable[[], Iterator[None]]) -> Turns:
+    def guide(self, start: Callable[[bool], int | None], wait: Iterator[None]) -> Turns:
         """Begin or change a guided motion, which goes on when the call returns.
 
         `start` begins it, shaped or not, and returns its number, or None if there is nothing to move;
-        `wait` lets time pass until the call returns.
+        `wait` then lets time pass until the call returns.
         """
         yield from self.finish()
         with self._moving():
             yield from self.regain()
-            while self.stopping or self._rate_limit.waits:
+            while self._stopping("speed_j") or self._rate_limit.waits:
                 yield
             self.steer(start)
-            yield from wait()
+            yield from wait
 
-    @property
-    def stopping(self) -> bool:
-        """Whether a guided motion has to wait: for a stop under way, or in a protective stop of this tick."""
+    def _stopping(self, command: str) -> bool:
+        """Whether a motion as that of a command waits for a stop under way, or in a protective stop of this tick."""
         activity = self._motion.activity
-        return (activity.moving or activity.protective) and after(activity, "speed_j") is None
+        return (activity.moving or activity.protective) and after(activity, command) is None
 
     def regain(self) -> Turns:
         """Wait for the end of a stop, and for force mode if the program has lost it and a thread begins it again.
@@ -184,8 +183,8 @@ class ProgramArm:
         A `Fault` says that none does.
         """
         left = AGAIN
-        while self.stopping or (self.lost and left > 0):
-            left -= not (self.stopping or self._asked)
+        while (stopping := self._stopping("speed_j")) or (self.lost and left > 0):
+            left -= not (stopping or self._asked)
             yield
         if self.lost:
             raise Fault(LOST)
@@ -198,21 +197,15 @@ class ProgramArm:
     def give_way(self, start: Callable[[], int]) -> Turns:
         """Let the arm give way to forces, or change how; `start` begins that and returns its number."""
         yield from self.finish()
-        motion = self._motion
         self._asked += 1
         try:
-            while (
-                (motion.activity.moving or motion.activity.protective)
-                and after(motion.activity, "force_mode") is None
-            ) or self._rate_limit.waits:
-                if motion.activity is Activity.STREAMING:
+            while self._stopping("force_mode") or self._rate_limit.waits:
+                if self._motion.activity is Activity.STREAMING:
                     raise Fault(STREAMED)
                 yield
-            self._own = True
-            with refusals_as_faults():
-                self._guided = start()
+            self._replace(start)
         finally:
-            self._own, self._asked = False, self._asked - 1
+            self._asked -= 1
         self._gives = self._thread()[0]
 
     def hold_again(self, *, by_hand: bool) -> None:
@@ -230,13 +223,18 @@ class ProgramArm:
             motion.activity is Activity.REST
             or (motion.activity is Activity.GUIDED and motion.cycle.mode.shaped)
         )
-        self._journey, self._own = None, True
+        self._journey = None
+        self._replace(lambda: start(shaped))
+        self.driver = None if self._guided is None else self._thread()
+
+    def _replace(self, start: Callable[[], int | None]) -> None:
+        """Begin a guided motion in place of the present one, which `hear` then does not miss."""
+        guided, self._guided = self._guided, None
         try:
             with refusals_as_faults():
-                self._guided = start(shaped)
-            self.driver = None if self._guided is None else self._thread()
+                guided = start()
         finally:
-            self._own = False
+            self._guided = guided
 
     def in_motion(self, seconds: float) -> Iterator[None]:
         """Let a time pass that is the motion's own: it lasts longer at a lower speed [s]. At least a tick passes."""
@@ -274,19 +272,16 @@ class ProgramArm:
         guidance = self._access.guidance
         if self._motion.activity.moving:
             self._rate_limit.charge()
-        self._own = True  # so that `hear` does not take this stop for one that ends the program
-        try:
-            if wholly or guidance.compliant is None:
-                stop()
-            else:
-                guidance.stand(BRAKING)
-        finally:
-            self._own = self._abandoned = False
-            self.driver = None
-            if guidance.compliant is None:
-                self._guided = None
-            if self._journey is not None:
-                self._journey.number = None
+        guided, self._guided = self._guided, None  # so that `hear` does not miss it
+        self.driver, self._abandoned = None, False
+        if self._journey is not None:
+            self._journey.number = None
+        if wholly or guidance.compliant is None:
+            stop()
+        else:
+            guidance.stand(BRAKING)
+        if guidance.compliant is not None:
+            self._guided = guided
 
     # ------------------------------------------------------------------ threads and events
 
@@ -326,14 +321,17 @@ class ProgramArm:
         self._abandoned, self._rate_limit.planning = False, 0
 
     def hear(self, event: Event) -> bool:
-        """Handle an event of the robot; return whether it ended a motion of the program against its will."""
+        """Handle an event of the robot; return whether it ended a motion of the program against its will.
+
+        The numbers of motions that the program itself ends are forgotten before.
+        """
         journey = self._journey
         moving = None if journey is None else journey.number
         if event.kind == "protective_stop":
             self._guided = self.driver = None
             if journey is not None and moving is not None:
                 journey.stop()
-        if event.id is None or self._own or event.id not in {moving, self._guided}:
+        if event.id is None or event.id not in {moving, self._guided}:
             return False
         stopped = event.kind == "motion_stopped" and event.code != "plant_failure"
         if event.id == moving and journey is not None:

@@ -1,4 +1,4 @@
-"""Moves of a program in force mode: the tool or the joints are led to the target, beside the axes that give way."""
+"""Moves that are led to their targets by velocities: those of `servoc`, and all in force mode."""
 
 import math
 
@@ -21,15 +21,6 @@ SETTLING = 4.0
 """Ticks in which the rest of the way is gone at the end."""
 
 
-def approach(away: Floats, far: float, velocity: float, acceleration: float) -> Floats:
-    """Velocity that lets a motion come to rest at a target; the way to it is `away`, its length `far`.
-
-    It is at most the velocity that is given, and decelerates with the acceleration that is.
-    """
-    speed = min(velocity, math.sqrt(2.0 * acceleration * far), far / (SETTLING * PERIOD))
-    return away * (speed / far) if far > 0.0 else away
-
-
 class ForceModeMoves:
     """Leads one robot."""
 
@@ -44,19 +35,27 @@ class ForceModeMoves:
             raise Fault(
                 "force mode allows lines and joint moves, no arcs: call end_force_mode before, or movel"
             )
-        guidance, near = self._access.guidance, max(segment.blend, ARRIVED)
-        joints = isinstance(segment, JointSegment)
-        far = self._way(segment)[1]
+        guidance, most = self._access.guidance, 2.0 * segment.acceleration
         duration = None if isinstance(segment, ProcessSegment) else segment.duration
-        velocity = max(segment.velocity if duration is None else far / duration, ARRIVED)
+        velocity = segment.velocity if duration is None else self._way(segment)[1] / duration
+        yield from self.lead(segment, max(velocity, ARRIVED), most, max(segment.blend, ARRIVED))
+        if segment.blend == 0.0:
+            yield from self._arm.halt(lambda: guidance.stop_joints(guidance.limits.acceleration))
+
+    def lead(self, segment: Segment, velocity: float, most: float, near: float) -> Turns:
+        """Lead the joints or the tool to the end of a move, until the rest of the way is no longer than `near`.
+
+        The tool accelerates with `most`; both decelerate as the move does, so that they come to rest at its end.
+        """
+        guidance, deceleration = self._access.guidance, segment.acceleration
 
         def start(shaped: bool) -> int:
-            away, left = self._way(segment)
-            twist = approach(away, left, velocity, segment.acceleration)
-            if joints:
-                return guidance.move_joints(twist, guidance.limits.acceleration, shaped=shaped)
-            most = 2.0 * segment.acceleration
-            return guidance.move_tool(twist, most, most / TURN, shaped=shaped)
+            away, far = self._way(segment)
+            speed = min(velocity, math.sqrt(2.0 * deceleration * far), far / (SETTLING * PERIOD))
+            rates = away * (speed / far) if far > 0.0 else away
+            if isinstance(segment, JointSegment):
+                return guidance.move_joints(rates, guidance.limits.acceleration, shaped=shaped)
+            return guidance.move_tool(rates, most, most / TURN, shaped=shaped)
 
         def wait() -> Turns:
             yield
@@ -65,9 +64,7 @@ class ForceModeMoves:
                 self._arm.steer(start)
                 yield
 
-        yield from self._arm.guide(start, wait)
-        if segment.blend == 0.0:
-            yield from self._arm.halt(lambda: guidance.stop_joints(guidance.limits.acceleration))
+        return self._arm.guide(start, wait())
 
     def _way(self, segment: Segment) -> tuple[Floats, float]:
         """Way to the end of a move, and its length, in joints or of the tool."""

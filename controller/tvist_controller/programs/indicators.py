@@ -17,6 +17,9 @@ from tvist_urscript import EVALUATIONS, Fault
 SILENT = 5
 """Missed turns in a row after which the arm no longer keeps the velocity that was commanded last."""
 _NAME = re.compile(r"input_(int|double|bit)_register_(\d+)|input_bit_registers(\d+)_to_(\d+)")
+_BANKS: dict[str, tuple[Bank, int]] = {
+    "int": ("input_int", NUMBERS), "double": ("input_double", NUMBERS), "bit": ("input_bit", BITS)
+}  # fmt: skip
 Group = Literal["digital", "analog", "bit"]
 """What an output is: a digital terminal, an analogue one, or an output bit register."""
 
@@ -161,9 +164,9 @@ def _register(name: str) -> tuple[Bank, int]:
     kind, place, first, _ = match.groups()
     if first is not None:
         return "input_bit", int(first)
-    bank: Bank = "input_int" if kind == "int" else "input_double" if kind == "double" else "input_bit"
-    if int(place) >= (BITS if kind == "bit" else NUMBERS):
-        raise Fault(f'"{name}" does not exist: the bank has {BITS if kind == "bit" else NUMBERS} registers')
+    bank, size = _BANKS[kind]
+    if int(place) >= size:
+        raise Fault(f'"{name}" does not exist: the bank has {size} registers')
     return bank, int(place)
 
 

@@ -38,8 +38,6 @@ class StatementQueue:
         """What the next statement is compiled after: the last one, or the program; None if no program takes any."""
         self._lengths: deque[tuple[int, int]] = deque()
         """Number and length of each statement that is held."""
-        self._held = self._added = 0
-        """Characters of the statements that are held, and of those since the last that forgets."""
         self._waiting = self._ending = self._clearing = self._published = False
         self._interpreted = self._executed = self._cleared = self._forgotten = 0
 
@@ -63,7 +61,6 @@ class StatementQueue:
         if WAITS in machine.script.used:
             self._program, self.last, self._published = machine, machine.script, True
             self._lengths.clear()
-            self._held = self._added = 0
             self._waiting = self._clearing = False
             self._interpreted = self._executed = self._cleared = self._forgotten = 0
 
@@ -124,14 +121,14 @@ class StatementQueue:
         self._clearing = False
         self._cleared, self._peripherals.changed = self._executed, True
         while self._lengths and self._lengths[0][0] <= self._cleared:
-            self._held -= self._lengths.popleft()[1]
+            self._lengths.popleft()
         machine.forget(before)
 
     def _restart(self, machine: Machine) -> None:
         """Compile later statements after the program alone."""
         if self.last is not None:
             self.last = machine.script.forgetting(self.last)
-            self._forgotten, self._added = self._interpreted, 0
+            self._forgotten = self._interpreted
 
     # ------------------------------------------------------------------ for clients
 
@@ -143,8 +140,6 @@ class StatementQueue:
         self._interpreted += 1
         self._queue.append((self._interpreted, script))
         self._lengths.append((self._interpreted, len(script.text)))
-        self._held += len(script.text)
-        self._added += len(script.text)
         self.last = script
         if clears:
             self._restart(self._program)
@@ -155,9 +150,10 @@ class StatementQueue:
 
         Those that are held until they are forgotten have room for twice as many, since a client need not wait for that.
         """
-        added = self._interpreted - self._forgotten >= MAX_STATEMENTS or self._added + length > MAX_SCRIPT
-        held = len(self._lengths) >= HELD * MAX_STATEMENTS or self._held + length > HELD * MAX_SCRIPT
-        if held or (added and not clears):
+        held = [characters for _, characters in self._lengths]
+        added = [characters for number, characters in self._lengths if number > self._forgotten]
+        full = len(held) >= HELD * MAX_STATEMENTS or sum(held) + length > HELD * MAX_SCRIPT
+        if full or ((len(added) >= MAX_STATEMENTS or sum(added) + length > MAX_SCRIPT) and not clears):
             taken = f"{MAX_STATEMENTS} statements or {MAX_SCRIPT} characters"
             why = f"the program has taken {taken}: clear them with {CLEAR}()"
             raise RefusalError("busy", "text", why, MAX_STATEMENTS)

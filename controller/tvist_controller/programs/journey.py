@@ -97,7 +97,8 @@ class Journey:
         """True after a call of `abort`; a motion that was being planned then is not started."""
         self.over = False
         """Whether there is nothing more to do."""
-        self._fault: Exception | None = None
+        self.fault: Exception | None = None
+        """What has gone wrong, which its thread raises."""
         self._steps: Turns | None = None
         self._marks: list[tuple[int, float]] = []
         """Where the blend at the end of each move under way begins, see `PlannedMove.marks`."""
@@ -129,12 +130,6 @@ class Journey:
         """Whether it is under way."""
         return self._steps is not None
 
-    def raise_fault(self) -> None:
-        """Raise what has gone wrong, in the thread that it concerns."""
-        fault, self._fault = self._fault, None
-        if fault is not None:
-            raise fault
-
     def hand_over(self) -> list[tuple[Segment, list[Effect]]]:
         """Leave the rest of the moves to another, with what the program does after each of them."""
         self.over = True
@@ -158,7 +153,7 @@ class Journey:
         except StopIteration:
             self.over = True
         except Exception as fault:  # noqa: BLE001  the thread that it concerns raises it again
-            self.over, self._fault = True, fault
+            self.over, self.fault = True, fault
 
     def _travel(self) -> Turns:
         while self.legs:
@@ -240,13 +235,13 @@ class Journey:
         ticks = FURTHER + FURTHER_PER_PART * len(legs)
         ordered = self._access.plans.further(command_of(legs, goes_on=True), (ticks + SPARE) * PERIOD)
         if ordered is not None:
-            self._further = ordered, self._tick + ticks, len(legs)
+            self._further = ordered, self._access.latest().tick + ticks, len(legs)
 
     def _take(self) -> bool:
         """Take the plan of further moves when it is due; return whether more may be ordered."""
         assert self._further is not None
         ordered, due, count = self._further
-        if self._tick < due:
+        if self._access.latest().tick < due:
             return False
         plan, self._further = ordered(), None
         if not self._access.plans.hold(plan):  # what it depends on has changed
@@ -272,10 +267,6 @@ class Journey:
         for each in effects:
             for effect in each:
                 effect()
-
-    @property
-    def _tick(self) -> int:
-        return self._access.latest().tick
 
     def _check_ready(self) -> None:
         with refusals_as_faults():

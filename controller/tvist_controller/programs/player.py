@@ -31,7 +31,6 @@ MAX_BESIDE = 8
 @dataclass(frozen=True, eq=False)
 class _Running:
     name: str
-    script: Script
     machine: Machine
     origin: str | None
     """Address of the machine that sent and started it; None if it is unknown, or if these are two machines."""
@@ -233,7 +232,7 @@ class ProgramPlayer:
             self._fail(running, error)
         self.popups.close(running.machine)
         self.sockets.close(running.machine)
-        secondary = running.script.secondary or None
+        secondary = running.machine.script.secondary or None
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
             self._main, self.state, self.line, self.label = None, "STOPPED", 0, None
@@ -287,7 +286,7 @@ class ProgramPlayer:
 
     def _begin(self, script: Script, name: str, origin: str | None) -> _Running:
         machine = Machine(script, self._functions, finish=self.arm.finish)
-        running = _Running(name, script, machine, origin)
+        running = _Running(name, machine, origin)
         self._all.append(running)
         self.idle = False
         self._emit("program_started", program=name, secondary=script.secondary or None)

@@ -5,10 +5,11 @@ The network is the host's: it gets orders after programs had their turn. What ha
 no network: it is part of the simulation, and answers a tick later.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import ceil
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from tvist_controller.cell.gripper import Requests
 from tvist_controller.cell.live_cell import LiveCell
@@ -119,12 +120,16 @@ class SocketPorts:
 class _Socket:
     number: int
     received: bytearray = field(default_factory=bytearray)
-    opening: bool = True
-    connected: bool = False
-    """True once it was open; the other side may have closed it since."""
+    connected: bool | None = None
+    """Whether it was opened; None as long as that is not known."""
     open: bool = False
+    """Whether it is connected still."""
     requests: Requests | None = None
     """What the program has sent to the gripper of the cell; None for a socket of the network."""
+
+    def shut(self) -> None:
+        """Note that it is open no more, or that it could not be opened."""
+        self.connected, self.open = bool(self.connected), False
 
 
 class Sockets:
@@ -163,11 +168,11 @@ class Sockets:
             return
         match news.change:
             case "opened":
-                socket.opening, socket.connected, socket.open = False, True, True
+                socket.connected = socket.open = True
             case "received":
                 socket.received += news.data
             case _:
-                socket.opening = socket.open = False
+                socket.shut()
 
     def answer(self) -> None:
         """Pass on what the gripper has answered in the last tick."""
@@ -190,22 +195,22 @@ class Sockets:
         socket = self._named[owner, name] = self._numbered[self._last] = _Socket(self._last)
         if self._cell is not None and self._cell.reaches(address, port):
             socket.requests = Requests()
-            socket.opening, socket.connected, socket.open = False, True, True
+            socket.connected = socket.open = True
             yield
             return True
         self.orders.append(Open(socket.number, self._origin(), address, port))
-        wait = self._begin(socket)
         try:
-            while socket.opening:
-                yield
+            with self._waiting(socket):
+                while socket.connected is None:
+                    yield
         finally:
-            self._end(wait, socket)
             if not socket.connected and self._named.get((owner, name)) is socket:
                 self._drop(owner, name)
-        if not socket.connected:
-            why = f'socket_open: "{name[:60]}" has no connection to {address[:60]} port {port}'
-            self._emit("warning", why=readable(why))
-        return socket.connected
+        if socket.connected:
+            return True
+        why = f'socket_open: "{name[:60]}" has no connection to {address[:60]} port {port}'
+        self._emit("warning", why=readable(why))
+        return False
 
     def disconnect(self, name: str) -> None:
         """Close a socket of the program; nothing happens if there is none of this name."""
@@ -217,19 +222,18 @@ class Sockets:
         socket = self._named.get((self._owner(), name))
         return socket is not None and socket.open
 
-    def send(self, name: str, data: bytes) -> bool:
-        """Send bytes; return whether the socket is open."""
+    def send(self, name: str, data: bytes) -> None:
+        """Send bytes; nothing happens if the socket is not open."""
         socket = self._named.get((self._owner(), name))
         if socket is None or not socket.open:
-            return False
+            return
         if socket.requests is not None and self._cell is not None:
             for request in socket.requests.cut(data):
                 self._answers.append((socket, self._cell.answer(request)))
         self._order(socket, Send(socket.number, data))
-        return True
 
     def read(
-        self, name: str, take: Take[T], timeout: float, meanwhile: Callable[[int], Generator[None, None, Any]]
+        self, name: str, take: Take[T], timeout: float, meanwhile: Callable[[int], None]
     ) -> Generator[None, None, T | None]:
         """Read from a socket what `take` finds, and wait until it has arrived.
 
@@ -246,8 +250,8 @@ class Sockets:
         if found is not None:
             return found[0]
         last = ceil(timeout / PERIOD - 1e-9)
-        wait, waited = self._begin(socket), 0
-        try:
+        waited = 0
+        with self._waiting(socket) as wait:
             while True:
                 yield
                 waited += 1
@@ -260,9 +264,7 @@ class Sockets:
                     if socket.requests is not None:
                         return None
                     self.orders.append(Expire(wait, socket.number, timeout))
-                yield from meanwhile(waited)
-        finally:
-            self._end(wait, socket)
+                meanwhile(waited)
 
     def close(self, owner: Machine) -> None:
         """Close all sockets of a program, which has ended."""
@@ -282,15 +284,17 @@ class Sockets:
                 self._order(socket, Taken(socket.number, found[1]))
         return found
 
-    def _begin(self, socket: _Socket) -> int:
-        self._last_wait += 1
-        self._waits[self._last_wait] = False
-        self._order(socket, Wait(self._last_wait, socket.number))
-        return self._last_wait
-
-    def _end(self, wait: int, socket: _Socket) -> None:
-        del self._waits[wait]
-        self._order(socket, Waited(wait))
+    @contextmanager
+    def _waiting(self, socket: _Socket) -> Iterator[int]:
+        """Wait for a socket; the number of the wait is returned."""
+        self._last_wait = wait = self._last_wait + 1
+        self._waits[wait] = False
+        self._order(socket, Wait(wait, socket.number))
+        try:
+            yield wait
+        finally:
+            del self._waits[wait]
+            self._order(socket, Waited(wait))
 
     def _order(self, socket: _Socket, order: SocketOrder) -> None:
         """Give an order to the network, unless the socket is one of the gripper."""
@@ -300,5 +304,5 @@ class Sockets:
     def _drop(self, owner: Machine, name: str) -> None:
         socket = self._named.pop((owner, name))
         del self._numbered[socket.number]
-        socket.opening = socket.open = False
+        socket.shut()
         self._order(socket, Close(socket.number))

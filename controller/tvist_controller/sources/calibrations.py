@@ -13,6 +13,7 @@ import pinocchio as pin
 from msgspec import structs
 
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.joint_controllers import described_friction
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import FlexibleModel, Floats, flexible_model
@@ -31,6 +32,7 @@ from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 from tvist_shaping.estimators.polynomial import Polynomial
+from tvist_shaping.filter import TvistFilter
 
 _FILES = resources.files(__package__)
 FRICTION: tuple[Quantity, ...] = (
@@ -145,8 +147,24 @@ def elastic_feed_forward(
         np.array(springs.damping) / stiffness,
         tvist.period,
         torques=tvist.feed_forward == "elastic",
-        law=friction_law(parameters, description),
+        law=known_friction(tvist, description, calibration),
     )
+
+
+def known_friction(
+    tvist: Filter | None, description: RobotDescription, calibration: Calibration | None
+) -> Floats | None:
+    """Return the friction that is fed forward in full with a filter, see `LAWS`; None for a share of Coulomb friction.
+
+    If the robot file says how the motors stick, it is that of the file. Unshaped, for which the filter is None, and
+    with the paper's filter it is not, since the tails of Table 2 are what a share of Coulomb friction leaves.
+    Otherwise it is what was identified.
+    """
+    plain = tvist is None or isinstance(tvist, TvistFilter)
+    described = None if plain else described_friction(description)
+    if described is not None or calibration is None or calibration.modal is None:
+        return described
+    return friction_law(calibration.modal.parameters, description)
 
 
 def _modal(calibration: Calibration, description: RobotDescription) -> ModalModel:

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from tvist_controller.sources.calibrations import available, estimator_of, friction_law, load, modal_estimator
+from tvist_controller.sources.calibrations import available, estimator_of, load, modal_estimator
 from tvist_plant.description import RobotDescription, fingerprint
-from tvist_plant.model import Floats
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
@@ -42,12 +41,6 @@ class ModeSource:
         """Whether the calibration was measured on the arm of the robot file; None if the calibration does not say."""
         measured = None if self.calibration is None else self.calibration.provenance.arm
         return None if measured is None else measured == fingerprint(self.description)
-
-    @cached_property
-    def friction(self) -> Floats | None:
-        """Identified friction of the joints, see `friction_law`; None if the calibration has none."""
-        modal = None if self.calibration is None else self.calibration.modal
-        return None if modal is None else friction_law(modal.parameters, self.description)
 
     @property
     def most(self) -> int:

@@ -13,7 +13,7 @@ from tvist_client.transports.session import close_session, open_session
 from tvist_lab.bench.one_robot import missed_share
 from tvist_lab.served import ServedError, served
 from tvist_protocol import keys
-from tvist_protocol.codec import decode_telemetry
+from tvist_protocol.codec import decode
 from tvist_protocol.stream import Telemetry
 
 NUMBERS = (1, 2, 4, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64)
@@ -62,7 +62,7 @@ async def _worst_share(number: int, seconds: float, options: Sequence[str]) -> f
 
     def on_telemetry(sample: zenoh.Sample) -> None:
         told = heard[str(sample.key_expr)]
-        told.append(decode_telemetry(sample.payload.to_bytes()))
+        told.append(decode(Telemetry, sample.payload.to_bytes()))
         if len(heard) == number and all(len(one) > SETTLE + seconds for one in heard.values()):
             loop.call_soon_threadsafe(enough.set)
 

@@ -53,7 +53,7 @@ def line_tick(shaper: str) -> Run:
     """Return what measures a tick of the whole line, from messages to encoded states, with a shaper by its name.
 
     Raises:
-        ConfigError: There is no such shaper.
+        StartError: There is no such shaper.
     """
     host, token, send = _robot(shaper)
     host.subscribe("state", len)

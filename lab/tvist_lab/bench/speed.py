@@ -28,7 +28,7 @@ def speed(seconds: float, shaper: str, tell: Callable[[str], None]) -> dict[str,
         tell: Called with a description of each measurement before it starts.
 
     Raises:
-        ConfigError: There is no such shaper.
+        StartError: There is no such shaper.
     """
     result: dict[str, Any] = {
         "machine": msgspec.to_builtins(this_machine()),

@@ -24,10 +24,10 @@ from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration
 from tvist_lab.recordings import Floats, Recording, RecordingError
 from tvist_lab.recordings.export import FOXGLOVE, ExportError, written_by
 from tvist_lab.recordings.mcap_file import RecordingFile
-from tvist_lab.recordings.mcap_records import DAMAGE, opened, ring_records
+from tvist_lab.recordings.mcap_records import DAMAGE, all_records, opened
 from tvist_lab.whole_file import whole_file
 from tvist_plant.robot_tables import Body
-from tvist_protocol.recorded import TICK_NS, topics
+from tvist_protocol.recorded import END_METADATA, TICK_NS, topics
 from tvist_protocol.stream import State
 
 PICTURE_TICKS = 10
@@ -75,7 +75,7 @@ def export(content: RecordingFile, path: Path) -> list[str]:
     ]
     try:
         with whole_file(path) as stream:
-            _write(merge(*own, _recorded(content.path, above), key=itemgetter(0)), stream)
+            _write(merge(*own, _recorded(content, above), key=itemgetter(0)), stream)
         with whole_file(written_by(path, FOXGLOVE)[1]) as stream:
             stream.write(_layout(content.robot, arm).encode())
     except OSError as error:
@@ -113,14 +113,14 @@ def _write(entries: Iterator[_Entry], stream: IO[bytes]) -> None:
     writer.finish()  # type: ignore[no-untyped-call]
 
 
-def _recorded(path: Path, above: str) -> Iterator[_Entry]:
-    """Yield what a file holds, up to a damage of it, but the channels of an export."""
+def _recorded(content: RecordingFile, above: str) -> Iterator[_Entry]:
+    """Yield what a recording holds, up to a damage, but the channels of an export."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, tuple[str, Schema | None]] = {}
-    told: set[str] = set()
+    told = {END_METADATA}
     time = 0
-    with suppress(*DAMAGE), opened(path) as streams:
-        for record in ring_records(streams):
+    with suppress(*DAMAGE), opened(content.files) as streams:
+        for record in all_records(streams):
             match record:
                 case Schema(id=number):
                     schemas[number] = record
@@ -128,9 +128,12 @@ def _recorded(path: Path, above: str) -> Iterator[_Entry]:
                     channels[number] = topic, schemas.get(record.schema_id)
                 case Message(channel_id=number, log_time=time) if number in channels:
                     yield time, *channels[number], record
-                case Metadata(name=name) if name not in told:  # that of a ring's older file comes first
+                case Metadata(name=name) if name not in told:  # that of the first segment counts
                     told.add(name)
                     yield time, "", None, record
+    if content.dropped is not None:
+        counts = {kind: str(count) for kind, count in content.dropped.items()}
+        yield time, "", None, Metadata(name=END_METADATA, metadata=counts)
 
 
 def _schema_of(example: Any) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from tvist_plant.foreign import check_unpaced
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.programs import ProgramClosePopup
-from tvist_server.config import ConfigError
+from tvist_server.option_values import StartError
 from tvist_server.recording.recorder import Recorder
 
 ATTEND_EVERY = 50
@@ -46,13 +46,13 @@ def run_in_lockstep(
         InputError: An input is wrong.
         RefusedError: The robot refuses the program.
         RecorderError: The recording cannot be written.
-        ConfigError: The setup is invalid, or its plant cannot be made or gives the tick.
+        StartError: The setup is invalid, or its plant cannot be made or gives the tick.
     """
     try:
         controller = Controller(setup)
         check_unpaced(controller.cycle.plant)
     except ValueError as error:
-        raise ConfigError(str(error)) from error
+        raise StartError(str(error)) from error
     waiting: list[Command] = []
     watch = ProgramWatch(
         controller, lambda: waiting.append(ProgramClosePopup()), _nothing, timeout=timeout, alone=True
@@ -67,9 +67,8 @@ def run_in_lockstep(
         try:
             start(lambda command: host.request(encode(command)), text, inputs)
         except BaseException:
-            if record is not None:  # nothing was recorded: the empty file would only block the next attempt
-                recorder.close()
-                record.unlink(missing_ok=True)
+            if record is not None:
+                recorder.discard()
             raise
         try:
             while not watch.over:

@@ -32,7 +32,7 @@ class ProgramServer:
         prepare: What takes long before the robot is made, see `Server`.
 
     Raises:
-        ConfigError: The configuration is invalid.
+        StartError: The configuration is invalid.
         RecorderError: The recording cannot be written.
         GatewayError: The server cannot listen on an endpoint.
         InputError: An input is wrong.

@@ -1,6 +1,7 @@
-"""Reader of recordings: MCAP files of one robot, complete or truncated."""
+"""Reader of recordings of one robot: an MCAP file or several segments, complete or truncated."""
 
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +13,7 @@ from mcap.records import Channel, McapRecord, Message, Metadata
 
 from tvist_lab.recordings.checks import check_names, check_recording
 from tvist_lab.recordings.json_columns import Block, JsonColumns
-from tvist_lab.recordings.mcap_records import CUT, DAMAGE, MAGIC, TOPIC, opened, ring_records
+from tvist_lab.recordings.mcap_records import CUT, DAMAGE, MAGIC, TOPIC, all_records, files_of, opened
 from tvist_lab.recordings.recorded_columns import recording_of_blocks
 from tvist_lab.recordings.recording import Recording, RecordingError
 from tvist_protocol.channels import tag
@@ -45,7 +46,9 @@ class RecordingFile:
     """Content of a recording."""
 
     path: Path
-    """The file."""
+    """The file, folder or pattern that names it."""
+    files: tuple[Path, ...]
+    """Its files in order."""
     robot: str
     """Name of the robot."""
     info: Info | None
@@ -106,7 +109,7 @@ class RecordingFile:
         """
         count = self.counts[tag(kind)]
         found = 0
-        for message in islice(_again(self.path, (kind,)), count):
+        for message in islice(_again(self.files, (kind,)), count):
             assert isinstance(message, kind)
             found += 1
             yield message
@@ -120,7 +123,7 @@ class RecordingFile:
             RecordingFileError: The file cannot be read any more.
         """
         left = self.counts[tag(State)]
-        for message in _again(self.path, (State, Truth, Event, Io)):
+        for message in _again(self.files, (State, Truth, Event, Io)):
             left -= isinstance(message, State)
             if left < 0:
                 return
@@ -132,20 +135,24 @@ class RecordingFile:
 def read(path: str | os.PathLike[str]) -> RecordingFile:
     """Read a recording. A truncated or damaged file is read up to the damage, which `note` reports.
 
+    Args:
+        path: A file, or a folder or pattern that names the segments of one recording.
+
     Raises:
         RecordingFileError: The file cannot be opened, is not an MCAP file, or contains no state or the states of
             several robots.
+        RecordingError: A folder or pattern names no recording, or several.
     """
     path = Path(path)
-    content = _Content(path)
+    content = _Content(path, files_of(path))
     try:
-        with opened(path) as streams:
-            if (first := streams[-1].read(len(MAGIC))) != MAGIC:
-                raise RecordingFileError(f"{path} is {'no MCAP file' if first else 'empty'}")
-            streams[-1].seek(0)
+        with opened(content.files) as streams:
+            if (first := streams[0].read(len(MAGIC))) != MAGIC:
+                raise RecordingFileError(f"{content.files[0]} is {'no MCAP file' if first else 'empty'}")
+            streams[0].seek(0)
             content.read(streams)
     except OSError as error:
-        raise RecordingFileError(f"{path} cannot be read: {error.strerror}") from error
+        raise RecordingFileError(f"{error.filename or path} cannot be read: {error.strerror}") from error
     return content.file()
 
 
@@ -156,13 +163,13 @@ def read_checked(path: str | os.PathLike[str]) -> RecordingFile:
     return content
 
 
-def _again(path: Path, kinds: Sequence[type[Published]]) -> Iterator[Published]:
-    """Read messages of some kinds up to the end or a damage of the file."""
+def _again(files: Sequence[Path], kinds: Sequence[type[Published]]) -> Iterator[Published]:
+    """Read messages of some kinds up to the end or a damage of the files."""
     readers: dict[str, JsonReader[Published]] = {tag(kind): JsonReader(kind) for kind in kinds}
     channels: dict[int, JsonReader[Published]] = {}
     try:
-        with opened(path) as streams:
-            for record in ring_records(streams):
+        with opened(files) as streams:
+            for record in all_records(streams):
                 match record:
                     case Message(channel_id=channel, data=data) if channel in channels:
                         yield channels[channel].read(data)
@@ -171,7 +178,7 @@ def _again(path: Path, kinds: Sequence[type[Published]]) -> Iterator[Published]:
                         if found is not None and found["kind"] in readers:
                             channels[record.id] = readers[found["kind"]]
     except OSError as error:
-        raise RecordingFileError(f"{path} cannot be read: {error.strerror}") from error
+        raise RecordingFileError(f"{error.filename} cannot be read: {error.strerror}") from error
     except (*DAMAGE, ProtocolError):
         return
 
@@ -181,7 +188,10 @@ class _Content:
     """Content read so far."""
 
     path: Path
+    files: tuple[Path, ...]
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    ends: list[dict[str, str]] = field(default_factory=list)
+    """What each closed file says at its end."""
     tables: dict[str, JsonColumns] = field(
         default_factory=lambda: {name: JsonColumns(kind) for name, kind in _TABLES.items()}
     )
@@ -205,7 +215,7 @@ class _Content:
 
     def _read(self, streams: Sequence[IO[bytes]]) -> None:
         try:
-            for record in ring_records(streams):
+            for record in all_records(streams):
                 self._take(record)
         except RecordingFileError:
             raise
@@ -229,6 +239,7 @@ class _Content:
         truths, io = (self.tables[tag(kind)].all() if counts[tag(kind)] else None for kind in (Truth, Io))
         return RecordingFile(
             path=self.path,
+            files=self.files,
             robot=self.robot,
             info=info,
             start=start,
@@ -256,7 +267,9 @@ class _Content:
                 self._open(record)
             case Metadata(name=name, metadata=content):
                 self._decode()
-                self.metadata.setdefault(name, content)  # a ring's older file comes first
+                self.metadata.setdefault(name, content)  # that of the first segment counts
+                if name == END_METADATA:
+                    self.ends.append(content)
                 if name == METADATA and content.get("format") != FORMAT:
                     raise self._error(f"has format {content.get('format')}; {FORMAT} can be read")
 
@@ -306,9 +319,13 @@ class _Content:
         self.channels.setdefault(channel.id, found["kind"])
 
     def _dropped(self) -> dict[str, int] | None:
-        counts = self.metadata.get(END_METADATA)
+        if len(self.ends) < len(self.files):
+            return None
+        dropped = Counter[str]()
         try:
-            return None if counts is None else {kind: int(count) for kind, count in counts.items()}
+            for counts in self.ends:
+                dropped.update({kind: int(count) for kind, count in counts.items()})
+            return dict(dropped)
         except ValueError as error:
             raise self._error(f"has no valid {END_METADATA}: {error}") from error
 

@@ -1,4 +1,4 @@
-"""Records of an MCAP file in order, complete or truncated, and of the two files of a ring."""
+"""Records of an MCAP file in order, complete or truncated, and of a recording that consists of several."""
 
 import re
 import struct
@@ -6,9 +6,6 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from io import BytesIO
-from itertools import islice
-from os import fstat
-from os.path import samestat
 from pathlib import Path
 from typing import IO
 
@@ -17,13 +14,12 @@ from lz4.frame import LZ4FrameDecompressor
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader
 from zstandard import ZstdError, frame_content_size
 
-from tvist_protocol.channels import tag
-from tvist_protocol.recorded import METADATA, RING, earlier_name
-from tvist_protocol.stream import State
+from tvist_lab.recordings.recording import RecordingError
+from tvist_protocol.recorded import segment_name, segment_of
 
 MAGIC = b"\x89MCAP0\r\n"
 """First bytes of every MCAP file."""
@@ -43,8 +39,8 @@ _MESSAGE = struct.Struct("<HIQQ")
 """Beginning of a message: its channel, number and two times."""
 TOPIC = re.compile(r"tvist/(?P<robot>[^/]+)/(?P<kind>\w+)")
 """Topic of a robot's channel."""
-BEFORE_METADATA = 3
-"""Number of records at the beginning of a file among which is the metadata of a recording."""
+WILD = "*?["
+"""Characters that make a pattern of a name."""
 
 
 class _Records(StreamReader):
@@ -119,59 +115,75 @@ def _unpacked(chunk: Chunk) -> bytes:
     return data
 
 
-@contextmanager
-def opened(path: Path) -> Iterator[Sequence[IO[bytes]]]:
-    """Open a recording, and before it the file with its older part if there is one.
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return the files of the recording that a path names, in order.
 
-    The newer file is opened first: if it takes the older one's place meanwhile, both are the same, and nothing between
-    them is missed.
+    Args:
+        path: A file; a folder; a pattern, such as `run-2-part*.mcap`; or, if there is no such file, the name of a
+            recording with segments, for those of its latest run.
+
+    Raises:
+        RecordingError: These are files of several recordings, or none, or a segment between two is missing; the message
+            names them.
+    """
+    if path.is_dir():
+        found = list(path.glob("*.mcap"))
+    elif path.exists():
+        return (path,)
+    else:
+        segments = [(segment_of(file.name), file) for file in path.parent.glob("*")]
+        runs = {segment[1] for segment, _ in segments if segment is not None and segment[0] == path.name}
+        found = [
+            file for segment, file in segments if segment and segment[:2] == (path.name, max(runs, default=0))
+        ]
+        if not found and not any(char in path.name for char in WILD):
+            return (path,)
+        found = found or list(path.parent.glob(path.name))
+    names = sorted({_run_of(file) for file in found})
+    if len(names) != 1:
+        several = f"{len(names)} recordings, {', '.join(names)}: give one of them"
+        there = several if names else "no recording: no MCAP file is there"
+        raise RecordingError(f"{path} names {there}")
+    files = tuple(sorted(found, key=lambda file: (len(file.name), file.name)))
+    numbers = [segment[2] for file in files if (segment := segment_of(file.name)) is not None]
+    if missing := sorted({*range(numbers[0], numbers[-1])} - {*numbers}) if numbers else []:
+        raise RecordingError(
+            f"{path} lacks segment {missing[0]} of {names[0]}: give the files before or behind it"
+        )
+    return files
+
+
+def _run_of(file: Path) -> str:
+    """Name what a file belongs to, with a pattern if it is a segment."""
+    segment = segment_of(file.name)
+    return file.name if segment is None else segment_name(*segment[:2], None)
+
+
+@contextmanager
+def opened(files: Sequence[Path]) -> Iterator[Sequence[IO[bytes]]]:
+    """Open the files of a recording together: the oldest, which may be deleted meanwhile, can then be read to its end.
 
     Raises:
         OSError: A file cannot be opened.
     """
     with ExitStack() as stack:
-        newer = stack.enter_context(path.open("rb"))
-        earlier = path.with_name(earlier_name(path.name))
-        if not _is_ring(newer) or not earlier.exists():
-            yield (newer,)
-            return
-        older = stack.enter_context(earlier.open("rb"))
-        yield (newer,) if samestat(fstat(newer.fileno()), fstat(older.fileno())) else (older, newer)
+        streams = []
+        for file in files:
+            try:
+                streams.append(stack.enter_context(file.open("rb")))
+            except FileNotFoundError:
+                if file == files[-1]:
+                    raise
+        yield streams
 
 
-def ring_records(streams: Sequence[IO[bytes]]) -> Iterator[McapRecord]:
-    """Yield the records of one file after those of the other.
-
-    While both are joined, the older one also contains messages of the newer one: those up to its last state are left
-    out of the newer one. A damage of the older file is raised when both have been read.
-    """
-    last, damage = -1, None
-    for stream in streams[:-1]:
-        channels: set[int] = set()
+def all_records(streams: Sequence[IO[bytes]]) -> Iterator[McapRecord]:
+    """Yield the records of files one after the other; a damage is raised when all have been read."""
+    damage = None
+    for stream in streams:
         try:
-            for record in records(stream):
-                match record:
-                    case Message(channel_id=channel, log_time=time) if channel in channels:
-                        last = time
-                    case Channel(id=channel, topic=topic):
-                        found = TOPIC.fullmatch(topic)
-                        if found is not None and found["kind"] == tag(State):
-                            channels.add(channel)
-                yield record
+            yield from records(stream)
         except DAMAGE as error:
             damage = error
-    for record in records(streams[-1]):
-        if not isinstance(record, Message) or record.log_time > last:
-            yield record
     if damage is not None:
         raise damage
-
-
-def _is_ring(stream: IO[bytes]) -> bool:
-    try:
-        first = list(islice(records(stream), BEFORE_METADATA))
-    except DAMAGE:
-        return False
-    finally:
-        stream.seek(0)
-    return any(isinstance(r, Metadata) and r.name == METADATA and RING in r.metadata for r in first)

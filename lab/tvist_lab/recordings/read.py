@@ -5,6 +5,7 @@ from pathlib import Path
 
 from tvist_lab.recordings.log_columns import ROBOT, Needs
 from tvist_lab.recordings.mcap_records import MAGIC as MCAP
+from tvist_lab.recordings.mcap_records import files_of
 from tvist_lab.recordings.packed import GZIP, content
 from tvist_lab.recordings.recording import Recording, RecordingError
 from tvist_plant.user_file import UserFileError, check_is_file
@@ -22,7 +23,7 @@ def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs 
     UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
 
     Args:
-        path: The file.
+        path: The file; or a folder, or a pattern such as `run-2-part*.mcap`, with the segments of one recording.
         columns: How a CSV, or a table of another program, names what is needed, as in `time=t:ms,q=joint_{}:deg`; see
             `named_columns.named`.
         needs: What a log must have.
@@ -44,8 +45,9 @@ def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs 
 
 
 def _read(path: Path, names: str | None, needs: Needs) -> Recording:
-    if path.is_dir():
-        return _read(_bag(path), names, needs)
+    if len(files := files_of(path)) > 1:
+        return _read_mcap(path, needs)
+    (path,) = files
     named = _named(path, needs, names)
     if named is not None:
         used = names is None or path.suffix.lower() in TABLES
@@ -80,14 +82,6 @@ def _named(path: Path, needs: Needs, names: str | None) -> Recording | None:
     return None
 
 
-def _bag(folder: Path) -> Path:
-    """Return the one MCAP file of a rosbag2 folder."""
-    files = sorted(folder.glob("*.mcap"))
-    if len(files) != 1:
-        raise RecordingError(f"{folder} is a directory with {len(files)} files *.mcap: give one of them")
-    return files[0]
-
-
 def _read_mcap(path: Path, needs: Needs) -> Recording:
     from tvist_lab.recordings import mcap_file
 
@@ -96,7 +90,7 @@ def _read_mcap(path: Path, needs: Needs) -> Recording:
     except mcap_file.RecordingFileError as error:
         from tvist_lab.recordings.rosbag import has_ros, read_rosbag
 
-        if not has_ros(path):
+        if not path.is_file() or not has_ros(path):
             raise error from None
         return read_rosbag(path, needs)
     recording = content.recording

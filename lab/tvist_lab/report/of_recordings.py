@@ -23,6 +23,7 @@ from tvist_lab.metrics import (
 )
 from tvist_lab.metrics.columns import number
 from tvist_lab.recordings import Recording, read
+from tvist_lab.recordings.mcap_records import files_of
 from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
 from tvist_lab.report.verdict import shaping_of, verdict_on_one, verdict_on_pairs, verdict_on_two
 from tvist_lab.words import counted
@@ -229,13 +230,18 @@ def _missing(files: Sequence[_File], panels: Sequence[Shown]) -> list[str]:
     return items
 
 
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
 def _provenance(file: _File) -> Mapping[str, str]:
     recording = file.measured.recording
     facts = {"File": str(file.path)}
-    if file.path.is_file():
-        with file.path.open("rb") as stream:
-            facts["SHA-256"] = hashlib.file_digest(stream, "sha256").hexdigest()
-        facts["Size"] = f"{file.path.stat().st_size} bytes"
+    there = [place for place in files_of(file.path) if place.is_file()]
+    if there:
+        facts["SHA-256"] = ", ".join(_sha256(place) for place in there)
+        facts["Size"] = f"{sum(place.stat().st_size for place in there)} bytes"
     facts["Rows"] = (
         f"{len(recording)}, one every {1e3 * recording.period:g} ms, from {recording.time[0]:.3f} to "
         f"{recording.time[-1]:.3f} s; {recording.missing_ticks} are missing"

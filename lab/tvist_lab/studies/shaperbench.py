@@ -1,8 +1,9 @@
-"""ShaperBench: all methods on thirteen arms with the same random moves and wrong payloads, and round corners."""
+"""ShaperBench: all methods on fifteen arms with the same random moves and wrong payloads, and round corners."""
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,8 +19,15 @@ from tvist_lab.study.shaping import ShaperFaultError
 from tvist_lab.study.work import FAILED, Job, Row, measure_each
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
-from tvist_plant.variants import Variant
+from tvist_plant.variants import HEAVIER, Variant, rubbed
 
+STICKS = "ur5e_stiction"
+"""The robot file of the arms whose motors stick; with its own calibration it is all that their controller knows."""
+STICKING = (
+    Variant("stiction", "motors that stick near standstill, as the controller knows"),
+    Variant("more_stiction", "motors that stick more than the controller knows", partial(rubbed, HEAVIER)),
+)
+"""These arms."""
 PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
 """Errors of the declared mass [-]."""
 WANTED = (

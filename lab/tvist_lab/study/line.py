@@ -122,6 +122,7 @@ class ControlLine:
         shaped: Floats,
         delay: float = 0.0,
         elastic: ElasticFeedForward | None = None,
+        law: Floats | None = None,
     ) -> "Following":
         """Return what any arm's drives get while they follow a shaped reference from rest, and rest for a while.
 
@@ -130,9 +131,10 @@ class ControlLine:
             shaped: The reference that the arm follows, shape (T', n) [rad].
             delay: Delay that the shaper declares [s].
             elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
+            law: Friction that the drives are fed forward in this motion; None for that of the line.
         """
         ticks = RESTING + max(len(shaped), len(reference)) + round(REST / PERIOD)
-        driven = self._line.drive(self._start, shaped, ticks, RESTING, elastic)
+        driven = self._line.drive(self._start, shaped, ticks, RESTING, elastic, law)
         return Following(self._start, reference, driven, delay)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tvist_controller.api.line import ElasticFeedForward, MotionLimits
+from tvist_controller.api.line import MotionLimits
 from tvist_lab.recordings import Floats
 from tvist_lab.study.line import PAPER, lengthened, point_to_point
 from tvist_lab.study.moves import Move
@@ -87,14 +87,14 @@ class Stepping(Method):
     def stepper(self, task: Task) -> RunningShaper:
         """Return the shaper, at rest at the start."""
 
-    def elastic(self, task: Task) -> ElasticFeedForward | None:  # noqa: ARG002  most do without
-        """Return the elastic feed-forward that the drives need; None for that of the paper's controller."""
-        return None
-
     def shaped(self, task: Task) -> Shaped:
         """Shape the reference."""
         found = shape(self.stepper(task), task.reference, watched=not task.as_served)
-        return replace(found, elastic=self.elastic(task))
+        return self.driven(found, task)
+
+    def driven(self, found: Shaped, task: Task) -> Shaped:  # noqa: ARG002  most do without
+        """Return a shaped reference with the feed-forward that the drives need for it."""
+        return found
 
 
 @dataclass(frozen=True)
@@ -116,18 +116,19 @@ class Named(Stepping):
         """Return the filter, reset and given the target."""
         return _from_rest(self.recipe.make(task.description, task.move.mass), task)
 
-    def elastic(self, task: Task) -> ElasticFeedForward | None:
-        """Return what the filter needs."""
-        tvist = self.recipe.make(task.description, task.move.mass)
-        return None if self.alone else self.recipe.elastic(task.description, tvist)
+    def driven(self, found: Shaped, task: Task) -> Shaped:
+        """Add what the filter needs, and the friction that is fed forward with it."""
+        description = task.description
+        tvist = self.recipe.make(description, task.move.mass)
+        elastic = None if self.alone else self.recipe.elastic(description, tvist)
+        return replace(found, elastic=elastic, law=self.recipe.friction(description, tvist))
 
     def shaped(self, task: Task) -> Shaped:
         """Shape the reference, or a motion that is planned for the filter as a robot plans it."""
         if task.stream or not task.as_served:
             return super().shaped(task)
         tvist, own = own_move(self.recipe, task.description, task.move, task.limits)
-        elastic = None if self.alone else self.recipe.elastic(task.description, tvist)
-        return replace(shape(Running(tvist), own, watched=False), elastic=elastic)
+        return self.driven(shape(Running(tvist), own, watched=False), task)
 
 
 @dataclass(frozen=True)

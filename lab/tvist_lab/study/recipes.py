@@ -14,6 +14,7 @@ from tvist_controller.api.line import (
     choose_filter,
     elastic_feed_forward,
     keeping_motion,
+    known_friction,
     paper_payload,
     wanted_modes,
 )
@@ -54,26 +55,12 @@ class Mistaken(Estimator):
 
     def __init__(self, right: Estimator, error: float) -> None:
         self._right, self._factor = right, 1.0 + error
+        self.modes, self.f_d_min, self.zeta_max = right.modes, right.f_d_min * self._factor, right.zeta_max
 
     def __repr__(self) -> str:
         return f"{self._right!r} with frequencies times {self._factor:g}"
 
-    @property
-    def modes(self) -> int:
-        """Number of modes, equal to the other estimator's."""
-        return self._right.modes
-
-    @property
-    def f_d_min(self) -> float:
-        """Lowest frequency of the other estimator, with the error [Hz]."""
-        return self._right.f_d_min * self._factor
-
-    @property
-    def zeta_max(self) -> float:
-        """Highest damping ratio of the other estimator [-]."""
-        return self._right.zeta_max
-
-    def _part(self) -> None:
+    def _unshare(self) -> None:
         self._right = self._right.fork()
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
@@ -140,18 +127,14 @@ class Recipe:
         except EstimatorError as error:
             raise RecipeError(f"shaper {self.shaper}: {error}") from error
 
-    def friction(self, description: RobotDescription) -> Floats | None:
-        """Return the friction that the drives are fed forward, see `ModeSource.friction`.
+    def friction(self, description: RobotDescription, tvist: Filter | None = None) -> Floats | None:
+        """Return the friction that the drives are fed forward with a filter or unshaped, see `known_friction`.
 
         Raises:
             RecipeError: The calibration has it for some joints only, or more than the drives have torque.
         """
         try:
-            return (
-                None
-                if self.calibration is None
-                else ModeSource("modal", description, self.calibration).friction
-            )
+            return known_friction(tvist, description, self.calibration)
         except EstimatorError as error:
             raise RecipeError(f"shaper {self.shaper}: {error}") from error
 

@@ -41,6 +41,8 @@ class Shaped:
     """Measured processor time per tick [s]."""
     elastic: ElasticFeedForward | None = None
     """Elastic feed-forward for the drives; None for that of the paper's controller."""
+    law: Floats | None = None
+    """Friction that the drives are fed forward with it; None for that of the unshaped motion."""
     ended: bool = True
     """Whether it came to rest at the target."""
 

@@ -60,7 +60,8 @@ class Bench:
             case.description, case.declared, case.reference(), case.limits, job.as_served, case.stream
         )
         """What the first method gets."""
-        # A robot has one calibration: the friction in it is fed forward whatever shapes, and unshaped as well.
+        # A robot has one calibration: the friction in it is fed forward whatever shapes, and unshaped as well. A method
+        # that is made for more has it in `Shaped.law`.
         recipes = (getattr(method, "recipe", None) for method in job.methods)
         law = next((recipe.friction(case.description) for recipe in recipes if recipe is not None), None)
         self._line = ControlLine(
@@ -107,7 +108,8 @@ class Bench:
         return self._plain[arm]
 
     def _following(self, shaped: Shaped) -> Callable[[str], Recording]:
-        following = self._line.follow(self.task.reference, shaped.q, shaped.delay, shaped.elastic)
+        drives = shaped.delay, shaped.elastic, shaped.law
+        following = self._line.follow(self.task.reference, shaped.q, *drives)
         return lambda arm: following.simulate(self._arms[arm], self.job.case.seed)
 
 

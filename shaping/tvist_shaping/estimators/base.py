@@ -1,42 +1,29 @@
 """Base of all estimators, which provide a filter with the modes of the arm."""
 
-import copy
 from abc import ABC, abstractmethod
-from typing import Self
 
-from tvist_shaping._types import Floats
+from tvist_shaping._types import Floats, Forked
 
 
-class Estimator(ABC):
+class Estimator(Forked, ABC):
     """Damped frequency and damping ratio of each mode as functions of q, sec. 3.3 of the paper.
 
     Attributes:
+        modes: Number of modes estimated, >= 1.
+        f_d_min: Lower bound of every mode's damped frequency over every q [Hz], > 0. It determines the longest possible
+            delay.
+        zeta_max: Upper bound of every mode's damping ratio over every q [-], < 1.
         clipped: Whether a mode of the last estimate was outside `f_d_min` or `zeta_max` and was clamped to it, so
             that the arm's mode differs. It is always False for an estimator whose bounds are those of its modes.
         abrupt: Whether modes may change almost at once from one configuration to the next, as where two of them come
             close.
     """
 
+    modes: int
+    f_d_min: float
+    zeta_max: float
     clipped: bool = False
     abrupt: bool = False
-
-    @property
-    @abstractmethod
-    def modes(self) -> int:
-        """Number of modes estimated, >= 1."""
-
-    @property
-    @abstractmethod
-    def f_d_min(self) -> float:
-        """Lower bound of every mode's damped frequency over every q [Hz], > 0.
-
-        It determines the longest possible delay.
-        """
-
-    @property
-    @abstractmethod
-    def zeta_max(self) -> float:
-        """Upper bound of every mode's damping ratio over every q [-], < 1."""
 
     @abstractmethod
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
@@ -62,16 +49,3 @@ class Estimator(ABC):
             Modes, see `estimate`.
         """
         return self.estimate(q)
-
-    def fork(self) -> Self:
-        """Return an independent copy of the present state: equal configurations give equal estimates.
-
-        Returns:
-            The copy. It shares constant data with the original; use both in the same thread.
-        """
-        other = copy.copy(self)
-        other._part()  # noqa: SLF001  one of its own kind
-        return other
-
-    def _part(self) -> None:  # noqa: B027  most estimators share only constant data
-        """Replace everything that is modified in place by copies, since a new copy still shares it."""

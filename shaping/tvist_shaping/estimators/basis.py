@@ -34,16 +34,7 @@ class BasisFunctions:
     centre: Floats
 
     def __init__(self, joints: Sequence[int], degree: int, centre: npt.ArrayLike | None = None) -> None:
-        """Create the basis.
-
-        Args:
-            joints: Different indices from 0, at most 7.
-            degree: Highest total degree, an integer >= 0.
-            centre: Centre of the angles, see above; None for zeros.
-
-        Raises:
-            EstimatorError: A parameter is invalid, or there are more than MAX_TERMS terms.
-        """
+        """Create the basis for different indices of joints from 0, at most 7."""
         n = len(joints)
         if not 1 <= n <= MAX_JOINTS or len(set(joints)) != n or not set(joints) <= set(range(MAX_JOINTS)):
             raise EstimatorError("joints", joints, f"1 to {MAX_JOINTS} different indices below {MAX_JOINTS}")
@@ -75,17 +66,7 @@ class BasisFunctions:
         return np.array(rows, dtype=np.int64).reshape(len(rows), n)
 
     def terms(self, q: npt.ArrayLike) -> Floats:
-        """Evaluate every basis function, which gives the design matrix of a least-squares fit.
-
-        Args:
-            q: Configurations [rad], shape (N, n), with n above the largest index used.
-
-        Returns:
-            Values [-], shape (N, len(self)): 1, then cos and sin of each combination in turn.
-
-        Raises:
-            EstimatorError: q has another shape.
-        """
+        """Evaluate every basis function for a fit: 1, then cos and sin of each combination."""
         angles = np.asarray(q, dtype=float)
         if angles.ndim != 2 or angles.shape[1] <= max(self.joints):
             raise EstimatorError("q", angles.shape, f"of shape (N, n), n > {max(self.joints)}")

@@ -1,7 +1,6 @@
 """Modes that do not depend on the configuration, for classic time-invariant input shaping."""
 
 from collections.abc import Sequence
-from typing import Self
 
 import numpy as np
 
@@ -36,29 +35,15 @@ class Fixed(Estimator):
             raise EstimatorError("zeta", zeta, "at least 0 and less than 1")
         self._f_d.setflags(write=False)
         self._zeta.setflags(write=False)
+        self.modes, self.f_d_min, self.zeta_max = (
+            self._f_d.size,
+            float(self._f_d.min()),
+            float(self._zeta.max()),
+        )
 
     def __repr__(self) -> str:
         return f"Fixed(f_d={self._f_d.tolist()}, zeta={self._zeta.tolist()})"
 
-    @property
-    def modes(self) -> int:
-        """Number of modes."""
-        return self._f_d.size
-
-    @property
-    def f_d_min(self) -> float:
-        """Lowest damped frequency [Hz]."""
-        return float(self._f_d.min())
-
-    @property
-    def zeta_max(self) -> float:
-        """Highest damping ratio [-]."""
-        return float(self._zeta.max())
-
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:  # noqa: ARG002  the same at every q
         """Return the modes, f_d [Hz] and ζ [-], each of shape (modes,), read-only."""
         return self._f_d, self._zeta
-
-    def fork(self) -> Self:
-        """Return this estimator itself, since it has no state."""
-        return self

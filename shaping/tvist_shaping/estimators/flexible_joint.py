@@ -73,28 +73,13 @@ class FlexibleJoint(Estimator):
         self._stiffness, self._damping = float(stiffness), float(damping)
         ends = [flexible_joint(end, self._stiffness, self._damping) for end in (self._low, self._high)]
         # Between the ends f_d² = (K/I - D²/4I²)/4π² has a maximum at most, and ζ falls with the inertia.
-        self._f_d_min, self._zeta_max = min(f_d for f_d, _ in ends), ends[0][1]
+        self.modes, self.f_d_min, self.zeta_max = 1, min(f_d for f_d, _ in ends), ends[0][1]
 
     def __repr__(self) -> str:
         return (
             f"FlexibleJoint({self._low:g} to {self._high:g} kg m², stiffness={self._stiffness:g}, "
             f"damping={self._damping:g})"
         )
-
-    @property
-    def modes(self) -> int:
-        """One."""
-        return 1
-
-    @property
-    def f_d_min(self) -> float:
-        """Lowest damped frequency over the range of inertia [Hz]."""
-        return self._f_d_min
-
-    @property
-    def zeta_max(self) -> float:
-        """Highest damping ratio, which is that of the smallest inertia [-]."""
-        return self._zeta_max
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Mode at a configuration; see `Estimator.estimate`."""

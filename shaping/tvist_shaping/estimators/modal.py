@@ -104,7 +104,7 @@ class Modal(Estimator):
         self.drivetrain = drivetrain
         self.clipped = False
         self._mass_matrix = mass_matrix
-        self._modes, self._f_d_min, self._zeta_max = modes, f_d_min, zeta_max
+        self.modes, self.f_d_min, self.zeta_max = modes, f_d_min, zeta_max
         self._rows = drivetrain.rows
         self._poles: Complex = np.zeros(modes, dtype=complex)
         self._shapes: Complex = np.zeros((modes, size), dtype=complex)
@@ -113,31 +113,10 @@ class Modal(Estimator):
         self._lowest, self._lost = False, False
 
     def __repr__(self) -> str:
-        return f"Modal(modes={self._modes}, f_d_min={self._f_d_min:g}, zeta_max={self._zeta_max:g})"
-
-    @property
-    def modes(self) -> int:
-        """Number of modes."""
-        return self._modes
-
-    @property
-    def f_d_min(self) -> float:
-        """Lower bound of the damped frequency [Hz]."""
-        return self._f_d_min
-
-    @property
-    def zeta_max(self) -> float:
-        """Upper bound of the damping ratio [-]."""
-        return self._zeta_max
+        return f"Modal(modes={self.modes}, f_d_min={self.f_d_min:g}, zeta_max={self.zeta_max:g})"
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Estimate the modes at a configuration, each as the continuation of the last estimate's.
-
-        Args:
-            q: Joint angles [rad], shape (joints,).
-
-        Returns:
-            f_d [Hz] and ζ [-], each of shape (modes,), clamped to `f_d_min` and `zeta_max`.
 
         Raises:
             EstimatorError: q or the mass matrix has the wrong shape, or the arm has fewer vibrating modes at q.
@@ -146,17 +125,7 @@ class Modal(Estimator):
         return self._describe()
 
     def settle(self, q: Floats) -> tuple[Floats, Floats]:
-        """Estimate the lowest modes at a configuration, regardless of the last estimate.
-
-        Args:
-            q: Joint angles, see `estimate`.
-
-        Returns:
-            Modes, see `estimate`.
-
-        Raises:
-            EstimatorError: See `estimate`.
-        """
+        """Estimate the lowest modes at a configuration, regardless of the last estimate; see `estimate`."""
         if self._lie(q) != RESTING or not self._lowest:
             self._take_lowest(q, self._mass_matrix(q))
         return self._describe()
@@ -166,13 +135,13 @@ class Modal(Estimator):
         self._go_to(q)
         return self._poles.copy()
 
-    def _part(self) -> None:
+    def _unshare(self) -> None:
         self._poles, self._shapes = self._poles.copy(), self._shapes.copy()
         self._scratch, self._q = np.empty_like(self._scratch), self._q.copy()
 
     def _describe(self) -> tuple[Floats, Floats]:
-        f_d, zeta = np.empty(self._modes), np.empty(self._modes)
-        beyond = describe(self._poles, self._f_d_min, self._zeta_max, f_d, zeta)
+        f_d, zeta = np.empty(self.modes), np.empty(self.modes)
+        beyond = describe(self._poles, self.f_d_min, self.zeta_max, f_d, zeta)
         self.clipped = beyond or self._lost
         return f_d, zeta
 
@@ -197,14 +166,14 @@ class Modal(Estimator):
     def _take_lowest(self, q: Floats, mass: Floats) -> None:
         self._check(q, mass)
         poles, shapes = self.drivetrain.poles(mass)
-        if len(poles) < self._modes:
+        if len(poles) < self.modes:
             self._q = np.zeros(0)
             raise EstimatorError(
                 "modes",
-                self._modes,
+                self.modes,
                 f"at most {len(poles)}, the number of modes that vibrate at {q.tolist()}",
             )
-        self._poles[:], self._shapes[:] = poles[: self._modes], shapes[: self._modes]
+        self._poles[:], self._shapes[:] = poles[: self.modes], shapes[: self.modes]
         self._lowest, self._lost = True, False
 
     def _check(self, q: Floats, mass: Floats) -> None:

@@ -28,17 +28,10 @@ APART = 1e-7
 
 @compiled
 def follow(mass: Floats, rows: Floats, poles: Complex, shapes: Complex, scratch: Complex) -> bool:
-    """Follow every pole by Newton's method from its last value; poles and shapes are changed in place.
+    """Follow every pole by Newton's method from its last value; change poles and shapes in place.
 
-    Args:
-        mass: M, shape (L, L).
-        rows: `Drivetrain.rows`.
-        poles: Shape (k,).
-        shapes: Shape (k, L), with largest entry 1.
-        scratch: Shape (L + k, L + 1).
-
-    Returns:
-        Whether all converged to different poles; otherwise poles and shapes are not changed.
+    Return whether all converged to different poles; otherwise poles and shapes are not changed. Scratch: (L +
+    k, L + 1).
     """
     L = mass.shape[0]
     before = scratch[L:]

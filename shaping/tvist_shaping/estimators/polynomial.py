@@ -49,20 +49,7 @@ def evaluate(
     ranges: Floats,
     modes: Floats,
 ) -> bool:
-    """Evaluate both polynomials at one configuration.
-
-    Args:
-        q: Joint angles [rad], shape (n,).
-        joints: Indices of the selected joints, shape (k,).
-        centre: Centre [rad], shape (k,).
-        multiples: `BasisFunctions.multiples`, shape (rows, k).
-        coefficients: Coefficients of f_d and ζ, shape (2, terms).
-        ranges: Range of f_d and range of ζ, shape (2, 2).
-        modes: Result: f_d [Hz] and ζ [-], shape (2, 1).
-
-    Returns:
-        Whether one of them was clamped to its range.
-    """
+    """Evaluate both polynomials at one configuration: f_d [Hz] and ζ [-]; return whether one was clamped."""
     f_d = coefficients[0, 0]
     zeta = coefficients[1, 0]
     term = 1
@@ -143,6 +130,7 @@ class Polynomial(Estimator):
             raise EstimatorError("f_d_range", f_d_range, f"within {F_D_RANGE[0]:g} to {F_D_RANGE[1]:g} Hz")
         if z_low < 0.0 or z_high >= 1.0:
             raise EstimatorError("zeta_range", zeta_range, "within 0 <= ζ < 1")
+        self.modes, self.f_d_min, self.zeta_max = 1, f_low, z_high
         self._ranges: Floats = np.array([[f_low, f_high], [z_low, z_high]])
         joints_used = np.array(self.basis.joints, dtype=np.int64)
         self.coefficients = Coefficients(
@@ -158,33 +146,8 @@ class Polynomial(Estimator):
             f"{len(self.basis)} terms, f_d_range=({f_low}, {f_high}), zeta_range=({z_low}, {z_high}))"
         )
 
-    @property
-    def modes(self) -> int:
-        """Number of modes, which is 1."""
-        return 1
-
-    @property
-    def f_d_min(self) -> float:
-        """Lower end of f_d's range [Hz]."""
-        return float(self._ranges[0, 0])
-
-    @property
-    def zeta_max(self) -> float:
-        """Upper end of ζ's range [-]."""
-        return float(self._ranges[1, 1])
-
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
-        """Evaluate both polynomials at a configuration.
-
-        Args:
-            q: Joint angles [rad], shape (n,), with n above the largest index used.
-
-        Returns:
-            f_d [Hz] and ζ [-], each of shape (1,).
-
-        Raises:
-            EstimatorError: q has too few joints.
-        """
+        """Evaluate both polynomials at a configuration; see `Estimator.estimate`."""
         if q.shape[0] < self._joints_needed:
             raise EstimatorError("q", q.shape, f"of at least {self._joints_needed} joints")
         modes = np.empty((2, 1))

@@ -76,6 +76,9 @@ class FakeControl:
     def lasting(self):
         return self
 
+    def hear(self, answer):
+        answer()
+
     def leave(self):
         """What lasted is over."""
         self.left += 1

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from tvist_server.config import ConfigError, ServeConfig
-from tvist_server.config_file import from_mapping
-from tvist_server.gateways.exposure import ExposureError, guarded_interfaces
+from tvist_server.config import ServeConfig, from_mapping
+from tvist_server.gateways.exposure import guarded_interfaces
+from tvist_server.option_values import StartError
 from tvist_server.ur_ports import WITHOUT_JOINTS, UrPorts
 
 SEVEN = Path(__file__).parents[2] / "plant" / "urdf" / "seven.urdf"
@@ -44,25 +44,25 @@ def test_of_several_robots_each_has_the_next_address():
     ],
 )
 def test_an_address_that_is_none_is_named(values, named):
-    with pytest.raises(ConfigError, match=named):
+    with pytest.raises(StartError, match=named):
         config(**values).interfaces(0)
 
 
 def test_an_arm_with_seven_joints_is_refused_since_the_last_would_be_missing():
     seven = {"robot": str(SEVEN), "calibration": "none"}
-    with pytest.raises(ConfigError, match="the robot seven has 7 joints") as refused:
+    with pytest.raises(StartError, match="the robot seven has 7 joints") as refused:
         config(**seven).setups()
     assert "without --ur" in str(refused.value)
     options = re.findall(r"--ur-port (\w+)=off", str(refused.value))
     assert config(**seven, ur_ports=dict.fromkeys(options, 0)).setups()[0].description.joints == 7
     assert set(UrPorts().open()) - set(options) == WITHOUT_JOINTS
-    with pytest.raises(ConfigError, match="--ur-port rtde=off"):
+    with pytest.raises(StartError, match="--ur-port rtde=off"):
         config(robots=f"ur5e,{SEVEN}", calibration="none").setups()
     assert from_mapping(seven, "tvist.toml").setups()[0].description.joints == 7
 
 
 def test_everywhere_is_no_address_for_several():
-    with pytest.raises(ConfigError, match="one address each"):
+    with pytest.raises(StartError, match="one address each"):
         config(ur_address=EVERYWHERE).interfaces(1)
 
 
@@ -71,7 +71,7 @@ def test_everywhere_is_no_address_for_several():
     [({"rtd": 30004}, "rtd"), ({"rtde": 70000}, "rtde"), ({"rtde": -1}, "rtde"), ({"rtde": "x"}, "rtde")],
 )
 def test_a_port_or_door_that_is_none_is_named(ports, named):
-    with pytest.raises(ConfigError, match=named):
+    with pytest.raises(StartError, match=named):
         config(ur_ports=ports)
 
 
@@ -80,5 +80,5 @@ def test_nobody_else_reaches_them_unasked():
     guarded_interfaces("::1", insecure=False)
     guarded_interfaces(EVERYWHERE, insecure=True)
     for address in (EVERYWHERE, "192.168.1.2", "::"):
-        with pytest.raises(ExposureError, match="insecure"):
+        with pytest.raises(StartError, match="insecure"):
             guarded_interfaces(address, insecure=False)

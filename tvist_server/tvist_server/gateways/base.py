@@ -1,7 +1,7 @@
 """Gateways, through which clients reach a robot, and the interface between a gateway and its robot."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Protocol, get_args
 
 from tvist_controller.instruments.report import Report, Topic
@@ -11,6 +11,13 @@ from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 Message = State | Event | Truth | Telemetry | Io
+TOPICS: Mapping[type[Message], Topic] = {
+    State: "state",
+    Event: "event",
+    Truth: "truth",
+    Telemetry: "telemetry",
+    Io: "io",
+}
 Answer = Callable[[Reply], None]
 """Takes the reply to a command, once, from any thread."""
 
@@ -25,8 +32,11 @@ class Queried(Protocol):
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; `answer` is called once: immediately if it is rejected, else from another thread."""
 
-    def info(self, answer: Callable[[bytes], None]) -> None:
-        """Answer a request for `info`; `answer` is called once with the encoded message, from any thread."""
+    def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
+        """Answer a request for `info`; `answer` is called once, from any thread, with what makes the encoded message.
+
+        That may read files, so it is for the thread that answers.
+        """
 
 
 class Desk(Queried, Protocol):

@@ -15,17 +15,15 @@ Both sides show a certificate (mutual TLS); the common name in the client's cert
 import contextlib
 import ipaddress
 import ssl
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tvist_plant.user_file import read_bytes, read_toml
+from tvist_plant.user_file import read_bytes
 from tvist_protocol.codec import MAX_BYTES
-from tvist_protocol.content import checked
-from tvist_protocol.errors import ProtocolError
 from tvist_server.gateways.access import Role, access_control, open_access, router_access
 from tvist_server.gateways.endpoints import is_endpoint, is_local, options, protocol
+from tvist_server.option_values import StartError, read_start_file
 
 AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key", "clients.toml"
 _LINE = 'a line is "NAME" = "operator", "viewer", "robot" or "router"'
@@ -42,10 +40,6 @@ LIMITS: Mapping[str, Any] = {
 """Zenoh settings of a session that other machines can reach, by path."""
 
 
-class ExposureError(ValueError):
-    """The robot would be reachable in an unintended way; the message says what to do."""
-
-
 def guarded(
     listen: Sequence[str],
     robots: Sequence[str],
@@ -56,15 +50,8 @@ def guarded(
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on and the settings that protect them.
 
-    Args:
-        listen: Requested endpoints.
-        robots: Names of the robots served there.
-        security: Folder with certificates and roles.
-        insecure: Whether clients need no authentication.
-        namespace: Namespace of the robots.
-
     Raises:
-        ExposureError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
+        StartError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
     """
     secured, settings, roles = _protected(listen, security, insecure=insecure)
     access = open_access(robots, namespace) if roles is None else access_control(robots, roles, namespace)
@@ -76,13 +63,8 @@ def guarded_router(
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the same for a router; without certificates, everyone may connect as a robot or a client.
 
-    Args:
-        listen: Requested endpoints.
-        security: Folder with certificates and roles.
-        insecure: Whether nobody needs authentication.
-
     Raises:
-        ExposureError: See `guarded`.
+        StartError: See `guarded`.
     """
     secured, settings, roles = _protected(listen, security, insecure=insecure)
     return secured, settings if roles is None else {**settings, "access_control": router_access(roles)}
@@ -91,16 +73,12 @@ def guarded_router(
 def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
     """Check the form of endpoints.
 
-    Args:
-        what: Name of the option.
-        endpoints: Endpoints.
-
     Raises:
-        ExposureError: One has another form.
+        StartError: One has another form.
     """
     for endpoint in endpoints:
         if not is_endpoint(endpoint):
-            raise ExposureError(
+            raise StartError(
                 f"{what} is {endpoint!r}: must have the form tcp/ADDRESS:PORT, such as tcp/127.0.0.1:7447"
             )
 
@@ -112,17 +90,17 @@ def _protected(
     check_endpoints("listen", listen)
     if security is not None:
         if insecure:
-            raise ExposureError("security and insecure exclude each other: leave one out")
+            raise StartError("security and insecure exclude each other: leave one out")
         secured, roles = [_secured(endpoint) for endpoint in listen], _roles(security)
         return secured, {**LIMITS, **_settings(security)}, roles
     for endpoint in listen:
         if protocol(endpoint) in {"tls", "quic"} and not options(endpoint):
-            raise ExposureError(
+            raise StartError(
                 f"listen is {endpoint}, which needs certificates: add --security DIR (made by `tvist keys`)"
             )
     exposed = [endpoint for endpoint in listen if not is_local(endpoint)]
     if exposed and not insecure:
-        raise ExposureError(
+        raise StartError(
             f"listen is {exposed[0]}, which other machines can reach: add --security DIR (made by `tvist keys`) and "
             "listen on tls/…, or add --insecure to let anyone move the robot"
         )
@@ -132,15 +110,11 @@ def _protected(
 def guarded_interfaces(address: str, *, insecure: bool) -> None:
     """Refuse to open UR's interfaces, which cannot authenticate clients, where other machines would reach them.
 
-    Args:
-        address: IP address on which they listen.
-        insecure: Whether clients need no authentication.
-
     Raises:
-        ExposureError: Other machines could reach them.
+        StartError: Other machines could reach them.
     """
     if not insecure and not ipaddress.ip_address(address).is_loopback:
-        raise ExposureError(
+        raise StartError(
             f"ur_address is {address}, which other machines can reach, and UR's interfaces do not authenticate "
             "clients: add --insecure to let anyone move the robot"
         )
@@ -150,18 +124,15 @@ def roles_in(folder: Path) -> dict[str, Role]:
     """Read the role of each client from `clients.toml`.
 
     Raises:
-        ExposureError: The file cannot be read, or a role is invalid.
+        StartError: The file cannot be read, or a role is invalid.
         UserFileError: The file is not text, too large or nested too deeply.
     """
     path = folder / CLIENTS
     try:
-        return checked(read_toml(path, "file of roles"), dict[str, Role])
-    except OSError as error:
-        raise ExposureError(f"{path}: {error.strerror}; `tvist keys` makes it") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ExposureError(f"{path}: it is not valid TOML: {error}; {_LINE}") from error
-    except ProtocolError as error:
-        raise ExposureError(f"{path}: {error.why}; {_LINE}") from error
+        return read_start_file(path, "file of roles", dict[str, Role])
+    except StartError as error:
+        hint = _LINE if path.exists() else "`tvist keys` makes it"
+        raise StartError(f"{error}; {hint}") from error
 
 
 def _secured(endpoint: str) -> str:
@@ -172,11 +143,11 @@ def _secured(endpoint: str) -> str:
     """
     if protocol(endpoint) != "tls":
         address = endpoint.partition("/")[2] or "<address>:<port>"
-        raise ExposureError(
+        raise StartError(
             f"listen is {endpoint}: with --security every endpoint must be tls/, such as tls/{address}"
         )
     if options(endpoint):
-        raise ExposureError(
+        raise StartError(
             f"listen is {endpoint}: with --security no options may follow #, since they would override it"
         )
     return f"{endpoint}#tls_handshake_timeout_ms={HANDSHAKE_MS}"
@@ -186,7 +157,7 @@ def _roles(security: str) -> dict[str, Role]:
     folder = Path(security).absolute()
     roles = roles_in(folder)
     if not roles:
-        raise ExposureError(
+        raise StartError(
             f"{folder / CLIENTS} lists no clients: add one with `tvist keys {security} --operator NAME`"
         )
     return roles
@@ -210,7 +181,7 @@ def _check_pair(folder: Path) -> None:
         try:
             read_bytes(folder / name, "certificate or key")
         except OSError as error:
-            raise ExposureError(f"{folder / name}: {error.strerror}; `tvist keys` makes it") from error
+            raise StartError(f"{folder / name}: {error.strerror}; `tvist keys` makes it") from error
     try:
         server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         server.load_cert_chain(folder / CERTIFICATE, folder / KEY)
@@ -219,10 +190,10 @@ def _check_pair(folder: Path) -> None:
         _shake_hands(server, client)
     except ssl.SSLCertVerificationError as error:
         why = f"no client would trust {CERTIFICATE}: {error.verify_message}"
-        raise ExposureError(f"{folder}: {why}; move it away and run `tvist keys` again") from error
+        raise StartError(f"{folder}: {why}; move it away and run `tvist keys` again") from error
     except ssl.SSLError as error:
         why = f"{AUTHORITY}, {CERTIFICATE} and {KEY} do not belong together"
-        raise ExposureError(f"{folder}: {why} ({error.reason or error})") from error
+        raise StartError(f"{folder}: {why} ({error.reason or error})") from error
 
 
 def _shake_hands(server: ssl.SSLContext, client: ssl.SSLContext) -> None:

@@ -41,6 +41,11 @@ REALTIME: Mapping[str, Any] = {
     # In real time, answers are the only messages that wait for room, and all other answers wait behind them. A client
     # that keeps asking but has stopped reading is disconnected after this time [us] instead of 5 s.
     "transport/link/tx/queue/congestion_control/block/wait_before_close": 1_000_000,
+    # The tick thread publishes, and must not wait for room; by default it would for a millisecond.
+    "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 0,
+    # An answer that waits for room holds its priority's queue of the link, and has the priority of its query. Nothing
+    # is published with this one, so the tick thread never waits for a client that asks and does not read.
+    "qos/network": [{"messages": ["query"], "flows": ["ingress"], "overwrite": {"priority": "data"}}],
 }
 """Additional settings for a clock that does not wait for clients."""
 CONNECT_S = 10

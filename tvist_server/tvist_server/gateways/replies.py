@@ -1,6 +1,7 @@
 """Answers to Zenoh queries, sent by a separate thread."""
 
 import contextlib
+import logging
 import threading
 from collections.abc import Callable
 from queue import SimpleQueue
@@ -9,6 +10,8 @@ import zenoh
 
 from tvist_protocol.codec import encode
 from tvist_protocol.replies import Reply
+
+log = logging.getLogger(__name__)
 
 ENCODING = zenoh.Encoding("application/msgpack")
 
@@ -26,13 +29,13 @@ class Answers:
     """
 
     def __init__(self) -> None:
-        self._queue: SimpleQueue[tuple[zenoh.Query, str, Reply | bytes] | None] = SimpleQueue()
+        self._queue: SimpleQueue[tuple[zenoh.Query, str, Reply | Callable[[], bytes]] | None] = SimpleQueue()
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="zenoh-answers", daemon=True)
         self._thread.start()
 
-    def to(self, query: zenoh.Query, key: str) -> Callable[[Reply | bytes], None]:
-        """Return the function that answers a query on a key, encoded or not. Zenoh ends the query when it is called."""
+    def to(self, query: zenoh.Query, key: str) -> Callable[[Reply | Callable[[], bytes]], None]:
+        """Return the function that answers a query on a key, with a reply or what makes an encoded one."""
         return lambda reply: self._queue.put((query, key, reply))
 
     def close(self) -> None:
@@ -43,8 +46,13 @@ class Answers:
 
     def _run(self) -> None:
         while not self._closed and (answer := self._queue.get()) is not None:
-            query, key, reply = answer
-            data = reply if isinstance(reply, bytes) else encode(reply)
-            # If the client has left or the session is closed, the answer is no longer needed.
-            with contextlib.suppress(zenoh.ZError), query:
-                query.reply(key, data, encoding=ENCODING)
+            try:
+                _send(*answer)
+            except Exception:
+                log.exception("a query is not answered")
+
+
+def _send(query: zenoh.Query, key: str, reply: Reply | Callable[[], bytes]) -> None:
+    # If the client has left or the session is closed, the answer is no longer needed. Here Zenoh ends the query.
+    with contextlib.suppress(zenoh.ZError), query:
+        query.reply(key, reply() if callable(reply) else encode(reply), encoding=ENCODING)

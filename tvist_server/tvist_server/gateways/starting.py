@@ -1,6 +1,7 @@
 """What clients hear of a robot that is not ready yet."""
 
 from collections.abc import Callable
+from functools import partial
 
 from tvist_protocol.codec import encode
 from tvist_protocol.replies import Refused
@@ -25,8 +26,8 @@ class Starting(Queried):
     def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  whatever it is
         answer(self._refused())
 
-    def info(self, answer: Callable[[bytes], None]) -> None:
-        answer(encode(self._refused()))
+    def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
+        answer(partial(encode, self._refused()))
 
     def _refused(self) -> Refused:
         return Refused(code="starting", where="", why=f"the robot is starting: {self._how_far}try again")

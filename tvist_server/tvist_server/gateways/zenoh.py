@@ -44,7 +44,7 @@ class ZenohGateway(Gateway):
         self._closed = False
         self.takes: set[Topic] = set()
         self._answers = Answers()
-        serve = {keys.command(robot): self._on_command, keys.info(robot): self._on_info}
+        serve = {keys.key(robot, "command"): self._on_command, keys.key(robot, "info"): self._on_info}
         self._queryables = [
             session.declare_queryable(key, Callback(partial(handler, key), indirect=False), complete=complete)
             for key, handler in serve.items()
@@ -65,7 +65,7 @@ class ZenohGateway(Gateway):
             keys.any_client(robot), Callback(self._on_client, indirect=False), history=True
         )
         self._queried = desk  # which knows the clients by now
-        setpoint = keys.setpoint(robot)
+        setpoint = keys.key(robot, "setpoint")
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
         self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth or wanted is not None)
         self.takes = set(self._publishers)
@@ -77,7 +77,7 @@ class ZenohGateway(Gateway):
         if wanted is not None:
             self._listen("truth", wanted)
         # Declared last, since it announces that everything else is ready.
-        self._alive = session.liveliness().declare_token(keys.alive(robot))
+        self._alive = session.liveliness().declare_token(keys.key(robot, "alive"))
 
     def report(self, report: Report) -> None:
         """Publish a tick's state, which need not be made for that."""
@@ -133,7 +133,7 @@ class ZenohGateway(Gateway):
         if answer is not None:
             self._queried.info(answer)
 
-    def _answer(self, key: str, query: zenoh.Query) -> Callable[[Reply | bytes], None] | None:
+    def _answer(self, key: str, query: zenoh.Query) -> Callable[[Reply | Callable[[], bytes]], None] | None:
         """Return the function that answers a query; None if the gateway is closed."""
         if self._closed:
             query.drop()  # type: ignore[no-untyped-call]
@@ -195,20 +195,24 @@ def _publishers(
     every_tick = zenoh.Priority.REAL_TIME if lockstep else zenoh.Priority.DATA_LOW
     event = zenoh.Priority.REAL_TIME if lockstep else zenoh.Priority.INTERACTIVE_HIGH
 
-    def declare(key: str, priority: zenoh.Priority) -> zenoh.Publisher:
-        return session.declare_publisher(
-            key, encoding=ENCODING, congestion_control=control, priority=priority, express=lockstep
-        )
-
-    publishers: dict[Topic, zenoh.Publisher] = {
-        "state": declare(keys.state(robot), every_tick),
-        "event": declare(keys.event(robot), event),
-        "telemetry": declare(keys.telemetry(robot), zenoh.Priority.DATA),
-        "io": declare(keys.io(robot), event),
+    priorities: dict[Topic, zenoh.Priority] = {
+        "state": every_tick,
+        "event": event,
+        "telemetry": zenoh.Priority.DATA_HIGH,  # in real time nothing has the priority of answers, see `REALTIME`
+        "io": event,
     }
     if truth:
-        publishers["truth"] = declare(keys.truth(robot), every_tick)
-    return publishers
+        priorities["truth"] = every_tick
+    return {
+        topic: session.declare_publisher(
+            keys.key(robot, topic),
+            encoding=ENCODING,
+            congestion_control=control,
+            priority=priority,
+            express=lockstep,
+        )
+        for topic, priority in priorities.items()
+    }
 
 
 def _malformed(where: str, why: str, limit: float | None = None) -> Refused:

@@ -1,5 +1,6 @@
 """A robot that is moved: a plant whose drives are another controller's."""
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,14 +12,8 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
 from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, RealArm, Sight
 from tvist_protocol.modes import RuntimeState, SafetyMode
-from tvist_server.moving.commanded_robot import CommandedRobot
-from tvist_server.moving.configuration import configuration_of, narrowed
-from tvist_server.moving.dashboard import asked
-from tvist_server.moving.halts import SILENT
-from tvist_server.moving.pace import Pace
-from tvist_server.moving.run import Run
-from tvist_server.moving.servo_lag import ServoLag
-from tvist_server.moving.start_checks import (
+from tvist_server.moving.checks import (
+    FELL_SILENT,
     QUESTIONS,
     Wanted,
     answers_trouble,
@@ -27,10 +22,19 @@ from tvist_server.moving.start_checks import (
     tells_gravity,
     version_trouble,
 )
+from tvist_server.moving.interfaces import asked, configuration_of, narrowed
+from tvist_server.moving.program import INPUTS, OUTPUTS
+from tvist_server.moving.run import Run
+from tvist_server.moving.servo_lag import ServoLag
 from tvist_server.watching.place import Place
+from tvist_server.watching.watched_robot import WatchedRobot
 
 NUMBERS = 1_000_000_000
 """Numbers of runs begin with our time in microseconds, so that those of two processes differ."""
+SILENT = 0.08
+"""Time without a row after which the robot counts as silent; its program has begun to brake long since [s]."""
+MOST = 50
+"""Most periods that are made up for after a gap: time that was longer away has passed by our clock."""
 
 
 class MovedRobot(RealArm):
@@ -60,7 +64,7 @@ class MovedRobot(RealArm):
         start: tuple[float, ...] | None = None,
         lag: ServoLag | None = None,
     ) -> None:
-        self._robot = CommandedRobot(place, description, payload)
+        self._robot = WatchedRobot(place, description, payload, OUTPUTS, INPUTS)
         self._place = place
         self._sight = self._robot.first()
         self._told = [f"no joint moves faster than {speed_cap:g} rad/s (--speed-cap)"]
@@ -142,7 +146,7 @@ class MovedRobot(RealArm):
                     return True
             elif self._run is not None and self._pace.silent(time.monotonic()) and not self._robot.wait(0.0):
                 # Nor is it this process that was stopped, with rows that wait to be read.
-                self._let_go(SILENT)
+                self._let_go(FELL_SILENT)
         return self._pace.next(time.monotonic())
 
     def _take(self, sight: Sight) -> bool:
@@ -151,7 +155,7 @@ class MovedRobot(RealArm):
         self._told += sight.told
         if not self._robot.connected:
             if self._held:
-                self._let_go(SILENT)
+                self._let_go(FELL_SILENT)
             return False
         if self._held and self._run is None:
             trouble = self._trouble()
@@ -200,3 +204,43 @@ class MovedRobot(RealArm):
         self.stop()
         self._left_paused = halt.safety_mode not in {SafetyMode.NORMAL, SafetyMode.UNDEFINED}
         self._halt = Halt(f"the robot at {self._place} does not follow: {halt.why}", halt.safety_mode)
+
+
+class Pace:
+    """Counts the control periods of one robot: they begin with its rows, by its clock; by ours while it is silent."""
+
+    def __init__(self) -> None:
+        self.tick = 0
+        """Number of the present period, by the robot's time."""
+        self.owed = 0
+        """Number of periods that have begun with the last row, and are yet to be computed."""
+        self._heard, self._due = -math.inf, 0.0
+
+    def silent(self, now: float) -> bool:
+        """Return whether the robot is silent; takes our time, as all that follows [s]."""
+        return now - self._heard > SILENT
+
+    def until(self, now: float) -> float:
+        """Return how long to wait for a row [s], until a period of our own begins or the robot counts as silent."""
+        return max(0.0, (self._due if self.silent(now) else self._heard + SILENT) - now)
+
+    def row(self, tick: int, now: float) -> bool:
+        """Take a row; return whether it begins a period. One that is made up for by our clock does not."""
+        self._heard = now
+        passed = tick - self.tick
+        if passed <= 0:
+            return False
+        self.owed = passed if passed <= MOST else 1
+        self.tick = tick - self.owed
+        return self.next(now)
+
+    def next(self, now: float) -> bool:
+        """Begin the next period, if one is owed or it is time for one of our own; return whether it begins."""
+        if self.owed:
+            self.owed -= 1
+        elif self.silent(now) and now >= self._due:
+            self._due = max(self._due + PERIOD, now - PERIOD)
+        else:
+            return False
+        self.tick += 1
+        return True

@@ -1,9 +1,16 @@
-"""The program in URScript that follows set-points on a robot, and brakes by itself when they stop."""
+"""The program that follows set-points on a robot, and the registers through which it gets them and says what happens.
 
+All registers are of the upper range, which UR leaves to clients of RTDE. `follow.script` is the program, with `$NAME`
+for each number that is given here.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from enum import IntEnum
+from importlib import resources
 from string import Template
 
-from tvist_server.moving import registers
-from tvist_server.moving.registers import JOINTS, MOST, Ended, State
+from tvist_server.rtde.wire import Field, Wire
 
 NAME = "tvist_follow"
 """Name of the program, which robots show."""
@@ -23,14 +30,80 @@ FADE = 0.05
 """Time constant with which a distance from the set-points fades [s]."""
 MARGIN = 1.05
 """Speed of the arm over that of the fastest set-points, at most."""
-_REGISTERS = ("NUMBER", "ORDER", "SETPOINTS", "STATE", "PLAYED", "ENDED", "ALONE", "LEFT_OUT", "RUN", "MOST")
+
+JOINTS = 6
+KEPT = 4
+"""Number of set-points in a package: the newest and those before it."""
+MOST = 2**30
+"""Largest number of a set-point, and of a run; 1 follows it. Differences fit into the 32 bits of a register."""
+
+NUMBER = 24
+"""Input integer: number n of the newest set-point, 1 more in each control period of the robot; 0: none yet."""
+ORDER = 25
+"""Input integer: number of the run whose program is to follow; any other ends it. Its negative also ends the wait."""
+SETPOINTS = 24
+"""First of the input doubles: joint angles of set-point n, then of n-1, n-2 and n-3 [rad]."""
+
+STATE = 24
+"""Output integer: a `State`."""
+PLAYED = 25
+"""Output integer: number of the set-point whose turn it is; 0 and less stand for `MOST` and those before it."""
+ENDED = 26
+"""Output integer: an `Ended`."""
+ALONE = 27
+"""Output integer: number of periods in which the set-point whose turn it was had not come, so the arm went on alone."""
+LEFT_OUT = 28
+"""Output integer: number of set-points that were never played, since they came too late or the program fell behind."""
+RUN = 29
+"""Output integer: number of the run. The others are of this run once it is there, since it is written last."""
+
+
+class State(IntEnum):
+    """What the program does."""
+
+    NONE = 0
+    WAITING = 1
+    """Waits for the first set-point."""
+    FOLLOWING = 2
+    BRAKING = 3
+    ENDED = 4
+
+
+class Ended(IntEnum):
+    """Why the program has braked, from then on."""
+
+    NOT = 0
+    ORDERED = 1
+    SILENCE = 2
+    """No set-point has come for almost 40 ms, or none at all in the time to wait for the first."""
+    AWAY = 3
+    """The first set-point is too far from the arm."""
+    TOO_FAST = 4
+    """A set-point is further from the one before than the speed cap permits, or is no number."""
+    LOST = 5
+    """The program was paused or fell behind, or the numbers do not continue."""
+    STRAYED = 6
+    """The arm did not follow the program."""
+
+
+INPUTS: dict[str, Wire] = {
+    f"input_int_register_{NUMBER}": Wire.INT32,
+    f"input_int_register_{ORDER}": Wire.INT32,
+    **{f"input_double_register_{SETPOINTS + place}": Wire.DOUBLE for place in range(KEPT * JOINTS)},
+}
+"""What is written, in the order of a package's values."""
+OUTPUTS: dict[str, Field] = dict.fromkeys(
+    [f"output_int_register_{place}" for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT, RUN)],
+    Field(Wire.INT32),
+)
+"""What is read."""
 
 
 def program(run: int, *, speed: float, deceleration: float, lookahead: float, gain: float) -> str:
     """Return the text of the program, which uses only functions of e-Series (5.9 or later) and CB3 (3.14 or later).
 
     Args:
-        run: Number of this run, 1 to `registers.MOST`, which the program says in its registers.
+        run: Number of this run, 1 to `MOST`, which the program says in its registers.
         speed: Fastest set-points; faster ones end the program [rad/s].
         deceleration: Deceleration of the fastest joint when it ends [rad/s^2].
         lookahead: `lookahead_time` of `servoj`, 0.03 to 0.2 [s].
@@ -48,213 +121,42 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
     ):
         if not least <= value <= most:
             raise ValueError(f"{name} is {value:g}: must be {least:g} to {most:g}")
-    return _TEXT.substitute(
-        {name: getattr(registers, name) for name in _REGISTERS}
-        | {f"ended_{one.name.lower()}": int(one) for one in Ended}
-        | {f"state_{one.name.lower()}": int(one) for one in State}
-        | {"name": NAME, "run": run, "speed": float(MARGIN * speed)}
-        | {"deceleration": float(deceleration), "lookahead": float(lookahead), "gain": float(gain)}
-        | {
-            "silence": SILENCE,
-            "first": FIRST,
-            "away": AWAY,
-            "fade": FADE,
-            "again": AGAIN,
-            "close": CLOSE,
-            "after_shift": AFTER_SHIFT,
-        }
-        | {
-            "steps": " and ".join(f"norm(own[{j}]) <= most" for j in range(JOINTS)),
-            "ways": "\n".join(
-                f"        if way[{j}] > most:\n          way[{j}] = most\n"
-                f"        elif way[{j}] < least:\n          way[{j}] = least\n        end"
-                for j in range(JOINTS)
-            ),
-            "angles": ", ".join(
-                f"read_input_float_register({at})" for at in ("at", *(f"at + {k}" for k in range(1, JOINTS)))
-            ),
-        }
-    )
+    given = {
+        "name": NAME, "run": run, "speed": float(MARGIN * speed), "deceleration": float(deceleration),
+        "lookahead": float(lookahead), "gain": float(gain), "silence": SILENCE, "first": FIRST, "away": AWAY,
+        "fade": FADE, "again": AGAIN, "close": CLOSE, "after_shift": AFTER_SHIFT, "NUMBER": NUMBER, "ORDER": ORDER,
+        "SETPOINTS": SETPOINTS, "STATE": STATE, "PLAYED": PLAYED, "ENDED": ENDED, "ALONE": ALONE,
+        "LEFT_OUT": LEFT_OUT, "RUN": RUN, "MOST": MOST,
+    }  # fmt: skip
+    given |= {f"ended_{one.name.lower()}": int(one) for one in Ended}
+    given |= {f"state_{one.name.lower()}": int(one) for one in State}
+    text = resources.files("tvist_server.moving").joinpath("follow.script").read_text("utf-8")
+    return Template(text).substitute(given)
 
 
-_TEXT = Template("""\
-def $name():
-  # Follows joint positions that a computer sends through RTDE, one in each control period, and stops the arm by itself
-  # when they stop. It moves nothing before the first has come, and after a stop it has ended.
-  #
-  # Input registers, which one package writes:
-  #   integer $NUMBER: number of the newest set-point, 1 more in each period; integer $ORDER: $run to follow, -$run: end
-  #   float $SETPOINTS to 47: the newest set-point and the three before it, six joint angles each [rad]
-  # Output registers:
-  #   integer $STATE: $state_waiting waiting, $state_following following, $state_braking braking, $state_ended ended
-  #   integer $PLAYED: number of the set-point whose turn it is; integer $RUN: number of this run
-  #   integer $ENDED: why it ended: $ended_ordered ordered, $ended_silence no set-point came,
-  #     $ended_away the first is too far from the arm, $ended_too_fast one is too far from the one before,
-  #     $ended_lost paused, or out of step, $ended_strayed the arm did not follow
-  #   integer $ALONE: periods without a set-point; integer $LEFT_OUT: set-points left out
+class Window:
+    """Numbers set-points from 1 on, one for each control period of the robot, and keeps those of the next package."""
 
-  def setpoint(at):
-    return [$angles]
-  end
+    def __init__(self) -> None:
+        self.number = 0
+        """Number of the newest set-point; 0 before the first."""
+        self._kept = deque[Sequence[float]](maxlen=KEPT)
 
-  write_output_integer_register($PLAYED, 0)
-  write_output_integer_register($ENDED, $ended_not)
-  write_output_integer_register($ALONE, 0)
-  write_output_integer_register($LEFT_OUT, 0)
-  write_output_integer_register($STATE, $state_waiting)
-  write_output_integer_register($RUN, $run) # the others are of this run from here on
+    @property
+    def newest(self) -> Sequence[float] | None:
+        """The newest set-point, shape (6,) [rad]; None before the first."""
+        return self._kept[0] if self._kept else None
 
-  step = get_steptime()
-  most = $speed * step # largest way of a joint in a period [rad]
-  least = -most
-  near = $away + 4.0 * $speed * ($lookahead + 4.0 * step) # largest distance of the arm from where servoj leads it [rad]
-  keep = pow($fade / ($fade + step), 2) # a distance from the set-points fades as if damped critically:
-  pull = pow(step / ($fade + step), 2) # what a period keeps of its velocity, and how it pulls
+    def add(self, setpoint: Sequence[float]) -> None:
+        """Add the next set-point, joint angles of shape (6,) [rad]. Before the first one, the arm counts as there."""
+        self.number = self.number % MOST + 1
+        self._kept.extendleft([setpoint] * (1 if self._kept else KEPT))
 
-  # What the registers hold may be from before: only a number that changes has a sender.
-  old = read_input_integer_register($NUMBER)
-  newest = old
-  waited = 0.0
-  order = read_input_integer_register($ORDER)
-  while waited < $first and order != -$run and (newest == old or order != $run):
-    sync()
-    waited = waited + step
-    order = read_input_integer_register($ORDER)
-    newest = read_input_integer_register($NUMBER)
-  end
+    def values(self, order: int) -> tuple[float, ...]:
+        """Return the values of an input package, in the order of `INPUTS`; zeros before the first set-point.
 
-  q = get_target_joint_positions() # where servoj leads the arm
-  change = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # of q in the last period
-  before = change # and in the period before
-  extra = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] # what of the change was not the change of the set-points
-  last = setpoint($SETPOINTS + 12) # last set-point that was played
-  number = newest - 2 # of the present one, which becomes the last but one, so that the newest may be late by a period
-  last_number = number
-  alone = 0
-  left_out = 0
-  silence = 0.0
-  patience = $silence - 2.5 * step # earlier by what reading and telling may take
-  missed = $silence / step # periods
-  close = $close # distance that is made up for at once [rad]
-  blind = True # whether the last period was without a set-point that had come
-
-  why = $ended_not
-  i = 0
-  while i < 6:
-    if not (norm(last[i] - q[i]) <= $away):
-      why = $ended_away
-    end
-    i = i + 1
-  end
-  if order != $run:
-    why = $ended_ordered
-  end
-  if waited >= $first:
-    why = $ended_silence
-  end
-  if why == $ended_not:
-    write_output_integer_register($STATE, $state_following)
-  end
-
-  while why == $ended_not:
-    now = read_input_integer_register($NUMBER)
-    silence = silence + step
-    if now != newest:
-      silence = 0.0
-      if now < newest: # 1 has followed the largest number
-        number = number - $MOST
-        last_number = last_number - $MOST
-      end
-    end
-    number = number + 1
-    behind = now - number
-    if behind > 2 or (blind and silence == 0.0 and behind < 1): # set-points come less late than at first, or later
-      number = now - 1
-      close = $after_shift
-    end
-
-    if read_input_integer_register($ORDER) != $run:
-      why = $ended_ordered
-    elif behind > missed: # another sender, or a pause: it must not catch up
-      why = $ended_lost
-    elif silence > patience:
-      why = $ended_silence
-    end
-    newest = now
-
-    lone = blind
-    blind = now < number
-    if not blind:
-      at = $SETPOINTS + 6 * (now - number)
-      new = setpoint(at)
-      previous = last
-      gap = number - last_number
-      if gap != 1:
-        previous = setpoint(at + 6)
-      end
-      blind = read_input_integer_register($NUMBER) != now # the next package has come meanwhile
-    end
-    if blind: # the arm goes on as before, with its acceleration if it is not for long
-      way = change + change - before
-      if silence > $again or norm(way) > most: # the sum of all joints, since a tick has no time to look at each
-        way = change
-      end
-      alone = alone + 1
-    else:
-      own = new - previous # change of the set-points in this period
-      fast = norm(own)
-      if gap != 1: # of two set-points, neither was compared before; there is no time to look at each joint
-        if not (fast <= 2.5 * most and norm(new - last) <= 2.5 * most * gap):
-          why = $ended_too_fast
-        end
-      elif not lone and norm(q - get_target_joint_positions()) > near:
-        why = $ended_strayed
-      end
-      if gap != 1 or lone:
-        extra = change - own
-      end
-      off = q - previous
-      if norm(off) + norm(extra) <= close and fast + norm(off) <= most:
-        q = previous # back onto the set-points at once, which servoj smooths
-        way = own
-        close = $close
-      else:
-        way = own + extra * keep - off * pull
-      end
-      if gap != 1:
-        if not (norm(way) <= most):
-          way = change
-        end
-      elif not (fast <= most and norm(way) <= most): # of all joints; only then a tick is to look at each
-        if not ($steps): # nor is what is no number
-          why = $ended_too_fast
-        end
-$ways
-      end
-      extra = way - own
-      last = new
-      last_number = number
-    end
-    q = q + way
-    before = change
-    change = way
-
-    if why == $ended_not:
-      write_output_integer_register($PLAYED, number)
-      if blind:
-        write_output_integer_register($ALONE, alone)
-      elif gap > 1:
-        left_out = left_out + gap - 1
-        write_output_integer_register($LEFT_OUT, left_out)
-      end
-      servoj(q, t=step, lookahead_time=$lookahead, gain=$gain)
-    end
-  end
-
-  write_output_integer_register($ENDED, why)
-  write_output_integer_register($STATE, $state_braking)
-  stopj($deceleration)
-  write_output_integer_register($STATE, $state_ended)
-  textmsg("$name has ended, reason ", why)
-end
-""")
+        Args:
+            order: Number of the run that is to follow; its negative to end it.
+        """
+        kept = self._kept or [(0.0,) * JOINTS] * KEPT
+        return self.number, order, *(angle for one in kept for angle in one)

@@ -1,5 +1,8 @@
 """One run of the program on a robot, from its upload to its end."""
 
+import contextlib
+import socket
+import threading
 import time
 from collections.abc import Callable, Sequence
 
@@ -9,14 +12,12 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Halt, Sight
 from tvist_plant.robot_tables import ArmLimits
 from tvist_protocol.modes import RuntimeState
-from tvist_server.moving.commanded_robot import CommandedRobot
-from tvist_server.moving.halts import REPLACED, halt_by_modes, halt_by_program
-from tvist_server.moving.program import program
-from tvist_server.moving.registers import ALONE, ENDED, LEFT_OUT, PLAYED, RUN, STATE, State
+from tvist_server.moving.checks import REMOTE, REPLACED, halt_by_modes, halt_by_program, remote_trouble
+from tvist_server.moving.interfaces import PATIENCE, PRIMARY, asked
+from tvist_server.moving.program import ALONE, ENDED, LEFT_OUT, PLAYED, RUN, STATE, State, Window, program
 from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
-from tvist_server.moving.upload import Upload
-from tvist_server.moving.window import Window
 from tvist_server.watching.place import Place
+from tvist_server.watching.watched_robot import WatchedRobot
 
 DECELERATION = 5.0
 """Least deceleration of the fastest joint when the program brakes [rad/s²]."""
@@ -35,6 +36,8 @@ BEGINS = 5.0
 """Longest time in which the program has to begin [s]."""
 TELL_EVERY = 10.0
 """Shortest time between two sentences about set-points that did not come in time [s]."""
+LOOK_EVERY = 0.2
+"""Longest time after which the thread ends [s]."""
 
 
 class Run:
@@ -51,7 +54,7 @@ class Run:
 
     def __init__(
         self,
-        robot: CommandedRobot,
+        robot: WatchedRobot,
         place: Place,
         number: int,
         limits: ArmLimits,
@@ -150,3 +153,44 @@ class Run:
             f"{missed[1]} set-points came too late to be played (look at the network and at the load of this machine); "
             f"{missed[2]} were cut to the joints' range or the speed cap by more than 1 mrad (move more slowly)"
         )
+
+
+class Upload:
+    """Sends a program from a thread of its own, and keeps the connection: some robots end one whose sender is gone.
+
+    Args:
+        place: The robot.
+        text: The program.
+        check: Returns why the robot takes no program now, in words; None if it does.
+    """
+
+    def __init__(self, place: Place, text: str, check: Callable[[], str | None]) -> None:
+        self._place, self._text, self._check = place, text, check
+        self.trouble: str | None = None
+        """Why the program cannot run, in words."""
+        self._closed = threading.Event()
+        self.thread = threading.Thread(target=self._run, name="tvist-upload", daemon=True)
+        self.thread.start()
+
+    def close(self) -> None:
+        """Let the connection go."""
+        self._closed.set()
+
+    def _run(self) -> None:
+        self.trouble = remote_trouble(asked(self._place, [REMOTE]))
+        if self.trouble is not None or self._closed.is_set():
+            return
+        where = self._place.beside(PRIMARY)
+        try:
+            with socket.create_connection((where.host, where.port), PATIENCE) as connection:
+                self.trouble = self._check()  # a program that comes late would end another one's motion
+                if self.trouble is not None or self._closed.is_set():
+                    return
+                connection.sendall(self._text.encode())
+                connection.settimeout(LOOK_EVERY)
+                while not self._closed.is_set():
+                    with contextlib.suppress(TimeoutError):
+                        if not connection.recv(1 << 16):
+                            return
+        except OSError as error:
+            self.trouble = f"its port {where.port} takes no program: {error.strerror or error}"

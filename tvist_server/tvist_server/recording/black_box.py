@@ -15,8 +15,7 @@ from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, Truth
-from tvist_server.recording.errors import RecorderError
-from tvist_server.recording.message import Kept
+from tvist_server.recording import Kept, RecorderError
 
 log = logging.getLogger(__name__)
 

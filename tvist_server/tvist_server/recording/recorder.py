@@ -21,12 +21,8 @@ from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import topics
 from tvist_protocol.stream import Event, State, Truth
-from tvist_server.recording.errors import RecorderError
-from tvist_server.recording.kept import OccupiedError, set_aside
-from tvist_server.recording.message import Kept
-from tvist_server.recording.one_file import OneFile
-from tvist_server.recording.ring import Ring
-from tvist_server.recording.whereabouts import DeletedError, whereabouts
+from tvist_server.recording import Kept, RecorderError
+from tvist_server.recording.segments import DeletedError, Segments
 from tvist_server.recording.writer import heading
 
 log = logging.getLogger(__name__)
@@ -43,10 +39,6 @@ LOOK = 1.0
 """Time between two checks whether the file has been moved or deleted [s]."""
 
 
-class MovedError(Exception):
-    """The file of a recording that forgets its beginning has been moved."""
-
-
 class Recorder(Sink):
     """Records one robot until it is closed.
 
@@ -55,13 +47,12 @@ class Recorder(Sink):
     has stopped.
 
     Args:
-        path: Path of the file.
+        path: Path of the file; with `keep`, segments are named after it.
         info: Description of the robot.
         start: How the server was started: everything besides the journal that a replay needs, as JSON types.
         overwrite: Whether to replace an existing file.
-        keep: Number of ticks that the recording keeps at least; it forgets those before, and the end of the recording
-            joins what is left to one file. Recordings of the five latest runs at the same path are kept under numbers.
-            None: it keeps all, and the file must not exist.
+        keep: Number of ticks that the recording keeps at least, in segments, of which the oldest are deleted. Those of
+            the five latest runs of the same name stay. None: it keeps all, and the file must not exist.
         queue_size: Number of messages that may wait for the writer.
         wait: Whether to wait when the queue is full: for robots whose time waits too, with the clocks lockstep and
             free.
@@ -71,7 +62,7 @@ class Recorder(Sink):
             continues in it.
 
     Raises:
-        RecordingError: The file exists, is no recording, or cannot be written, or `start` cannot be encoded.
+        RecorderError: The file exists or cannot be written, or `start` cannot be encoded.
     """
 
     def __init__(
@@ -90,8 +81,6 @@ class Recorder(Sink):
         if queue_size < 1:
             raise RecorderError(f"queue_size is {queue_size}: must be at least 1")
         self.path = Path(path)
-        self.place: Path | None = self.path
-        """Last known path of the file: `path`, unless it was moved. After `close`, the path at the end."""
         self.error: str | None = None
         """Why the recording stopped by itself, as a sentence."""
         self._dropped: dict[type[msgspec.Struct], int] = dict.fromkeys((State, Event, Truth, Io, Entry), 0)
@@ -105,6 +94,8 @@ class Recorder(Sink):
         self._wake = Flag()
         self._room = Flag()
         self._begin(info, start, overwrite, keep)
+        self.place: Path | None = self._file.whole
+        """Where readers find the recording: the last known path of the file, or a pattern for all segments."""
         # A daemon thread does not keep a program that ends without closing from ending, and the file stays readable.
         self._thread = Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
@@ -141,6 +132,11 @@ class Recorder(Sink):
         if current_thread() is not self._thread:
             self._thread.join()
 
+    def discard(self) -> None:
+        """End a recording that never began; its file would only stand in the way of the next start."""
+        self.close()
+        self._file.path.unlink(missing_ok=True)
+
     def __enter__(self) -> Self:
         return self
 
@@ -167,29 +163,21 @@ class Recorder(Sink):
             self._room.wait(PAUSE)
 
     def _begin(self, info: Info, start: Mapping[str, Any], overwrite: bool, keep: int | None) -> None:
-        self._file: OneFile | Ring
         try:
             topic_of, first = topics(info.name), heading(info, start)
         except (TypeError, ValueError, TvistError) as error:
             raise RecorderError(f"{self.path} cannot be started: {error}") from error
         try:
-            if keep is None:
-                self._file = OneFile(self.path, topic_of, first, overwrite=overwrite)
-            else:
-                kept = None if overwrite else set_aside(self.path)
-                if kept is not None:
-                    log.warning("%s held the recording of an earlier run, which is now %s", self.path, kept)
-                self._file = Ring(self.path, topic_of, first, overwrite=overwrite, keep=keep)
+            self._file = Segments(self.path, topic_of, first, self._dropped, overwrite=overwrite, keep=keep)
         except FileExistsError as error:
-            existing = error.filename or self.path
             raise RecorderError(
-                f"{existing} exists already and is not overwritten: choose another file, or record with --keep 10min, "
-                "which keeps it under another name"
+                f"{error.filename} exists already and is not overwritten: choose another file, or record with --keep "
+                "10min, which numbers its files"
             ) from None
-        except OccupiedError as error:
-            raise RecorderError(f"{error}: choose another file") from None
         except OSError as error:
             raise RecorderError(f"{self.path} cannot be written: {_reason(error)}") from error
+        if keep is not None and self.path.exists():
+            log.warning("%s is an earlier recording and stays: this one is %s", self.path, self._file.whole)
 
     def _run(self) -> None:
         try:
@@ -202,21 +190,13 @@ class Recorder(Sink):
                     self._look()
                     looked = time.monotonic()
             self._drain()
-            if isinstance(self._file, Ring):
-                self._look()
-                self._file.finish(self._dropped)
-            else:
-                self._file.finish(self._dropped)
-                self._look()
+            self._file.finish()
+            self._look()
             self._file.close()
         except DeletedError:
             self._stop(
-                f"the recording {self.path} was deleted, or moved to another file system, where it ends: "
+                f"the recording {self._file.path} was deleted, or moved to another file system, where it ends: "
                 "no more is recorded"
-            )
-        except MovedError:
-            self._stop(
-                f"the recording {self.path} was moved: new files could not take its place, so no more is recorded"
             )
         except Exception as error:  # noqa: BLE001  a thread has nobody above it: whatever it was must be told
             self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")
@@ -226,14 +206,12 @@ class Recorder(Sink):
 
         Raises:
             DeletedError: The file was deleted; continuing would fill the disk with data that cannot be read.
-            MovedError: The file was moved, and its recording needs the name for the next file.
         """
-        self.place = whereabouts(self.path, self._file.fileno())
-        if self.place != self.path and isinstance(self._file, Ring):
-            raise MovedError
-        if self.place != self.path and self._on_moved is not None:
-            where = "it continues in that file" if self.place is None else f"it continues in {self.place}"
-            self._on_moved(f"the recording {self.path} was moved away: {where}")
+        there, expected = self._file.where(), self._file.path
+        self.place = self._file.whole if there == expected else there
+        if there != expected and self._on_moved is not None:
+            where = "it continues in that file" if there is None else f"it continues in {there}"
+            self._on_moved(f"the recording {expected} was moved away: {where}")
             self._on_moved = None
 
     def _drain(self) -> None:

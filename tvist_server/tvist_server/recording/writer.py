@@ -6,7 +6,7 @@ from typing import IO, Any
 
 import msgspec
 from mcap.well_known import MessageEncoding, SchemaEncoding
-from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, IndexType, Writer
+from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from tvist_protocol.channels import tag
 from tvist_protocol.info import Info
@@ -21,7 +21,6 @@ from tvist_protocol.recorded import (
     to_json,
     viewer_schema,
 )
-from tvist_server.recording.kept import claim
 
 CHUNK_SIZE = 64 * 1024
 """Bytes compressed at once: some 70 states, which take half a millisecond and are lost if the process is killed. A
@@ -55,33 +54,17 @@ class RecordingWriter:
         stream: Stream to write to; the caller closes it.
         topic_of: Topic of each kind of message.
         heading: Metadata at its beginning.
-        part: Write no index, since the file is part of a recording that gets one at its end. To write an index takes
-            longer than a tick.
 
     Raises:
-        OSError: The stream cannot be written to, or another process writes the same file.
+        OSError: The stream cannot be written to.
     """
 
     def __init__(
-        self,
-        stream: IO[bytes],
-        topic_of: Mapping[type[msgspec.Struct], str],
-        heading: dict[str, str],
-        *,
-        part: bool = False,
+        self, stream: IO[bytes], topic_of: Mapping[type[msgspec.Struct], str], heading: dict[str, str]
     ) -> None:
         self._stream = stream
-        claim(stream)
         self._writer = Writer(
-            stream,
-            chunk_size=CHUNK_SIZE,
-            compression=CompressionType.ZSTD,
-            enable_data_crcs=True,
-            index_types=IndexType.MESSAGE if part else IndexType.ALL,
-            repeat_channels=not part,
-            repeat_schemas=not part,
-            use_statistics=not part,
-            use_summary_offsets=not part,
+            stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD, enable_data_crcs=True
         )
         self._writer.start(library=f"tvist {LIBRARY_IDENTIFIER}")
         self._writer.add_metadata(METADATA, heading)
@@ -110,15 +93,6 @@ class RecordingWriter:
         """
         counts = {tag(kind): str(dropped.get(kind, 0)) for kind in self._channels}
         self._writer.add_metadata(END_METADATA, counts)
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self.flush()
-
-    def end_part(self) -> None:
-        """Write the last chunk. Nothing can be added afterwards.
-
-        Raises:
-            OSError: The stream cannot be written to.
-        """
         self._writer.finish()  # type: ignore[no-untyped-call]
         self.flush()
 

@@ -1,16 +1,17 @@
-"""The reading end of an RTDE connection, without its socket: bytes in, bytes and rows out.
+"""The client's end of an RTDE connection, without its socket: bytes in, bytes and rows out.
 
-It asks for protocol version 2, for the controller's version and for a list of outputs, and starts them. It knows no
-other package, so that it can neither write a register nor send a command.
+It asks for protocol version 2, for the controller's version and for a list of outputs, claims inputs if there are any
+to be written, and starts. It knows no other package, so that without inputs it can send no command.
 """
 
 from collections.abc import Mapping, Sequence
 from struct import Struct
+from types import MappingProxyType
 from typing import NamedTuple
 
 from tvist_protocol.errors import quoted
-from tvist_server.rtde.codec import PackageKind, PackageReader, package
-from tvist_server.rtde.wire import Field
+from tvist_server.rtde.codec import PackageKind, PackageReader, package, words
+from tvist_server.rtde.wire import Field, Wire
 
 Row = Mapping[str, tuple[float, ...]]
 """Values of one cycle of the robot by name, each in its range; a number is a tuple of one."""
@@ -37,15 +38,23 @@ class Received(NamedTuple):
 
 
 class RtdeClient:
-    """Reads one robot's outputs.
+    """Reads one robot's outputs, and writes its inputs.
 
     Args:
         needed: Types and ranges of the variables without which the rows are of no use, by name.
         optional: Those of further variables, which some robots do not know and rows then lack.
+        inputs: Types of the inputs to claim, by name; none is a vector.
     """
 
-    def __init__(self, needed: Mapping[str, Field], optional: Mapping[str, Field]) -> None:
+    def __init__(
+        self,
+        needed: Mapping[str, Field],
+        optional: Mapping[str, Field],
+        inputs: Mapping[str, Wire] = MappingProxyType({}),
+    ) -> None:
         self._needed, self._types = needed, {**needed, **optional}
+        self._inputs, self._claimed = inputs, 0
+        self._written = Struct(">B" + "".join(wire.value for wire in inputs.values()))
         self._names = list(self._types)
         self._reader = PackageReader()
         self._row: Struct | None = None
@@ -80,6 +89,10 @@ class RtdeClient:
                 send += self._answered(kind, payload)
         return Received(send, rows, texts)
 
+    def write(self, numbers: Sequence[float]) -> bytes:
+        """Return a package with the values of all inputs, in their order, once the connection has started."""
+        return package(PackageKind.DATA, self._written.pack(self._claimed, *numbers))
+
     def _answered(self, kind: int, payload: bytes) -> bytes:
         """Take the answer to a package; return the next one."""
         match kind:
@@ -92,6 +105,9 @@ class RtdeClient:
                 return self._set_up()
             case PackageKind.SETUP_OUTPUTS:
                 return self._take_recipe(payload)
+            case PackageKind.SETUP_INPUTS if self._inputs:
+                self._take_claim(payload)
+                return package(PackageKind.START)
             case PackageKind.START if payload[:1] == b"\x01":
                 self.started = True
                 return b""
@@ -105,25 +121,41 @@ class RtdeClient:
 
     def _take_recipe(self, payload: bytes) -> bytes:
         """Take the types of the variables, and start; ask again without those that the robot does not know."""
-        words = payload[1:].decode("ascii", "replace").removesuffix(",").split(",")
-        if len(words) != len(self._names):
-            raise RtdeError(f"it names {len(words)} types for {len(self._names)} variables")
-        unknown = [name for name, word in zip(self._names, words, strict=True) if word == "NOT_FOUND"]
+        types = _types(payload, len(self._names), "variables")
+        unknown = [name for name, word in zip(self._names, types, strict=True) if word == "NOT_FOUND"]
         if needed := [name for name in unknown if name in self._needed]:
             raise RtdeError(f"it does not know {', '.join(needed)}, without which there is nothing to watch")
         if unknown:
             self._names = [name for name in self._names if name not in unknown]
             return self._set_up()
-        for name, word in zip(self._names, words, strict=True):
+        for name, word in zip(self._names, types, strict=True):
             if word != self._types[name].wire.name:
                 raise RtdeError(f"{name} is of type {quoted(word)}, not {self._types[name].wire.name}")
         self._recipe = payload[0]
         self._row = Struct(">" + "".join(self._types[name].wire.value for name in self._names))
-        return self._begin_rows()
-
-    def _begin_rows(self) -> bytes:
-        """Return what to send once the outputs are set up."""
+        if self._inputs:
+            return words(PackageKind.SETUP_INPUTS, b"", self._inputs)
         return package(PackageKind.START)
+
+    def _take_claim(self, payload: bytes) -> None:
+        """Check that all inputs are this client's."""
+        found = _types(payload, len(self._inputs), "inputs")
+        by_word: dict[str, list[str]] = {}
+        for name, word in zip(self._inputs, found, strict=True):
+            by_word.setdefault(word, []).append(name)
+        if names := by_word.get("IN_USE"):
+            raise RtdeError(
+                f"another client holds its inputs {names[0]} to {names[-1]}: end that client, such as a fieldbus, a "
+                "driver or another tvist, and start again"
+            )
+        if names := by_word.get("NOT_FOUND"):
+            raise RtdeError(
+                f"it does not know its inputs {names[0]} to {names[-1]}: update its software to one with 48 registers"
+            )
+        for name, wire in self._inputs.items():
+            if name not in by_word.get(wire.name, ()):
+                raise RtdeError(f"its input {name} is not of type {wire.name}")
+        self._claimed = payload[0]
 
     def _rows(self, payload: bytes) -> Sequence[Row]:
         if self._row is None or payload[:1] != bytes([self._recipe]):
@@ -139,3 +171,11 @@ class RtdeClient:
                 raise RtdeError(f"its {name} is {wrong[0]:g}: must be {least:g} to {most:g}")
             at += len(values)
         return (row,)
+
+
+def _types(payload: bytes, count: int, of: str) -> list[str]:
+    """Return the types of so many variables, behind the number of a recipe."""
+    found = payload[1:].decode("ascii", "replace").removesuffix(",").split(",")
+    if len(found) != count:
+        raise RtdeError(f"it names {len(found)} types for {count} {of}")
+    return found

@@ -36,7 +36,7 @@ class Connection:
     Args:
         place: Where the robot is.
         address: Its resolved address, as `socket.getaddrinfo` returns it: family and address.
-        client: What is read there.
+        client: What is read and written there.
     """
 
     def __init__(self, place: Place, address: Address, client: RtdeClient) -> None:
@@ -44,7 +44,7 @@ class Connection:
         self.texts: list[str] = []
         """Messages of the controller since somebody has emptied the list."""
         self._begun = self._heard = time.monotonic()
-        self._connected, self._newest = False, -1
+        self._connected, self._newest, self._rest = False, -1, b""
         self._socket = socket.socket(address[0], socket.SOCK_STREAM)
         self._selector = selectors.DefaultSelector()
         self._socket.setblocking(False)
@@ -71,6 +71,21 @@ class Connection:
             raise UnreachableError(f"no robot answers at {self._place}: {why}") from error
         self._check_silence()
         return rows
+
+    def write(self, numbers: Sequence[float]) -> None:
+        """Write all inputs, without waiting: while a link takes nothing, packages are left out, and not kept."""
+        if not self.client.started:
+            return
+        self._rest = self._rest[self._give(self._rest) :]
+        if not self._rest:
+            data = self.client.write(numbers)
+            self._rest = data[self._give(data) :]
+
+    def _give(self, data: bytes) -> int:
+        try:
+            return self._socket.send(data)
+        except OSError:  # a lost connection shows when it is read
+            return 0
 
     def close(self) -> None:
         """Close the connection."""

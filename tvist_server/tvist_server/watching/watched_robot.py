@@ -1,11 +1,13 @@
-"""The robot that is watched, as a plant: it gives the ticks, and gets no command.
+"""The robot that is watched, as a plant: it gives the ticks, and gets no command; what moves it writes its inputs.
 
 A lost connection is looked for again once a second, without delaying the thread that ticks.
 """
 
 import time
 from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -17,10 +19,10 @@ from tvist_plant.plant import PERIOD, Measurement, PlantError, RealArm, Sight
 from tvist_protocol.errors import harmless
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.rtde.client import Row, RtdeClient, RtdeError
+from tvist_server.rtde.wire import Field, Wire
 from tvist_server.watching.connection import ANSWERS, Connection, LostError, UnreachableError, resolved
 from tvist_server.watching.place import Place
-from tvist_server.watching.row_count import RowCount
-from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, has_real_payload, sight_of
+from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, RowCount, has_real_payload, sight_of
 
 LOOKED_AT = 25
 """Number of rows from which the time between two is found."""
@@ -38,21 +40,27 @@ kinematics differ by some millimetres."""
 
 
 class WatchedRobot(RealArm):
-    """Reads one robot.
+    """Reads one robot, and writes the inputs that are claimed.
 
     Args:
         place: Where it is.
         description: The robot file.
         payload: Payload, in case it does not say what it carries.
+        outputs: Types and ranges of further variables that are needed, by name.
+        inputs: Types of the inputs to claim, by name.
 
     Raises:
         PlantError: There is none, or it is none that can be watched.
     """
 
-    done = "watched"
-    """What is done to it, in a word."""
-
-    def __init__(self, place: Place, description: RobotDescription, payload: Payload) -> None:
+    def __init__(
+        self,
+        place: Place,
+        description: RobotDescription,
+        payload: Payload,
+        outputs: Mapping[str, Field] = MappingProxyType({}),
+        inputs: Mapping[str, Wire] = MappingProxyType({}),
+    ) -> None:
         model = description.robot.model
         if description.joints != JOINTS:
             raise PlantError(
@@ -60,6 +68,7 @@ class WatchedRobot(RealArm):
                 f"the robot at {place}"
             )
         self._place, self._model, self.payload = place, model, payload
+        self._needed, self._inputs = {**NEEDED, **outputs}, inputs
         self._arm = Arm(description)
         self._constants = [rating.torque_constant for rating in joint_ratings(description)]
         self._sights: deque[tuple[Sight, Row]] = deque()
@@ -120,6 +129,16 @@ class WatchedRobot(RealArm):
             self._lose(error)
         return bool(self._sights)
 
+    @property
+    def connected(self) -> bool:
+        """Whether it is connected."""
+        return self._connection is not None
+
+    def write(self, numbers: Sequence[float]) -> None:
+        """Write all inputs, in their order; nothing happens while there is no connection."""
+        if self._connection is not None:
+            self._connection.write(numbers)
+
     def close(self) -> None:
         """Close the connection."""
         if self._connection is not None:
@@ -156,9 +175,9 @@ class WatchedRobot(RealArm):
         self._count = RowCount(self._interval)
         self._last, self.newest = self._sight(rows[-1], 0), rows[-1]
         software = ".".join(map(str, self.version[:3]))
-        rate = INTERVALS[self._interval]
+        rate, done = INTERVALS[self._interval], "moved" if self._inputs else "watched"
         self._notes.append(
-            f"the robot at {self._place} (software {software}, {rate} rows a second) is {self.done}"
+            f"the robot at {self._place} (software {software}, {rate} rows a second) is {done}"
         )
         if self._interval > 1:
             self._notes.append(
@@ -177,7 +196,8 @@ class WatchedRobot(RealArm):
         self._client = self._connection.client
 
     def _new_connection(self) -> Connection:
-        return Connection(self._place, self._address, RtdeClient(NEEDED, OPTIONAL))
+        client = RtdeClient(self._needed, OPTIONAL, self._inputs)
+        return Connection(self._place, self._address, client)
 
     def _rows(self, timeout: float) -> list[Row]:
         """Return the rows that have come, and note what the robot says with them."""

@@ -37,7 +37,8 @@ def analyze(
     Args:
         files: Recording of `tvist serve --record`, `tvist log record` or `tvist log export`; or a log of another robot:
             CSV with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP. Two are compared; their formats may
-            differ.
+            differ. A folder, or a pattern in quotes such as 'run-1-part*.mcap', names the files of one recording that
+            were made with --keep.
         figures: Folder for the figures of each motion: what was recorded, and the ring-down after it.
         look: How to write the figures.
         logs: How to read logs.

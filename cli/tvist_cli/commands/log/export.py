@@ -24,13 +24,14 @@ def export(
             those of a CSV into FILE.csv-metadata.json. With foxglove, the recording is written with channels for the
             3D panel of Foxglove and Lichtblick, and beside it a layout for both.
         output: File to write or replace [FILE with its ending replaced, such as run.csv or run.foxglove.mcap for
-            run.mcap, if there is none yet].
+            run.mcap, if there is none yet; of several segments, the first one's].
         logs: How to read logs.
         json: Print one JSON object.
     """
     from tvist_lab.recordings import RecordingError, mcap_file
     from tvist_lab.recordings.export import FORMATS, FOXGLOVE, written_by
     from tvist_lab.recordings.export import export as write
+    from tvist_lab.recordings.mcap_records import files_of
 
     kind = lower(to)
     if kind not in (*FORMATS, FOXGLOVE):
@@ -38,10 +39,13 @@ def export(
     if kind == FOXGLOVE and logs.given:
         raise Failure("--columns and --imu are for logs: --to foxglove needs a recording", code=2)
     ending = f".{kind}.mcap" if kind == FOXGLOVE else f".{kind}"
-    path = output or file.with_name(file.name.removesuffix(".gz")).with_suffix(ending)
+    with told(RecordingError):
+        files = files_of(file)
+    named = file if file.exists() else files[0]
+    path = output or named.with_name(named.name.removesuffix(".gz")).with_suffix(ending)
     written = written_by(path, kind)
     for place in written:
-        if place.exists() and file.exists() and place.samefile(file):
+        if place.exists() and any(one.exists() and place.samefile(one) for one in files):
             raise Failure(f"{place} is the file to be exported: choose another one with --output", code=2)
         if output is None:
             default_output(place)

@@ -30,15 +30,15 @@ def record(
         namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         seconds: Stop this many seconds after the first state.
-        keep: Keep the last 90s, 10min or 2h, and at most twice as much, and forget what was before [keep all]. What is
-            in FILE already gets another name, as with tvist serve --keep.
+        keep: Keep the last 90s, 10min or 2h, and at most a quarter more, and forget what was before [keep all]. FILE
+            then names several files, as with tvist serve --keep.
         json: Print one JSON object at the end.
     """
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     from tvist_client.robot import Robot
-    from tvist_server.durations import ticks_of
     from tvist_server.ending import Ending
+    from tvist_server.option_values import ticks_of
     from tvist_server.recording import RecorderError
     from tvist_server.recording.recorder import Recorder
 

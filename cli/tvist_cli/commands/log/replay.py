@@ -118,7 +118,7 @@ def _publish(
     from tvist_lab.republish import Playback
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
-    from tvist_server.gateways.exposure import ExposureError
+    from tvist_server.option_values import StartError
 
     with told(RecordingError):
         content = read_checked(file)
@@ -143,7 +143,7 @@ def _publish(
             await playing
         return playback
 
-    with told(ExposureError, code=2), told(RecordingError, GatewayError):
+    with told(StartError, code=2), told(RecordingError, GatewayError):
         playback = asyncio.run(run())
     ending.close()
     if json:

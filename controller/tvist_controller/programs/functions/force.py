@@ -19,7 +19,7 @@ from tvist_controller.programs.arguments import (
     whole,
     within,
 )
-from tvist_controller.programs.functions.family import Family, Parts
+from tvist_controller.programs.functions.family import Family, Parts, reads
 from tvist_controller.programs.journey import Turns
 from tvist_controller.trajectory import ForceTask
 from tvist_protocol.forces import Push
@@ -103,9 +103,10 @@ class ForceFunctions(Family):
         """Hold the position again."""
         self._arm.hold_again(by_hand=True)
 
-    def get_freedrive_status(self) -> int:
-        """Return 0, or 1 where a singular posture hinders the arm from being moved by hand, 2 where it forbids it."""
-        return self._access.force.hindrance
+    get_freedrive_status = reads(
+        "Return 0, or 1 where a singular posture hinders the arm from being moved by hand, 2 where it forbids it.",
+        lambda on: on.access.force.hindrance,
+    )
 
     @costs(120)
     def teach_mode(self) -> Turns:

@@ -1,6 +1,6 @@
 """Functions that move the arm."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Final
 
 import numpy as np
@@ -13,13 +13,12 @@ from tvist_controller.programs.arguments import (
     Positive,
     Vector6,
     above_zero,
-    is_pose,
     numbers,
     pose,
     shown,
     within,
 )
-from tvist_controller.programs.force_mode_moves import TURN, ForceModeMoves, approach
+from tvist_controller.programs.force_mode_moves import ForceModeMoves
 from tvist_controller.programs.functions.family import Family, Parts
 from tvist_controller.programs.journey import Turns
 from tvist_controller.refusal import SLOWEST, check_joints
@@ -27,7 +26,7 @@ from tvist_controller.trajectory import Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, Segment
 from tvist_protocol.transitions import Activity
-from tvist_urscript import Array, Fault, costs
+from tvist_urscript import Array, Fault, Pose, costs
 
 LONGEST: Final = 3600.0
 """Longest duration of a move [s]."""
@@ -76,39 +75,42 @@ class MotionFunctions(Family):
         if v > self._velocity and t == 0.0:
             why = f"v of movej is {v:.4g} rad/s: the joints turn with at most {self._velocity:.4g}"
             self._access.emit("warning", code="limit_velocity", why=why)
-        segment = JointSegment(
-            q=posture,
-            velocity=_within(v, "velocity", self._velocity),
-            acceleration=_within(a, "acceleration", self._acceleration),
-            duration=t or None,
-            blend=r,
+        return self._follow(
+            JointSegment(
+                q=posture,
+                velocity=_within(v, "velocity", self._velocity),
+                acceleration=_within(a, "acceleration", self._acceleration),
+                duration=t or None,
+                blend=r,
+            )
         )
-        yield from self._follow(segment)
 
     @costs(60)
     def movel(
         self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, t: Duration = 0, r: Blend = 0
     ) -> Turns:
         """Move the tool on a straight line to a pose, or to the one at joint positions."""
-        segment = LineSegment(
-            pose=self._pose("pose", pose),
-            velocity=_within(v, "velocity"),
-            acceleration=_within(a, "acceleration"),
-            duration=t or None,
-            blend=r,
+        return self._follow(
+            LineSegment(
+                pose=self._pose("pose", pose),
+                velocity=_within(v, "velocity"),
+                acceleration=_within(a, "acceleration"),
+                duration=t or None,
+                blend=r,
+            )
         )
-        yield from self._follow(segment)
 
     @costs(60)
     def movep(self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, r: Blend = 0) -> Turns:
         """Move the tool on a straight line at a constant speed, also in the blend at its end."""
-        segment = ProcessSegment(
-            pose=self._pose("pose", pose),
-            velocity=_within(v, "velocity"),
-            acceleration=_within(a, "acceleration"),
-            blend=r,
+        return self._follow(
+            ProcessSegment(
+                pose=self._pose("pose", pose),
+                velocity=_within(v, "velocity"),
+                acceleration=_within(a, "acceleration"),
+                blend=r,
+            )
         )
-        yield from self._follow(segment)
 
     @costs(100)
     def movec(
@@ -121,25 +123,26 @@ class MotionFunctions(Family):
         mode: Bit = 0,
     ) -> Turns:
         """Move the tool on an arc through the position of one pose to another."""
-        segment = ArcSegment(
-            via=self._pose("pose_via", pose_via),
-            pose=self._pose("pose_to", pose_to),
-            orientation="tangent" if mode else "interpolated",
-            velocity=_within(v, "velocity"),
-            acceleration=_within(a, "acceleration"),
-            blend=r,
+        return self._follow(
+            ArcSegment(
+                via=self._pose("pose_via", pose_via),
+                pose=self._pose("pose_to", pose_to),
+                orientation="tangent" if mode else "interpolated",
+                velocity=_within(v, "velocity"),
+                acceleration=_within(a, "acceleration"),
+                blend=r,
+            )
         )
-        yield from self._follow(segment)
 
     @costs(180)
     def optimovej(self, goal: object, a: PartOfLargest = 0.3, v: PartOfLargest = 0.3, r: Blend = 0) -> Turns:
         """Move the joints with shares of the arm's largest acceleration and velocity."""
-        yield from self.movej(goal, a * self._acceleration, v * self._velocity, 0, r)
+        return self.movej(goal, a * self._acceleration, v * self._velocity, 0, r)
 
     @costs(60)
     def optimovel(self, goal: object, a: PartOfLargest = 0.3, v: PartOfLargest = 0.3, r: Blend = 0) -> Turns:
         """Move the tool on a line with shares of the largest acceleration and speed, which the joints limit further."""
-        yield from self.movel(goal, a * MAX_TOOL[1], v * MAX_TOOL[0], 0, r)
+        return self.movel(goal, a * MAX_TOOL[1], v * MAX_TOOL[0], 0, r)
 
     def _follow(self, segment: Segment) -> Turns:
         if self._arm.lost:
@@ -168,45 +171,27 @@ class MotionFunctions(Family):
                 return None  # clients repeat where the arm is: no motion of a tick for each
             return self._access.guidance.servo(posture, lookahead_time, gain, shaped=shaped)
 
-        yield from self._arm.guide(start, lambda: iter([None] * max(round(t / PERIOD), 1)))
+        return self._arm.guide(start, iter([None] * max(round(t / PERIOD), 1)))
 
     @costs(200)
     def servoc(self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, r: Blend = 0) -> Turns:
         """Move the tool towards a pose at a speed; the next call may replace the pose in motion."""
-        goal = self._pose("pose", pose)
-        acceleration, velocity = _within(a, "acceleration"), _within(v, "velocity")
-        radius = max(r, CLOSE)
-        guidance = self._access.guidance
-        angular = acceleration / TURN
-
-        def course() -> tuple[Floats, float]:
-            away = self._kinematics.difference(self._kinematics.tool_pose(self._reference), goal)
-            far = max(float(np.linalg.norm(away[:3])), TURN * float(np.linalg.norm(away[3:])))
-            return approach(away, far, velocity, acceleration), far
-
-        def start(shaped: bool) -> int:
-            return guidance.move_tool(course()[0], acceleration, angular, shaped=shaped)
-
-        def wait() -> Turns:
-            yield
-            while course()[1] > radius:
-                yield from self._arm.regain()
-                self._arm.steer(start)
-                yield
-
-        yield from self._arm.guide(start, wait)
+        goal = ProcessSegment(
+            pose=self._pose("pose", pose),
+            velocity=_within(v, "velocity"),
+            acceleration=_within(a, "acceleration"),
+        )
+        return self._led.lead(goal, goal.velocity, goal.acceleration, max(r, CLOSE))
 
     @costs(100)
     def speedj(self, qd: Joints, a: Positive = 1.4, t: Duration | None = None) -> Turns:
         """Approach velocities of the joints, and keep them; return after a time, or when they are reached."""
         most, wanted = self._access.description.limits.velocity, np.array(qd)
         wanted *= min(1.0, *(limit / max(abs(one), 1e-12) for one, limit in zip(wanted, most, strict=True)))
-        acceleration = _within(a, "acceleration", self._acceleration)
-
-        def start(shaped: bool) -> int:
-            return self._access.guidance.move_joints(wanted, acceleration, shaped=shaped)
-
-        yield from self._arm.guide(start, self._wait(t))
+        acceleration, guidance = _within(a, "acceleration", self._acceleration), self._access.guidance
+        return self._arm.guide(
+            lambda shaped: guidance.move_joints(wanted, acceleration, shaped=shaped), self._wait(t)
+        )
 
     @costs(120)
     def speedl(
@@ -217,26 +202,24 @@ class MotionFunctions(Family):
         aRot: AngularRate | None = None,
     ) -> Turns:
         """Approach a velocity of the tool in the base frame, and keep it; see `speedj`."""
-        twist, acceleration = np.array(xd), _within(a, "acceleration")
+        twist, acceleration, guidance = np.array(xd), _within(a, "acceleration"), self._access.guidance
         angular = acceleration if aRot is None else aRot
-
-        def start(shaped: bool) -> int:
-            return self._access.guidance.move_tool(twist, acceleration, angular, shaped=shaped)
-
-        yield from self._arm.guide(start, self._wait(t))
+        return self._arm.guide(
+            lambda shaped: guidance.move_tool(twist, acceleration, angular, shaped=shaped), self._wait(t)
+        )
 
     @costs(150)
     def stopj(self, a: Positive = 2) -> Turns:
         """Stop with a deceleration of the joints."""
         deceleration = _within(a, "acceleration", self._acceleration)
-        yield from self._arm.halt(lambda: self._access.guidance.stop_joints(deceleration))
+        return self._arm.halt(lambda: self._access.guidance.stop_joints(deceleration))
 
     @costs(150)
     def stopl(self, a: ToolRate = 1.2, aRot: AngularRate | None = None) -> Turns:
         """Stop with a deceleration of the tool."""
         deceleration = _within(a, "acceleration")
         angular = deceleration if aRot is None else aRot
-        yield from self._arm.halt(lambda: self._access.guidance.stop_tool(deceleration, angular))
+        return self._arm.halt(lambda: self._access.guidance.stop_tool(deceleration, angular))
 
     # ------------------------------------------------------------------ arguments
 
@@ -244,26 +227,18 @@ class MotionFunctions(Family):
     def _reference(self) -> Floats:
         return self._access.guidance.reference
 
-    @property
-    def _here(self) -> list[float]:
-        found: list[float] = self._reference.tolist()
-        return found
-
-    def _wait(self, t: float | None) -> Callable[[], Iterator[None]]:
-        """How a call waits for a time, or if none is given until the velocity is reached."""
+    def _wait(self, t: float | None) -> Iterator[None]:
+        """Wait for a time, or if none is given until the velocity is reached."""
         if t:
-            return lambda: self._arm.in_motion(t)
-
-        def until_reached() -> Iterator[None]:
+            yield from self._arm.in_motion(t)
+            return
+        yield
+        while isinstance(speed := self._access.guidance.guided, Speed) and speed.duration > 0.0:
             yield
-            while isinstance(speed := self._access.guidance.guided, Speed) and speed.duration > 0.0:
-                yield
-
-        return until_reached
 
     def _posture(self, name: str, value: object) -> tuple[float, ...]:
         """Joint positions within their range, from these or from a pose."""
-        if is_pose(value):
+        if isinstance(value, Pose):
             return self._kinematics.posture(pose(name, value), self._near)
         q = numbers(name, value, self._access.description.joints)
         with refusals_as_faults():
@@ -272,7 +247,7 @@ class MotionFunctions(Family):
 
     def _pose(self, name: str, value: object) -> tuple[float, float, float, float, float, float]:
         """A pose of the tool, from this or from joint positions."""
-        if is_pose(value):
+        if isinstance(value, Pose):
             return pose(name, value)
         if not isinstance(value, Array):
             raise Fault(f"{name} is {shown(value)}: it must be a pose or a list of joint positions")
@@ -281,12 +256,11 @@ class MotionFunctions(Family):
     @property
     def _near(self) -> Sequence[float]:
         """Posture from which the next move begins."""
+        here: list[float] = self._reference.tolist()
         end = self._arm.end
         if end is None:
-            return self._here
-        if isinstance(end, JointSegment):
-            return end.q
-        return self._kinematics.posture(end.pose, self._here)
+            return here
+        return end.q if isinstance(end, JointSegment) else self._kinematics.posture(end.pose, here)
 
 
 def _within(value: float, name: str, most: float = np.inf) -> float:

@@ -5,7 +5,7 @@ from typing import Annotated
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import OWN_TOKEN, refusals_as_faults
 from tvist_controller.programs.arguments import Vector3, pose, several, within
-from tvist_controller.programs.functions.family import Family
+from tvist_controller.programs.functions.family import Family, reads
 from tvist_controller.programs.journey import DELAY, Turns
 from tvist_plant.plant import PERIOD
 from tvist_plant.robot_checks import lacking_inertia
@@ -24,10 +24,12 @@ ROUNDED = 0.05
 """Share of the largest moment of inertia that others may lack because a CAD system has rounded them."""
 ORDER = (0, 3, 5, 1, 2, 4)
 """Places of Ixx Iyy Izz Ixy Ixz Iyz, as programs have them, in the order of robot files."""
+NONE: Tensor = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+"""Inertia of a payload that is declared without any."""
 
 
-Centre = Annotated[tuple[float, ...], several(3, Offset)]
-Moments = Annotated[tuple[float, ...], several(6, Moment)]
+Centre = Annotated[tuple[float, float, float], several(3, Offset)]
+Moments = Annotated[Tensor, several(6, Moment)]
 ToolPose = Annotated[values.Pose, lambda name, value: pose(name, value, Length)]
 
 
@@ -45,19 +47,20 @@ class SettingFunctions(Family):
     @costs(20)
     def set_payload(self, m: Mass, cog: Centre | None = None) -> Turns:
         """Declare a payload without inertia; without a centre of mass, it is at the tool centre point."""
-        yield from self._declare(m, self._access.motion.tcp[:3] if cog is None else cog, (0.0,) * 6)
+        x, y, z = self._access.motion.tcp[:3] if cog is None else cog
+        return self._declare(m, (x, y, z), NONE)
 
     @costs(20)
     def set_payload_mass(self, m: Mass) -> Turns:
         """Change the mass of the declared payload."""
         declared = self._access.declared()
-        yield from self._declare(m, declared.com, declared.inertia)
+        return self._declare(m, declared.com, declared.inertia)
 
     @costs(20)
     def set_payload_cog(self, cog: Centre) -> Turns:
         """Change the centre of mass of the declared payload."""
         declared = self._access.declared()
-        yield from self._declare(declared.mass, cog, declared.inertia)
+        return self._declare(declared.mass, cog, declared.inertia)
 
     @costs(20)
     def set_target_payload(
@@ -68,8 +71,8 @@ class SettingFunctions(Family):
         transition_time: Annotated[float, within(0.0, 3600.0)] = 0,
     ) -> Turns:
         """Declare a payload with its inertia, Ixx Iyy Izz Ixy Ixz Iyz; clients see it change in a time."""
-        xx, yy, zz, xy, xz, yz = inertia or (0.0,) * 6
-        yield from self._declare(m, cog, self._as_a_body((xx, xy, xz, yy, yz, zz)), transition_time)
+        xx, yy, zz, xy, xz, yz = inertia or NONE
+        return self._declare(m, cog, self._as_a_body((xx, xy, xz, yy, yz, zz)), transition_time)
 
     def _as_a_body(self, inertia: Tensor) -> Tensor:
         """Make the moments of a body of those that were rounded, with a warning; others are left to be refused."""
@@ -92,9 +95,10 @@ class SettingFunctions(Family):
             raise Fault(f"set_gravity: d is [{x:g}, {y:g}, {z:g}]; the simulated arm stands upright, so it must be "
                         f"[0, 0, {GRAVITY}]")  # fmt: skip
 
-    def get_gravity(self) -> Array:
-        """Return the gravity that the arm has, which is installed upright [m/s^2]."""
-        return Array((0.0, 0.0, GRAVITY))
+    get_gravity = reads(
+        "Return the gravity that the arm has, which is installed upright [m/s^2].",
+        lambda _: Array((0.0, 0.0, GRAVITY)),
+    )
 
     @costs(80)
     def zero_ftsensor(self) -> None:
@@ -102,12 +106,10 @@ class SettingFunctions(Family):
         self._send(ZeroFtsensor(token=OWN_TOKEN))
 
     def _declare(
-        self, mass: float, com: tuple[float, ...], inertia: tuple[float, ...], seconds: float = 0.0
+        self, mass: float, com: tuple[float, float, float], inertia: Tensor, seconds: float = 0.0
     ) -> Turns:
-        xyz = (com[0], com[1], com[2])
-        six = (inertia[0], inertia[1], inertia[2], inertia[3], inertia[4], inertia[5])
         yield from self._arm.finish()
-        command = SetPayload(token=OWN_TOKEN, mass=mass, com=xyz, inertia=six, transition_time=seconds)
+        command = SetPayload(token=OWN_TOKEN, mass=mass, com=com, inertia=inertia, transition_time=seconds)
         # Planned beside the ticks and taken after a fixed number of them, as a move is: so it takes effect at the same
         # tick on every machine (decision 26).
         ordered = self._access.plans.later(command)

@@ -18,7 +18,7 @@ from tvist_controller.programs.arguments import (
     within,
     word,
 )
-from tvist_controller.programs.functions.family import Family, Parts
+from tvist_controller.programs.functions.family import Family, Parts, reads
 from tvist_controller.programs.functions.terminals import BitPlace, Configurable, Standard, Tool
 from tvist_controller.programs.indicators import SHOWS_UNTIL_FAILURE, Group
 from tvist_urscript import Array, Fault
@@ -151,9 +151,9 @@ class SetupFunctions(Family):
     def set_base_acceleration(self, a: Annotated[None, _at_rest]) -> None:
         """Accept that the base stands."""
 
-    def get_base_acceleration(self) -> Array:
-        """Return the acceleration of the base, which stands [m/s^2]."""
-        return Array((0.0, 0.0, 0.0))
+    get_base_acceleration = reads(
+        "Return the acceleration of the base, which stands [m/s^2].", lambda _: Array((0.0, 0.0, 0.0))
+    )
 
     def position_deviation_warning(self, enabled: Flag, threshold: Share = 0.8) -> None:
         """Check a setting; a warning says that deviations are not told if it is enabled."""

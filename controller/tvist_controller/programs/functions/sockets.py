@@ -119,9 +119,7 @@ class SocketFunctions(Family):
         r"""Send `GET name\n` and return the integer of the answer `name value\n`; 0 if none comes within 2 s."""
         yield from self._arm.finish()
         self._parts.sockets.send(socket_name, to_bytes(f"GET {name}\n"))
-        found = yield from self._parts.sockets.read(
-            socket_name, lambda got: _variable(got, name), ANSWER, _idle
-        )
+        found = yield from self._read(socket_name, lambda got: _variable(got, name), ANSWER)
         return found or 0
 
     @costs(10)
@@ -150,10 +148,7 @@ class SocketFunctions(Family):
         return self._send(socket_name, to_bytes(to_str(str)))
 
     def _send(self, name: str, data: bytes) -> bool:
-        def send() -> None:
-            self._parts.sockets.send(name, data)
-
-        self._arm.then(send)
+        self._arm.then(lambda: self._parts.sockets.send(name, data))
         return self._parts.sockets.is_open(name)
 
     def _read_list(
@@ -171,15 +166,10 @@ class SocketFunctions(Family):
     def _read(self, name: str, take: Take[T], timeout: float) -> Generator[None, None, T | None]:
         return self._parts.sockets.read(name, take, timeout, self._go_on)
 
-    def _go_on(self, waited: int) -> Generator[None, None, None]:
+    def _go_on(self, waited: int) -> None:
         """Begin the moves that wait for a further one, if its data have not come by now; it may come under way."""
         if waited >= MORE:
             self._arm.begin()
-        yield from ()
-
-
-def _idle(_: int) -> Generator[None, None, None]:
-    yield from ()
 
 
 # ---------------------------------------------------------------------- messages

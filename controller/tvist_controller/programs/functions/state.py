@@ -18,11 +18,10 @@ from tvist_controller.programs.arguments import (
     a_list,
     a_pose,
     integer,
-    is_pose,
     numbers,
 )
 from tvist_controller.programs.functions.family import Family, Parts, reads
-from tvist_controller.programs.functions.settings import ToolPose
+from tvist_controller.programs.functions.settings import ORDER, ToolPose
 from tvist_controller.refusal import RefusalError, check_joints
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
@@ -153,11 +152,10 @@ class StateFunctions(Family):
         "Return the centre of mass of the declared payload [m].", lambda on: a_list(on.access.declared().com)
     )
 
-    def get_target_payload_inertia(self) -> Array:
-        """Return the inertia of the declared payload, Ixx Iyy Izz Ixy Ixz Iyz [kg m^2]."""
-        xx, xy, xz, yy, yz, zz = self._access.declared().inertia
-        return a_list((xx, yy, zz, xy, xz, yz))
-
+    get_target_payload_inertia = reads(
+        "Return the inertia of the declared payload, Ixx Iyy Izz Ixy Ixz Iyz [kg m^2].",
+        lambda on: a_list([on.access.declared().inertia[place] for place in ORDER]),
+    )
     get_joint_torques = reads(
         "Return the external torques on the joints: without what the arm itself needs [N m].",
         lambda on: a_list(on.access.forces.torques()),
@@ -250,7 +248,7 @@ class PoseFunctions(Family):
     @costs(200)
     def is_within_safety_limits(self, pose: object, qNear: Joints | None = None) -> bool:
         """Return whether the arm can be at a pose or at joint positions: within their range, without a collision."""
-        if is_pose(pose):
+        if isinstance(pose, Pose):
             q = self._solution(arguments.pose("pose", pose), self._near(qNear))
         else:
             q = numbers("pose", pose, self._access.description.joints)

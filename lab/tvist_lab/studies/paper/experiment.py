@@ -1,5 +1,6 @@
 """The three motions by several methods, with repetitions, as a client."""
 
+import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -7,7 +8,9 @@ import numpy as np
 
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
+from tvist_controller.api.line import Setup
 from tvist_lab.collect import collect
+from tvist_lab.in_process import robot_in_process
 from tvist_lab.metrics import (
     MotionResult,
     Runs,
@@ -145,6 +148,18 @@ async def experiment(
             for method in fixed_baselines(done.info, done.delay(motion)):
                 await _repeat(robot, arm, done, motion, method, runs, progress)
     return done
+
+
+def simulate(
+    setup: Setup, *, runs: int, seed: int, baselines: bool = False, progress: Progress = lambda _: None
+) -> Experiment:
+    """Run every motion with every method on a robot in this process; see `experiment`."""
+
+    async def whole() -> Experiment:
+        async with robot_in_process(setup) as robot, robot.control("paper") as arm:
+            return await experiment(robot, arm, runs=runs, seed=seed, baselines=baselines, progress=progress)
+
+    return asyncio.run(whole())
 
 
 def fixed_baselines(info: Info, delay: float) -> Sequence[Method]:

@@ -17,5 +17,7 @@ def pose(name: str) -> tuple[float, ...]:
     return tuple(published()["configurations"][name]["q"])
 
 
+ARMS = ("ur5e", "ur5e_stiction")
+"""The robots that make its experiment: one fitted to Table 1, and one tuned to Table 2 as well."""
 MOTIONS = {"Q1-Q2": ("Q1", "Q2"), "Q1-Q3": ("Q1", "Q3"), "Q3-Q1": ("Q3", "Q1")}
 """The three motions: name to start and end."""

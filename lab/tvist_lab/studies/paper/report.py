@@ -7,13 +7,15 @@ import numpy as np
 from tvist_lab.metrics import table_2, table_notes
 from tvist_lab.studies.paper.experiment import Experiment, JudgedRun
 from tvist_lab.studies.paper.methods import ACCELERATION
+from tvist_lab.studies.paper.origins import origins
 from tvist_lab.studies.paper.published import MOTIONS
 
 
 def as_dict(done: Experiment) -> dict[str, Any]:
-    """Return the content of `tvist paper --json`."""
+    """Return what `tvist paper --json` prints of an arm."""
     runs = done.of_table_2()
-    return {
+    result: dict[str, Any] = {
+        "robot": done.info.model,
         "seed": done.seed,
         "runs": done.runs,
         "shaper": "zv",
@@ -26,6 +28,7 @@ def as_dict(done: Experiment) -> dict[str, Any]:
         "methods": done.labels,
         "notes": table_notes(runs),
     }
+    return result | {"origins": origins(done.info.model, result)}
 
 
 def _methods(done: Experiment, motion: str) -> dict[str, dict[str, float | None]]:

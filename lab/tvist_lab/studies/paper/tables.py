@@ -1,5 +1,6 @@
 """Rows of Table 2 beside the paper's, and of a table of all methods."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from tvist_lab.studies.paper.published import published
@@ -58,6 +59,20 @@ def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, 
         return first.format(said) if rows[name]["still_after_ms"] == soonest else said
 
     return cells([{"label": label(name), **row} for name, row in rows.items()], METHODS)
+
+
+def beside(arms: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
+    """Return heading and rows of the table of the origins, with the paper's figures and those of each arm.
+
+    Args:
+        arms: Result of `report.as_dict` for each arm.
+    """
+    heading = ("figure", "paper", *(title for one in arms for title in (one["robot"], "origin")))
+    rows = zip(*(one["origins"] for one in arms), strict=True)
+    return [heading, *(
+        (same[0]["figure"], same[0]["paper"], *(row[key] for row in same for key in ("here", "origin")))
+        for same in rows
+    )]  # fmt: skip
 
 
 def _form(value: float | None, form: str, unit: str = "") -> str:

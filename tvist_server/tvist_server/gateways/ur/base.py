@@ -86,12 +86,20 @@ class InTurnSession(PortSession, Generic[Item]):
             begin(self._work())
 
     async def _work(self) -> None:
-        self._busy = True
+        self._busy, raised = True, None
         try:
             while self._items:
                 await self._do(self._items.popleft())
+        except Exception as error:  # noqa: BLE001  `hear` logs it and ends the connection
+            raised = error
         finally:
             self._busy = False
+
+        def done() -> None:
+            if raised is not None:
+                raise raised
+
+        self._control.hear(done)
         if self.over:
             self._control.leave()
 

@@ -5,6 +5,7 @@ from fnmatch import fnmatchcase
 from typing import get_args
 
 from tvist_protocol.io import Bank
+from tvist_server.option_values import StartError
 from tvist_server.rtde.wire import Wire
 
 NUMBERS = range(48)
@@ -80,10 +81,10 @@ def matching(patterns: Iterable[str]) -> list[str]:
     """Return the input variables that patterns name, in which `*`, `?` and `[0-9]` stand for others.
 
     Raises:
-        ValueError: A pattern names none.
+        StartError: A pattern names none.
     """
     found = {pattern: [name for name in INPUTS if fnmatchcase(name, pattern)] for pattern in patterns}
     if wrong := [pattern for pattern, names in found.items() if not names]:
         why = "must be the name of an RTDE input, such as speed_slider_mask or input_int_register_*"
-        raise ValueError(f"reserve_inputs has {wrong[0]!r}: {why}")
+        raise StartError(f"reserve_inputs has {wrong[0]!r}: {why}")
     return [name for names in found.values() for name in names]

@@ -1,15 +1,25 @@
-"""A robot's own limits and dimensions, from the configuration data of its primary interface."""
+"""What a robot's other interfaces say: its limits and dimensions, and the answers of its dashboard."""
 
+import socket
+import time
+from collections.abc import Callable, Sequence
 from struct import Struct, error
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from msgspec.structs import replace
 
 from tvist_plant.description import RobotDescription
-from tvist_server.moving.dialogue import NoAnswerError, ask
+from tvist_protocol.errors import short
 from tvist_server.watching.place import Place
 
+PATIENCE = 2.0
+"""Longest duration of a conversation [s]."""
+MOST = 1 << 20
+"""Most bytes that are taken as an answer."""
+DASHBOARD = 29999
+"""Port of the dashboard server on a robot of UR's."""
+_UNKNOWN = "could not understand"
 _PACKAGE, _PART, _DATA = Struct(">iB"), Struct(">IB"), Struct(">53d4i")
 PRIMARY = 30001
 """Port of the primary interface on a robot of UR's."""
@@ -17,6 +27,58 @@ STATE, CONFIGURATION = 16, 6
 """Type of the packages with a robot's state, and number of the part with its configuration."""
 FAR, TURNED = 5e-3, 0.01
 """Differences of its dimensions from the robot file, from which on it is another model [m, rad]."""
+T = TypeVar("T")
+
+
+class NoAnswerError(Exception):
+    """An interface does not answer; the message says which, and why."""
+
+
+def ask(place: Place, question: bytes, answer: Callable[[bytes], T | None]) -> T:
+    """Send a question, and return what its answer says.
+
+    Args:
+        place: The interface.
+        question: What to send, as soon as the connection is there.
+        answer: Reads what has come so far; None if more has to come.
+
+    Raises:
+        NoAnswerError: There is no interface, or it does not answer in time.
+    """
+    heard, ends = b"", time.monotonic() + PATIENCE
+    try:
+        with socket.create_connection((place.host, place.port), PATIENCE) as connection:
+            connection.sendall(question)
+            while len(heard) < MOST and (left := ends - time.monotonic()) > 0.0:
+                connection.settimeout(left)
+                data = connection.recv(1 << 16)
+                heard += data
+                found = answer(heard)
+                if found is not None:
+                    return found
+                if not data:
+                    break
+    except OSError as error:
+        raise NoAnswerError(f"port {place.port} of {place.host}: {error.strerror or error}") from error
+    raise NoAnswerError(f"port {place.port} of {place.host} gives no answer within {PATIENCE:g} s")
+
+
+def asked(place: Place, questions: Sequence[str]) -> dict[str, str]:
+    """Return the answers by question; those that it does not understand are left out, all if there is no dashboard."""
+    text = "".join(f"{question}\n" for question in (*questions, "quit")).encode()
+
+    def answers(heard: bytes) -> dict[str, str] | None:
+        # Without the greeting, and what is incomplete.
+        lines = heard.decode(errors="replace").split("\n")[1:-1]
+        if len(lines) < len(questions):
+            return None
+        found = zip(questions, lines, strict=False)
+        return {question: short(line.strip()) for question, line in found if _UNKNOWN not in line}
+
+    try:
+        return ask(place.beside(DASHBOARD), text, answers)
+    except NoAnswerError:
+        return {}
 
 
 class Configuration(NamedTuple):

@@ -1,0 +1,112 @@
+"""Designs of taps that are made of others: for a known end of a motion, and smoothed; and constant taps."""
+
+import math
+
+import numpy as np
+
+from tvist_shaping._types import Floats
+from tvist_shaping.steady import Design, ShortDesign
+
+AT_TARGET = 3
+"""Number of modes, from the lowest on, that have a zero-vibration shaper in a motion with a known end."""
+LONGEST = 0.26
+"""Longest time of these shapers together, as long as the other design is not slowed down [s]."""
+
+
+class TargetDesign(Design):
+    """One design for motions without a known end, and for the others zero-vibration shapers for the modes there.
+
+    The weights are constant in a motion with a known end, so they need no constant mean delay, which costs a lightly
+    damped arm most of its reduction.
+    """
+
+    def __init__(self, design: ShortDesign, slower: float = 1.0) -> None:
+        """Create a design from one that no other filter has, for an arm by which all times are longer."""
+        self.name, self.modes, self.period = design.name, design.modes, design.period
+        self.taps = math.ceil(LONGEST * slower / self.period) + 3
+        self._design = design
+
+    def __repr__(self) -> str:
+        return f"TargetDesign({self._design!r})"
+
+    def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
+        """Compute the taps without a known end, for a reference at rest."""
+        taps[self._design.taps :] = 0.0
+        return self._design.start(f_d, zeta, taps[: self._design.taps])
+
+    def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:
+        """Compute the taps without a known end, some time later."""
+        return self._design.go_on(f_d, zeta, seconds, taps[: self._design.taps])
+
+    def at_target(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
+        """Compute the taps for the modes at the end of a motion.
+
+        Impulses between two ticks are shared by both, so that no tap is negative and all limits are kept exactly.
+        """
+        sizes, ticks = np.ones(1), np.zeros(1)
+        for f, z in zip(f_d[:AT_TARGET], zeta[:AT_TARGET], strict=True):
+            later = math.exp(-math.pi * z / math.sqrt(1.0 - z * z))
+            sizes = np.outer(sizes, [1.0 / (1.0 + later), later / (1.0 + later)]).ravel()
+            ticks = np.add.outer(ticks, [0.0, 0.5 / (f * self.period)]).ravel()
+        within = np.minimum(ticks, self.taps - 2.0)
+        first = within.astype(np.int64)
+        taps[:] = 0.0
+        np.add.at(taps, first, sizes * (1.0 - within + first))
+        np.add.at(taps, first + 1, sizes * (within - first))
+        return bool(np.array_equal(within, ticks))
+
+    def _unshare(self) -> None:
+        self._design = self._design.fork()
+
+
+class SmoothedDesign(Design):
+    """The taps of another design, which no other filter has, followed by constant weights with sum 1."""
+
+    def __init__(self, design: Design, weights: Floats, name: str) -> None:
+        self.name, self.modes, self.period, self.peak = name, design.modes, design.period, design.peak
+        self.taps = design.taps + len(weights) - 1
+        self._design, self._weights, self._own = design, weights, np.zeros(design.taps)
+
+    def __repr__(self) -> str:
+        return f"SmoothedDesign({self._design!r}, {len(self._weights)} weights)"
+
+    def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
+        """Compute the taps for a reference at rest."""
+        done = self._design.start(f_d, zeta, self._own)
+        taps[:] = np.convolve(self._own, self._weights)
+        return done
+
+    def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:
+        """Compute the taps some time later."""
+        done = self._design.go_on(f_d, zeta, seconds, self._own)
+        taps[:] = np.convolve(self._own, self._weights)
+        return done
+
+    def _unshare(self) -> None:
+        self._design, self._own = self._design.fork(), self._own.copy()
+
+
+class ConstantDesign(Design):
+    """Constant weights, none negative, with sum 1: feed-forward of the arm's elasticity does the rest."""
+
+    constant = True
+
+    def __init__(self, name: str, weights: Floats, modes: int, period: float = 0.002) -> None:
+        self.name, self.weights, self.modes = name, weights, modes
+        self.taps, self.period = len(weights), period
+
+    def __repr__(self) -> str:
+        return f"ConstantDesign({self.name!r}, {self.taps} weights)"
+
+    def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:  # noqa: ARG002  the same for all modes
+        """Give the weights."""
+        taps[:] = self.weights
+        return True
+
+
+def running_means(*ticks: int) -> Floats:
+    """Weights of consecutive running means over numbers of ticks, shape (sum - count + 1,), with sum 1."""
+    weights: Floats = np.ones(1)
+    for count in ticks:
+        weights = np.convolve(weights, np.full(count, 1.0 / count))
+    return weights

@@ -1,0 +1,364 @@
+"""Recordings that keep the last ticks: enough of them, in complete files, and readable at any time."""
+
+import errno
+import os
+from itertools import pairwise
+
+import msgspec
+import pytest
+from mcap.reader import make_reader
+from tests.server.test_recording_writer import INFO, STATE, TRUTH, golden
+
+from tvist_lab.recordings import RecordingError
+from tvist_lab.recordings import read as read_log
+from tvist_lab.recordings.mcap_file import read
+from tvist_lab.replay import ReplayError, replay_file
+from tvist_protocol import Event, Io, State, Truth
+from tvist_protocol.journal import Entry
+from tvist_protocol.recorded import segment_name, segment_of, topics
+from tvist_server.recording import RecorderError, writer
+from tvist_server.recording.recorder import Recorder
+from tvist_server.recording.segments import Segments
+from tvist_server.recording.writer import heading
+
+KEEP = 100
+
+
+IO = golden("io", Io)
+
+
+def messages(ticks, first=1):
+    """What a robot sends: inputs and outputs once, and an event now and then."""
+    for tick in range(first, first + ticks):
+        yield Entry(tick=tick, kind="missed", count=1)
+        if tick == 1:
+            yield msgspec.structs.replace(IO, tick=tick, actual_digital_output_bits=5)
+        if tick % 7 == 0:
+            yield Event(tick=tick, kind="warning", why=str(tick))
+        yield msgspec.structs.replace(STATE, tick=tick, timestamp=tick * 0.002)
+        yield msgspec.structs.replace(TRUTH, tick=tick, timestamp=tick * 0.002)
+
+
+@pytest.fixture
+def path(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "CHUNK_SIZE", 8 * 1024)  # some five ticks
+    return tmp_path / "run.mcap"
+
+
+def names(folder):
+    return sorted(place.name for place in folder.iterdir())
+
+
+def segments(path):
+    return Segments(
+        path, topics(INFO.name), heading(INFO, {"seed": 1}), dict.fromkeys(topics(INFO.name), 0),
+        overwrite=False, keep=KEEP,
+    )  # fmt: skip
+
+
+def run_names(path, run, numbers):
+    return [segment_name(path.name, run, number) for number in numbers]
+
+
+def assert_whole(content, last, at_least=KEEP):
+    """Nothing is missing or twice from the first state to the last."""
+    ticks = [state.tick for state in content.states]
+    assert all(after - before == 1 for before, after in pairwise(ticks))
+    assert ticks[-1] == last
+    assert at_least <= len(ticks) <= 1.25 * KEEP
+    assert [truth.tick for truth in content.truths] == ticks
+    assert [entry.tick for entry in content.journal] == ticks
+    assert [event.tick for event in content.events] == [tick for tick in ticks if tick % 7 == 0]
+    assert content.recording["actual_digital_output_bits"].tolist() == [5.0] * len(ticks)
+    assert content.from_tick == (None if ticks[0] == 1 else ticks[0])
+
+
+def record_all(path, ticks):
+    with Recorder(path, INFO, {"seed": 1}, keep=KEEP, wait=True) as recorder:
+        for message in messages(ticks):
+            match message:
+                case State():
+                    recorder.state(message)
+                case Truth():
+                    recorder.truth(message)
+                case Event():
+                    recorder.event(message)
+                case Io():
+                    recorder.io(message)
+                case Entry():
+                    recorder.journal(message)
+    assert recorder.error is None
+    return recorder
+
+
+@pytest.mark.parametrize("ticks", [10, 40, KEEP, KEEP + 1, 2 * KEEP, 2 * KEEP + 1, 777])
+def test_a_recording_holds_the_last_ticks_in_segments_of_a_quarter_of_them_each(ticks, path):
+    recorder = record_all(path, ticks)
+    last = (ticks - 1) // 25 + 1
+    assert names(path.parent) == run_names(path, 1, range(max(last - 4, 1), last + 1))
+    assert recorder.place == path.with_name("run-1-part*.mcap")
+    for named in (recorder.place, path.parent, path):
+        content = read(named)
+        assert content.complete
+        assert content.dropped == {"state": 0, "event": 0, "truth": 0, "io": 0, "journal": 0}
+        assert_whole(content, ticks, at_least=min(ticks, KEEP))
+        assert len(read_log(named)) == len(content.states)
+
+
+def test_each_segment_is_a_complete_recording_with_an_index(path):
+    record_all(path, 330)
+    for place in sorted(path.parent.iterdir()):
+        content = read(place)
+        assert content.complete
+        assert content.from_tick == content.states[0].tick
+        assert content.recording["actual_digital_output_bits"].tolist() == [5.0] * len(content.states)
+        with place.open("rb") as stream:
+            reader = make_reader(stream, validate_crcs=True)
+            assert reader.get_summary().statistics.message_count == len(list(reader.iter_messages()))
+
+
+def test_it_can_be_read_after_any_message_as_if_the_process_had_been_killed(path):
+    written = segments(path)
+    for number, message in enumerate(messages(450)):
+        written.write(message)
+        if number % 37 == 0 and number > 60:
+            written.flush()
+            content = read(path)
+            assert not content.complete
+            assert content.dropped is None
+            last = content.states[-1].tick
+            assert message.tick - 10 <= last <= message.tick
+            ticks = [state.tick for state in content.states]
+            assert ticks == list(range(ticks[0], last + 1))
+            assert len(ticks) >= min(KEEP, message.tick) - 10
+            assert [event.tick for event in content.events][:3] == [
+                t for t in range(ticks[0], last) if t % 7 == 0
+            ][:3]
+    written.close()
+    whole = names(path.parent)[:-1]
+    assert len(whole) == 4
+    assert all(read(path.with_name(name)).complete for name in whole)
+
+
+def test_what_a_segment_lacks_is_counted_in_it_and_in_the_whole(path):
+    dropped = dict.fromkeys(topics(INFO.name), 0)
+    written = Segments(path, topics(INFO.name), heading(INFO, {}), dropped, overwrite=False, keep=KEEP)
+    for message in messages(60):
+        if isinstance(message, State):
+            dropped[State] += message.tick in (3, 30, 31)
+            written.write(message)
+    written.finish()
+    written.close()
+    assert [read(path.with_name(name)).dropped["state"] for name in names(path.parent)] == [1, 2, 0]
+    assert read(path).dropped["state"] == 3
+
+
+def test_a_disk_that_is_full_at_a_new_segment_leaves_those_before_it(path, monkeypatch):
+    class Full(writer.Writer):
+        def add_metadata(self, name, data):
+            if "from_tick" in data:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            super().add_metadata(name, data)
+
+    monkeypatch.setattr(writer, "Writer", Full)
+    recorder = Recorder(path, INFO, {}, keep=KEEP, wait=True)
+    for message in messages(30):
+        if isinstance(message, State):
+            recorder.state(message)
+    recorder.close()
+    assert "No space left on device" in recorder.error
+    assert read(path).complete
+    assert ticks_of(path) == list(range(1, 26))
+
+
+def test_files_of_several_recordings_are_not_read_as_one(path):
+    record(path, 30)
+    record(path, 30)
+    with Recorder(path, INFO, {}) as recorder:
+        recorder.state(STATE)
+    for named in (path.parent, path.with_name("*.mcap")):
+        for reader in (read, read_log):
+            with pytest.raises(
+                RecordingError,
+                match=r"names 3 recordings, run-1-part\*\.mcap, run-2-part\*\.mcap, run\.mcap: give one",
+            ):
+                reader(named)
+    with pytest.raises(RecordingError, match=r"x-\*\.mcap names no recording"):
+        read(path.with_name("x-*.mcap"))
+
+
+def test_a_recording_without_one_of_its_middle_segments_is_refused(path):
+    record(path, 100)
+    (path.parent / names(path.parent)[1]).unlink()
+    with pytest.raises(RecordingError, match="lacks segment"):
+        read(path)
+
+
+@pytest.mark.parametrize("name", ["run[1].mcap", "run*.mcap", "log.2026-11-29"])
+def test_any_name_of_a_recording_names_its_segments(path, name):
+    record(path.with_name(name), 30)
+    record(path.with_name(name), 30)
+    (place,) = {segment_name(name, 2, None)}
+    assert ticks_of(path.with_name(name)) == ticks_of(path.with_name(place))
+
+
+def record(path, ticks, killed=False):
+    """Record ticks; killed, the files are left as they are."""
+    recorder = Recorder(path, INFO, {}, keep=KEEP, wait=True)
+    for message in messages(ticks):
+        if isinstance(message, State):
+            recorder.state(message)
+    if not killed:
+        recorder.close()
+        return
+    while recorder._queue:
+        recorder._wake.set()
+    recorder._file.write = recorder._file.finish = lambda *_: None
+    recorder.close()
+
+
+def ticks_of(path):
+    return [state.tick for state in read(path).states]
+
+
+def kept(path, number):
+    return path.with_name(segment_name(path.name, number, None))
+
+
+@pytest.mark.parametrize("killed", [False, True])
+@pytest.mark.parametrize("name", ["run.mcap", "run", "a.b.mcap"])
+def test_a_recording_of_an_earlier_run_stays_and_the_name_alone_is_that_of_the_latest(name, killed, path):
+    path = path.with_name(name)
+    record(path, 330, killed)
+    before = ticks_of(path)
+    assert len(before) >= KEEP - 10
+    record(path, 120)
+    assert ticks_of(kept(path, 1)) == before
+    assert ticks_of(path) == ticks_of(kept(path, 2)) == list(range(1, 121))
+
+
+def test_the_five_newest_are_kept_and_files_of_other_names_stay(path):
+    strange = [
+        path.with_name(name)
+        for name in ("run.1.mcap", "run-1.mcap", "run-x-part0001.mcap", "run-01-part0001.mcap")
+    ]
+    for place in strange:
+        place.write_bytes(b"mine")
+    for number in range(1, 9):
+        record(path, 250 + number, killed=number % 2 == 0)
+    assert all(ticks_of(kept(path, number))[-1] > 230 for number in range(3, 9))
+    left = {*names(path.parent)} - {place.name for place in strange}
+    assert {segment_of(name)[1] for name in left} == set(range(3, 9))
+    assert all(place.read_bytes() == b"mine" for place in strange)
+
+
+def test_a_start_that_fails_costs_no_earlier_recording(path):
+    record(path, 20)
+    for _ in range(9):
+        Recorder(path, INFO, {}, keep=KEEP).discard()  # as a server does that cannot listen
+    assert ticks_of(path) == list(range(1, 21))
+    assert names(path.parent) == run_names(path, 1, [1])
+
+
+@pytest.mark.parametrize(
+    ("content", "stays"),
+    [(b"", False), (b"\x89MCAP0\r\n", False), (bytes(5000), True)],
+    ids=["empty", "begun", "zeros"],
+)
+def test_what_a_power_failure_left_keeps_no_recording_from_starting(content, stays, path):
+    left = path.with_name(segment_name(path.name, 1, 1))
+    left.write_bytes(content)
+    record(path, 20)
+    assert names(path.parent) == run_names(path, 1, [1]) + (run_names(path, 2, [1]) if stays else [])
+    assert not stays or left.read_bytes() == content
+    assert ticks_of(path) == list(range(1, 21))
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_runs_that_end_before_they_have_recorded_anything_cost_no_earlier_recording(killed, path):
+    """As when the system kills a process whenever it has started."""
+    record(path, 20)
+    for _ in range(9):
+        record(path, 0, killed)
+    record(path, 10)
+    assert names(path.parent) == run_names(path, 1, [1]) + run_names(path, 2, [1])
+    assert ticks_of(kept(path, 1)) == list(range(1, 21))
+
+
+@pytest.mark.parametrize("keep", [KEEP, None])
+def test_a_full_disk_costs_no_earlier_recording_however_often_the_server_starts(keep, path, monkeypatch):
+    record(path, 20)
+
+    class Full(writer.Writer):
+        def add_metadata(self, *_):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(writer, "Writer", Full)
+        for _ in range(9):
+            with pytest.raises(RecorderError, match="No space left on device"):
+                Recorder(path if keep else path.with_name("all.mcap"), INFO, {}, keep=keep)
+    assert names(path.parent) == run_names(path, 1, [1])
+    assert ticks_of(path) == list(range(1, 21))
+
+
+def test_a_file_of_the_name_itself_stays_and_is_what_the_name_means(path, caplog):
+    with Recorder(path, INFO, {}) as recorder:
+        recorder.state(STATE)
+    record(path, 20)
+    assert f"{path} is an earlier recording and stays: this one is {kept(path, 1)}" in caplog.text
+    assert ticks_of(path) == [STATE.tick]
+    assert ticks_of(kept(path, 1)) == list(range(1, 21))
+
+
+@pytest.mark.parametrize("ticks", [0, 20])
+def test_what_another_process_writes_is_never_deleted(ticks, path):
+    with Recorder(path, INFO, {}, keep=KEEP, wait=True) as first:
+        for message in messages(ticks):
+            if isinstance(message, State):
+                first.state(message)
+        for _ in range(7):
+            record(path, 10)
+    assert first.error is None
+    assert kept(path, 1) == first.place
+    assert path.with_name(segment_name(path.name, 1, 1)).exists()
+
+
+def test_a_segment_that_was_moved_is_completed_where_it_is_and_the_next_one_takes_its_own_place(path):
+    said = []
+    recorder = Recorder(path, INFO, {}, keep=KEEP, wait=True, on_moved=said.append)
+    (moved := path.with_name("elsewhere.mcap")).hardlink_to(
+        first := path.with_name(segment_name(path.name, 1, 1))
+    )
+    first.unlink()
+    for message in messages(30):
+        if isinstance(message, State):
+            recorder.state(message)
+    recorder.close()
+    assert recorder.error is None
+    assert ticks_of(moved) == list(range(1, 26))
+    assert ticks_of(path) == list(range(26, 31))
+
+
+def test_replay_says_that_the_beginning_is_forgotten(path):
+    with Recorder(path, INFO, {"seed": 1}, keep=KEEP, wait=True) as recorder:
+        for message in messages(350):
+            if isinstance(message, State):
+                recorder.state(message)
+    with pytest.raises(ReplayError, match="has forgotten all before tick 226, so its run cannot be repeated"):
+        replay_file(read(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "segment"),
+    [
+        ("run.mcap", "run-2-part0003.mcap"),
+        ("run", "run-2-part0003"),
+        (".mcap", ".mcap-2-part0003"),
+        ("a.b.c", "a.b-2-part0003.c"),
+    ],
+)
+def test_the_name_of_a_segment_tells_recording_run_and_number(name, segment):
+    assert segment_name(name, 2, 3) == segment
+    assert segment_of(segment) == (name, 2, 3)
+    assert segment_of(name) is None

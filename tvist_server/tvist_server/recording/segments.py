@@ -1,0 +1,213 @@
+"""Files of a recording: one that grows or, if only the last ticks are kept, segments of which the oldest are deleted.
+
+A recording `run.mcap` that keeps the last ticks is `run-1-part0001.mcap`, `run-1-part0002.mcap` and so on, that of the
+next run begins with `run-2-part0001.mcap`. So a service that starts again and again with the same options needs nobody
+to clear the way. Each segment is a complete file, and none but the last loses anything when the process is killed.
+"""
+
+import os
+from collections import deque
+from collections.abc import Mapping
+from contextlib import suppress
+from fcntl import LOCK_EX, LOCK_NB, flock
+from pathlib import Path
+from typing import IO
+
+import msgspec
+from mcap.exceptions import EndOfFile, McapError
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
+
+from tvist_protocol.io import Io
+from tvist_protocol.recorded import FROM_TICK, Recorded, segment_name, segment_of
+from tvist_protocol.stream import State
+from tvist_server.recording.writer import RecordingWriter
+
+PARTS = 4
+"""Number of segments that hold as many ticks as have to be kept."""
+MOST = 5
+"""Number of earlier runs of which recordings are kept."""
+
+
+class DeletedError(Exception):
+    """The file has been deleted: its data disappears when it is closed."""
+
+
+class Segments:
+    """Writes a recording.
+
+    Args:
+        path: Path of the file, from whose name those of segments are made.
+        topic_of: Topic of each kind of message.
+        heading: Metadata at the beginning of each file.
+        dropped: Number of messages of each kind that the recorder has dropped so far.
+        overwrite: Whether to replace an existing file; segments never replace one.
+        keep: Number of ticks that segments hold at least together; None for one file with all.
+
+    Raises:
+        FileExistsError: The file exists.
+        OSError: It cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        topic_of: Mapping[type[msgspec.Struct], str],
+        heading: dict[str, str],
+        dropped: Mapping[type[msgspec.Struct], int],
+        *,
+        overwrite: bool,
+        keep: int | None,
+    ) -> None:
+        self.path = self.whole = path
+        """The file that grows; and what readers take for the recording, a pattern if there are segments."""
+        self._name, self._topic_of, self._heading, self._keep = path, topic_of, heading, keep
+        self._dropped, self._counted = dropped, dict(dropped)
+        self._held: deque[tuple[int, Path]] = deque()
+        """First tick of each segment."""
+        self._first: int | None = None
+        self._last = 0
+        self._io: Io | None = None
+        if keep is None:
+            self._begin({}, overwrite=overwrite)
+            return
+        self._run, self._number = _new_run(path), 1
+        self.path = path.with_name(segment_name(path.name, self._run, 1))
+        self.whole = path.with_name(segment_name(path.name, self._run, None))
+        self._begin({}, overwrite=False)
+
+    def write(self, message: Recorded) -> None:
+        """Add a message; between two ticks, begin a new segment if this one holds its part.
+
+        Raises:
+            OSError: A file cannot be written.
+        """
+        if self._first is None:
+            self._first = message.tick
+            self._held.append((message.tick, self.path))
+        elif self._keep is not None and message.tick > self._last >= self._first + self._keep // PARTS - 1:
+            self._turn(message.tick, self._keep)
+        if isinstance(message, State):
+            self._last = message.tick
+        elif isinstance(message, Io):
+            self._io = message
+        self._writer.write(message)
+
+    def flush(self) -> None:
+        """Pass complete chunks to the operating system."""
+        self._writer.flush()
+
+    def finish(self) -> None:
+        """Write the last chunk, the numbers of messages that were dropped meanwhile, and the index."""
+        now = dict(self._dropped)
+        self._writer.finish({kind: count - self._counted[kind] for kind, count in now.items()})
+        self._counted = now
+
+    def where(self) -> Path | None:
+        """Return the current path of the file that grows, which may have been moved; None if the system keeps it back.
+
+        Raises:
+            DeletedError: The file no longer has a name.
+        """
+        here = os.fstat(self._stream.fileno())
+        if here.st_nlink == 0:
+            raise DeletedError
+        try:
+            if os.path.samestat(self.path.stat(), here):
+                return self.path
+        except (FileNotFoundError, NotADirectoryError):
+            pass
+        except OSError:  # the folder cannot be read now, which says nothing about the file
+            return self.path
+        try:
+            there = Path(f"/proc/self/fd/{self._stream.fileno()}").readlink()
+            return there if os.path.samestat(there.stat(), here) else None
+        except OSError:  # of several names, the system may report a deleted one
+            return None
+
+    def close(self) -> None:
+        """Close the file; without `finish` before, it has no index."""
+        self._stream.close()
+
+    def _begin(self, more: dict[str, str], *, overwrite: bool) -> None:
+        self._stream = self.path.open("wb" if overwrite else "xb")
+        try:
+            _claim(self._stream)
+            self._writer = RecordingWriter(self._stream, self._topic_of, self._heading | more)
+        except OSError:
+            if not overwrite:
+                self.path.unlink()  # what the disk had no room for would only stand in the way of the next start
+            with suppress(OSError):
+                self._stream.close()
+            raise
+
+    def _turn(self, tick: int, keep: int) -> None:
+        """Complete the segment, begin the next one with this tick, and delete those that are not needed any more."""
+        self.finish()
+        self._stream.close()
+        self._number += 1
+        self.path = self._name.with_name(segment_name(self._name.name, self._run, self._number))
+        self._begin({FROM_TICK: str(tick)}, overwrite=False)
+        if self._io is not None:
+            self._writer.write(self._io)
+        self._first = tick
+        self._held.append((tick, self.path))
+        while self._held[1][0] <= tick - keep:
+            self._held.popleft()[1].unlink(missing_ok=True)
+
+
+def _new_run(path: Path) -> int:
+    """Return the number of a new run, and delete the oldest earlier ones, and those that have recorded nothing.
+
+    So neither a start that fails nor one that is killed at once costs an earlier recording its place. What another
+    process writes stays.
+    """
+    runs: dict[int, list[Path]] = {}
+    for place in path.parent.iterdir():
+        found = segment_of(place.name)
+        if found is not None and found[0] == path.name and place.is_file():
+            runs.setdefault(found[1], []).append(place)
+    kept = [run for run in sorted(runs) if not all(map(_is_empty, runs[run]))]
+    for run in runs.keys() - kept[-MOST:]:
+        if not any(map(_is_claimed, runs[run])):
+            for place in runs[run]:
+                place.unlink(missing_ok=True)
+        else:
+            kept.append(run)
+    return max(kept, default=0) + 1
+
+
+def _claim(stream: IO[bytes]) -> None:
+    """Mark an open file as one that is being written, until it is closed or the process is gone.
+
+    Raises:
+        BlockingIOError: Another process writes it.
+    """
+    try:
+        flock(stream, LOCK_EX | LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError:  # it is no file, or on a file system without locks
+        return
+
+
+def _is_claimed(place: Path) -> bool:
+    with place.open("rb") as stream:
+        try:
+            _claim(stream)
+        except BlockingIOError:
+            return True
+    return False
+
+
+def _is_empty(place: Path) -> bool:
+    """Return whether a recording ends before its first message; what is no recording, as zeros, counts as one."""
+    with place.open("rb") as stream:
+        try:
+            return not any(
+                isinstance(record, Chunk) for record in StreamReader(stream, emit_chunks=True).records
+            )
+        except EndOfFile:
+            return True
+        except McapError:
+            return False

@@ -1,0 +1,101 @@
+"""The files that a robot starts with: cells, states, shapers and calibrations."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct
+
+from tvist_controller.cell.description import Cell
+from tvist_controller.setup import Setup
+from tvist_controller.sources import calibrations
+from tvist_controller.sources.own_files import is_file
+from tvist_controller.sources.own_shapers import check_for, load_own
+from tvist_plant.description import RobotDescription
+from tvist_plant.world.scene_file import scenes
+from tvist_protocol.calibration import Calibration
+from tvist_protocol.values import Joints, Payload, ResetMode, Seed
+from tvist_server.option_values import StartError, read_start_file
+from tvist_shaping import FirShaper
+
+ShaperChoice = Annotated[str, Meta(min_length=1, max_length=4096)]
+
+
+def read_cell(path: str) -> Cell:
+    """Read a cell; a scene that it names is a file beside it, unless one of that name comes with the package."""
+    cell = read_start_file(path, "cell", Cell)
+    if cell.world is not None and cell.world not in scenes():
+        cell = msgspec.structs.replace(cell, world=str(Path(path).parent / cell.world))
+    try:
+        cell.check()
+    except ValueError as error:
+        raise StartError(f"cell {path}: {error}") from error
+    return cell
+
+
+class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Content of a state file, the fields of `simulation.reset`; one that is None keeps the value of the `Setup`."""
+
+    q: Joints | None = None
+    """Joint angles at which the arm rests [rad]."""
+    seed: Seed | None = None
+    """Seed of sensor noise and gear errors."""
+    payload: Payload | None = None
+    """Payload that the arm carries, independent of the declared one."""
+    mode: ResetMode | None = None
+    """Robot mode."""
+    shaper: ShaperChoice | None = None
+    """Name of the shaper, or FILE.py:NAME."""
+
+    def on(self, setup: Setup) -> Setup:
+        """Return a setup with the fields of this state that are not None."""
+        if self.shaper is not None:
+            setup = shaped_by(setup, self.shaper)
+        given: dict[str, Any] = {
+            "q": self.q,
+            "seed": self.seed,
+            "carried": self.payload,
+            "mode": self.mode,
+        }
+        return replace(setup, **{name: value for name, value in given.items() if value is not None})
+
+
+def shaped_by(setup: Setup, shaper: str) -> Setup:
+    """Return a setup with another shaper, given by its name or as FILE.py:NAME, which is then loaded.
+
+    Raises:
+        OwnFileError: The file contains no such shaper, or it fails for this arm's modes.
+        UserFileError: FILE.py is not a text file, or too large.
+    """
+    if not is_file(shaper):
+        return replace(setup, shaper=shaper)
+    own = load_own(shaper)
+    modes = own.shaper.modes if isinstance(own.shaper, FirShaper) else 1
+    if modes <= (source := setup.source()).most:  # else it is refused where a filter is made
+        check_for(own, source.estimator(modes, setup.payload), setup.description.joints)
+    known = setup.own_shapers if own in setup.own_shapers else (*setup.own_shapers, own)
+    return replace(setup, shaper=own.name, own_shapers=known)
+
+
+def calibration_for(name: str | None, description: RobotDescription) -> Calibration | None:
+    """Load a calibration for a robot.
+
+    Its name is that of one that comes with the package, a file that `tvist identify` made, or `none`; None stands for
+    the one that comes with the package for this model.
+    """
+    model = description.robot.model
+    name = calibrations.default_for(model) if name is None else name
+    if name is None:
+        raise StartError(
+            f"no calibration for a {model} comes with the package: give one that tvist identify made, or none"
+        )
+    if name == "none":
+        return None
+    found = calibrations.load(name)
+    if found.robot != model:
+        raise StartError(
+            f"calibration {found.name!r} is for a {found.robot}, but the robot is a {model}: give another "
+            "calibration, or none"
+        )
+    return found
