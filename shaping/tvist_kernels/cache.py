@@ -57,12 +57,7 @@ class DistrustWarning(UserWarning):
 
 
 class KernelCache(_Cache):
-    """The machine code of one kernel, for numba's dispatcher.
-
-    Args:
-        function: The kernel's Python source.
-        dispatcher: numba's dispatcher of it, for `load_all`.
-    """
+    """The machine code of one kernel, for numba's dispatcher."""
 
     def __init__(self, function: Callable[..., Any], dispatcher: Any = None) -> None:
         self._function, self._dispatcher = function, dispatcher
@@ -140,7 +135,7 @@ class KernelCache(_Cache):
         return f"{self.name}.{self.sources}-{machine}-{_short(str(sig))}.kernel"
 
     def _forget_older(self, written: Path) -> None:
-        """Remove what this kernel was on this machine before its sources changed, but not what others may use now."""
+        """Remove what this kernel was before its sources changed, on this machine; others may use the latest."""
         same = written.parent.glob(f"{self.name}.*-{written.name.split('-')[-2]}-*.kernel")
         with contextlib.suppress(OSError):  # another process removes some
             others = [file for file in same if self.sources not in file.name]

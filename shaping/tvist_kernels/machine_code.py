@@ -36,7 +36,7 @@ def to_bytes(result: Any) -> bytes:
 
 
 def from_bytes(target: Any, content: bytes) -> Any:
-    """Return a kernel, as numba's `CompileResult`."""
+    """Return a kernel, numba's `CompileResult`; the content has to be trusted, since it can run anything."""
     name, code, intermediate, defined, needed, rest = pickle.loads(content)  # noqa: S301  ours, or root's
     _offer_memory()
     if any(binding.address_of_symbol(symbol) is None for symbol in needed):

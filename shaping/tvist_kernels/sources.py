@@ -19,9 +19,6 @@ def digest(module: str) -> str:
 
     The machine code of a kernel contains that of the kernels which it calls, and the values of constants, wherever
     they are from. A module that is imported within a function cannot add to it.
-
-    Args:
-        module: Full name of the module.
     """
     found: set[str] = set()
     waiting = [module]

@@ -173,10 +173,6 @@ class TestFresh:
         (own / "libraries.pth").write_text(
             f"{site}\n{site / 'cmeel.prefix' / site.relative_to(sys.prefix)}\n"
         )
-        for kernel in ROOT.glob("*/tvist_*/**/__pycache__/*.kernel"):  # compiled from equal sources
-            there = own.joinpath(*kernel.relative_to(ROOT).parts[1:])
-            there.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(kernel, there)
         with Served("--clock", "lockstep", python=python) as served:
             assert "ok" in run(python, "-m", "tvist_client", "check", served.endpoint)
 

@@ -13,10 +13,7 @@ IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 class AllowedHosts:
-    """The machines that the server allows, besides the one that sent a program.
-
-    Args:
-        given: IP addresses, networks such as 192.168.1.0/24, and names.
+    """IP addresses, networks and names that the server allows, besides the machine that sent a program.
 
     Raises:
         StartError: One is none of these.
@@ -32,14 +29,10 @@ class AllowedHosts:
         self._networks = [network for text in given if (network := _network(text)) is not None]
 
     def allows(self, name: str, address: str, origin: str | None) -> bool:
-        """Return whether a program may connect to an address.
+        """Return whether a program may connect to an address, which stands for a machine that it names.
 
-        The loopback interface is open to programs that came from there, and if it is given itself.
-
-        Args:
-            name: What the program calls the machine.
-            address: IP address that this stands for.
-            origin: IP address of the machine that started the program; None if it is unknown.
+        The program comes from `origin`; None if that is unknown. The loopback interface is open to programs
+        that came from there, and if it is given itself.
         """
         to, sender = _ip(address), None if origin is None else _ip(origin)
         if _is_here(to):  # a name or a wide network does not open it by the way

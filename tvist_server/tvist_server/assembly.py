@@ -40,10 +40,6 @@ def made_robot(
 def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on, and the settings that protect them.
 
-    Args:
-        config: Configuration.
-        names: Names of the robots that are reached there.
-
     Raises:
         StartError: An endpoint is none, or other machines could reach an unprotected one.
     """

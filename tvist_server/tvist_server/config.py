@@ -261,10 +261,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         return AllowedHosts(self.ur_allow)
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
-        """Return the address of a robot's UR interfaces, and the port of each, also of a cell's gripper.
-
-        Args:
-            number: Index of the robot, 0 for the first.
+        """Return address and ports of UR's interfaces, and of a gripper, of the robot with this index.
 
         Raises:
             StartError: `ur_address` is not an IP address, or too few addresses follow it.
@@ -294,12 +291,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         return " and ".join(places) + (f" in namespace {self.namespace}" if self.namespace else "")
 
     def command_line(self, command: str, name: str) -> str:
-        """Return the command line that reaches a robot from this machine.
-
-        Args:
-            command: Name of the command, such as `unlock`.
-            name: Name of the robot.
-        """
+        """Return the command line that reaches a robot from this machine."""
         words = ["tvist", command]
         first = (*self.endpoints, *self.connect)[0]
         if first != DEFAULT_ENDPOINT:

@@ -70,9 +70,7 @@ def warm_up() -> None:
 def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> None:
     """Compile every kernel that a served robot calls, unless its machine code is on disk already.
 
-    Args:
-        processes: Number of processes that compile at once; None for one on each processor of this process.
-        tell: Called now and then with the progress.
+    So many processes compile at once; None: one on each processor of this process.
 
     Raises:
         KernelsError: Some could not be compiled or kept.

@@ -31,7 +31,7 @@ _DURATION = re.compile(r"\s*(?P<number>\d+(\.\d+)?)\s*(?P<unit>s|min|h)\s*", re.
 
 
 class StartError(ValueError):
-    """Nothing can be started from a file or an option; the message names it, the key, the value and what is allowed."""
+    """A file or an option is invalid; the message names it, the key, the value and what is allowed."""
 
 
 def read_start_file(path: str | Path, what: str, kind: type[T]) -> T:
@@ -106,7 +106,7 @@ class Member:
 
 
 def members(text: str, most: int = MOST) -> list[Member]:
-    """Return the robots of a list such as `ur5e*2,other.toml`: at most so many ROBOT[*COUNT], separated by commas.
+    """Return the robots of a list such as `ur5e*2,other.toml`: ROBOT[*COUNT], separated by commas.
 
     A robot is named after its file. A robot that is listed several times gets a number: `ur5e-1`, `ur5e-2`.
     """

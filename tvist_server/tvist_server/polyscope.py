@@ -11,27 +11,16 @@ from tvist_server.polyscope_nodes import EXTERNAL_CONTROL, Nodes
 _HEADER_ENDS = "# HEADER_END"
 
 
-class PolyscopeError(ValueError):
-    """A program of PolyScope cannot be played; the message says why."""
-
-
 def script_of(name: str, data: bytes) -> str:
     """Return the text of a program.
 
-    Args:
-        name: Name of the program.
-        data: Its XML.
-
     Raises:
-        PolyscopeError: It is not XML, or has nodes that are not understood.
+        UserFileError: It is not XML, or has nodes that are not understood.
     """
-    try:
-        tree = xml(data)
-    except UserFileError as error:
-        raise PolyscopeError(str(error)) from error
+    tree = xml(data)
     main = tree.find("./children/MainProgram")
     if main is None or main.find("./children/*") is None:
-        raise PolyscopeError("it is PolyScope's and has no program: save it as a script")
+        raise UserFileError("it is PolyScope's and has no program: save it as a script")
     nodes, root = Nodes(tree), tree.find("./children")
     assert root is not None, "the main program was found in it"
     lines: list[str] = []
@@ -47,9 +36,7 @@ def script_of(name: str, data: bytes) -> str:
     body = "\n".join(nodes.lines(main.findall("./children/*")))
     if nodes.missing:
         found = short(", ".join(dict.fromkeys(nodes.missing)))
-        raise PolyscopeError(
-            f"it is PolyScope's and has {found}, which cannot be played; save it as a script"
-        )
+        raise UserFileError(f"it is PolyScope's and has {found}, which cannot be played; save it as a script")
     repeats = main.get("runOnlyOnce") == "false" and not _only_defines(body)
     lines.append(_again(body) if repeats else body)
     return program(name, "\n".join(lines))
@@ -64,11 +51,8 @@ def program(name: str, body: str) -> str:
 def with_external_control(text: str, sent: str) -> str:
     """Put the text that a client has sent in the place of the nodes External Control.
 
-    Its header comes first in the program, since its functions may not stand inside a loop.
-
-    Args:
-        text: Text of the program.
-        sent: Text that the client has sent: a header that ends with the line `# HEADER_END`, and the node's own part.
+    Its header, which ends with the line `# HEADER_END`, comes first in the program, since its functions may not stand
+    inside a loop.
     """
     header, mark, part = sent.partition(_HEADER_ENDS)
     if not mark:

@@ -12,7 +12,7 @@ from tvist_protocol.codec import decode, encode
 from tvist_protocol.info import Info
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad
 from tvist_protocol.replies import Refused
-from tvist_server.polyscope import PolyscopeError, script_of
+from tvist_server.polyscope import script_of
 
 SCRIPT, URP = ".script", ".urp"
 """Endings of the files. A script is text in URScript; a .urp file is the same, or a file that PolyScope has saved."""
@@ -21,11 +21,7 @@ _XML: Final = b"<"
 
 
 class ProgramFolder:
-    """The programs in a folder, which is looked at whenever a client loads one or asks for their names.
-
-    Args:
-        path: Path of the folder.
-    """
+    """The programs in a folder, which is looked at whenever a client loads one or asks for their names."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -46,8 +42,7 @@ class ProgramFolder:
     def read(self, name: str) -> str | None:
         """Return the text of a program; None if there is no such file.
 
-        Args:
-            name: Name of the file; folders before it are ignored. `X.urp` also finds `X.script`.
+        Folders before its name are ignored. `X.urp` also finds `X.script`.
 
         Raises:
             UserFileError: The file is not a program that the controller can run.
@@ -110,7 +105,7 @@ def _text(path: Path, data: bytes) -> str:
     if data.lstrip().startswith(_XML):
         try:
             return script_of(path.stem, data)
-        except PolyscopeError as error:
+        except UserFileError as error:
             raise UserFileError(f"program {path}: {error}") from error
     try:
         return data.decode("utf-8-sig")

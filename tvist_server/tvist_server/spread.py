@@ -22,22 +22,13 @@ class Share:
 
 
 def shares(robots: int, workers: int) -> list[range]:
-    """Return the robots of each process: neighbours, and nowhere more than one more than elsewhere.
-
-    Args:
-        robots: Number of robots.
-        workers: Number of processes, at most `robots`.
-    """
+    """Return the robots of each process: neighbours, and nowhere more than one more than elsewhere."""
     bounds = [worker * robots // workers for worker in range(workers + 1)]
     return [range(first, last) for first, last in pairwise(bounds)]
 
 
 def check_together(config: ServeConfig, robots: int) -> None:
     """Check durations and folders, and what the options of network and processes ask of each other.
-
-    Args:
-        config: Configuration.
-        robots: Number of robots that it names.
 
     Raises:
         StartError: They exclude each other, or one of them is wrong.

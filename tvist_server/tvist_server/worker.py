@@ -99,13 +99,6 @@ def meet_clients(
 
     The conversation: it says `Made`; it is told progress; told that all robots are ready, it says `Ready` once it
     reaches them; told that it is over, it says `Ended`.
-
-    Args:
-        config: Configuration of all robots.
-        names: Names of the robots.
-        listen: Endpoints to listen on.
-        guard: Settings that protect them.
-        first: The first process.
     """
     place, starting = config.namespace or "", Starting()
     try:
@@ -156,11 +149,6 @@ def work(config: ServeConfig, share: Share, first: First) -> None:
     The conversation: told to begin, this process makes its robots and says `Made`; told to go on, it starts them and
     says `Ready`; told to end, it says `Ended`. Signals are the first process's to hear: a terminal sends them to all
     processes.
-
-    Args:
-        config: Configuration of all robots.
-        share: The robots of this process.
-        first: The first process.
     """
     ending = Ending()
     ending.close()  # hears no signals

@@ -55,10 +55,6 @@ class _Worker:
 class Workers:
     """The first process: it starts the others, and ends with them.
 
-    Args:
-        config: Configuration of the robots.
-        prepare: What takes long before the robots are made, see `Server`.
-
     Raises:
         StartError: The configuration is invalid.
         UserFileError: A file that is named has the wrong kind of content.
@@ -99,10 +95,6 @@ class Workers:
 
     def run(self, ready: Callable[[], None], ending: Ending) -> None:
         """Serve until a signal comes.
-
-        Args:
-            ready: Function to call once all robots tick and answer.
-            ending: The shutdown requested by signals.
 
         Raises:
             WorkersError: A process has died or a robot has stopped; all others were ended in order.

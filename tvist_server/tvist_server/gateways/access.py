@@ -26,16 +26,10 @@ MESSAGES = (
 
 
 def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: str = "") -> dict[str, Any]:
-    """Return Zenoh's `access_control` settings for a server with certificates.
+    """Return Zenoh's `access_control` settings for a server with certificates, which has at least one role.
 
-    Args:
-        robots: Names of the robots it serves.
-        roles: Role by common name of a client's certificate; at least one.
-        namespace: Namespace of the robots.
-
-    Returns:
-        Rules and the clients they apply to. Everything else is denied: to names without a role, and to clients without
-        a certificate.
+    The names are the common names of certificates. Names without a role, and clients without a certificate,
+    are denied everything.
     """
     robots = [_at(namespace, robot) for robot in robots]
     viewing, operating = _viewing(robots), _operating(robots)
@@ -60,10 +54,6 @@ def open_access(robots: Sequence[str], namespace: str = "") -> dict[str, Any]:
 
     Only the server may answer commands or publish the robot's topics. Otherwise another session could swallow a stop
     or make up states.
-
-    Args:
-        robots: Names of the robots it serves.
-        namespace: Namespace of the robots.
     """
     robots = [_at(namespace, robot) for robot in robots]
     # Keys with wildcards are allowed too: egress is restricted below, and only the server answers queries.
@@ -83,9 +73,6 @@ def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
 
     Operators and viewers have their rights on all robots. A robot may publish and answer as the robot of its
     certificate's name, and as all robots of the namespace of that name. Another router may do everything.
-
-    Args:
-        roles: Role by common name of a certificate; at least one.
     """
     everywhere = [keys.ANYWHERE]
     viewing, operating = _viewing(everywhere), _operating(everywhere)
@@ -117,11 +104,7 @@ def with_robots_behind(
 ) -> dict[str, Any]:
     """Return `access_control` settings that also let the robots themselves connect, over a protocol of their own.
 
-    Args:
-        access: Settings for clients, see `access_control` and `open_access`.
-        robots: Names of the robots.
-        namespace: Namespace of the robots.
-        protocol: Protocol over which nobody but them can connect.
+    Nobody but them can connect over that protocol.
     """
     places = [_at(namespace, robot) for robot in robots]
     # What reaches a client of a robot leaves the robot, and the reverse.

@@ -50,13 +50,6 @@ def guarded(
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on and the settings that protect them.
 
-    Args:
-        listen: Requested endpoints.
-        robots: Names of the robots served there.
-        security: Folder with certificates and roles.
-        insecure: Whether clients need no authentication.
-        namespace: Namespace of the robots.
-
     Raises:
         StartError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
     """
@@ -70,11 +63,6 @@ def guarded_router(
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the same for a router; without certificates, everyone may connect as a robot or a client.
 
-    Args:
-        listen: Requested endpoints.
-        security: Folder with certificates and roles.
-        insecure: Whether nobody needs authentication.
-
     Raises:
         StartError: See `guarded`.
     """
@@ -84,10 +72,6 @@ def guarded_router(
 
 def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
     """Check the form of endpoints.
-
-    Args:
-        what: Name of the option.
-        endpoints: Endpoints.
 
     Raises:
         StartError: One has another form.
@@ -125,10 +109,6 @@ def _protected(
 
 def guarded_interfaces(address: str, *, insecure: bool) -> None:
     """Refuse to open UR's interfaces, which cannot authenticate clients, where other machines would reach them.
-
-    Args:
-        address: IP address on which they listen.
-        insecure: Whether clients need no authentication.
 
     Raises:
         StartError: Other machines could reach them.

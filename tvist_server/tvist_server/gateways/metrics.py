@@ -23,10 +23,7 @@ MICRO = 1e-6
 class MetricsGateway(Gateway):
     """Keeps a robot's newest messages for whoever asks; it takes no input.
 
-    Args:
-        namespace: Namespace of the robot; empty if it has none.
-        robot: Name of the robot.
-        newest: Returns the robot's newest state when somebody asks, from any thread; None if there is none yet.
+    `newest` returns the robot's newest state when somebody asks, from any thread.
     """
 
     setpoints_refused = 0
@@ -65,10 +62,7 @@ class MetricsGateway(Gateway):
 
 
 class Metrics(Collector):
-    """An HTTP server for Prometheus; `collect` computes the figures when somebody asks.
-
-    Args:
-        address: `ADDRESS:PORT`, or a port of the loopback interface; port 0 takes any.
+    """An HTTP server for Prometheus; `collect` computes the figures when somebody asks. Port 0 takes any.
 
     Raises:
         GatewayError: The server cannot listen there, or prometheus_client is not installed.

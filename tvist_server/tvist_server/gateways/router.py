@@ -47,15 +47,10 @@ class Rate(NamedTuple):
 
 
 class Router:
-    """A running router.
+    """A running router, which connects to other routers now or when they appear.
 
-    Args:
-        listen: Endpoints to listen on.
-        connect: Routers to connect to, now or when they appear.
-        rates: Limits on the states that leave; an interface that is named has its own.
-        robots: Robots that each limit holds for, one by one; all others share one.
-        security: Folder with certificates and roles.
-        insecure: Whether other machines may connect without certificates.
+    It limits the states that leave: those of each of `robots`, and those of all others together. An interface
+    that is named has its own rates.
 
     Raises:
         StartError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
@@ -109,10 +104,6 @@ def downsampling(rates: Sequence[Rate], robots: Sequence[Place]) -> list[dict[st
 
     Zenoh counts by rule, not by key: a rule with a wildcard lets one robot's states use up what is meant for all. So
     each robot has rules of its own, and only robots that are not listed share one. The first rule that fits is taken.
-
-    Args:
-        rates: Limits.
-        robots: Robots that have rules of their own.
     """
     places = [
         *(keys.within(place.namespace, f"{keys.PREFIX}/{place.robot}") for place in robots),
