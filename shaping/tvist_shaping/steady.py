@@ -262,6 +262,8 @@ class SteadyFilter(Filter):
 
     def _unshare(self) -> None:
         super()._unshare()
+        if self.design.constant:  # nothing of it ever changes
+            return
         self.design = self.design.fork()
         self._designed, self._taps = self._designed.copy(), self._taps.copy()
         self._past, self._sums = self._past.copy(), self._sums.copy()
