@@ -137,8 +137,9 @@ class TestOperator:
         other = session("otto")
         other.announce("otto")
         assert other.command("take_control", client="otto")["type"] == "accepted"
+        before = len(operator.received["event"])
         other.session.close()
-        lost = operator.next("event", lambda event: event["kind"] == "lease_lost")
+        lost = operator.wait("event", lambda event: event["kind"] == "lease_lost", since=before)
         assert "otto" in lost["why"]
 
     async def test_with_the_client_of_this_project(self, served, ring):
