@@ -16,7 +16,7 @@ from tvist_protocol.info import Info
 from tvist_protocol.recorded import TICK_NS
 from tvist_protocol.replies import Refused
 from tvist_protocol.stream import State, Truth
-from tvist_server.gateways.base import TOPICS, Answer, Desk, Gateway
+from tvist_server.gateways.base import Answer, Desk, Gateway, topic_of
 from tvist_server.gateways.exposure import guarded
 from tvist_server.gateways.network import Network
 
@@ -141,7 +141,7 @@ class Playback:
                         await asyncio.sleep(0)  # it is late, but has to notice that it is cancelled
                     self.states += 1
                     self._desk.tick = message.tick
-                self._gateway.publish(TOPICS[type(message)], message, encode(message))
+                self._gateway.publish(topic_of(message), message, encode(message))
         finally:
             self._close()
 

@@ -11,7 +11,7 @@ from tvist_controller.instruments.report import Report, Sink
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event, Telemetry, Truth
-from tvist_server.gateways.base import TOPICS, Gateway, Message
+from tvist_server.gateways.base import Gateway, Message, topic_of
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +59,7 @@ class Publisher(Sink):
         self.report(report)
 
     def _publish(self, message: Message) -> None:
-        topic = TOPICS[type(message)]
+        topic = topic_of(message)
         takers = [gateway for gateway in self._gateways if topic in gateway.takes]
         if not takers:
             return

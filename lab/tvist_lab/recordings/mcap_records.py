@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 from typing import IO
 
@@ -146,10 +147,10 @@ def files_of(path: Path) -> tuple[Path, ...]:
         raise RecordingError(f"{path} names {there}")
     files = tuple(sorted(found, key=lambda file: (len(file.name), file.name)))
     numbers = [segment[2] for file in files if (segment := segment_of(file.name)) is not None]
-    if missing := sorted({*range(numbers[0], numbers[-1])} - {*numbers}) if numbers else []:
-        raise RecordingError(
-            f"{path} lacks segment {missing[0]} of {names[0]}: give the files before or behind it"
-        )
+    for before, after in pairwise(numbers):
+        if after != before + 1:
+            why = f"lacks segment {before + 1} of {names[0]}: give the files before or behind it"
+            raise RecordingError(f"{path} {why}")
     return files
 
 

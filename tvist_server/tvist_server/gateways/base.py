@@ -1,25 +1,24 @@
 """Gateways, through which clients reach a robot, and the interface between a gateway and its robot."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
-from typing import Protocol, get_args
+from collections.abc import Callable, Collection
+from typing import Protocol, cast, get_args
 
 from tvist_controller.instruments.report import Report, Topic
+from tvist_protocol.channels import tag
 from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 Message = State | Event | Truth | Telemetry | Io
-TOPICS: Mapping[type[Message], Topic] = {
-    State: "state",
-    Event: "event",
-    Truth: "truth",
-    Telemetry: "telemetry",
-    Io: "io",
-}
 Answer = Callable[[Reply], None]
 """Takes the reply to a command, once, from any thread."""
+
+
+def topic_of(message: Message) -> Topic:
+    """Return the topic on which a message is published, which its type names."""
+    return cast("Topic", tag(type(message)))
 
 
 class GatewayError(Exception):
@@ -35,7 +34,7 @@ class Queried(Protocol):
     def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
         """Answer a request for `info`; `answer` is called once, from any thread, with what makes the encoded message.
 
-        That may read files, so it is for the thread that answers.
+        Only the thread that answers may call that, since it may read files.
         """
 
 
