@@ -179,7 +179,7 @@ class Host:
                 sink.raised(error)
 
     def _forgets(self, command: Command) -> bool:
-        """Whether a command invalidates what the robot is learning of its motions."""
+        """Return True if a command invalidates what the robot is learning from its motions."""
         if isinstance(command, SimulationReset):
             return command.payload is not None or self.controller.cell is not None
         return isinstance(command, Forget)

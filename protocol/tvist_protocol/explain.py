@@ -1,4 +1,4 @@
-"""What is wrong with a message or a file, said to a program and to a person.
+"""Explains errors in messages and files, for programs and for people.
 
 msgspec finds the fault and says it in one text; here the text becomes code, field, sentence and limit. Only a
 message at fault pays for it: it is decoded a second time, untyped, to name the value. A long one is not: a quarter of
@@ -56,7 +56,7 @@ class _Fault:
 def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -> ProtocolError:
     """Return the error of a message that is valid MessagePack but not one of the expected messages.
 
-    Of one longer than `EXPLAINED_BYTES`, only its type is named.
+    If the message is longer than `EXPLAINED_BYTES`, this names only its type.
     """
     message = _untyped(data, Any if len(data) <= EXPLAINED_BYTES else _Head)
     name = message.get("type") if isinstance(message, dict) else None

@@ -46,7 +46,7 @@ class Design(Forked, ABC):
     peak: float = 1.0
     """Upper bound of the sum of the taps' magnitudes, 1 if none is negative [-]."""
     constant: bool = False
-    """Whether the taps are the same for all modes, which are then only estimated in order to be reported."""
+    """True if the taps do not depend on the modes, which are then estimated only for reports."""
 
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:

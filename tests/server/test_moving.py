@@ -350,7 +350,7 @@ def test_a_program_that_takes_the_place_of_ours_is_noticed(running, how):
         robot.says(r.PLAYED, 30 + row if how == "a run of ours" else 29)
         robot.says(r.RUN, 8 if how == "a run of ours" else 7)
         run.take(playing)
-    assert "another program has taken the place of ours" in run.halt.why
+    assert "another program has replaced the one that follows set-points" in run.halt.why
     assert not run.ready
 
 
@@ -360,7 +360,7 @@ def test_a_program_that_takes_the_place_of_ours_while_it_waits_is_noticed(runnin
         run.add(DriveCommand(Q, np.zeros(6), np.zeros(6)), played=True)
         run.take(playing)
         assert (run.halt is None) or number > HEEDS
-    assert "another program has taken the place of ours" in run.halt.why
+    assert "another program has replaced the one that follows set-points" in run.halt.why
 
 
 @pytest.mark.parametrize(

@@ -198,8 +198,7 @@ def test_a_recording_without_one_of_its_middle_segments_is_refused(path):
 def test_any_name_of_a_recording_names_its_segments(path, name):
     record(path.with_name(name), 30)
     record(path.with_name(name), 30)
-    (place,) = {segment_name(name, 2, None)}
-    assert ticks_of(path.with_name(name)) == ticks_of(path.with_name(place))
+    assert ticks_of(path.with_name(name)) == ticks_of(path.with_name(segment_name(name, 2, None)))
 
 
 def record(path, ticks, killed=False):
@@ -276,7 +275,7 @@ def test_what_a_power_failure_left_keeps_no_recording_from_starting(content, sta
 
 @pytest.mark.parametrize("killed", [False, True])
 def test_runs_that_end_before_they_have_recorded_anything_cost_no_earlier_recording(killed, path):
-    """As when the system kills a process whenever it has started."""
+    """The system kills each process soon after its start."""
     record(path, 20)
     for _ in range(9):
         record(path, 0, killed)

@@ -193,8 +193,8 @@ class ServedRobot:
         for gateway in self._gateways:
             await gateway.shut()
 
-    def hurry(self) -> None:
-        """Stop planning, since the robot is about to end."""
+    def cancel_plans(self) -> None:
+        """Begin no further plan, since the robot is about to end."""
         if self._plan_ahead is not None:
             self._plan_ahead.end()
 

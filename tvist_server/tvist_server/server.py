@@ -191,7 +191,7 @@ class Server:
     def close(self) -> None:
         """Shut down in order: stop the clocks, close the recordings, deliver pending messages to clients that read."""
         for robot in self.robots:
-            robot.hurry()
+            robot.cancel_plans()
         # A planning thread waits for jobs of the tick thread, so it ends while that thread still runs.
         for robot in self.robots:
             robot.stop_planning()

@@ -121,9 +121,9 @@ class _Socket:
     number: int
     received: bytearray = field(default_factory=bytearray)
     connected: bool | None = None
-    """Whether it was opened; None as long as that is not known."""
+    """True once it was opened, False if it could not be, None while it is being opened."""
     open: bool = False
-    """Whether it is connected still."""
+    """True while it is connected."""
     requests: Requests | None = None
     """What the program has sent to the gripper of the cell; None for a socket of the network."""
 

@@ -1,1 +1,1 @@
-"""A UR robot that is moved: a program of ours runs on it and follows set-points that come in RTDE's registers."""
+"""A UR robot that is moved: `follow.script` runs on it and follows set-points that come in RTDE's registers."""

@@ -52,7 +52,9 @@ _ENDED = {
 }
 _MOVABLE = {SafetyMode.NORMAL, SafetyMode.REDUCED}
 _PAUSED = {RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING}
-REPLACED = f"another program has taken the place of ours: end that, and see who has sent it, {_AGAIN}"
+REPLACED = (
+    f"another program has replaced the one that follows set-points: end it, and see who has sent it, {_AGAIN}"
+)
 FELL_SILENT = Halt(
     "it says nothing any more, so that its own program has stopped it: look at the network and at the robot, "
     f"{_AGAIN}",

@@ -174,7 +174,7 @@ class MovedRobot(RealArm):
         return self._pace.row(sight.tick, time.monotonic())
 
     def _trouble(self) -> str | None:
-        """Return why the robot takes no program of ours as it is now."""
+        """Return why the robot does not accept the program now."""
         return state_trouble(self._wanted, self._sight, may_play=self._left_paused)
 
     # ------------------------------------------------------------------ its program

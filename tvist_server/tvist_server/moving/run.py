@@ -29,9 +29,10 @@ by then, since it ends when numbers come faster than it counts."""
 GRACE = 5
 """Number of rows after the program's end in which modes may still tell why."""
 STANDS = 10
-"""Number of rows with the same set-point after which another program has taken the place of ours."""
+"""Number of rows with the same set-point after which another program counts as having replaced this one."""
 HEEDS = 250
-"""Number of set-points that a waiting program has got when it is another one: ours follows the first that it sees."""
+"""Number of set-points without effect after which a waiting program is another one: `follow.script` follows the first.
+"""
 BEGINS = 5.0
 """Longest time in which the program has to begin [s]."""
 TELL_EVERY = 10.0

@@ -23,7 +23,7 @@ class PortSession(ABC):
     """
 
     over = False
-    """Whether the client has asked to end the connection, which is then closed; or it is closed."""
+    """True if the client has asked to end the connection, or if that is closed."""
     client_begins = False
     """Whether nothing is sent to a client that requests nothing, so that it may be disconnected to make room."""
     served = False
@@ -67,7 +67,7 @@ class InTurnSession(PortSession, Generic[Item]):
         super().__init__(robot, control, send)
         self._items = deque[Item]()
         self._busy = False
-        """Whether something is being done."""
+        """True while an item is being processed."""
 
     @property
     def waiting(self) -> int:

@@ -53,7 +53,7 @@ class Command:
     carry_out: Callable[[Request], str | Awaitable[str | None] | None]
     """Returns the answer, at once or later; None if the command has failed."""
     argument: bool = False
-    """Whether an argument may follow."""
+    """True if the command takes an argument."""
 
 
 # ---------------------------------------------------------------------- power and safety
