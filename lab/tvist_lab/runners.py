@@ -13,7 +13,7 @@ from queue import SimpleQueue
 from typing import Any, TypeVar
 
 from tvist_plant.user_file import named
-from tvist_server.ending import end_with_parent, signals_held
+from tvist_server.ending import end_with_parent
 from tvist_server.punctual import processors
 
 Task = TypeVar("Task")
@@ -21,8 +21,8 @@ Result = TypeVar("Result")
 
 AHEAD = 1024
 """Largest number of tasks handed out at a time: more than a cluster has processes, few enough to keep in memory."""
-OF_TERMINAL = {signal.SIGINT, signal.SIGHUP, signal.SIGQUIT}
-"""Signals that reach all processes of a terminal, from its keys or at its end; the first process ends the others."""
+OF_GROUP = {signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTERM}
+"""Signals that a terminal or a supervisor sends to all processes of a group; the first process ends the others."""
 
 
 class TaskError(Exception):
@@ -66,7 +66,7 @@ def outcomes(
                 except Exception as error:  # noqa: BLE001  what a task contains may raise anything
                     yield following, Failed(TaskError(f"it cannot be pickled: {named(error)}"))
                 else:
-                    with signals_held():  # a process that this starts must get all that it needs to begin
+                    with _group_signals_blocked():  # also in a process that this starts, until it ignores them
                         future = executor.submit(_attempt, work, packed)
                     out[future] = following
                     future.add_done_callback(arrived.put)
@@ -115,14 +115,15 @@ def processes(number: int | None = None) -> Iterator[Executor]:
     Args:
         number: Number of processes; None for one for each core.
     """
-    _start_tracker()
+    with _group_signals_blocked():  # the process by which multiprocessing cleans up must outlive this one
+        multiprocessing.resource_tracker.ensure_running()
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(number or processors(), multiprocessing.get_context("spawn"), _begin)
     try:
         yield pool
     except BaseException:  # what the processes still do is of no use
         for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
+            process.kill()
         raise
     finally:
         # Without waiting, the pool's thread may meet the end of this process half way.
@@ -131,19 +132,18 @@ def processes(number: int | None = None) -> Iterator[Executor]:
 
 def _begin() -> None:
     """Let this process end when the one that hands out the work does, and not before."""
-    for number in OF_TERMINAL:
+    for number in OF_GROUP:
         signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, OF_GROUP)
     end_with_parent()
 
 
-def _start_tracker() -> None:
-    """Start the process by which multiprocessing cleans up, so that a closed terminal does not end it.
-
-    By itself it ignores Control+C alone; it inherits what this thread has blocked.
-    """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINAL)
+@contextmanager
+def _group_signals_blocked() -> Iterator[None]:
+    """Let signals wait while the body runs; processes that it starts inherit this."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_GROUP)
     try:
-        multiprocessing.resource_tracker.ensure_running()
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 

@@ -280,7 +280,7 @@ def test_the_dashboard_pauses_resumes_and_stops_within_a_step(tmp_path):
         assert served.end() == 0
     content = replayed(tmp_path / "run.mcap")
     told = [(entry.tick, entry.message["type"]) for entry in content.journal if entry.kind == "command"]
-    within = [kind for tick, kind in told if 2 < tick < content.states[-1].tick]
+    within = [kind for tick, kind in told if 2 < tick < 100_000]
     asked = [kind for kind in within if kind.startswith("program.")]
     assert asked == [f"program.{command}" for command in ("play", "pause", "play", "stop")]
     assert "simulation.step" not in within

@@ -38,25 +38,6 @@ def end_like_interrupted() -> None:
             signal.signal(number, interrupt)
 
 
-@contextlib.contextmanager
-def signals_held() -> Iterator[None]:
-    """Let signals that shut this process down wait until the body is through, so that nothing there is half done."""
-    if threading.current_thread() is not threading.main_thread():  # where no signal raises anything
-        yield
-        return
-    came: list[int] = []
-    handlers = {
-        number: signal.signal(number, lambda number, _: came.append(number)) for number in ending_signals()
-    }
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-    for one in came:
-        signal.raise_signal(one)
-
-
 def limit_shutdown() -> None:
     """End this process in `LONGEST`, also if a thread keeps the interpreter's lock; stderr shows what hangs."""
     faulthandler.dump_traceback_later(LONGEST, exit=True, file=2)
