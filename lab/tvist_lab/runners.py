@@ -66,7 +66,9 @@ def outcomes(
                 except Exception as error:  # noqa: BLE001  what a task contains may raise anything
                     yield following, Failed(TaskError(f"it cannot be pickled: {named(error)}"))
                 else:
-                    with _group_signals_blocked():  # also in a process that this starts, until it ignores them
+                    with (
+                        _group_signals_blocked()
+                    ):  # also in a process that this starts, until it ignores them
                         future = executor.submit(_attempt, work, packed)
                     out[future] = following
                     future.add_done_callback(arrived.put)
