@@ -40,7 +40,7 @@ OTHERS = np.linspace(0.01, 1.0, 30)
 
 
 def advice_figures(advice: Advice) -> tuple[Figure, Figure]:
-    """Return the figures of an advice that recommends a shaper: its worst stop, and what each shaper costs."""
+    """Return both figures of an advice that recommends a shaper: its worst stop, and what shapers cost."""
     with rc_context({"font.size": LARGE * rcParams["font.size"]}):
         return _worst_stop(advice), _costs(advice)
 

@@ -30,7 +30,7 @@ from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_lab.recordings import Floats
 
 BEFORE, AFTER = 60.0, 150.0
-"""Time shown in figure 15 before the stop of the unshaped reference and after the last of the marked times [ms]."""
+"""Time shown in figure 15 before the unshaped reference's stop and after the last mark [ms]."""
 STOPS = {"$t_b$, $t_b^*$": "stop of the reference and of the shaped one"}
 """What two symbols mean."""
 SYMBOLS = {
@@ -155,7 +155,7 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
 
 
 def _draw(panel: Axes, recorded: Recorded, style: Series, label: str) -> tuple[Residual, str]:
-    """Draw one recording; return its residual vibration, and how it was found where not from a decay that is drawn."""
+    """Draw one recording; return its residual vibration, and how it was found if not from a drawn decay."""
     recording, motion = recorded
     start, rv = recording.time[motion.start], residual(recording, motion)
     alpha = amplitude(tool_acceleration(recording))

@@ -43,7 +43,7 @@ Recorded = tuple[Recording, MotionRows]
 
 
 def motion_figure(name: str, *recorded: Recorded) -> Figure:
-    """Draw accelerations of the reference, E, |α|, and the mode that the shaper uses unless it is constant, over time.
+    """Draw over time: accelerations of the reference, E, |α|, and the shaper's mode unless it is constant.
 
     Time is zero when the reference starts.
 

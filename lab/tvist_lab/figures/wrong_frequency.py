@@ -26,7 +26,7 @@ from tvist_lab.recordings import Floats
 from tvist_shaping import Shaper, residual
 
 DESIGN, SPAN = 10.5, (6.0, 15.0)
-"""Frequency that the shapers of figure 4 are designed for, and the range of the UR5e's first mode with 5 kg [Hz]."""
+"""Design frequency of the shapers of figure 4, and range of the UR5e's first mode with 5 kg [Hz]."""
 SHOWN_HZ = (5.5, 16.0)
 """Frequencies on the axis of figure 4 [Hz]."""
 ERRORS = (0.0, 0.1, 0.2)

@@ -1,4 +1,4 @@
-"""The experiment's results as values and as rows of tables, beside the paper's, with the origin of each figure."""
+"""The experiment's results as values and rows of tables, beside the paper's; the origin of each figure."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -83,7 +83,6 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
     residual = _mean([one.result.residual_vibration_m_s2 for one in judged])
     before = _mean([one.result.residual_vibration_m_s2 for one in unshaped])
     peak, peak_before = _mean([one.peak for one in judged]), _mean([one.peak for one in unshaped])
-    still = _mean([one.still_after for one in judged])
     # The unshaped references of a motion start alike, so the later stop of the shaped one is its delay.
     started = [one.result.stop_s - one.result.start_s for one in judged]
     started_before = [one.result.stop_s - one.result.start_s for one in unshaped]
@@ -93,8 +92,9 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
         "residual_vibration_reduction_percent": _reduction(residual, before),
         "peak_m_s2": peak,
         "peak_reduction_percent": _reduction(peak, peak_before),
-        "still_after_ms": None if still is None else 1e3 * still,
-        "peak_acceleration_ratio": max(one.acceleration for one in judged) / ACCELERATION,
+        "still_after_ms": _mean([one.result.still_after_ms for one in judged]),
+        "peak_acceleration_ratio": max(one.result.peak_acceleration_rad_s2 or 0.0 for one in judged)
+        / ACCELERATION,
     }
 
 

@@ -1,4 +1,4 @@
-"""The experiment on a served robot: over the network, in real time, measured by the robot's recording, and replayed."""
+"""The experiment on a served robot: in real time, measured by the robot's recording, and replayed."""
 
 import asyncio
 from dataclasses import dataclass
