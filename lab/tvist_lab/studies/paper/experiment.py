@@ -13,10 +13,10 @@ from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_controller.api.line import Setup
 from tvist_lab.collect import collect
+from tvist_lab.frequency_error import robust_over
 from tvist_lab.in_process import robot_in_process
 from tvist_lab.metrics import MotionResult, Runs, measure, motions, peak_after_stop
 from tvist_lab.recordings import Recording
-from tvist_lab.robust import robust_over
 from tvist_lab.studies.paper.published import MOTIONS, pose
 from tvist_protocol.info import Info
 
