@@ -7,6 +7,7 @@ from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, told
+from tvist_cli.offered import ROBOTS, SHAPERS
 from tvist_cli.output import err
 from tvist_cli.pages import Door, serve_page
 from tvist_cli.tracks import MAGNIFY, Shows, compared, recorded, repeated
@@ -20,8 +21,8 @@ def view(
     at: Connection = LOCAL,
     *,
     beside: bool = False,
-    compare: Annotated[tuple[str, ...] | None, Parameter(consume_multiple=True)] = None,
-    robot: str = "ur5e",
+    compare: Annotated[tuple[str, ...] | None, SHAPERS, Parameter(consume_multiple=True)] = None,
+    robot: Annotated[str, ROBOTS] = "ur5e",
     magnify: float = MAGNIFY,
     html: Path | None = None,
     address: str = "127.0.0.1",
