@@ -105,16 +105,6 @@ class Serving:
         self._robots.close()
         self._own.close()
 
-    def robot(self, kind: type[R], item: pytest.Item, *, ur: bool = False) -> tuple[R, RobotOfTest]:
-        """Make a test's robot; a robot that cannot be made fails the test with one sentence.
-
-        Args:
-            kind: Class of its client.
-            item: The test.
-            ur: Whether UR's interfaces are open, and time is real.
-        """
-        return self._made(kind, item, NAME, 0, ur=ur)
-
     def robots(
         self, kind: type[R], item: pytest.Item, count: int, before: int
     ) -> list[tuple[R, RobotOfTest]]:
@@ -124,11 +114,12 @@ class Serving:
                 f"tvist_robots({count!r}): the number of a test's robots is 1 to {MOST}", pytrace=False
             )
         numbers = range(before, before + count)
-        return [self._made(kind, item, f"{NAME}-{number + 1}", number) for number in numbers]
+        return [self.robot(kind, item, f"{NAME}-{number + 1}", number) for number in numbers]
 
-    def _made(
-        self, kind: type[R], item: pytest.Item, name: str, number: int, *, ur: bool = False
+    def robot(
+        self, kind: type[R], item: pytest.Item, name: str = NAME, number: int = 0, *, ur: bool = False
     ) -> tuple[R, RobotOfTest]:
+        """Make a robot of a test; one that cannot be made fails the test with one sentence."""
         folder = self._own.path / str(next(self._numbers))
         folder.mkdir()
         recording, log = folder / f"{name}.mcap", folder / f"{name}.log"
