@@ -33,10 +33,10 @@ def view(
 
     ENDPOINT is that of a served robot, which the page shows live, or the name of a recording, which it plays back.
     --compare needs neither: it simulates the same motion with two or three shapers and shows the arms beside each
-    other.
+    other. Without a name, a live page begins with the robot ur5e.
 
     Args:
-        at: Where the robot is, or the MCAP file. Without a name, the page begins with the robot ur5e.
+        at: Where the robot is, or the MCAP file.
         beside: Of a recording, show the motion that it holds without and with a shaper, both at once.
         compare: Two or three shapers to simulate and to show beside each other: --compare none auto.
         robot: Name of the robot to simulate with --compare, or path of a robot file.
