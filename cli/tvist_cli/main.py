@@ -126,7 +126,7 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
         )
         app.command(group)
         _add(group, f"tvist_cli.commands.{name}", commands, called[1:2] if called[:1] == [name] else ())
-        if name == "study":
+        if name == "study" and (name in called or not called):
             # The parser takes no path for what a group does without a command of its own.
             group.default(import_module("tvist_cli.commands.study.file").file)
     return app
