@@ -10,12 +10,9 @@ ALLOWED = 0.05
 
 
 def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
-    """Residual vibration of a shaper designed for a wrong frequency, as a share of the unshaped vibration [-].
+    """Residual vibration of a shaper, as a share of the unshaped one, over shares by which its frequency is too high.
 
-    Args:
-        shaper: The shaper.
-        zeta: Damping ratio, both assumed and true [-].
-        errors: Shares by which the assumed frequency is too high [-], > -1, shape (E,).
+    The damping ratio is both the assumed and the true one.
     """
     return np.asarray(residual(1.0 / (1.0 + errors), zeta, shaper.impulses(1.0, zeta)))
 
@@ -23,13 +20,8 @@ def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
 def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> float:
     """Time from the unshaped stop until the mode is at 5 % of its unshaped vibration for good [s].
 
-    It is the shaper's delay, and after it the time in which what is left decays; infinite where nothing decays.
-
-    Args:
-        shaper: The shaper.
-        f_d: True damped frequency [Hz].
-        zeta: Damping ratio, both assumed and true [-].
-        error: Size of the error of the assumed frequency, of which the worse sign counts [-].
+    It is the shaper's delay, and after it the time in which what is left decays; infinite where nothing decays. Of an
+    error of the assumed frequency, the worse sign counts.
     """
     times = []
     for side in (-error, error):
@@ -42,19 +34,11 @@ def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> floa
 
 
 def robust_over(name: str, f_d: tuple[float, float], zeta: tuple[float, float]) -> tuple[float, float]:
-    """Return the design of a fixed shaper for a whole workspace.
+    """Return frequency [Hz] and damping ratio of a fixed shaper for a whole workspace, given its ranges of both.
 
     It is the shortest one that leaves at most 5 % anywhere; if none does, the one with the smallest worst case. The
     damping ratio is assumed to fall linearly from its highest value at the lowest frequency to its lowest value at
     the highest frequency.
-
-    Args:
-        name: Name of the shaper.
-        f_d: Lowest and highest damped frequency of the workspace [Hz].
-        zeta: Lowest and highest damping ratio [-].
-
-    Returns:
-        Design frequency [Hz] and damping ratio [-].
     """
     frequencies = np.linspace(*f_d, 60)
     damping = _damping(frequencies, f_d, zeta)

@@ -154,11 +154,6 @@ def pluck(description: RobotDescription, payload: Payload, elbow: float) -> Ring
     """Twist the shoulder, let it go, and fit a damped sine to what the accelerometer feels.
 
     The fit knows nothing of the arm: neither masses nor spring.
-
-    Args:
-        description: An arm with a shoulder and an elbow, about vertical axes.
-        payload: What it carries.
-        elbow: Angle of the elbow [rad].
     """
     plant = FlexibleArm(description, payload)
     still = DriveCommand(np.array([0.0, elbow]), np.zeros(2), np.zeros(2))

@@ -58,14 +58,9 @@ BOTH = {"Unshaped": (OF_UNSHAPED, "$t_b$"), "Shaped": (OF_SHAPED, "$t_b^*$")}
 
 
 def figure_15(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
-    """Draw E of one motion around its stop, unshaped and shaped, with the times and the overshoot of the unshaped one.
+    """Draw E of one motion around its stop, unshaped and shaped, with the times and the overshoot of the former.
 
     Where E never settles, its curves are drawn without these marks.
-
-    Args:
-        name: Name of the motion, used as the heading.
-        unshaped: The motion without shaping.
-        shaped: The same motion with shaping.
 
     Raises:
         NotMeasurableError: The attained position cannot be determined, because too little rest was recorded.
@@ -123,9 +118,6 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
     """|α| around the stop of each motion, unshaped and shaped, with the fitted decay from t_b on.
 
     Time is zero when the reference starts.
-
-    Args:
-        motions: Name to the recording and motion without and with shaping.
 
     Raises:
         NotMeasurableError: Less than 0.3 s were recorded after a stop.

@@ -166,16 +166,7 @@ async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) ->
 async def experiment(
     robot: Robot, arm: Arm, *, runs: int, seed: int, baselines: bool, progress: Progress
 ) -> Experiment:
-    """Run every motion with every method.
-
-    Args:
-        robot: The robot.
-        arm: Control of the robot.
-        runs: Number of repetitions, each with its own noise and gear errors.
-        seed: Seed of the first repetition.
-        baselines: Whether to run the baselines, too.
-        progress: Called after each run.
-    """
+    """Run every motion with every method, and repeat it, each time with other noise and gear errors."""
     done = Experiment(info=await robot.info(), seed=seed, runs=runs, table_1=await table_1(robot, arm))
     for motion in MOTIONS:
         for method in (UNSHAPED, SHAPED):

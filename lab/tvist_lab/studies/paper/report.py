@@ -111,12 +111,7 @@ def _reduction(after: float | None, before: float | None) -> float | None:
 
 
 def origins(robot: str, result: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Return an entry for each figure: its name, the paper's value, that of an arm, and the origin of the latter.
-
-    Args:
-        robot: Model of the arm.
-        result: Table 1, the span of f_d and Table 2 of the arm, see `as_dict`.
-    """
+    """Return an entry for each figure of an arm: its name, the paper's value, the arm's, and the latter's origin."""
     theirs, adjusted, entries = published(), ADJUSTED.get(robot, {}), []
 
     def compare(
@@ -154,9 +149,7 @@ def origins(robot: str, result: Mapping[str, Any]) -> list[dict[str, str]]:
 def table_2(table: dict[str, Any], digits: int) -> list[tuple[str, ...]]:
     """Return the rows of Table 2: the motion, what is shown and whose it is, and the figures.
 
-    Args:
-        table: Table 2 of `as_dict`.
-        digits: Decimals of the residual vibration.
+    The residual vibration has this number of decimals.
     """
     forms = {
         "delay_ms": ".1f", "stabilisation_ms": ".1f", "cycle_ms": ".1f", "overshoot_m": ".1e",
@@ -176,13 +169,7 @@ def table_2(table: dict[str, Any], digits: int) -> list[tuple[str, ...]]:
 
 
 def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, ...]]:
-    """Return the rows of a table of methods.
-
-    Args:
-        result: Result of `as_dict`.
-        motion: The motion.
-        first: How the method that is still first is written, such as "**{}**".
-    """
+    """Return the rows of a motion's table of methods; `first` writes the one that is still first, as "**{}**"."""
     rows = result["baselines"][motion]
     known = [row["still_after_ms"] for row in rows.values() if row["still_after_ms"] is not None]
     soonest = min(known, default=None)
@@ -195,11 +182,7 @@ def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, 
 
 
 def beside(arms: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
-    """Return heading and rows of the table of the origins, with the paper's figures and those of each arm.
-
-    Args:
-        arms: Result of `as_dict` for each arm.
-    """
+    """Return heading and rows of the table of the origins, with the paper's figures and those of each arm."""
     heading = ("figure", "paper", *(title for one in arms for title in (one["robot"], "origin")))
     rows = zip(*(one["origins"] for one in arms), strict=True)
     return [heading, *(
