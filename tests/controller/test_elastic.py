@@ -244,7 +244,7 @@ def test_without_springs_it_is_refused_with_the_way_to_get_them():
     robot = Robot(description=other, calibration=calibration(robot="strange"))
     reply = robot.send(c.SetShaper, name="elastic")
     assert (reply.code, reply.where) == ("out_of_range", "name")
-    assert "tvist identify --model modal" in reply.why
+    assert "tvist identify" in reply.why
 
 
 def test_the_drives_tick_counts_in_the_delay_that_is_published():
