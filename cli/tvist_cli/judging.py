@@ -42,7 +42,7 @@ def verdict(change: "Change") -> "Verdict":
 
 def _recording(run: "Run") -> "Recording":
     """One motion as columns, by the truth, or by the sensor where few truths have come."""
-    from tvist_lab.recordings.recorded_columns import recording_of_messages
+    from tvist_lab.recordings.messages import recording_of_messages
 
     truths = sorted(run.truths, key=lambda truth: truth.tick)
     if len(truths) < MOST * len(run.states):
