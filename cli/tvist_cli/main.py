@@ -52,8 +52,7 @@ GROUPS = {
         "study": f"Run a study, one's own from a file or one of {', '.join(STUDY)}.",
     },
     "Make and manage": {
-        "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
-        "paper": "Run the paper's experiment and print its tables beside ours.",
+        "demo": "Run the paper's experiment, in real time or simulated, and print its tables beside ours.",
         "lesson": "Open a page on which to try shaping.",
         "identify": "Calibrate a robot from its own accelerometer, or from its logs.",
         "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",
@@ -127,7 +126,7 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
         )
         app.command(group)
         _add(group, f"tvist_cli.commands.{name}", commands, called[1:2] if called[:1] == [name] else ())
-        if name == "study":
+        if name == "study" and (name in called or not called):
             # The parser takes no path for what a group does without a command of its own.
             group.default(import_module("tvist_cli.commands.study.file").file)
     return app

@@ -8,6 +8,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.offered import PLANTS, ROBOTS, SHAPERS
 from tvist_cli.output import number, out, say, typed
 from tvist_cli.shapers_of import calibration_for, designing, loaded
 from tvist_cli.simulated_arm import disturbed, limits_of, masses_of, named, plants_of
@@ -32,10 +33,10 @@ def evaluate(
     moves: Path | None = None,
     random: int | None = None,
     payload: str | None = None,
-    shaper: str = "zv",
+    shaper: Annotated[str, SHAPERS] = "zv",
     modes: int = 1,
     calibration: str | None = None,
-    robot: str = "ur5e",
+    robot: Annotated[str, ROBOTS] = "ur5e",
     seed: int = 0,
     wrists: bool = False,
     clean: bool = False,
@@ -43,7 +44,7 @@ def evaluate(
     frequency_error: float = 0.0,
     payload_error: float = 0.0,
     stiffness_error: float = 0.0,
-    plant: str | None = None,
+    plant: Annotated[str | None, PLANTS] = None,
     hidden: int | None = None,
     limits: str = "gentle",
     stroke: tuple[float, float] | None = None,

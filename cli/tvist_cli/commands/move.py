@@ -1,37 +1,34 @@
 """`tvist move`: move a served robot to one pose."""
 
 import asyncio
-from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
+from typing import Annotated, Any
 
+from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.offered import POSES, SHAPERS
 from tvist_cli.output import out, print_json, program
 from tvist_cli.poses import pose, tool_numbers
+from tvist_client.arm import Arm
+from tvist_client.motion import Motion
+from tvist_client.readiness import look
 from tvist_protocol.errors import RefusedError
-
-if TYPE_CHECKING:
-    from tvist_client.arm import Arm
-    from tvist_client.motion import Motion
 
 BENT = "0,-1.57,1.57,-1.57,-1.57,0"
 """A posture of arms like UR's that is far from any singular one [rad]."""
 
 
 def move(
-    target: str,
+    target: Annotated[str, POSES],
     *,
     line: bool = False,
     by: bool = False,
-    endpoint: str = "tcp/127.0.0.1:7447",
-    name: str | None = None,
-    security: Path | None = None,
-    namespace: str = "",
+    at: Connection = LOCAL,
     degrees: bool = False,
     velocity: float | None = None,
     acceleration: float | None = None,
     jerk: float | None = None,
     duration: float | None = None,
-    shaper: str | None = None,
+    shaper: Annotated[str | None, SHAPERS] = None,
     json: bool = False,
 ) -> None:
     """Move a served robot to a pose and print how long it took; Control+C stops the motion.
@@ -43,10 +40,7 @@ def move(
         line: Move the tool on a straight line to the target.
         by: Read the target of --line as the distance dx,dy,dz in m from the present position, in the base frame:
             --line --by 0,0,-0.1 moves the tool 0.1 m down.
-        endpoint: Zenoh endpoint of the robot.
-        name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
-        namespace: Namespace of the robot, if it is served in one.
-        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
+        at: Where the robot is.
         degrees: Read the target's angles in degrees; the limits stay in rad.
         velocity: Velocity limit of every joint in rad/s [1.5], or of the tool in m/s with --line [0.25].
         acceleration: Acceleration limit of every joint in rad/s² [2], or of the tool in m/s² with --line [1.2].
@@ -56,23 +50,18 @@ def move(
         shaper: Shaper to select before the motion.
         json: Print one JSON object.
     """
-    from tvist_client.readiness import look, unlock_command
-    from tvist_client.robot import NAME, Robot
-    from tvist_client.transports.zenoh import only_robot
-
-    given = _given(velocity, acceleration, jerk, duration)
+    given = _limits(velocity=velocity, acceleration=acceleration, jerk=jerk, duration=duration)
     numbers = _numbers(target, line=line, by=by, degrees=degrees)
     held = False
 
     async def run() -> tuple[int, int, str | None]:
         nonlocal held
-        found = name if name is not None else await only_robot(endpoint, NAME, security, namespace)
-        async with await Robot.connect(endpoint, found, security=security, namespace=namespace) as robot:
+        async with await at.robot() as robot:
             info = await robot.info()
             q = () if line else pose(target, info.poses, "target", degrees=degrees)
-            standing = await look(robot, unlock_command(endpoint, found, security, namespace))
+            standing = await look(robot, at.unlock_command(info.name))
             if not standing.ready:
-                raise Failure(f"{found} is not ready: {standing.sentence}")
+                raise Failure(f"{info.name} is not ready: {standing.sentence}")
             async with robot.control("tvist move") as arm:
                 if shaper is not None:
                     await arm.set_shaper(shaper.lower())
@@ -109,31 +98,12 @@ def move(
             out.print(limited, markup=False)
 
 
-class _Limits(TypedDict, total=False):
-    """The limits or the duration that the user has set."""
-
-    velocity: float
-    acceleration: float
-    jerk: float
-    duration: float
-
-
-def _given(
-    velocity: float | None, acceleration: float | None, jerk: float | None, duration: float | None
-) -> _Limits:
-    """The limits, or the duration instead."""
-    limits = _Limits()
-    if velocity is not None:
-        limits["velocity"] = velocity
-    if acceleration is not None:
-        limits["acceleration"] = acceleration
-    if jerk is not None:
-        limits["jerk"] = jerk
-    if duration is None:
-        return limits
-    if limits:
+def _limits(**given: float | None) -> dict[str, Any]:
+    """The limits that the user has set, or the duration instead."""
+    limits = {name: value for name, value in given.items() if value is not None}
+    if "duration" in limits and len(limits) > 1:
         raise Failure(f"--{next(iter(limits))} and --duration exclude each other: give one of them", code=2)
-    return _Limits(duration=duration)
+    return limits
 
 
 def _numbers(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float, ...]:
@@ -148,8 +118,8 @@ def _numbers(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float
 
 
 async def _line(
-    arm: "Arm", numbers: tuple[float, ...], limits: _Limits, *, by: bool, joints: int
-) -> "Motion":
+    arm: Arm, numbers: tuple[float, ...], limits: dict[str, Any], *, by: bool, joints: int
+) -> Motion:
     """Move the tool to a position, with an orientation or its own, or by a distance."""
     goal = numbers
     if len(numbers) == 3:
@@ -165,7 +135,7 @@ async def _line(
         raise Failure(f"{error}. Next: move the joints to another posture first{example}") from error
 
 
-async def _stop(arm: "Arm") -> None:
+async def _stop(arm: Arm) -> None:
     """Bring the robot to rest, whether or not the motion has been answered."""
     await arm.stop()
     await arm.robot.rest()

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.offered import COMPARED, ROBOTS
 from tvist_cli.output import out, say
 from tvist_cli.shapers_of import load_given, modal_for, on_the_bench
 from tvist_cli.simulated_arm import plants_of
@@ -27,9 +28,9 @@ def shaperbench(
     shaper: str | None = None,
     quick: bool = False,
     moves: int | None = None,
-    against: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    against: Annotated[list[str] | None, COMPARED, Parameter(consume_multiple=True)] = None,
     hidden: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
-    robot: str = "ur5e",
+    robot: Annotated[str, ROBOTS] = "ur5e",
     seed: int = 0,
     calibration: str | None = None,
     output: Path | None = None,
