@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from tests.examples import examples
 
@@ -112,6 +112,7 @@ CHANGES = {
 
 
 @examples(4)
+@example([(1, "heavy"), (102, "heavy")])
 @given(st.lists(st.tuples(st.integers(1, 120), st.sampled_from(list(CHANGES))), max_size=6))
 def test_whatever_is_changed_on_the_way_it_stays_on_the_path_and_comes_to_its_end(changes):
     points = circle(40)
