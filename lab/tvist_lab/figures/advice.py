@@ -10,8 +10,7 @@ from matplotlib import rc_context, rcParams
 from matplotlib.figure import Figure
 
 from tvist_lab.advice import Advice, Option
-from tvist_lab.advice.options import impulses_of
-from tvist_lab.advice.slower import smoothed
+from tvist_lab.advice.options import impulses_of, smoothed
 from tvist_lab.figures.style import (
     FAINT,
     MUTED,

@@ -8,13 +8,12 @@ from scipy.spatial.transform import Rotation, Slerp
 from tests.search.subject import Subject
 
 from tvist_controller.setup import paper_payload
-from tvist_plant.description import Payload
+from tvist_plant.description import Payload, load
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_protocol.io import SetTcp
-from tvist_protocol.motions import ArcSegment, LineSegment, MovePath, ProcessSegment
+from tvist_protocol.motions import ArcSegment, LineSegment, ProcessSegment
 
-from .robots import UR5E
-
+UR5E = load("ur5e")
 BENT = np.array([0.2, -1.4, 1.7, -1.8, -1.5, 0.3])
 """A posture far from any singular one [rad]."""
 NO_TOOL = (0.0,) * 6
@@ -142,16 +141,6 @@ def random_path(random, q, count: int | None = None) -> tuple[dict, list[Leg]]:
         legs.append(leg)
         start = leg.end
     return {"segments": tuple(segments), "jerk": float(random.choice([20.0, 60.0, 400.0]))}, legs
-
-
-def moved(robot: Subject, **path) -> np.ndarray | None:
-    """All shaped references of a path; None if it is refused, as many random ones have to be."""
-    reply = robot.send(MovePath, **path)
-    if type(reply).__name__ != "Accepted":
-        return None
-    robot.until_rest()
-    robot.tick(20)
-    return np.array(robot.references)
 
 
 def errors(q, legs: list[Leg], tcp=TOOL) -> tuple[float, float]:

@@ -1,20 +1,30 @@
-"""Robots that have just begun a random path, and how far along it they are in each tick."""
+"""Random motions of the tool, and stops, pauses and changes on them, compared with the same motion left alone."""
 
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
+from tests.search.draws import SHAPERS
+from tests.search.spaces import TOOL, UR5E, Leg, errors, random_path, start_posture, tool_pose
+from tests.search.stops import KINDS, PAUSES
 from tests.search.subject import Subject, torques
 
-from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
-from tvist_controller.line.limits import TORQUE_SHARE
-from tvist_controller.setup import body, paper_payload
+from tvist_controller.api.line import (
+    CLEARANCE,
+    TORQUE_SHARE,
+    CollisionModel,
+    body,
+    paper_payload,
+    resting_after,
+)
+from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp
 from tvist_protocol.motions import MovePath
 from tvist_protocol.replies import Accepted, Done
 
-from .robots import UR5E, H
-from .spaces import TOOL, Leg, random_path, start_posture
+LEAD = 1e-8
+"""A pause goes through a filter whose weights follow the posture, and so may lead by nanometres [m]."""
 
 
 @dataclass
@@ -105,7 +115,64 @@ def keeps_limits(q, free, payload, case):
     most = TORQUE_SHARE * np.array(UR5E.limits.torque)
     asked, taken = (np.abs(torques(UR5E, payload, each)).max(axis=0) for each in (free, q))
     assert (taken / np.maximum(most, asked)).max() <= 1.001, case
-    present = np.abs(np.diff(free, 2, axis=0)).max() / H**2
-    hardest = np.abs(np.diff(q, 2, axis=0)).max() / H**2
+    present = np.abs(np.diff(free, 2, axis=0)).max() / PERIOD**2
+    hardest = np.abs(np.diff(q, 2, axis=0)).max() / PERIOD**2
     assert hardest <= max(1.01 * min(UR5E.limits.acceleration), present), case
     assert CollisionModel(UR5E, body(payload)).nearest(q) >= CLEARANCE, case
+
+
+def assert_on_path(q, legs):
+    """The tool is on the legs of its path, by their geometry alone."""
+    off, turned = errors(q[:: max(len(q) // 300, 1)], legs)
+    assert off <= 5e-5
+    assert turned <= 1e-4
+
+
+def judge(seed):
+    """Make a random path, and check that it is where it should be, within the limits, until its end."""
+    trip = journey([seed, 31], [SHAPERS[seed % len(SHAPERS)]])
+    robot = trip.begin()
+    robot.until_rest(500_000)
+    robot.tick(20)
+    q = np.array(robot.references)
+    assert_on_path(q, trip.legs)
+    for order, limit in ((1, UR5E.limits.velocity), (2, UR5E.limits.acceleration)):
+        assert np.abs(np.diff(q, order, axis=0)).max() / PERIOD**order <= min(limit)
+    position, rotation = tool_pose(q[-1])
+    end, turned_end = trip.legs[-1].end
+    assert np.linalg.norm(position - end) <= 1e-6
+    assert (rotation * turned_end.inv()).magnitude() <= 1e-6
+    kinds = [event.kind for event in robot.events if event.kind.startswith("motion")]
+    assert kinds == ["motion_started", "motion_done"]
+
+
+def judge_stop(seed):
+    """Stop a random path in some way: it stays on the path, is not ahead of the motion, and rests no later."""
+    trip = journey([seed, 41], SHAPERS)
+    random = np.random.default_rng([seed, 42])
+    alone = Progress(trip.begin())
+    alone.until_rest()
+    alone.tick(200)
+    free = np.array(alone.robot.references)
+    moment = int(random.integers(1, max(resting_after(free), 2)))
+    kind = str(random.choice(list(KINDS)))
+    case = (seed, kind, trip.shaper, moment)
+    stop = Progress(trip.begin())
+    stop.tick(moment)
+    stop.robot.events.clear()
+    KINDS[kind](stop.robot, random)
+    stop.until_rest()
+    stop.tick(100)
+    q = np.array(stop.robot.references)
+    longest = max(len(free), len(q))
+    covered, ahead = (np.pad(one.covered, (0, longest - len(one.covered)), "edge") for one in (stop, alone))
+    assert (covered - ahead)[moment:].max() <= LEAD, case
+    assert resting_after(q) <= resting_after(free), case
+    assert_on_path(q, trip.legs)
+    keeps_limits(q[moment - 1 :], free[moment - 1 :], trip.payload, case)
+    if kind not in PAUSES:
+        event = next(event for event in stop.robot.events if event.kind == "motion_stopped")
+        if event.duration is not None:
+            assert event.duration == pytest.approx(
+                max(resting_after(q) - moment, 0) * PERIOD, abs=3 * PERIOD
+            ), case
