@@ -52,8 +52,7 @@ GROUPS = {
         "study": f"Run a study, one's own from a file or one of {', '.join(STUDY)}.",
     },
     "Make and manage": {
-        "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
-        "paper": "Run the paper's experiment and print its tables beside ours.",
+        "demo": "Run the paper's experiment, in real time or simulated, and print its tables beside ours.",
         "lesson": "Open a page on which to try shaping.",
         "identify": "Calibrate a robot from its own accelerometer, or from its logs.",
         "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",

@@ -106,7 +106,7 @@ class Places:
 
         Args:
             result: What --json prints.
-            draw: Draws the figures.
+            draw: Draws the figures, in the style that is set when it is called.
             web_page: Makes the web page around the figures.
 
         Raises:
@@ -115,13 +115,16 @@ class Places:
         with told(OSError):
             if self.output is not None:
                 write_json(self.output, result)
-            if draw is None or self.figures is self.report is None:
+            if draw is None:
                 return
-            drawn = draw()
             if self.report is not None and web_page is not None:
-                write_report(self.report, web_page(drawn))
-            if self.figures is not None:  # last, since a style changes the figures
-                write(self.look.into(self.figures), drawn)
+                from tvist_lab.figures import house_style
+
+                with house_style():
+                    write_report(self.report, web_page(draw()))
+            if self.figures is not None:
+                with self.look.into(self.figures) as save:
+                    write(save, draw())
 
 
 def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, json: bool) -> None:

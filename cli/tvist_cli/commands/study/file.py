@@ -7,7 +7,7 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import typed
 from tvist_cli.study_names import STUDY
-from tvist_cli.studying import Places
+from tvist_cli.studying import Figures, Places
 
 
 def file(
@@ -64,12 +64,15 @@ def file(
     }
     few = min(entry["rows"] for entry in result["summary"]) < MANY
     on_pages = {**result, "summary": study.summary(rows, ENDS)} if few else result
-    figure = study_figure(on_pages["summary"], study.by, study.show)
-    with told(OSError):
-        result["figure"] = str(look.into(folder).write(figure, "study"))
+
+    def draw() -> Figures:
+        return {"study": study_figure(on_pages["summary"], study.by, study.show)}
+
+    with told(OSError), look.into(folder) as save:
+        result["figure"] = str(save(draw()["study"], "study"))
     places.write(
         result,
-        draw=lambda: {"study": figure},
+        draw=draw,
         web_page=lambda drawn: study_page(study, on_pages, drawn, typed()),
     )
     entries = result["summary"]

@@ -10,7 +10,6 @@ from tvist_cli.shapers_of import calibration_for, designing, loaded
 from tvist_cli.simulated_arm import disturbed
 
 if TYPE_CHECKING:
-    from tvist_lab.figures import FigureFiles
     from tvist_lab.studies.sweep.spec import NamedRobot, Spec
     from tvist_lab.studies.sweep.sweep import Axes, SweptRobot
     from tvist_lab.study.recipes import Recipe
@@ -58,7 +57,7 @@ def sweep(
     rows, about = kept.run(_axes(spec).plan(), folder, processes, scheduler)
     result = {"spec": str(spec), **about, "summary": summary(rows)}
     entries = [{"setting": setting_name(entry), **entry} for entry in result["summary"]]
-    result["figure"] = _drawn(entries, look.into(folder), result["rows_file"])
+    result["figure"] = _drawn(entries, look, folder, result["rows_file"])
     bad = rows.filter(rows["status"] == FAILED).head(NAMED).iter_rows(named=True)
     kept.tell(
         result,
@@ -73,7 +72,7 @@ def sweep(
     )
 
 
-def _drawn(entries: list[dict[str, Any]], files: "FigureFiles", rows: str) -> str | None:
+def _drawn(entries: list[dict[str, Any]], look: FigureOptions, folder: Path, rows: str) -> str | None:
     """The path of the figure; None if there are too many settings for one."""
     from tvist_lab.figures import sweep_figure
 
@@ -81,10 +80,11 @@ def _drawn(entries: list[dict[str, Any]], files: "FigureFiles", rows: str) -> st
     if len(set(settings)) > DRAWN:
         return None
     try:
-        return str(files.write(sweep_figure(entries, settings), "sweep"))
+        with look.into(folder) as save:
+            return str(save(sweep_figure(entries, settings), "sweep"))
     except OSError as error:
         raise Failure(
-            f"the figure in {files.folder} cannot be written: {error.strerror}; all rows are in {rows}"
+            f"the figure in {folder} cannot be written: {error.strerror}; all rows are in {rows}"
         ) from error
 
 

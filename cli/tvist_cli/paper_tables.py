@@ -24,9 +24,8 @@ METHOD_TERMS = {
 
 
 def print_paper(result: dict[str, Any]) -> None:
-    """Print the results of `tvist paper` and `tvist demo`: the tables of each arm, and the origins of its figures."""
-    from tvist_lab.studies.paper.origins import MEANINGS
-    from tvist_lab.studies.paper.tables import beside
+    """Print the results of `tvist demo`: the tables of each arm, and the origins of its figures."""
+    from tvist_lab.studies.paper.report import MEANINGS, beside
 
     arms = [result, *result.get("others", ())]
     for one in arms:
@@ -41,7 +40,7 @@ def print_paper(result: dict[str, Any]) -> None:
 
 def _print_arm(result: dict[str, Any]) -> None:
     from tvist_lab.studies.paper.published import published
-    from tvist_lab.studies.paper.tables import methods, table_2
+    from tvist_lab.studies.paper.report import methods, table_2
 
     theirs, robot = published()["configurations"], result["robot"]
     table(

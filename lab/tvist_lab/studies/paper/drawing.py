@@ -17,7 +17,7 @@ from tvist_lab.figures import (
     ring_down_figure,
 )
 from tvist_lab.metrics import motions
-from tvist_lab.one_joint.plucks import pluck_all
+from tvist_lab.one_joint import pluck_all
 from tvist_lab.studies.paper.experiment import Experiment
 from tvist_lab.studies.paper.published import MOTIONS
 
@@ -36,15 +36,10 @@ def draw(done: Experiment, *, all_figures: bool) -> dict[str, Figure]:
     figures = {f"figure_{NUMBERS[name]}": motion_figure(name, *pair) for name, pair in pairs.items()}
     figures |= {"figure_15": figure_15(DEFINED_ON, *pairs[DEFINED_ON]), "figure_16": figure_16(pairs)}
     if all_figures:
-        figures |= {
-            "figure_01": figure_1(),
-            "figure_02": figure_2(pluck_all()),
-            "figure_03": figure_3(),
-            "figure_04": figure_4(),
-            "figure_07": figure_7(),
-            "figure_08": figure_8(),
-            "ring_down": ring_down_figure(DEFINED_ON, pairs[DEFINED_ON][0]),
-        }
+        figures |= {"figure_02": figure_2(pluck_all())}
+        makers = {1: figure_1, 3: figure_3, 4: figure_4, 7: figure_7, 8: figure_8}
+        figures |= {f"figure_{number:02}": make() for number, make in makers.items()}
+        figures |= {"ring_down": ring_down_figure(DEFINED_ON, pairs[DEFINED_ON][0])}
     return dict(sorted(figures.items()))
 
 
