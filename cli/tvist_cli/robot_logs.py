@@ -22,15 +22,7 @@ def robot_logs(
     columns: str | None,
     known: int | None = None,
 ) -> "tuple[RobotDescription, list[Log]]":
-    """Return the robot's description, and the logs with what the arm carried.
-
-    Args:
-        files: Recordings and logs.
-        robot: Name of a robot or path of its file; None to find it by the model that the logs name.
-        mass: Mass of the disc that the arm carried in all of them [kg]; None for what they say.
-        columns: Names of a CSV's columns.
-        known: Number of the first files among which a model is looked for; None for all.
-    """
+    """Return the robot's description, and the logs with what the arm carried."""
     from tvist_controller.setup import paper_payload
     from tvist_lab.identification.everyday_stops import Log
     from tvist_lab.recordings import RecordingError, read

@@ -15,6 +15,8 @@ from tvist_plant.description import RobotDescription, load
 from tvist_plant.plant import PERIOD, Measurement, Plant
 from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration, calibration_of
+from tvist_protocol.codec import encode
+from tvist_protocol.replies import Done
 from tvist_shaping.catalogue import SHAPERS, shaper
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.filter import TvistFilter
@@ -76,21 +78,12 @@ def calibration(mass: float = 5.0, robot: str = "UR5e", name: str = "test", **po
             "payload": {"mass": mass, "com": [0.0, 0.0, 0.0405], "inertia": [0.006, 0, 0, 0.006, 0, 0.006]},
             "polynomial": POLYNOMIAL | polynomial,
             "provenance": {
-                "command": "by hand",
-                "version": "0",
-                "seed": 0,
-                "configurations": 1,
-                "ring_downs": 1,
-                "rejected": 0,
-                "measured_f_d_range": [6.0, 15.0],
-                "measured_zeta_range": [0.1, 0.35],
-                "residual_f_d_percent": spread,
-                "residual_zeta_percent": spread,
-                "cross_validated_f_d_percent": spread,
-                "cross_validated_zeta_percent": spread,
+                "command": "by hand", "version": "0", "seed": 0, "configurations": 1, "ring_downs": 1, "rejected": 0,
+                "measured_f_d_range": [6.0, 15.0], "measured_zeta_range": [0.1, 0.35],
+                **{f"{how}_{of}_percent": spread for how in ("residual", "cross_validated") for of in ("f_d", "zeta")},
             },
         }
-    )
+    )  # fmt: skip
 
 
 class Line(ControlCycle):
@@ -196,11 +189,23 @@ class Robot:
                 return self.states[-1]
         raise AssertionError("still moving")
 
+    def stream(self, ticks: int = 100, **limits):
+        """A stream of small set-points for some ticks, which goes on."""
+        assert self.send(c.ServoStart, **limits) == Done()
+        start = self.controller.cycle.sample.reference
+        for k in range(ticks):
+            self.setpoint(k, start + 0.1 * (1 - np.cos(3.0 * k * H)))
+            self.tick()
+
     def kinds(self):
         return [event.kind for event in self.events]
 
     def column(self, name):
         return np.array([getattr(state, name) for state in self.states])
+
+
+def bits(states):
+    return [encode(state) for state in states]
 
 
 def spring_loads(lead, target):

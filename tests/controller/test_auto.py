@@ -7,10 +7,8 @@ from tvist_controller.setup import paper_payload
 from tvist_controller.sources.calibrations import load
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
-from tvist_protocol.simulation import SimulationReset
-from tvist_protocol.values import Payload
 
-from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot
+from .robots import PAPER, Q3, UR5E, H, Robot
 
 POLYNOMIAL = load("ur5e_5kg")
 NAMES = ("auto", "short", "auto-target", "elastic-auto")
@@ -43,17 +41,6 @@ def test_they_bring_their_own_estimator_and_leave_less_than_the_papers_shaper():
             assert left[shaper] < min(0.1 * left["none"], left["zv"]), shaper
 
 
-@pytest.mark.parametrize(("name", "target"), [*zip(NAMES, (Q2, Q3, Q2, Q2), strict=True), ("elastic", Q3)])
-def test_a_motion_of_our_own_keeps_its_limits_to_the_last_digit(name, target):
-    robot = Robot(calibration=POLYNOMIAL, shaper=name)
-    robot.send(c.MoveJ, q=tuple(target))
-    robot.until_rest()
-    q = robot.column("target_q")
-    assert np.abs(np.diff(q, 2, axis=0)).max() / H**2 <= PAPER.acceleration * (1.0 + 1e-8)
-    assert np.abs(np.diff(q, axis=0)).max() / H <= PAPER.velocity * (1.0 + 1e-9)
-    assert robot.states[-1].target_q == pytest.approx(target, abs=2e-7)
-
-
 def test_to_know_the_end_is_to_be_there_sooner_and_a_stream_is_followed_all_the_same():
     ticks = {}
     for name in ("auto", "auto-target"):
@@ -84,47 +71,6 @@ def test_another_payload_makes_other_modes_at_once_at_rest_and_without_a_step_in
     assert robot.events[-1].kind == "motion_done"
     q = robot.column("target_q")[since - 3 :]
     assert np.abs(np.diff(q, 2, axis=0)).max() / H**2 <= PAPER.acceleration * 1.01
-
-
-def test_it_knows_what_it_carries():
-    """Unlike polynomials, which are of one payload, the modal estimator needs no warning."""
-    left = {}
-    for shaper in ("none", "auto"):
-        robot = Robot(calibration=POLYNOMIAL, shaper=shaper, payload=LIGHT)
-        robot.send(c.MoveJ, q=tuple(Q3))
-        robot.until_rest()
-        left[shaper] = ringing(robot)
-    assert left["auto"] < 0.12 * left["none"]
-    assert not [event for event in robot.events if event.code == "payload_mismatch"]
-
-
-def test_where_the_arm_has_no_modal_calibration_it_says_what_to_do():
-    robot = Robot()
-    reply = robot.send(c.SetShaper, name="auto")
-    assert (reply.code, reply.where) == ("out_of_range", "name")
-    with pytest.raises(ValueError, match="modes"):
-        Robot(shaper="auto")
-
-
-@pytest.mark.parametrize("modes", [2, 3])
-def test_a_shaper_may_have_as_many_modes_as_the_estimator_gives(modes):
-    robot = Robot(calibration=POLYNOMIAL)
-    assert robot.send(c.SetShaper, name="zv", modes=modes) == Done()
-    assert len(robot.tick().estimated_f_d) == modes
-    assert robot.controller.assumed.source.name == "modal"
-    assert robot.send(c.SetEstimator, name="polynomial").code == "out_of_range"
-    assert robot.send(c.SetShaper, name="zv") == Done()
-    assert robot.send(c.SetEstimator, name="polynomial") == Done()
-
-
-def test_a_payload_that_no_calibration_saw():
-    robot = Robot(calibration=POLYNOMIAL, shaper="auto")
-    odd = Payload(mass=3.3, com=(0.02, -0.03, 0.09), inertia=(0.01, 0.0, 0.0, 0.012, 0.0, 0.008))
-    assert robot.send(c.SetPayload, mass=odd.mass, com=odd.com, inertia=odd.inertia) == Done()
-    assert robot.send(SimulationReset, payload=odd, q=tuple(Q1)).tick is not None
-    robot.send(c.MoveJ, q=tuple(Q3))
-    robot.until_rest()
-    assert ringing(robot) < 0.1
 
 
 def test_a_filter_that_cannot_do_what_it_should_says_so_once():

@@ -1,10 +1,8 @@
 """Filter and payload changed while the arm moves: no step, nothing beyond the limits, atomic, deterministic."""
 
-import msgspec
 import numpy as np
 import pytest
 
-from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.inverse_dynamics import SLEW, InverseDynamics
@@ -13,25 +11,14 @@ from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
+from tvist_protocol.transitions import Activity
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.filter import TvistFilter
 
-from .robots import (
-    FITTING,
-    PAPER,
-    POLYNOMIAL,
-    Q1,
-    Q2,
-    Q3,
-    UR5E,
-    H,
-    Robot,
-    calibration,
-    stop,
-    without_arm,
-)
+from .robots import FITTING, PAPER, POLYNOMIAL, Q1, Q2, Q3, UR5E, H, bits, calibration, without_arm
+from .test_modes import at
 
 DISC = paper_payload(UR5E)
 TOLERANCE = 1e-6
@@ -115,29 +102,6 @@ def test_a_motion_keeps_its_limits_and_its_target_through_changes_of_the_filter(
     assert (line.position == target).all()
 
 
-def test_of_changes_during_a_change_the_newest_is_what_remains():
-    random = np.random.default_rng(0)
-    first = a_filter(random, "none")
-    line = a_line(first)
-    line.begin(line.plan(Q3, PAPER))
-    # The second one begins to fade in; the others come while it does, ten ticks apart.
-    changes = {450 + 10 * k: a_filter(random, name) for k, name in enumerate(("zvd", "zv", "ei3", "ei"))}
-    drive(line, first, changes, PAPER)
-    assert line.at_rest
-    assert line.tvist.shaper.name == "ei"
-    assert line.tvist is changes[480]
-
-
-def test_a_change_that_has_not_begun_to_count_gives_way_to_the_next():
-    line = a_line(TvistFilter(shaper("zvd"), Fixed([6.7], [0.1]), joints=6))
-    line.begin(line.plan(Q3, PAPER))
-    for _ in range(500):
-        line.step()
-    line.use(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
-    line.use(newest := TvistFilter(shaper("ei3"), Fixed([6.7], [0.1]), joints=6))
-    assert line.filter._fade.new is newest
-
-
 def test_a_stream_at_its_limit_keeps_it_through_a_change():
     first, then = (TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=6) for name in ("zv", "ei"))
     line = a_line(first)
@@ -165,74 +129,14 @@ def test_a_stream_at_its_limit_keeps_it_through_a_change():
     assert np.abs(line.position - line.reference).max() <= STILL
 
 
-def test_paused_a_change_is_made_where_nothing_moves():
-    robot = Robot(calibration=calibration())
-    robot.send(c.MoveJ, q=tuple(Q2))
-    robot.tick(300)
-    robot.send(c.Pause)
-    robot.tick(500)
-    assert robot.send(c.SetShaper, name="ei3") == Done()
-    robot.tick(5)
-    held = robot.column("target_q")[-100:]
-    assert (held == held[0]).all()
-    assert robot.controller.cycle.filter._fade is None
-    robot.send(c.Resume)
-    robot.until_rest()
-    assert robot.kinds()[-1] == "motion_done"
-    assert robot.controller.cycle.position == pytest.approx(Q2, abs=STILL)
-
-
-def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_it():
-    line = a_line(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
-    line.begin(line.plan(Q3, PAPER))
-    new = TvistFilter(shaper("ei"), Fixed([6.7], [0.1]), joints=6)
-    for tick in range(600):
-        if tick == 500:
-            line.use(new)
-        line.step()
-    assert 0.0 < line.filter._fade.share < 1.0
-    before = line.newest
-    stop(line, None)
-    line.step()
-    assert line.newest.q == pytest.approx(before.q + H * before.qd, abs=1e-4)
-    while not line.at_rest:
-        line.step()
-    assert line.tvist is new
-    assert line.filter._fade is None
-    assert (line.tvist.filter(line.reference) == line.reference).all()
-
-
-def test_a_reset_during_a_change_leaves_nothing_of_it():
-    line = a_line(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
-    line.begin(line.plan(Q3, PAPER))
-    for tick in range(600):
-        if tick == 500:
-            line.use(TvistFilter(shaper("ei"), Fixed([6.7], [0.1]), joints=6))
-            line.dynamics.declare(body(paper_payload(UR5E, 1.0)))
-        line.step()
-    line.reset(Q2)
-    fresh = a_line(TvistFilter(shaper("ei"), Fixed([6.7], [0.1]), joints=6))
-    fresh.dynamics.declare(body(paper_payload(UR5E, 1.0)))
-    fresh.reset(Q2)
-    assert line.at_rest
-    for each in (line, fresh):
-        each.begin(each.plan(Q1, PAPER))
-    for _ in range(300):
-        one, other = line.step(), fresh.step()
-        assert (one.target.q == other.target.q).all()
-        assert (one.torque == other.torque).all()
-
-
-@pytest.mark.parametrize("moving", [False, True])
-@pytest.mark.parametrize("masses", [(5.0, 0.0), (0.0, 5.0), (1.0, 4.0)])
-def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_been(moving, masses):
+@pytest.mark.parametrize("masses", [(5.0, 0.0), (1.0, 4.0)])
+def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_been(masses):
     first, then = (body(paper_payload(UR5E, mass)) for mass in masses)
     changed, never, always = (without_arm() for _ in range(3))
     for line, payload in ((changed, first), (never, first), (always, then)):
         line.dynamics.declare(payload)
         line.reset(Q1)
-        if moving:
-            line.begin(line.plan(Q3, PAPER))
+        line.begin(line.plan(Q3, PAPER))
     torques = []
     for tick in range(700):
         if tick == 100:
@@ -269,22 +173,6 @@ def test_a_stop_while_the_payload_changes_is_safe_with_either(masses):
         assert (np.abs(dynamics.torques(*states)) <= limit + 1e-9).all()
 
 
-def test_a_payload_swapped_in_place_collides_as_one_built_anew():
-    random = np.random.default_rng(0)
-    swapped = CollisionModel(UR5E, body(DISC))
-    for mass, com in (
-        (2.0, (0.0, 0.0, 0.3)),
-        (0.0, (0.0, 0.0, 0.0)),
-        (1.0, (0.1, -0.2, 0.05)),
-        (5.0, DISC.com),
-    ):
-        payload = body(msgspec.structs.replace(paper_payload(UR5E, mass), com=com))
-        swapped.declare(payload)
-        fresh = CollisionModel(UR5E, payload)
-        for q in random.uniform(-3.0, 3.0, (300, 6)):
-            assert swapped.meeting(q) == fresh.meeting(q)
-
-
 CHANGES = [
     (c.SetShaper, {"name": "ei"}),
     (c.SetEstimator, {"name": "fixed", "f_d": (8.0,), "zeta": (0.2,)}),
@@ -292,45 +180,19 @@ CHANGES = [
 ]
 
 
-def moving(robot):
-    robot.send(c.MoveJ, q=tuple(Q3))
-    robot.tick(600)
-
-
-def streaming(robot):
-    robot.send(c.ServoStart, period=H)
-    for k in range(300):
-        robot.setpoint(k, Q1 + 0.2 * (1.0 - np.cos(2.0 * k * H)))
-        robot.tick()
-
-
-def ending(robot):
-    streaming(robot)
-    robot.send(c.ServoStop)
-    robot.tick(5)
-
-
-def stopping(robot):
-    moving(robot)
-    robot.send(c.Stop)
-    robot.tick(5)
-
-
-@pytest.mark.parametrize("begin", [moving, streaming, ending, stopping])
-def test_changes_are_done_in_motion_and_the_same_every_time(begin):
-    robots = [Robot(calibration=calibration()) for _ in range(2)]
+@pytest.mark.parametrize(
+    "activity", [Activity.MOVING, Activity.STREAMING, Activity.ENDING, Activity.STOPPING]
+)
+def test_changes_are_done_in_motion_and_the_same_every_time(activity):
+    robots = [at(activity, calibration=calibration()) for _ in range(2)]
     for robot in robots:
-        begin(robot)
         for kind, fields in CHANGES:
             assert robot.send(kind, **fields) == Done()
             robot.tick(20)
-        if begin is streaming:
+        if activity is Activity.STREAMING:
             robot.send(c.ServoStop)
         robot.until_rest()
         robot.tick(50)
         assert robot.states[-1].target_qd == pytest.approx([0.0] * 6, abs=1e-6)
         assert robot.kinds().count("shaper_changed") == 2
-    one, other = robots
-    assert [msgspec.json.encode(state) for state in one.states] == [
-        msgspec.json.encode(state) for state in other.states
-    ]
+    assert bits(robots[0].states) == bits(robots[1].states)

@@ -23,9 +23,6 @@ DOWN = np.array([0.0, 0.6, 0.0, -1.57, 0.0, 0.0])
 """The upper arm points below the horizon."""
 
 
-LONG = Payload(mass=1.0, com=(0.0, 0.1, 0.25))
-
-
 @pytest.fixture(scope="module")
 def model():
     return CollisionModel(UR5E, UR5E.payload)
@@ -76,18 +73,13 @@ def nearest(q):
 
 def test_meetings_are_those_of_an_independent_geometry(model):
     met = 0
-    for q in WORKSPACE.random(150, 6, seed=8):
+    for q in WORKSPACE.random(100, 6, seed=8):
         expected = nearest(q)
         if abs(expected - CLEARANCE) < 1e-3:  # brute force is no finer
             continue
         assert (model.meeting(q) is not None) == (expected < CLEARANCE), (q, expected)
         met += expected < CLEARANCE
     assert 5 < met < 100
-
-
-def test_the_papers_motions_are_free(model):
-    for start, end in ((Q1, Q2), (Q1, Q3), (Q3, Q1)):
-        assert model.on_way(JointLine(start, end).whole) is None
 
 
 def test_a_way_that_is_found_free_is_free_by_small_steps(model):
@@ -104,15 +96,6 @@ def test_a_way_that_is_found_free_is_free_by_small_steps(model):
         else:
             assert deepest < CLEARANCE
     assert free > 20
-
-
-@pytest.mark.parametrize("arm", [UR5E, UR5E.without_floor()], ids=["floor", "none"])
-def test_no_point_of_a_payload_travels_farther_than_the_bound_on_which_steps_depend(arm):
-    model, random = CollisionModel(arm, LONG), np.random.default_rng(3)
-    for _ in range(200):
-        q, turned = random.uniform(-3.0, 3.0, 6), random.uniform(-0.5, 0.5, 6) * (random.random(6) < 0.5)
-        before, after = (capsules(posture, LONG)["payload"] for posture in (q, q + turned))
-        assert np.linalg.norm(np.subtract(after[1], before[1])) <= model.travel(turned) + 1e-12
 
 
 def test_a_move_that_would_collide_is_refused_with_the_pair_and_the_time():
@@ -134,7 +117,7 @@ def turned_wrists(number):
     return posture
 
 
-@pytest.mark.parametrize("number", [7, 13, 26, 28, 60, 124, 235, 302, 425, 509])
+@pytest.mark.parametrize("number", [7, 26, 124, 302, 509])
 def test_a_way_out_of_a_meeting_brings_no_pair_of_bodies_nearer(model, number):
     """The nearest pair may move apart while another one, that meets as well, would come nearer."""
     start = turned_wrists(number)
@@ -146,27 +129,14 @@ def test_a_way_out_of_a_meeting_brings_no_pair_of_bodies_nearer(model, number):
     assert nearer < 1e-3 if model.on_way(way) is None else nearer > 0.0
 
 
-def test_bodies_that_meet_may_turn_together(model):
-    """The distance of the payload from the wrist is the same all along the way, but for rounding."""
-    model.declare(Payload(mass=3.0, com=(0.0, 0.3, 0.0)))
-    start = np.array([0.0, -1.5, 0.0, -1.57, 0.0, 0.0])
-    assert model.meeting(start).second == "payload"
-    for number in range(20):
-        turn = np.append(np.random.default_rng(number).uniform(-0.5, 0.5, 2), np.zeros(4))
-        assert model.on_way(JointLine(start, start + turn).whole) is None
-    model.declare(UR5E.payload)
-
-
 PAYLOADS = {
-    "none": {"mass": 0.0, "com": (0.0, 0.0, 0.0)},
     "the paper's": {"mass": 5.0, "com": UR5E.payload.com},
     "far out": {"mass": 2.0, "com": (0.1, -0.2, 0.2)},
 }
 INERTIA = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
 
 
-@pytest.mark.parametrize("name", ["ur3e", "ur5e", "ur16e", "ur30"])
-@pytest.mark.parametrize("payload", list(PAYLOADS))
+@pytest.mark.parametrize(("name", "payload"), [("ur5e", "the paper's"), ("ur30", "far out")])
 def test_a_reset_into_a_meeting_is_refused_with_the_posture_and_the_bodies(name, payload):
     arm, robot = load(name), Robot(description=load(name))
     declared = PAYLOADS[payload] | {"mass": min(PAYLOADS[payload]["mass"], arm.limits.payload)}
@@ -206,15 +176,6 @@ def test_a_refused_reset_leaves_a_motion_running_and_changes_nothing():
     assert robot.events == plain.events
 
 
-def test_a_payload_that_would_meet_something_is_not_put_on_the_arm():
-    robot = Robot()
-    robot.send(SimulationReset, q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0))
-    far = Carried(mass=3.0, com=(0.3, 0.0, 0.3), inertia=INERTIA)
-    reply = robot.send(SimulationReset, payload=far)
-    assert (reply.code, reply.where) == ("collision", "payload")
-    assert "payload and floor would overlap by" in reply.why
-
-
 def test_no_robot_starts_in_a_meeting():
     with pytest.raises(ValueError, match=r"start: at q = \[0, 0.6, .*wrist_2 and floor would overlap by"):
         Robot(q=tuple(DOWN))
@@ -236,10 +197,3 @@ def test_an_arm_in_a_meeting_may_be_put_at_rest_again_and_move_out_of_it_and_not
     assert robot.send(c.MoveJ, q=(0.0, -0.9, 0.0, -1.57, 0.0, 0.0)) == Accepted(id=1)
     robot.until_rest()
     assert robot.controller.motion.collisions.meeting(robot.controller.cycle.position) is None
-
-
-def test_a_robot_file_without_bodies_never_meets_anything():
-    import msgspec
-
-    bare = msgspec.structs.replace(UR5E, collision=type(UR5E.collision)())
-    assert CollisionModel(bare, UR5E.payload).meeting(DOWN) is None

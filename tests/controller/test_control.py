@@ -1,12 +1,9 @@
 """Differentiator, inverse dynamics, joint controllers and kinematics, each against another way."""
 
-import msgspec
 import numpy as np
 import pytest
 from tests.plant.arms import frames
 
-from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.pose import rotation_vector
 from tvist_controller.line.differentiator import Differentiator, Target
 from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.inverse_dynamics import InverseDynamics
@@ -15,9 +12,7 @@ from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 
-from .robots import Q1, Q2, Q3, UR5E, H, cut
-
-# ---------------------------------------------------------------- differentiator
+from .robots import Q1, UR5E, H, cut
 
 
 def updated(differentiator, q):
@@ -40,37 +35,6 @@ def test_on_a_parabola_position_velocity_and_acceleration_are_those_of_the_tick_
     assert (target.q == parabola(48)).all()
     assert target.qd == pytest.approx([-0.7 + 2.6 * time, 0.5], abs=1e-12)
     assert target.qdd == pytest.approx([2.6, 0.0], abs=1e-9)
-
-
-def test_the_newest_state_goes_on_with_the_same_second_difference():
-    differentiator = Differentiator(parabola(-2), H)
-    for tick in range(-1, 50):
-        updated(differentiator, parabola(tick))
-    newest = differentiator.newest
-    assert (newest.q == parabola(49)).all()
-    following = newest.q + H * newest.qd + 0.5 * H**2 * newest.qdd
-    assert updated(differentiator, following).qdd == pytest.approx(newest.qdd, abs=1e-9)
-    assert following == pytest.approx(parabola(50), abs=1e-14)
-
-
-def test_on_a_parabola_the_newest_state_is_its_own():
-    differentiator = Differentiator(parabola(0), H)
-    for tick in range(1, 5):
-        updated(differentiator, parabola(tick))
-    assert differentiator.newest.qd == pytest.approx([-0.7 + 2.6 * 4 * H, 0.5], abs=1e-12)
-
-
-def test_at_rest_it_is_zero_to_the_bit():
-    differentiator = Differentiator(Q3, H)
-    for _ in range(5):
-        target = updated(differentiator, Q3.copy())
-    for state in (target, differentiator.newest):
-        assert (state.q == Q3).all()
-        assert not state.qd.any()
-        assert not state.qdd.any()
-
-
-# ---------------------------------------------------------------- an arm by the textbook
 
 
 def tensor(values):
@@ -129,17 +93,6 @@ def test_torques_are_those_of_lagrange(joints):
         )
 
 
-def test_torques_are_the_callers_own():
-    dynamics = InverseDynamics(UR5E, UR5E.payload)
-    first = dynamics.torque(Q1, Q2, Q3)
-    kept = first.copy()
-    dynamics.torque(Q3, Q1, Q2)
-    assert (first == kept).all()
-
-
-# ---------------------------------------------------------------- joint controllers
-
-
 def command_of(controllers, target, torque, gravity):
     command = np.empty((3, len(torque)))
     command_drives(target.q, np.array([target.qd, target.qdd]), torque, gravity, controllers.rows, command)
@@ -168,14 +121,6 @@ def test_the_feed_forward_has_rotor_inertia_and_a_share_of_coulomb_friction():
     assert command.torque == pytest.approx(torque + rotors + friction, rel=1e-14)
 
 
-def test_where_friction_is_linear_all_of_it_is_fed_forward():
-    clean = UR5E.clean()
-    target = Target(Q1, np.full(6, 0.3), np.zeros(6))
-    command, torque, _ = commanded(clean, target)
-    viscous = np.array(clean.drives.coulomb_friction) / clean.drives.friction_width
-    assert command.torque == pytest.approx(torque + 0.3 * viscous, rel=1e-14)
-
-
 def test_the_motor_leads_by_a_share_of_the_gears_wind_up_and_gravitys_own_is_left():
     drives, still = UR5E.drives, np.zeros(6)
     moving = Target(Q1 + 0.1, still, np.array([1.0, -2.0, 0.5, 0.0, 0.0, 2.0]))
@@ -184,74 +129,3 @@ def test_the_motor_leads_by_a_share_of_the_gears_wind_up_and_gravitys_own_is_lef
     assert command.q == pytest.approx(moving.q + lead, abs=1e-15)
     assert command.qd == pytest.approx(lead / H, abs=1e-12)
     assert np.abs(lead).max() > 1e-5
-
-
-def test_at_rest_the_command_is_the_position_and_gravity():
-    still = np.zeros(6)
-    command, _, gravity = commanded(UR5E, Target(Q3, still, still))
-    assert command.q == pytest.approx(Q3, abs=1e-15)
-    assert command.qd == pytest.approx(still, abs=1e-12)
-    assert command.torque == pytest.approx(gravity, abs=1e-12)
-
-
-def test_a_reset_forgets_the_wind_up():
-    controllers, still = DriveFeedForward(UR5E, H), np.zeros(6)
-    command_of(controllers, Target(Q1, still, still), np.full(6, 50.0), still)
-    controllers.reset(still)
-    assert not command_of(controllers, Target(Q1, still, still), still, still).qd.any()
-
-
-# ---------------------------------------------------------------- kinematics
-
-
-def rodrigues(vector):
-    angle = np.linalg.norm(vector)
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
-
-
-POSTURES = [Q1, Q2, Q3, np.zeros(6), *np.random.default_rng(1).uniform(-3, 3, (10, 6))]
-
-
-@pytest.mark.parametrize("q", POSTURES)
-def test_the_pose_is_the_product_of_denavit_hartenberg(q):
-    """Rotation vectors lose half the digits near a half turn, where Q1 to Q3 are."""
-    pose = Arm(UR5E).motion(q, np.zeros(6))[:6]
-    expected = frames(UR5E, q)[-1]
-    assert pose[:3] == pytest.approx(expected[:3, 3], abs=1e-12)
-    assert rodrigues(np.array(pose[3:])) == pytest.approx(expected[:3, :3], abs=1e-7)
-    assert np.linalg.norm(pose[3:]) <= np.pi + 1e-9
-
-
-@pytest.mark.parametrize("joints", [1, 2, 5, 6])
-def test_the_speed_is_the_pose_s_change(joints):
-    description, random = cut(joints), np.random.default_rng(joints)
-    arm, step = Arm(description), 1e-6
-    q, qd = random.uniform(-3, 3, (2, joints))
-    speed = arm.motion(q, qd)[6:]
-    after, before = frames(description, q + step * qd)[-1], frames(description, q - step * qd)[-1]
-    rate = (after - before) / (2 * step)
-    spin = rate[:3, :3] @ frames(description, q)[-1][:3, :3].T
-    assert speed[:3] == pytest.approx(rate[:3, 3], abs=1e-8)
-    assert speed[3:] == pytest.approx([spin[2, 1], spin[0, 2], spin[1, 0]], abs=1e-8)
-
-
-@pytest.mark.parametrize(
-    "vector",
-    [(0, 0, 0), (1e-9, 0, 0), (0.3, -0.2, 1.1), (3.0, 0.5, -0.2), (np.pi - 1e-6, 0, 0), (0, 0, -3.1)],
-)
-def test_rotation_vectors(vector):
-    assert rotation_vector(rodrigues(np.array(vector, dtype=float))) == pytest.approx(vector, abs=1e-8)
-
-
-def test_a_half_turn_has_a_rotation_vector_of_that_length():
-    half_turn = np.diag([1.0, -1.0, -1.0])
-    assert np.abs(rotation_vector(half_turn)) == pytest.approx([np.pi, 0, 0], abs=1e-7)
-
-
-def test_the_payload_moves_no_kinematics():
-    other = msgspec.structs.replace(UR5E, payload=Payload())
-    assert (Arm(other).motion(Q3, Q1) == Arm(UR5E).motion(Q3, Q1)).all()

@@ -1,15 +1,19 @@
 """The control line as a whole: Figure 6."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
+from tests.search.spaces import BENT, pose_of, tool_pose
 
-from tvist_controller.line.differentiator import STILL
-from tvist_controller.line.line_mode import LineMode
+from tvist_controller.line.differentiator import STILL, central_differences
+from tvist_controller.line.line_mode import LineMode, check_change
+from tvist_protocol import commands as c
+from tvist_protocol.motions import MoveL
 from tvist_shaping.estimators.fixed import Fixed
 
-from .robots import FITTING, PAPER, Q1, Q2, Q3, H, cycle, without_arm
-
-GRAVITY = np.array([0.0, 0.0, -9.81])
+from .robots import FITTING, PAPER, Q1, Q2, Q3, H, Robot, without_arm
 
 
 def motion(line, target, limits=PAPER):
@@ -24,31 +28,6 @@ def motion(line, target, limits=PAPER):
         if rested is not None and tick > rested + 600:
             return np.array(shaped), rested
     raise AssertionError("still moving")
-
-
-def alpha(line):
-    """Magnitude of the flange's acceleration without gravity, free of noise [m/s^2]."""
-    truth = line.plant.truth()
-    return np.linalg.norm(truth.flange_rotation @ truth.specific_force + GRAVITY)
-
-
-def residual(name):
-    """Largest acceleration from 10 ms to 0.3 s after the shaped reference rests."""
-    line = cycle(name, estimator=Fixed([6.7], [0.34]))
-    line.begin(line.plan(Q2, PAPER))
-    while not line.at_rest:
-        line.step()
-    after = []
-    for _ in range(150):
-        line.step()
-        after.append(alpha(line))
-    return max(after[5:])
-
-
-def test_shaping_takes_most_of_the_residual_vibration():
-    unshaped = residual("none")
-    assert 0.5 < unshaped < 2.5
-    assert residual("zv") < 0.3 * unshaped
 
 
 @pytest.mark.parametrize("name", FITTING)
@@ -77,49 +56,101 @@ def test_a_plateau_between_two_impulses_is_no_rest(name):
     assert (shaped[rested + 20 :] == Q1 + 1e-4).all()
 
 
-def test_moves_one_after_the_other_begin_where_the_reference_ended():
-    """Not where the shaped reference was when it was said to rest, up to 1e-7 rad before."""
-    line = without_arm()
-    for target in (Q1 + 0.2, Q1 + 0.5):
-        line.begin(line.plan(target, PAPER))
-        line.step()
-        while not line.at_rest:
-            line.step()
-        assert (line.reference == target).all()
-    fresh = without_arm(q=Q1 + 0.5)
-    assert (motion(line, Q2)[0][:900] == motion(fresh, Q2)[0][:900]).mean() > 0.99
+def test_a_stop_is_final_and_what_bypasses_the_filter_is_not_shaped_before_it_rests():
+    assert set(LineMode.STOPPING.followed_by) == {"REST", "STOPPING"}
+    for mode in LineMode:
+        if not mode.shaped:
+            assert not any(LineMode[after].shaped for after in mode.followed_by if after != "REST")
 
 
-def test_shaping_lasts_as_long_as_its_delay_says():
-    """Double-S plus delay at the end, on the tick grid."""
-    line = without_arm("zv", estimator=Fixed([6.7], [0.34]))
-    _, plain = motion(without_arm("none"), Q2)
-    _, shaped = motion(line, Q2)
-    assert (shaped - plain) * H == pytest.approx(0.5 / 6.7, abs=3 * H)
+def test_every_pair_of_modes_is_judged_by_the_table():
+    for before in LineMode:
+        for after in LineMode:
+            if after.name in before.followed_by:
+                check_change(before, after, guarded=True)
+            else:
+                with pytest.raises(ValueError, match=f"from {before.name} to {after.name}"):
+                    check_change(before, after, guarded=True)
 
 
-def test_the_target_s_derivatives_are_central_differences_of_the_shaped_reference():
-    line = without_arm()
-    line.begin(line.plan(Q3, PAPER))
-    samples = [line.step().target for _ in range(700)]
-    q = np.array([target.q for target in samples])
-    qd, qdd = np.array([target.qd for target in samples]), np.array([target.qdd for target in samples])
-    assert qd[1:-1] == pytest.approx((q[2:] - q[:-2]) / (2 * H), abs=1e-11)
-    assert qdd[1:-1] == pytest.approx(np.diff(q, 2, axis=0) / H**2, abs=1e-8)
+FIELDS = ("q", "qd", "qdd")
 
 
-def test_what_a_stream_leaves_behind_comes_to_rest_through_the_filter():
-    line = without_arm("zv")
-    stream = line.stream(H, PAPER)
-    for k in range(300):
-        stream.offer(k, Q1 + 0.2 * (1 - np.cos(2.0 * k * H)))
-        line.step()
-    line.begin(stream.end)
-    shaped = []
-    while not line.at_rest:
-        line.step()
-        shaped.append(line.position)
-    assert line.mode is not LineMode.STOPPING
-    assert np.abs(np.diff(shaped, 2, axis=0)).max() / H**2 < 1.2 * PAPER.acceleration
-    assert shaped[-1] == pytest.approx(line.reference, abs=STILL)
-    assert len(shaped) * H > line.tvist.delay
+def unshaped(state):
+    """Position, velocity and acceleration before shaping; what is null is that of the target."""
+    return [
+        own if (own := getattr(state, f"unshaped_{name}")) is not None else getattr(state, f"target_{name}")
+        for name in FIELDS
+    ]
+
+
+def column(states, number):
+    return np.array([unshaped(state)[number] for state in states])
+
+
+def line(robot):
+    position, turned = tool_pose(robot.controller.setup.q, (0.0,) * 6)
+    return robot.send(MoveL, pose=pose_of(position + np.array([0.1, 0.05, -0.1]), turned))
+
+
+def joints(robot):
+    return robot.send(c.MoveJ, q=tuple(Q3))
+
+
+def stream(robot):
+    robot.send(c.ServoStart)
+    for number in range(300):
+        robot.setpoint(number, Q1 + 0.05 * np.sin(0.02 * number) ** 2)
+        robot.tick()
+    robot.send(c.ServoStop)
+
+
+MOTIONS = {"joints": (Q1, joints), "line": (BENT, line), "stream": (Q1, stream)}
+
+
+def moved(motion, shaper, *, rest=50):
+    start, begin = MOTIONS[motion]
+    robot = Robot(q=tuple(start), shaper=shaper)
+    robot.tick(5)
+    begin(robot)
+    robot.until_rest()
+    robot.tick(rest)
+    return robot
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("shaper", ["zv", "ei"])
+def test_it_is_the_reference_of_a_tick_ago_with_its_central_differences(motion, shaper):
+    states = moved(motion, shaper).states
+    reference = np.array([state.reference_q for state in states])
+    assert np.abs(reference - np.array([state.target_q for state in states])).max() > 1e-3
+    for number, expected in enumerate(central_differences(reference, H)):
+        # Velocities are differences of neighbours here, which rounds in another way.
+        np.testing.assert_allclose(
+            column(states, number)[2:], expected, rtol=0.0, atol=(0.0, 1e-12, 0.0)[number]
+        )
+
+
+@pytest.mark.parametrize("motion", ["joints", "line"])
+def test_a_stop_takes_it_to_the_shaped_reference_without_a_peak_in_its_derivatives(motion):
+    start, begin = MOTIONS[motion]
+    robot = Robot(q=tuple(start), shaper="zv")
+    begin(robot)
+    robot.tick(400)
+    assert robot.states[-1].unshaped_q is not None
+    before = len(robot.states)
+    robot.send(c.Stop)
+    robot.until_rest()
+    for state in robot.states[before:]:
+        assert state.unshaped_q is state.unshaped_qd is None
+    velocity, acceleration = (np.abs(column(robot.states, number)).max() for number in (1, 2))
+    shaped = robot.column("target_qdd")
+    assert velocity < 2.0
+    assert acceleration <= max(np.abs(shaped).max(), 2.1)
+
+
+def test_the_page_on_architecture_draws_the_modes_of_the_line():
+    picture = Path(__file__).parents[2] / "docs/images/line-modes.svg"
+    drawn = " ".join(re.findall(r'data-ways="([^"]+)"', picture.read_text("utf-8"))).split()
+    ways = {f"{mode.name}-{after}" for mode in LineMode for after in mode.followed_by if after != mode.name}
+    assert sorted(drawn) == sorted(ways)

@@ -1,21 +1,30 @@
 """Motions are recorded whole, and what is learnt is journaled and can be undone."""
 
 from dataclasses import replace
+from functools import partial
 
+import msgspec
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.safety.experience import AFTER, LONGEST, Experience
+from tvist_controller.planning.snapshot import FilterState
+from tvist_controller.safety.experience import AFTER, Experience, MotionRecord
+from tvist_controller.safety.payload_student import DEAD, PayloadStudent
 from tvist_controller.setup import paper_payload
+from tvist_controller.sources.calibrations import load as load_calibration
+from tvist_controller.sources.mode_source import first_source
 from tvist_lab.in_process import free_setup
 from tvist_lab.replay import replay
 from tvist_plant.description import load
 from tvist_protocol.codec import decode, encode
-from tvist_protocol.commands import Forget, MoveJ, Stop, TakeControl
+from tvist_protocol.commands import Forget, MoveJ, SetPayload, Stop, TakeControl
 from tvist_protocol.lessons import PayloadLesson
-from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
-from tvist_protocol.stream import State
+from tvist_protocol.simulation import SimulationReset, SimulationStep
+from tvist_protocol.stream import Event, State
+from tvist_server.option_values import StartError
 
 ROBOT = load("ur5e")
 Q1, Q2 = ROBOT.poses["Q1"], ROBOT.poses["Q2"]
@@ -92,43 +101,6 @@ def test_a_motion_that_did_not_go_as_planned_says_so(what):
     assert len(second.q) == second.stop + AFTER
 
 
-def test_what_is_learnt_is_told_journaled_replayed_and_undone():
-    robot = Served(Recalling(2.0), payload=paper_payload(ROBOT, 1.0), carried=paper_payload(ROBOT, 2.0))
-    controller = robot.host.controller
-    robot.move(Q2)
-    assert (controller.declared.mass, controller.assumed.assumed.mass) == (1.0, 2.0)
-    assert b"it carries 2 kg" in b"".join(robot.events)
-    robot.move(Q1)
-    robot.ask(Forget(token=robot.token, what="payload"))
-    assert controller.assumed.assumed.mass == 1.0
-    robot.move(Q2)
-    assert [entry.kind for entry in robot.host.entries].count("lesson") == 1
-    assert replay(robot.setup, robot.host.entries, robot.states[1:]).first_difference is None
-
-
-def test_a_motion_longer_than_the_memory_teaches_nothing():
-    student = Recalling()
-    robot = Served(student, shaper="none")
-    robot.ask(MoveJ(token=robot.token, q=Q2, duration=LONGEST * 0.002 + 1.0))
-    robot.tick(LONGEST + 1500)
-    assert not student.motions
-    robot.move(Q1)
-    assert len(student.motions) == 1
-
-
-def test_an_arm_that_is_placed_elsewhere_in_a_motion_has_made_none():
-    student = Recalling()
-    robot = Served(student)
-    robot.move(Q2, 0.6)
-    robot.ask(SimulationReset(token=robot.token, q=Q1, payload=paper_payload(ROBOT, 2.0)))
-    robot.tick(500)
-    assert not student.motions
-    robot.move(Q2, 2.5)
-    robot.ask(SimulationReset(token=robot.token, q=Q1))
-    robot.move(Q2)
-    assert np.abs(student.motions[-1].q[0] - Q1).max() < 0.01
-
-
 class Failing:
     """Fails at each motion in the same way."""
 
@@ -143,36 +115,150 @@ def test_a_study_that_fails_is_told_once():
     assert b"".join(robot.events).count(b"No space left on device") == 1
 
 
-def test_what_is_being_learnt_when_it_is_to_be_forgotten_is_not_taken():
-    robot, works = Served(Recalling(2.0)), []
+MODAL = load_calibration("ur5e_modal")
 
-    def later(work):
-        works.append(work)
-        return lambda: not works
 
-    robot.host._host._experience._later = later
+def taken_for(payload):
+    return FilterState("zv", 1, first_source(ROBOT, None), payload, payload)
+
+
+class Following(Served):
+    """A robot that follows its payload."""
+
+    def __init__(self, declared, carried, student=None, **changes):
+        changes = {"adapt": "payload", "calibration": MODAL} | changes
+        super().__init__(
+            student, payload=paper_payload(ROBOT, declared), carried=paper_payload(ROBOT, carried), **changes
+        )
+
+    @property
+    def assumed(self):
+        return self.host.controller.assumed.assumed
+
+    def told(self, kind):
+        return [event for event in map(partial(decode, Event), self.events) if event.kind == kind]
+
+
+class Keeping:
+    """Keeps the motions."""
+
+    def __init__(self):
+        self.motions = []
+
+    def study(self, motion):
+        self.motions.append(motion)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """A motion with 4 kg, of which 1 kg is declared."""
+    student = Keeping()
+    robot = Following(1.0, 4.0, student, adapt=None)
     robot.move(Q2)
+    return student.motions[0]
+
+
+@pytest.mark.parametrize(("declared", "carried"), [(0.0, 3.0), (4.0, 1.5), (2.5, 0.0)])
+def test_one_motion_tells_what_is_carried_and_no_warning_nags(declared, carried):
+    robot = Following(declared, carried)
+    robot.move(Q2)
+    assert robot.assumed.mass == pytest.approx(carried, abs=0.2)
+    (event,) = robot.told("learnt")
+    assert f"not {declared:g} kg" in event.why
+    assert robot.host.controller.io().assumed_payload == robot.assumed
+    assert robot.host.controller.declared.mass == declared
+    robot.move(Q1)
+    robot.tick(700)
+    assert not robot.told("warning")
+    assert len(robot.told("learnt")) == 1
+
+
+def test_a_right_payload_is_left_alone():
+    robot = Following(2.0, 2.2)
+    for q in (Q2, Q1):
+        robot.move(q, 2.0)
+    assert not robot.told("learnt")
+    assert robot.host.controller.io().assumed_payload is None
+
+
+def test_more_than_the_rating_is_said_and_the_rating_assumed():
+    robot = Following(2.0, 6.5)
+    for q in (Q2, Q1):
+        robot.move(q)
+    assert robot.assumed.mass == 5.0
+    (warning,) = robot.told("warning")
+    assert warning.code == "payload_mismatch"
+    assert "above its rating: 5 kg are assumed" in warning.why
+
+
+def test_lessons_come_at_rest_are_replayed_and_forgotten_to_the_last_bit():
+    robot, plain = Following(1.0, 3.0), Following(1.0, 3.0, adapt=None)
+    robot.move(Q2)
+    robot.move(Q1)
+    taught = [entry.tick for entry in robot.host.entries if entry.kind == "lesson"]
+    moving = {state.tick for state in robot.states if np.abs(state.target_qd).max() > 1e-6}
+    assert taught
+    assert not moving & set(taught)
     robot.ask(Forget(token=robot.token, what="payload"))
-    works.pop()()
-    robot.tick(5)
-    assert "lesson" not in [entry.kind for entry in robot.host.entries]
+    plain.move(Q2)
+    plain.move(Q1)
+    for one in (robot, plain):  # both now move as the declared payload needs, whatever one has learnt before
+        one.tick(500)
+        one.ask(SimulationReset(token=one.token, q=Q1, seed=3))
+        one.move(Q2, 1.0)
+    assert "are assumed again" in robot.told("learnt")[1].why
+    assert robot.assumed == robot.host.controller.declared
+    names = ("target_moment", "actual_q", "actual_tool_accelerometer")
+    one, other = (
+        [[getattr(state, name) for name in names] for state in each.states[-400:]] for each in (robot, plain)
+    )
+    assert one == other
+    assert replay(robot.setup, robot.host.entries, robot.states[1:]).first_difference is None
 
 
-def test_motions_that_are_made_faster_than_studied_do_not_fill_the_memory(monkeypatch):
-    monkeypatch.setattr("tvist_controller.safety.experience.WAITING", 2)
-    robot = Served(Recalling())
-    experience = robot.host._host._experience
-    experience._later = lambda _: lambda: False
-    for _ in range(2):
-        robot.move(Q2, 2.5)
-        robot.move(Q1, 2.5)
-    assert len(experience._under_way) == 2
+def test_what_is_declared_anew_counts():
+    robot = Following(1.0, 3.0)
+    robot.move(Q2)
+    assert robot.assumed.mass > 2.5
+    anew = paper_payload(ROBOT, 2.0)
+    robot.ask(SetPayload(token=robot.token, mass=anew.mass, com=anew.com, inertia=anew.inertia))
+    assert robot.assumed == anew
+    assert robot.host.controller.io().assumed_payload is None
 
 
-def test_a_motion_that_the_simulation_broke_off_after_a_fault_is_no_motion():
-    student = Recalling()
-    robot = Served(student)
-    robot.move(Q2, 0.4)
-    robot.ask(SimulationInject(token=robot.token, fault="nan"))
-    robot.tick(400)
-    assert not student.motions
+def test_an_arm_that_carries_no_weight_cannot_follow_it():
+    with pytest.raises(StartError, match="no joint of a one-joint arm carries weight"):
+        free_setup(robot="one-joint", adapt="payload")
+
+
+def odd(motion, what):
+    ticks = np.arange(len(motion.q))[:, None]
+    upright = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])
+    return {
+        "short": {"q": motion.q[:1], "moments": motion.moments[:1]},
+        "stopped": {"whole": False},
+        "hardly moving": {"q": upright + 1e-6 * motion.q, "moments": 0.0 * motion.moments},
+        "NaN": {"moments": np.where(ticks == 200, np.nan, motion.moments)},
+        "huge": {"moments": 1e6 * motion.moments},
+        "pushed": {"moments": motion.moments + 25.0 * ((ticks >= 150) & (ticks < 300)) * (np.arange(6) < 3)},
+    }[what]
+
+
+@pytest.mark.parametrize("what", ["short", "stopped", "hardly moving", "NaN", "huge", "pushed"])
+def test_a_motion_that_tells_nothing_teaches_nothing(motion, what):
+    assert PayloadStudent(ROBOT).study(motion) is not None
+    assert PayloadStudent(ROBOT).study(replace(motion, **odd(motion, what))) is None
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32), st.integers(1, 600), st.floats(1e-9, 1e9))
+def test_no_record_makes_a_payload_that_is_none(seed, ticks, size):
+    random = np.random.default_rng(seed)
+    q, moments = random.standard_normal((ticks, 6)), size * random.standard_normal((ticks, 6))
+    record = MotionRecord(q, moments, min(ticks, 5), True, taken_for(paper_payload(ROBOT, 2.0)))
+    lesson = PayloadStudent(ROBOT).study(record)
+    if lesson is not None:
+        assert 0.0 <= lesson.payload.mass <= 5.0
+        assert abs(lesson.payload.mass - 2.0) > DEAD
+        assert max(map(abs, lesson.payload.com)) <= 0.3
+        msgspec.json.decode(msgspec.json.encode(lesson.payload), type=type(lesson.payload))

@@ -1,6 +1,7 @@
 """Force at the tool, force mode, freedrive and contacts: what gives way, what stays, and what ends it."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,21 +17,14 @@ from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
 from .forces import KINEMATICS, UR5E_IN_AIR, feeling, force_mode, places, pressed, touching
-from .robots import UR5E, H, Robot
+from .robots import H
 from .scripts import URSIM, failure, playing, said, start
-
-# ---------------------------------------------------------------- the law
 
 one = st.floats(-200.0, 200.0)
 six = st.tuples(one, one, one, one, one, one).map(np.array)
 
 
-@given(
-    st.lists(six, min_size=1, max_size=30),
-    st.floats(0.0, 1.0),
-    st.floats(0.0, 2.0),
-    st.floats(0.0, 2.0),
-)
+@given(st.lists(six, min_size=1, max_size=30), st.floats(0.0, 1.0), st.floats(0.0, 2.0), st.floats(0.0, 2.0))
 def test_the_law_keeps_its_speeds_and_takes_no_more_energy_than_the_force_gives(forces, damping, gain, limit):
     task = ForceTask(np.ones(6), np.zeros(6), np.full(6, limit), damping, gain)
     inertia = task.mass * np.repeat([1.0, 0.22**2], 3)
@@ -42,26 +36,10 @@ def test_the_law_keeps_its_speeds_and_takes_no_more_energy_than_the_force_gives(
         assert (gained <= gain * PERIOD * np.abs(force * velocity) + 1e-12).all()
 
 
-@given(six, st.integers(0, 2**6 - 1), st.floats(0.0, 1.0))
-def test_axes_that_do_not_give_way_feel_nothing_and_lose_the_speed_they_had(force, chosen, speed):
-    compliant = np.array([chosen >> k & 1 for k in range(6)], float)
-    task, velocity = ForceTask(compliant, force, np.full(6, 10.0)), np.full(6, speed)
-    for _ in range(round(speed / (3.0 * PERIOD)) + 1):
-        velocity = compliant_velocity(task, velocity, force, PERIOD)
-    assert (velocity[compliant == 0.0] == 0.0).all()
-
-
-# ---------------------------------------------------------------- the force at the tool
-
-
 def test_a_sensor_is_read_without_the_weight_of_the_payload_however_the_tool_turns():
     payload = Payload(mass=2.0, com=(0.01, -0.02, 0.05), inertia=(0.0,) * 6)
     robot, plant = feeling(payload=payload)
-    plant.weight, plant.com, plant.pushed = (
-        2.0,
-        np.array(payload.com),
-        np.array([4.0, -3.0, 12.0, 0.0, 0.0, 0.0]),
-    )
+    plant.weight, plant.com, plant.pushed[:3] = 2.0, np.array(payload.com), [4.0, -3.0, 12.0]
     robot.send(SetTcp, offset=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0))
     robot.send(m.SpeedJ, qd=(0.2, 0.3, -0.2, 0.4, 0.5, 0.6))
     instruments = Instruments(UR5E_IN_AIR)
@@ -91,11 +69,6 @@ def test_zeroing_a_sensor_takes_away_an_offset_of_its_own_frame():
     assert robot.controller.forces.wrench()[:3] == pytest.approx(np.array([0.0, 0.0, 5.0]) - zero, abs=1e-9)
 
 
-def test_an_arm_without_a_sensor_reports_no_wrench_of_one():
-    robot = Robot(q=URSIM)
-    assert robot.tick().flange_wrench is None
-
-
 def test_a_sensor_of_ones_own_counts_when_a_program_says_so():
     robot, _ = feeling()
     assert robot.send(f.SetExternalWrench, wrench=(0.0, 0.0, 7.0, 0.0, 0.0, 0.0)) == Done()
@@ -105,9 +78,6 @@ def test_a_sensor_of_ones_own_counts_when_a_program_says_so():
     robot.tick(60)
     start(robot, "enable_external_ft_sensor(False)")
     assert robot.tick(20).flange_wrench == pytest.approx([0.0] * 6)
-
-
-# ---------------------------------------------------------------- force mode in the air and on surfaces
 
 
 def test_in_the_air_the_tool_moves_along_the_wanted_force_and_in_no_other_direction():
@@ -123,8 +93,7 @@ def test_in_the_air_the_tool_moves_along_the_wanted_force_and_in_no_other_direct
     assert robot.kinds().count("motion_stopped") == 1
 
 
-@pytest.mark.parametrize("sensor", [True, False])
-@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5])
+@pytest.mark.parametrize(("stiffness", "sensor"), [(1e3, True), (1e4, False), (1e5, True)])
 def test_a_surface_is_pressed_with_the_wanted_force_without_bouncing(stiffness, sensor):
     robot, plant = touching(stiffness, sensor=sensor)
     force_mode(robot, wrench=(0.0, 0.0, -20.0, 0.0, 0.0, 0.0))
@@ -135,11 +104,8 @@ def test_a_surface_is_pressed_with_the_wanted_force_without_bouncing(stiffness, 
         assert np.diff(forces[met + 200 :]).min() > -1e-3
         assert forces[-1] == pytest.approx(20.0, abs=8.0)
         return
-    if stiffness == 1e4:
-        assert np.abs(forces[met + 250 :] - 20.0).max() <= 2.0
-    late = forces[met + 500 :]
-    assert late.max() <= 22.0
-    assert late.min() >= 18.0
+    late = forces[met + (250 if stiffness == 1e4 else 500) :]
+    assert np.abs(late - 20.0).max() <= 2.0
 
 
 def test_the_loop_of_force_control_is_stable_by_its_response_and_says_with_which_margin():
@@ -187,103 +153,34 @@ def test_a_motion_in_the_other_axes_goes_on_while_the_force_is_kept():
     assert abs(way[1]) < 1e-6
 
 
-# ---------------------------------------------------------------- frames
-
-
-@pytest.mark.parametrize("axis", range(3))
-def test_an_axis_of_a_frame_gives_way_along_it(axis):
+def test_an_axis_of_a_frame_gives_way_along_it():
     robot, _ = feeling()
-    frame = (0.1, 0.2, 0.3, 0.4, -0.8, 0.5)
-    axes = turn_matrix(frame[3:])
-    compliant = tuple(k == axis for k in range(6))
-    force_mode(robot, compliant, tuple(30.0 * (k == axis) for k in range(6)), frame=frame)
+    frame, chosen = (0.1, 0.2, 0.3, 0.4, -0.8, 0.5), [False, True, False, False, False, False]
+    axes = pin.exp3(np.array(frame[3:]))
+    force_mode(robot, tuple(chosen), tuple(30.0 * one for one in chosen), frame=frame)
     robot.tick(200)
     way = axes.T @ (places(robot)[-1] - places(robot)[0])
-    assert way[axis] > 0.005
-    assert np.abs(np.delete(way, axis)).max() < 1e-7
-
-
-def turn_matrix(vector):
-    import pinocchio as pin
-
-    return np.asarray(pin.exp3(np.array(vector)))
+    assert way[1] > 0.005
+    assert np.abs(np.delete(way, 1)).max() < 1e-7
 
 
 def test_type_1_pushes_to_the_origin_of_its_frame_and_type_3_across_the_way():
     robot, _ = feeling()
-    here = places(robot)[-1]
+    across, here = (False, True, False, False, False, False), places(robot)[-1]
     origin = here + np.array([0.2, 0.1, 0.05])
-    force_mode(
-        robot, (False, True, False, False, False, False), (0.0, 30.0, 0.0, 0.0, 0.0, 0.0),
-        frame=(*origin, 0.3, 0.2, 0.1), frame_type=1,
-    )  # fmt: skip
+    force_mode(robot, across, (0.0, 30.0, *[0.0] * 4), frame=(*origin, 0.3, 0.2, 0.1), frame_type=1)
     robot.tick(200)
-    way = places(robot)[-1] - here
-    assert way / np.linalg.norm(way) == pytest.approx(
-        (origin - here) / np.linalg.norm(origin - here), abs=1e-4
-    )
+    way, wanted = places(robot)[-1] - here, origin - here
+    assert way / np.linalg.norm(way) == pytest.approx(wanted / np.linalg.norm(wanted), abs=1e-4)
     robot, _ = feeling()
     robot.send(m.SpeedL, xd=(0.03, 0.04, 0.0, 0.0, 0.0, 0.0))
     robot.tick(100)
-    here = places(robot)[-1]
-    force_mode(
-        robot, (False, True, False, False, False, False), (0.0, 20.0, 0.0, 0.0, 0.0, 0.0), frame_type=3
-    )
-    robot.tick(1)
-    axes = robot.controller.cycle.trajectory.axes
-    assert axes[:, 0] == pytest.approx([0.6, 0.8, 0.0], abs=1e-6)
-
-
-# ---------------------------------------------------------------- limits and ends
-
-FRAMES = st.sampled_from([None, (0.3, 0.2, 0.1, 0.5, 0.1, -0.7)])
-COMMANDS = st.one_of(
-    st.tuples(
-        st.just("force_mode"), st.tuples(*[st.booleans()] * 6),
-        st.tuples(*[st.floats(-60.0, 60.0)] * 3, *[st.floats(-8.0, 8.0)] * 3),
-        st.floats(0.01, 0.2), FRAMES, st.sampled_from([1, 2, 3]), st.floats(0.0, 1.0), st.floats(0.0, 2.0),
-    ),
-    st.tuples(st.just("freedrive"), st.tuples(*[st.booleans()] * 6), st.sampled_from(["base", "tool"])),
-    st.tuples(st.just("speed_l"), st.tuples(*[st.floats(-0.1, 0.1)] * 3)),
-    st.tuples(st.just("speed_j"), st.tuples(*[st.floats(-0.5, 0.5)] * 6)),
-    st.tuples(st.just("servo_j"), st.tuples(*[st.floats(-0.2, 0.2)] * 6)),
-    st.tuples(st.just("push"), st.tuples(*[st.floats(-80.0, 80.0)] * 3)),
-    st.tuples(st.just("end_force_mode")),
-    st.tuples(st.just("stop_j")),
-)  # fmt: skip
-
-
-@given(st.lists(st.tuples(COMMANDS, st.integers(1, 60)), min_size=1, max_size=8))
-def test_whatever_is_commanded_and_pushes_the_joints_keep_their_limits_and_come_to_rest(sequence):
-    robot, plant = feeling()
-    for (kind, *given_), ticks in sequence:
-        if kind == "force_mode":
-            compliant, wrench, limit, frame, frame_type, damping, gain = given_
-            force_mode(
-                robot, compliant, wrench, limits=tuple(limit if one else 1e3 for one in compliant), frame=frame,
-                frame_type=frame_type, damping=damping, gain=gain,
-            )  # fmt: skip
-        elif kind == "freedrive":
-            robot.send(f.Freedrive, free=given_[0], frame=given_[1])
-        elif kind == "speed_l":
-            robot.send(m.SpeedL, xd=(*given_[0], 0.0, 0.0, 0.0))
-        elif kind == "speed_j":
-            robot.send(m.SpeedJ, qd=given_[0])
-        elif kind == "servo_j":
-            robot.send(m.ServoJ, q=tuple(np.array(URSIM) + given_[0]))
-        elif kind == "push":
-            plant.pushed[:3] = given_[0]
-        else:
-            robot.send(f.EndForceMode if kind == "end_force_mode" else m.StopJ)
-        robot.tick(ticks)
-    robot.send(m.StopJ)
-    robot.until_rest()
-    q = robot.column("reference_q")
-    limits = UR5E.limits
-    assert np.abs(np.diff(q, axis=0) / H).max() <= min(limits.velocity) * (1.0 + 1e-6)
-    assert np.abs(np.diff(q, 2, axis=0) / H**2).max() <= min(limits.acceleration) * (1.0 + 1e-6) + 1e-6
-    ends = [event for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]
-    assert len(ends) == robot.kinds().count("motion_started")
+    before = places(robot)[-1]
+    force_mode(robot, across, (0.0, 20.0, *[0.0] * 4), frame_type=3)
+    robot.tick(20)
+    way = places(robot)[-1] - before
+    assert way @ np.array([-0.8, 0.6, 0.0]) > 1e-4  # pushed across,
+    assert way @ np.array([0.6, 0.8, 0.0]) > 1e-3  # while the motion goes on
 
 
 def test_a_compliant_axis_keeps_its_speed_limit_and_the_others_their_place():
@@ -297,10 +194,9 @@ def test_a_compliant_axis_keeps_its_speed_limit_and_the_others_their_place():
     assert np.abs(way[:, :2]).max() < 1e-6
 
 
-@pytest.mark.parametrize("push", [(0.0, 0.0, 260.0), (200.0, 200.0, 0.0)])
-def test_a_force_beyond_what_a_robot_bears_is_a_protective_stop(push):
+def test_a_force_beyond_what_a_robot_bears_is_a_protective_stop():
     robot, plant = feeling()
-    plant.pushed[:3] = push
+    plant.pushed[:3] = 200.0, 200.0, 0.0
     robot.tick(5)
     assert "protective_stop" not in robot.kinds()
     robot.tick(5)
@@ -335,9 +231,6 @@ def test_end_force_mode_needs_something_to_end_and_force_mode_an_arm_that_may_be
     assert robot.controller.motion.activity is Activity.REST
 
 
-# ---------------------------------------------------------------- by hand
-
-
 def test_the_arm_follows_a_hand_along_the_free_axes_and_stops_when_it_lets_go():
     robot, plant = feeling()
     assert robot.send(f.Freedrive, free=(True, False, True, False, False, False)) == Accepted(id=1)
@@ -363,8 +256,6 @@ def test_a_hand_cannot_push_the_arm_through_a_singular_posture():
     assert "protective_stop" not in robot.kinds()
 
 
-# ---------------------------------------------------------------- programs
-
 MODE = "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,{},0,0,0], 2, [2,2,1.5,1,1,1])"
 
 
@@ -379,36 +270,20 @@ def finished(robot, plant, *lines, most=6000):
     return np.array(forces)
 
 
-def test_the_example_of_ur_rtde_presses_into_the_air_and_back():
-    """A thread calls force_mode in every step: -10 N, then +10 N, for 2 s each; within 5.8 cm of its start."""
-    robot, plant = touching(0.0)
-    loop = ("i = 0", "while i < {}:", MODE, "sync()", "i = i + 1", "end")
-    down, up = ([line.format(value) for line in loop] for value in (-10, 10))
-    down[1], up[1] = "while i < 1000:", "while i < 999:"
-    finished(
-        robot, plant, "force_mode_set_damping(0.025)", "force_mode_set_gain_scaling(0.5)", *down, *up,
-        "end_force_mode()", "stopl(10)",
-    )  # fmt: skip
-    way = places(robot) - places(robot)[0]
-    assert way[:, 2].min() < -0.005
-    assert np.abs(way).max() < 0.058
-    assert np.abs(way[-1]).max() < 0.003
-
-
 def test_moves_of_a_program_in_force_mode_keep_the_force_and_arrive():
     robot, plant = touching(1e4)
-    x, y, z = places(robot)[-1].tolist()
-    turned = ", ".join(f"{one!r}" for one in robot.states[-1].actual_TCP_pose[3:])
-    there, back = (f"p[{x + dx!r}, {y!r}, {z!r}, {turned}]" for dx in (0.03, 0.0))
+    here = places(robot)[-1]
+    pose = ", ".join(f"{one!r}" for one in robot.states[-1].actual_TCP_pose)
+    there = f"pose_add(p[{pose}], p[0.03, 0, 0, 0, 0, 0])"
     forces = finished(
         robot, plant, "zero_ftsensor()", MODE.format(-20), "sleep(1)", f"movel({there}, a=.5, v=.1)", "textmsg(1)",
-        f"movej(get_inverse_kin({back}), a=.5, v=.2)", "stopl(1)", "textmsg(2)", "end_force_mode()",
+        f"movej(get_inverse_kin(p[{pose}]), a=.5, v=.2)", "stopl(1)", "textmsg(2)", "end_force_mode()",
     )  # fmt: skip
     assert said(robot) == ["1", "2"]
     assert np.abs(forces[500:-50] - 20.0).max() < 2.0
-    way = places(robot) - np.array([x, y, z])
-    assert way[:, 0].max() == pytest.approx(0.03, abs=1e-4)
-    assert np.abs(way[-1, :2]).max() < 1e-4
+    way = places(robot) - here
+    assert way[:, 0].max() == pytest.approx(0.03, abs=1e-3)
+    assert np.abs(way[-1, :2]).max() < 1e-3
 
 
 def test_an_arc_in_force_mode_and_a_move_in_freedrive_are_refused_in_words():
@@ -439,23 +314,3 @@ def test_a_contact_is_found_with_when_it_began_and_none_in_the_air(stiffness, se
         return
     assert 0 < steps < 60
     assert abs(z - plant.height) < 1.5e-3  # steps of .06 mm, and what the force took to count
-
-
-def test_the_end_of_a_program_ends_force_mode_and_a_pause_does_too():
-    robot, _ = feeling()
-    start(robot, MODE.format(-20), "sleep(0.2)")
-    robot.until_rest(400)
-    assert robot.controller.motion.activity is Activity.REST
-    assert not playing(robot)
-
-
-def test_a_thread_that_ends_stops_its_own_motion_and_not_force_mode():
-    robot, plant = touching(1e4)
-    forces = finished(
-        robot, plant, "thread aside():", "speedl([0.02, 0, 0, 0, 0, 0], 1, 10)", "end", MODE.format(-20), "sleep(1)",
-        "t = run aside()", "sleep(.3)", "kill t", "sleep(.5)", "textmsg(get_tcp_force()[2])",
-    )  # fmt: skip
-    assert float(said(robot)[0]) == pytest.approx(20.0, abs=1.0)
-    assert np.abs(forces[500:-5] - 20.0).max() < 2.0
-    still = np.diff(places(robot)[-60:-5, 0])
-    assert np.abs(still).max() < 1e-9

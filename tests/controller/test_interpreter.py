@@ -7,7 +7,6 @@ from tvist_protocol.programs import (
     MAX_SCRIPT,
     Interpreter,
     ProgramInterpret,
-    ProgramPause,
     ProgramPlay,
     ProgramSkip,
     ProgramStop,
@@ -106,28 +105,6 @@ def test_functions_and_variables_of_statements_are_forgotten_and_those_of_the_pr
     assert said(robot) == ["7", "8"]
 
 
-def test_statements_behind_a_clear_are_compiled_without_those_before_it():
-    robot = waiting()
-    robot.send(ProgramInterpret, text="def f():\n  return 7\nend")
-    robot.send(ProgramInterpret, text="clear_interpreter()")
-    assert robot.send(ProgramInterpret, text="textmsg(f())").code == "script_error"
-    robot.send(ProgramInterpret, text="def f():\n  return 8\nend")
-    robot.send(ProgramInterpret, text="textmsg(f())")
-    robot.tick(3)
-    assert said(robot) == ["8"]
-
-
-def test_a_program_is_not_given_statements_without_end():
-    robot = waiting()
-    replies = [robot.send(ProgramInterpret, text="x = 1") for _ in range(1001)]
-    assert isinstance(replies[999], Accepted)
-    assert replies[1000].code == "busy"
-    robot.send(ProgramInterpret, text="clear_interpreter()")
-    assert isinstance(robot.send(ProgramInterpret, text="x = 1"), Accepted)
-    robot.tick(100)
-    assert state(robot).waiting == 0
-
-
 def test_waiting_statements_are_skipped_and_the_present_move_goes_on():
     robot = waiting()
     add(robot, f"movej({NEAR}, a=2, v=1)")
@@ -150,17 +127,13 @@ def test_a_move_that_is_skipped_ends_where_it_stops_and_the_next_statement_follo
     assert playing(robot)
 
 
-def test_statements_that_are_left_over_wait_for_the_next_time_if_the_program_says_so():
-    robot = waiting(after=["interpreter_mode(clearQueueOnEnter=False)"])
+@pytest.mark.parametrize(("mode", "kept"), [("clearQueueOnEnter=False", ["later"]), ("", [])])
+def test_statements_that_are_left_over_wait_for_the_next_time_if_the_program_says_so(mode, kept):
+    robot = waiting(after=[f"interpreter_mode({mode})"])
     robot.send(ProgramInterpret, text="end_interpreter()")
     robot.send(ProgramInterpret, text='textmsg("later")')
     robot.tick(3)
-    assert said(robot) == ["later"]
-    robot = waiting(after=["interpreter_mode()"])
-    robot.send(ProgramInterpret, text="end_interpreter()")
-    robot.send(ProgramInterpret, text='textmsg("later")')
-    robot.tick(3)
-    assert said(robot) == []
+    assert said(robot) == kept
 
 
 def test_only_the_main_program_waits_for_statements_and_only_once():
@@ -175,15 +148,6 @@ def test_only_the_main_program_waits_for_statements_and_only_once():
     assert "in a thread" in failure(robot).why
 
 
-def test_statements_that_come_before_the_program_waits_are_kept_if_it_says_so():
-    robot = a_robot()
-    start(robot, "sleep(0.1)", "interpreter_mode(clearQueueOnEnter=False)")
-    assert add(robot, 'textmsg("kept")') == Accepted(id=1)
-    assert said(robot) == []
-    robot.tick(60)
-    assert said(robot) == ["kept"]
-
-
 def test_statements_that_come_before_the_program_waits_are_dropped_with_a_warning():
     robot = a_robot()
     start(robot, "sleep(0.1)", "interpreter_mode()")
@@ -194,60 +158,6 @@ def test_statements_that_come_before_the_program_waits_are_dropped_with_a_warnin
     assert said(robot) == ["late"]
     (warning,) = [event.why for event in robot.events if event.kind == "warning"]
     assert "statements 1 to 2" in warning
-
-
-def test_a_program_that_never_waits_takes_no_statements():
-    robot = a_robot()
-    start(robot, "sleep(1)")
-    robot.tick(2)
-    assert add(robot, "a = 1").code == "wrong_mode"
-    assert state(robot) is None
-
-
-def test_end_interpreter_leaves_statements_that_wait_and_they_do_not_run_later():
-    robot = waiting(after=["sleep(0.1)", "interpreter_mode()", 'textmsg("over")'])
-    for text in ("sleep(0.02)", "end_interpreter()", 'textmsg("behind")', 'textmsg("behind")'):
-        robot.send(ProgramInterpret, text=text)
-    robot.tick(100)
-    assert state(robot) == Interpreter(interpreted=4, executed=2, cleared=2, waiting=0)
-    add(robot, "end_interpreter()")
-    assert said(robot) == ["over"]
-
-
-def test_a_thread_of_the_program_ends_the_interpreter_mode():
-    robot = a_robot()
-    start(
-        robot,
-        "thread t():",
-        "sleep(0.1)",
-        "end_interpreter()",
-        "end",
-        "run t()",
-        "interpreter_mode()",
-        "textmsg(7)",
-    )
-    finish(robot)
-    assert said(robot) == ["7"]
-
-
-def test_only_a_program_that_waits_can_forget_statements():
-    robot = a_robot()
-    start(robot, "clear_interpreter()", "interpreter_mode()")
-    robot.tick(2)
-    assert "can only be called while" in failure(robot).why
-
-
-def test_a_program_is_paused_and_played_with_its_statements():
-    robot = waiting()
-    add(robot, f"movej({NEAR}, a=2, v=1)", 100)
-    assert robot.send(ProgramPause) == Done()
-    robot.tick(500)
-    assert add(robot, 'textmsg("there")') == Accepted(id=2)
-    robot.tick(200)
-    assert said(robot) == []
-    assert robot.send(ProgramPlay) == Done()
-    assert said_at_rest(robot) == ["there"]
-    assert robot.states[-1].reference_q == pytest.approx(NEAR)
 
 
 def test_after_a_protective_stop_the_statement_is_resumed_and_later_ones_follow():
@@ -282,44 +192,6 @@ def test_a_move_is_skipped_before_it_has_begun():
     add(robot, f"movel({NEAR}, a=1, v=0.3)", 20)
     robot.until_rest()
     assert robot.states[-1].reference_q == pytest.approx(NEAR)
-
-
-def test_a_move_that_waits_for_one_to_blend_into_is_skipped_with_it():
-    robot = waiting()
-    for share, radius in ((0.1, 0.02), (0.2, 0.0)):
-        near = [angle + share for angle in URSIM]
-        robot.send(ProgramInterpret, text=f"movel({near}, a=1, v=0.3, r={radius})")
-    add(robot, 'textmsg("on")', 150)
-    assert said(robot) == []
-    assert robot.send(ProgramSkip, what="move") == Done()
-    assert said_at_rest(robot) == ["on"]
-    assert playing(robot)
-
-
-def test_nothing_is_skipped_where_nothing_moves():
-    robot = a_robot()
-    assert robot.send(ProgramSkip, what="move") == Done()
-    robot = waiting()
-    assert robot.send(ProgramSkip, what="move") == Done()
-    add(robot, f"servoj({NEAR}, t=0.5, lookahead_time=0.2)", 20)
-    assert robot.send(ProgramSkip, what="move") == Done()
-    assert playing(robot)
-    add(robot, "textmsg(1)", 300)
-    assert said(robot) == ["1"]
-
-
-def test_a_paused_move_is_skipped():
-    robot = waiting()
-    add(robot, f"movej({NEAR}, a=1, v=0.5)", 100)
-    add(robot, "textmsg(1)")
-    robot.send(ProgramPause)
-    robot.tick(500)
-    assert robot.send(ProgramSkip, what="move") == Done()
-    robot.tick(5)
-    assert robot.send(ProgramPlay) == Done()
-    robot.tick(5)
-    assert said(robot) == ["1"]
-    assert robot.states[-1].reference_q != pytest.approx(NEAR)
 
 
 def test_long_statements_are_limited_together():

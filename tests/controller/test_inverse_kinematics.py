@@ -1,29 +1,143 @@
 """Inverse kinematics against forward kinematics, and against a numerical search."""
 
-import itertools
-
 import numpy as np
 import pytest
-from tests.controller.postures import (
-    PUMA,
-    UR5E,
-    error,
-    every,
-    nearest,
-    pose_of,
-    random_spherical,
-    random_ur,
-    wrapped,
-)
-from tests.controller.robots import cut
 from tests.examples import share
-from tests.plant.arms import chain, changed
+from tests.plant.arms import chain, changed, forward_kinematics
 
+from tvist_controller.kinematics import choice
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.choice import closest
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
-from tvist_controller.kinematics.least_squares import descend
+from tvist_controller.kinematics.least_squares import approach, descend
+from tvist_controller.kinematics.postures import ANY, arm_table
 from tvist_plant.description import load
+
+from .robots import cut
+
+UR5E = load("ur5e")
+RIGHT = np.pi / 2
+
+
+def arm(a, d, alpha, limit=2 * np.pi):
+    """A description with these parameters."""
+    joints = len(a)
+    base = UR5E if joints == 6 else chain(joints)
+    base = changed(base, "kinematics", a=tuple(a), d=tuple(d), alpha=tuple(alpha))
+    return changed(base, "limits", position=(limit,) * joints)
+
+
+def random_ur(rng):
+    """An arm with parallel axes 2, 3, 4 and lengths of any sign, some of them zero."""
+    a, d = rng.uniform(-0.5, 0.5, (2, 6))
+    a[[1, 2]] += np.sign(a[[1, 2]]) * 0.1
+    a[4] = 0.0
+    a[[0, 3, 5]] *= rng.integers(0, 2, 3)
+    d *= rng.integers(0, 2, 6)
+    d[3] += 0.1
+    signs = rng.choice([-1, 1], 3) * RIGHT
+    straight = rng.choice([0.0, np.pi, -np.pi], 2)
+    return arm(a, d, (signs[0], *straight, signs[1], signs[2], rng.uniform(-np.pi, np.pi)))
+
+
+def random_spherical(rng):
+    """An arm with a spherical wrist and lengths of any sign, some of them zero."""
+    a, d = rng.uniform(-0.5, 0.5, (2, 6))
+    a[1] += np.sign(a[1]) * 0.1
+    d[3] += np.sign(d[3]) * 0.1
+    a[[3, 4]] = d[4] = 0.0
+    a[[0, 2, 5]] *= rng.integers(0, 2, 3)
+    d[[0, 1, 2, 5]] *= rng.integers(0, 2, 4)
+    signs = rng.choice([-1, 1], 4) * RIGHT
+    straight = rng.choice([0.0, np.pi, -np.pi])
+    return arm(a, d, (signs[0], straight, *signs[1:], rng.uniform(-np.pi, np.pi)))
+
+
+PUMA = arm(
+    (0.0, 0.43, -0.02, 0.0, 0.0, 0.0),
+    (0.67, 0.0, 0.15, 0.43, 0.0, 0.06),
+    (RIGHT, 0.0, -RIGHT, RIGHT, -RIGHT, 0.0),
+)
+CENTRED = arm(
+    (0.0, 0.4, 0.0, 0.0, 0.0, 0.0), (0.3, 0.0, 0.0, 0.4, 0.0, 0.1), (RIGHT, 0.0, -RIGHT, RIGHT, -RIGHT, 0.0)
+)
+EVEN_UR = arm(
+    (0.0, -0.4, -0.4, 0.0, 0.0, 0.0), (0.2, 0.1, -0.3, 0.2, 0.1, 0.1), (RIGHT, 0.0, 0.0, RIGHT, -RIGHT, 0.0)
+)
+
+
+def pose_of(description, q):
+    return Arm(description).pose(np.asarray(q, dtype=float))
+
+
+def error(description, pose, q):
+    """Largest error of position [m] and rotation [rad], by the textbook's products."""
+    found = forward_kinematics(description, q)
+    return max(np.linalg.norm(found[:3, 3] - pose[1]), np.linalg.norm(found[:3, :3] - pose[0]) / np.sqrt(2))
+
+
+def wrapped(difference):
+    return np.remainder(difference + np.pi, 2 * np.pi) - np.pi
+
+
+def improved(table, links, pose, near):
+    """What `all_postures` finds, each improved as far as its error is not rounding; rows without one begin with NaN."""
+    found = np.empty((8, 6))
+    choice.all_postures(table, links, *pose, near, found)
+    for row in range(8):
+        if np.isnan(found[row, 0]):
+            continue
+        choice.represent(table, near, found[row])
+        if choice.descend(links, *pose, near, 0.0, 5, found[row]) > choice.ACCURACY:
+            found[row, 0] = np.nan
+    return found
+
+
+def every(description, pose):
+    """The distinct postures that have a pose, whatever the ranges; those next to zero of a curve of them."""
+    table, links, zero = arm_table(description), Arm(description).chain, np.zeros(description.joints)
+    table[:-1, 4] = 2 * np.pi
+    if table[-1, 0] != ANY:
+        found = improved(table, links, pose, zero)
+    else:
+        starts = np.random.default_rng(1).uniform(-np.pi, np.pi, (63, description.joints))
+        found = np.empty((128, description.joints))
+        choice.search(table, links, starts, *pose, zero, found)
+    kept = []
+    for q in found[~np.isnan(found[:, 0])]:
+        if all(np.abs(wrapped(q - other)).max() > 1e-6 for other in kept):
+            kept.append(q)
+    return np.array(kept).reshape(len(kept), description.joints)
+
+
+def nearest(postures, near, limit):
+    """The smallest distance, of all postures and all their representations in the range."""
+    least = np.inf
+    for posture in postures:
+        total = 0.0
+        for angle, wish, most in zip(posture, near, limit, strict=True):
+            turned = angle + 2 * np.pi * np.arange(-3, 4)
+            turned = turned[np.abs(turned) <= most]
+            total += np.min((turned - wish) ** 2, initial=np.inf)
+        least = min(least, total)
+    return np.sqrt(least)
+
+
+FREE = {
+    "ur5e, Q1": (UR5E, UR5E.poses["Q1"]),
+    "ur5e, Q2": (UR5E, UR5E.poses["Q2"]),
+    "ur5e, Q3": (UR5E, UR5E.poses["Q3"]),
+    "ur5e, wrist folded": (UR5E, (0.3, -1.0, 1.2, 0.4, np.pi, 0.7)),
+    "ur5e, elbow folded": (UR5E, (0.3, -1.0, np.pi, 0.4, 0.6, 0.7)),
+    "ur5e, stretched": (UR5E, (0.3, -1.0, 0.0, 0.4, 0.6, 0.7)),
+    "ur, wrist on axis 1": (EVEN_UR, (0.3, -0.5, 1.0, -0.5 + RIGHT, 0.4, 0.7)),
+    "ur, wrist on axis 2": (EVEN_UR, (0.3, -1.0, np.pi, 0.4, 0.6, 0.7)),
+    "puma, wrist straight": (PUMA, (0.3, -1.0, 0.5, 0.4, 0.0, 0.7)),
+    "puma, wrist folded": (PUMA, (0.3, -1.0, 0.5, 0.4, np.pi, 0.7)),
+    "centred, wrist on axis 1": (CENTRED, (0.3, RIGHT, 0.0, 0.4, 0.6, 0.7)),
+    "centred, upright": (CENTRED, (0.3, RIGHT, RIGHT, 0.4, 0.0, 0.7)),
+    "centred, above": (CENTRED, (0.3, 1.0, 2 * (RIGHT - 1.0) + RIGHT, 0.4, 0.6, 0.7)),
+    "centred, wrist on axis 2": (CENTRED, (0.3, 0.5, -RIGHT, 0.4, 0.6, 0.7)),
+}
 
 
 def missed(description, pose, rng, starts=64):
@@ -109,18 +223,6 @@ def test_other_arms_are_solved_numerically(description):
             assert error(description, pose, posture) <= 1.001e-9
 
 
-def test_a_redundant_arm_moves_as_little_as_it_can():
-    """At the nearest posture, the way to the wish is perpendicular to all motions that keep the pose."""
-    rng, description = np.random.default_rng(5), chain(7)
-    ik, arm = InverseKinematics(description), Arm(description)
-    for _ in range(10):
-        q = rng.uniform(-2, 2, 7)
-        near = q + 0.1 * rng.normal(size=7)
-        found = ik.solve(*pose_of(description, q), near)
-        kept = np.linalg.svd(arm.jacobian(found))[2][6]
-        assert abs(kept @ (near - found)) < 1e-5
-
-
 @pytest.mark.parametrize("place", [(0.0, 0.0, 0.3), (0.05, 0.0, 0.5), (3.0, 0.0, 0.0), (np.nan, 0.0, 0.0)])
 @pytest.mark.parametrize("description", [UR5E, PUMA, chain(6), cut(4)], ids=["ur", "puma", "chain", "short"])
 def test_a_place_that_no_posture_reaches_has_no_solution(description, place):
@@ -147,66 +249,20 @@ def test_a_posture_out_of_range_is_told_from_none(description):
     assert f"{narrow.robot.joints[farthest]} would be at {q[farthest]:.4f} rad" in str(refusal.value)
 
 
-def test_a_posture_within_the_ranges_is_preferred_to_a_nearer_one_outside():
-    rng = np.random.default_rng(8)
-    limits = (2.0, 2.5, 3.0, 2.0, 3.5, 6.0)
-    ik = InverseKinematics(changed(UR5E, "limits", position=limits))
-    outcomes = set()
-    for _ in range(300):
-        pose = pose_of(UR5E, rng.uniform(-np.pi, np.pi, 6))
-        near = rng.uniform(-1, 1, 6) * limits
-        expected = nearest(every(UR5E, pose), near, limits)
-        outcomes.add(bool(np.isfinite(expected)))
-        if np.isfinite(expected):
-            found = ik.solve(*pose, near)
-            assert np.all(np.abs(found) <= limits)
-            assert np.linalg.norm(found - near) == pytest.approx(expected, abs=1e-7)
-        else:
-            with pytest.raises(InverseKinematicsError, match="outside its range"):
-                ik.solve(*pose, near)
-    assert outcomes == {True, False}
-
-
-def test_a_posture_on_its_limit_is_inside():
-    limits = (1.0, 1.0, 1.2, 1.0, 1.0, 1.0)
-    ik = InverseKinematics(changed(UR5E, "limits", position=limits))
-    for signs in itertools.product((-1.0, 1.0), repeat=6):
-        q = np.array(signs) * limits
-        found = ik.solve(*pose_of(UR5E, q), np.zeros(6))
-        assert np.all(np.abs(found) <= limits)
-
-
-def test_twists_that_are_nearly_right_angles_are_made_good():
-    """A file may give them with fewer digits; then there is no closed form, but for the rounding of the last ones."""
-    for digits, closed in ((5, False), (10, True)):
-        alpha = tuple(round(value, digits) for value in UR5E.kinematics.alpha)
-        description = changed(UR5E, "kinematics", alpha=alpha)
-        ik, rng = InverseKinematics(description), np.random.default_rng(9)
-        assert ik._closed == closed
-        for _ in range(10):
-            q = rng.uniform(-3, 3, 6)
-            pose = pose_of(description, q)
-            found = ik.solve(*pose, q)
-            assert error(description, pose, found) <= 1e-10
-            np.testing.assert_allclose(found, q, rtol=0, atol=1e-6)
-
-
-def test_arrays_of_any_layout_are_taken():
-    ik, q = InverseKinematics(UR5E), np.array([0.3, -1.0, 1.2, 0.4, 0.6, 0.7])
-    rotation, position = pose_of(UR5E, q)
-    expected, given = ik.solve(rotation, position, q), q.copy()
-    given.flags.writeable = False
-    matrix = np.eye(4, order="F")
-    matrix[:3, :3], matrix[:3, 3] = rotation, position
-    np.testing.assert_array_equal(ik.solve(matrix[:3, :3], matrix[:3, 3], given), expected)
-    np.testing.assert_array_equal(given, q)
-
-
-def test_a_robot_compiles_for_no_other_layout_or_type_of_arrays():
-    """Else a program's first `get_inverse_kin` would hold up the tick for seconds."""
-    pose = [np.ascontiguousarray(part) for part in pose_of(UR5E, np.full(6, 0.5))]
-    InverseKinematics(UR5E).solve(*pose, np.full(6, 0.4))
-    known = set(closest.overloads)
-    other = [np.asfortranarray(part, dtype=np.float32) for part in pose]
-    InverseKinematics(UR5E).solve(*other, np.full(6, 0.4))
-    assert set(closest.overloads) == known
+@pytest.mark.parametrize("case", FREE)
+def test_the_nearest_posture_is_found_where_postures_merge_or_a_joint_is_free(case):
+    description, q = FREE[case]
+    q, rng, ik = np.array(q), np.random.default_rng(6), InverseKinematics(description)
+    links, pose = Arm(description).chain, pose_of(description, q)
+    np.testing.assert_allclose(ik.solve(*pose, q), q, rtol=0, atol=1e-6)
+    for scale in (1e-3, 0.1, 1.0, 3.0):
+        near = np.clip(q + scale * rng.normal(size=6), -6, 6)
+        found = ik.solve(*pose, near)
+        assert error(description, pose, found) <= 1e-10
+        distance = np.linalg.norm(found - near)
+        assert distance <= np.linalg.norm(q - near) + 1e-6
+        for start in near + rng.uniform(-np.pi, np.pi, (12, 6)):
+            if approach(links, *pose, near, start) < 1e-9 and np.all(
+                np.abs(start) <= description.limits.position
+            ):
+                assert distance <= np.linalg.norm(start - near) + 1e-4, (found, start)

@@ -1,10 +1,7 @@
 """The limiter: inside the limits, and exact again afterwards."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-import ruckig
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
@@ -79,15 +76,6 @@ def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalle
     assert (np.array(held[-10:]) == walk[-1]).all()
 
 
-def test_a_walk_inside_the_limits_passes_to_the_bit_and_is_never_limited():
-    time = np.arange(2000) * H
-    walk = np.stack([0.1 * (1 - np.cos(2.0 * time)) ** 2, 0.1 * np.sin(1.0 * time) ** 3], axis=1)
-    limiter = at_rest(walk[0], PAPER, H)
-    for before, point in pairwise(walk):
-        assert (limiter.follow(point, (point - before) / H) == point).all()
-        assert not limiter.limited
-
-
 @pytest.mark.parametrize("jump", [1e-4, 0.01, 0.2, -0.2])
 @pytest.mark.parametrize(
     "motion",
@@ -114,51 +102,6 @@ def test_after_catching_up_with_what_moves_it_passes_to_the_bit_again(motion, ju
     assert equal[:, 1].all(), "the other joint is not held back"
 
 
-def test_at_the_change_from_catching_up_to_passing_acceleration_does_not_step_beyond_the_limit():
-    """The first passed tick is judged by the last displacement, not by ruckig's velocity at its end."""
-    random = np.random.default_rng(5)
-    worst = 0.0
-    for _ in range(40):
-        limiter = at_rest(np.zeros(1), PAPER, H)
-        jump, speed = random.uniform(1e-5, 0.02), random.uniform(-0.5, 0.5)
-        walk = [np.array([jump + speed * H * k]) for k in range(600)]
-        out = followed(limiter, walk)
-        worst = max(worst, np.abs(np.diff(out, 2, axis=0)).max() / H**2)
-    assert worst <= PAPER.acceleration * (1 + 2e-6) + ROUNDING
-
-
-def test_where_no_catching_up_can_be_computed_it_brakes_inside_the_limits(monkeypatch):
-    limiter = at_rest(np.zeros(2), PAPER, H)
-    out = list(followed(limiter, [np.full(2, 0.5 * 1.9 * (k * H) ** 2) for k in range(1, 200)]))
-
-    class Refusing:
-        def reset(self):
-            pass
-
-        def update(self, *_):
-            raise ruckig.RuckigError
-
-    monkeypatch.setattr(limiter, "_catcher", Refusing())
-    out += [limiter.follow(np.full(2, 5.0), np.zeros(2)) for _ in range(300)]
-    assert_within(np.array(out), PAPER)
-    assert out[-1] == pytest.approx(out[-2], abs=1e-12)
-
-
-def test_the_state_it_tells_is_one_that_a_motion_can_go_on_from():
-    """A cubic is known by four positions."""
-
-    def cubic(time):
-        return 0.9 * time**2 + 10.0 * time**3
-
-    limiter = at_rest(np.zeros(1), MotionLimits(1.5, 20.0, 2000.0), H)
-    followed(limiter, [np.array([cubic(k * H)]) for k in range(1, 50)])
-    q, qd, qdd = limiter.state
-    time = 49 * H
-    assert q == cubic(time)
-    assert qd == pytest.approx(1.8 * time + 30.0 * time**2, rel=1e-9)
-    assert qdd == pytest.approx(1.8 + 60.0 * time, rel=1e-7)
-
-
 @pytest.mark.parametrize(
     "limits",
     [PAPER, MotionLimits(3.0, 40.0, 2000.0), MotionLimits(0.2, 2.0, 40.0), MotionLimits(1.5, 4.0, 9.0)],
@@ -169,19 +112,6 @@ def test_a_motion_made_at_the_very_limits_passes_to_the_bit(limits):
     limiter = at_rest(walk[0], limits, H)
     assert (followed(limiter, walk[1:]) == walk).all()
     assert not limiter.limited
-
-
-@pytest.mark.parametrize("jerk", [20.0, 100.0])
-def test_a_trapezoid_of_velocity_is_rounded_to_the_jerk_limit(jerk):
-    """Within velocity and acceleration from end to end; its acceleration steps."""
-    time = np.arange(2500) * H
-    velocity = np.interp(time, [0.1, 0.6, 1.1, 1.6], [0.0, 0.8, 0.8, 0.0])
-    walk = np.cumsum(velocity * H)[:, None]
-    limits = MotionLimits(1.5, 2.0, jerk)
-    out = followed(at_rest(np.zeros(1), limits, H), walk)
-    assert_within(out, limits)
-    assert (out[-200:] == walk[-1]).all()
-    assert np.abs(out[1:] - walk).max() < 2 * 1.6 * 1.6 / jerk
 
 
 def test_the_range_is_never_left_however_hard_the_signal_drives_at_its_end():

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from tests.examples import examples
 
-from tvist_controller.dispatch.planner import Planner
-from tvist_controller.planning.move_planner import PlannedMove
 from tvist_protocol import commands as c
-from tvist_protocol.motions import MovePath
 from tvist_protocol.programs import ProgramPlay
 
 from .robots import H
@@ -89,14 +87,6 @@ def test_the_arm_goes_along_points_as_fast_as_their_curve_permits_and_never_stan
     assert away(robot, points) < 2e-5
 
 
-def test_corners_between_points_are_passed_without_a_stop_and_inside_their_radius():
-    points = zigzag(150)
-    robot = finish(begin(points))
-    assert speeds(robot).min() > 0.01 * SPEED
-    assert away(robot, points) < 5e-4
-    assert robot.kinds().count("motion_started") == 1
-
-
 def test_limits_are_kept_where_a_motion_goes_on():
     robot = finish(begin(circle(200)))
     q = np.array([state.reference_q for state in robot.states])
@@ -108,67 +98,28 @@ def test_limits_are_kept_where_a_motion_goes_on():
     assert jerk.max() < 2.0 * 60.0  # along the path it is limited to 60, and across it by the joints
 
 
-def test_however_many_points_there_are_a_plan_has_few_of_them_and_a_short_part_of_the_path(monkeypatch):
-    sizes, plan = [], Planner.plan
-
-    def noted(self, command, *rest, **named):
-        found = plan(self, command, *rest, **named)
-        if isinstance(command, MovePath):
-            assert isinstance(found.found, PlannedMove)
-            course = found.found.course
-            sizes.append((len(command.segments), len(course.curve.knots.s), len(course.law.edges)))
-        return found
-
-    monkeypatch.setattr(Planner, "plan", noted)
-    robot = begin(circle(900))
-    journeys, most = robot.controller.programs.arm._journeys, 0
-    while playing(robot):
-        robot.tick()
-        most = max([most, *(len(one.legs) for one in journeys.values())])
-    parts, knots, edges = np.array(sizes).T
-    assert parts[0] == 50
-    assert max(parts[1:]) <= 25
-    assert max(knots) < 700
-    assert max(edges) < 1500
-    assert most < 250
+LOAD = {"com": (0, 0, 0.05), "inertia": (0,) * 6}
+CHANGES = {
+    "pause": (c.Pause, {}),
+    "resume": (c.Resume, {}),
+    "slow": (c.SetSpeed, {"fraction": 0.3}),
+    "fast": (c.SetSpeed, {"fraction": 1.0}),
+    "zv": (c.SetShaper, {"name": "zv"}),
+    "none": (c.SetShaper, {"name": "none"}),
+    "heavy": (c.SetPayload, {"mass": 3.0} | LOAD),
+    "light": (c.SetPayload, {"mass": 0.5} | LOAD),
+}
 
 
-def test_equal_programs_give_equal_bits():
-    one, other = (finish(begin(circle(120), shaper="zv")) for _ in range(2))
-    assert [state.target_q for state in one.states] == [state.target_q for state in other.states]
-
-
-CHANGES = st.lists(
-    st.tuples(
-        st.integers(1, 120),
-        st.sampled_from(["pause", "resume", "slow", "fast", "zv", "none", "heavy", "light"]),
-    ),
-    max_size=6,
-)
-
-
-def change(robot, what):
-    match what:
-        case "pause":
-            robot.send(c.Pause)
-        case "resume":
-            robot.send(c.Resume)
-        case "slow" | "fast":
-            robot.send(c.SetSpeed, fraction=0.3 if what == "slow" else 1.0)
-        case "heavy" | "light":
-            robot.send(c.SetPayload, mass=3.0 if what == "heavy" else 0.5, com=(0, 0, 0.05), inertia=(0,) * 6)
-        case _:
-            robot.send(c.SetShaper, name=what)
-
-
-@settings(max_examples=10, deadline=None)
-@given(CHANGES)
+@examples(4)
+@example([(1, "heavy"), (102, "heavy")])
+@given(st.lists(st.tuples(st.integers(1, 120), st.sampled_from(list(CHANGES))), max_size=6))
 def test_whatever_is_changed_on_the_way_it_stays_on_the_path_and_comes_to_its_end(changes):
-    points = circle(100)
-    robot = begin(points, 215)
+    points = circle(40)
+    robot = begin(points, 90)
     for ticks, what in changes:
         robot.tick(ticks)
-        change(robot, what)
+        robot.send(CHANGES[what][0], **CHANGES[what][1])
     robot.send(c.Resume)
     robot.send(c.SetSpeed, fraction=1.0)
     finish(robot)
@@ -177,7 +128,7 @@ def test_whatever_is_changed_on_the_way_it_stays_on_the_path_and_comes_to_its_en
     assert away(robot, points) < 2e-5
 
 
-@pytest.mark.parametrize("ticks", [230, 300, 371, 480])
+@pytest.mark.parametrize("ticks", [230, 371])
 def test_a_stop_on_the_way_ends_it_on_the_path(ticks):
     points = circle(200)
     robot = begin(points, ticks)
@@ -189,7 +140,7 @@ def test_a_stop_on_the_way_ends_it_on_the_path(ticks):
     assert away(robot, points) < 2e-5
 
 
-@pytest.mark.parametrize("ticks", [230, 371, 480])
+@pytest.mark.parametrize("ticks", [230, 371])
 def test_after_a_protective_stop_it_goes_on_to_the_end_and_not_back_to_points_that_the_stop_has_passed(ticks):
     points = circle(150)
     robot = begin(points, ticks)
@@ -207,21 +158,7 @@ def test_after_a_protective_stop_it_goes_on_to_the_end_and_not_back_to_points_th
     assert away(robot, points) < 5e-5
 
 
-def test_a_protective_stop_of_a_paused_arm_passes_no_points():
-    points = circle(150)
-    robot = begin(points, 371)
-    robot.send(c.Pause)
-    robot.tick(300)
-    robot.controller.motion.protect("a test")
-    robot.tick(10)
-    robot.send(c.UnlockProtectiveStop)
-    robot.send(ProgramPlay)
-    finish(robot)
-    np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
-    assert away(robot, points) < 5e-5
-
-
-@pytest.mark.parametrize("ticks", [295, 330, 400, 480])
+@pytest.mark.parametrize("ticks", [295, 400])
 def test_a_stop_before_tight_corners_is_as_quick_as_one_on_a_line(ticks):
     """The motion slows down for its corners by itself, so no one limit suits the way to the end of a stop."""
     points = zigzag(150)
@@ -279,15 +216,3 @@ def test_where_the_next_point_comes_too_late_the_arm_stops_at_the_last_one_and_s
     robot.tick(600)
     assert robot.kinds().count("motion_started") == 2
     np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
-
-
-def test_a_far_point_that_comes_while_the_arm_is_on_its_way_is_blended():
-    """The arm has begun the last line that it knows, and is not yet where the blend begins."""
-    x, y, z = HERE[:3]
-    robot, far = opened(*READS)
-    far.tell("received", sent([(x, y + 0.05, z)]))
-    robot.tick(100)
-    far.tell("received", sent([(x, y + 0.05, z + 0.05)]))
-    robot.tick(900)
-    assert robot.kinds().count("motion_started") == 1
-    assert speeds(robot).min() > 0.01 * SPEED

@@ -3,51 +3,29 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.plant.arms import chain
 from tests.search.draws import SHAPERS
+from tests.search.paths import assert_on_path, interfere, journey, judge, judge_stop
+from tests.search.spaces import BENT, NO_TOOL, away, begun, pose_of, tool_pose
 from tests.search.subject import Subject
 
-from tvist_controller.kinematics.arm import Arm
-from tvist_controller.setup import paper_payload
 from tvist_protocol import commands as c
-from tvist_protocol.io import SetTcp
-from tvist_protocol.motions import (
-    ArcSegment,
-    JointSegment,
-    LineSegment,
-    MoveC,
-    MoveL,
-    MovePath,
-    ProcessSegment,
-)
+from tvist_protocol.commands import MoveJ, Pause, Resume, SetPayload, Stop
+from tvist_protocol.motions import JointSegment, LineSegment, MoveC, MoveL, MovePath, ProcessSegment
 from tvist_protocol.replies import Accepted, Refused
+from tvist_protocol.simulation import SimulationInject
+from tvist_protocol.transitions import Activity
 
-from .paths import journey
-from .robots import Q1, UR5E, H
-from .spaces import BENT, NO_TOOL, TOOL, away, begun, errors, pose_of, tool_pose
+from .robots import UR5E, H
 
 
-@pytest.mark.parametrize(
-    "seed",  # 581 creeps to its end
-    [*range(22), 581, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(22, 120))],
-)
-def test_a_random_path_is_where_it_should_be_with_every_shaper(seed):
-    trip = journey([seed, 31], [SHAPERS[seed % len(SHAPERS)]])
-    robot = trip.begin()
-    robot.until_rest(500_000)
-    robot.tick(20)
-    q = np.array(robot.references)
-    off, turned = errors(q[:: max(len(q) // 400, 1)], trip.legs)
-    assert off <= 5e-5
-    assert turned <= 1e-4
-    for order, limit in ((1, UR5E.limits.velocity), (2, UR5E.limits.acceleration)):
-        assert np.abs(np.diff(q, order, axis=0)).max() / H**order <= min(limit)
-    position, rotation = tool_pose(q[-1])
-    end, turned_end = trip.legs[-1].end
-    assert np.linalg.norm(position - end) <= 1e-6
-    assert (rotation * turned_end.inv()).magnitude() <= 1e-6
-    kinds = [event.kind for event in robot.events if event.kind.startswith("motion")]
-    assert kinds == ["motion_started", "motion_done"]
+@pytest.mark.parametrize("seed", [3, 7, 581])  # 581 creeps to its end; `make search` draws others
+def test_a_random_path_is_where_it_should_be(seed):
+    judge(seed)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_kind_of_stop_stays_on_the_path_behind_the_motion_and_rests_no_later(seed):
+    judge_stop(seed)
 
 
 def went(robot: Subject, kind, **fields) -> np.ndarray:
@@ -73,8 +51,7 @@ def test_velocity_acceleration_and_jerk_are_those_of_the_tools_trapezoid():
     assert (len(positions) - 2) * H == pytest.approx(ideal, abs=4 * H)
 
 
-@pytest.mark.parametrize("duration", [0.8, 2.0, 7.0])
-@pytest.mark.parametrize("kind", ["line", "joints", "path"])
+@pytest.mark.parametrize(("kind", "duration"), [("line", 2.0), ("joints", 7.0), ("path", 0.8)])
 def test_a_duration_wins_over_velocity_and_acceleration(kind, duration):
     robot = begun()
     line = LineSegment(pose=away((0.05, 0.1, 0.05)), duration=0.6 * duration, blend=0.03, velocity=0.01)
@@ -85,24 +62,6 @@ def test_a_duration_wins_over_velocity_and_acceleration(kind, duration):
         "path": lambda: went(robot, MovePath, segments=(line, then)),
     }[kind]()
     assert (len(positions) - 2) * H == pytest.approx(duration, abs=4 * H)
-
-
-@pytest.mark.parametrize(
-    "fields", [{"kind": MoveL, "pose": away((0.1, 0.3, -0.1))}, {"kind": c.MoveJ, "q": Q1}]
-)
-def test_a_duration_that_is_too_short_takes_longer_within_the_limits(fields):
-    robot, kind = begun(), fields["kind"]
-    target = {name: tuple(value) for name, value in fields.items() if name != "kind"}
-    went(robot, kind, duration=0.01, **target)
-    q = np.array(robot.references)
-    assert len(q) * H > 0.2
-    assert np.abs(np.diff(q, axis=0)).max() / H > 0.5 * min(UR5E.limits.velocity)
-    assert np.abs(np.diff(q, 2, axis=0)).max() / H**2 <= min(UR5E.limits.acceleration) * 1.0001
-
-
-def test_joint_limits_slow_a_line_down_and_do_not_refuse_it():
-    positions = went(begun(), MoveL, pose=away((0.1, 0.3, -0.1)), velocity=30.0, acceleration=300.0, jerk=1e5)
-    assert 0.5 < speeds(positions).max() < 3.0
 
 
 def test_a_process_keeps_its_speed_in_blends_and_a_line_slows_down_there():
@@ -133,16 +92,6 @@ def test_the_second_of_two_blends_that_overlap_is_skipped_and_the_arm_stops_ther
     assert speeds(positions)[np.argmin(near) - 1] < 1e-3
 
 
-def test_blends_of_which_two_just_fit_are_both_made():
-    corners = [(0.2, 0.0, 0.0), (0.2, 0.2, 0.0), (0.0, 0.2, 0.0)]
-    robot = begun(BENT + np.array([0.0, 0.2, 0.2, 0.0, 0.0, 0.0]))
-    start = robot.references[0]
-    segments = tuple(LineSegment(pose=away(corner, q=start), blend=0.1) for corner in corners)
-    positions = went(robot, MovePath, segments=segments)
-    assert [event.code for event in robot.events if event.code == "blend_skipped"] == []
-    assert speeds(positions)[100:-100].min() > 0.1
-
-
 @pytest.mark.parametrize("way", ["joint to line", "line to joint"])
 def test_joint_moves_blend_with_lines_inside_the_radius(way):
     joint = JointSegment(q=tuple(BENT + 0.3), blend=0.05)
@@ -163,10 +112,7 @@ def test_joint_moves_blend_with_lines_inside_the_radius(way):
 
 
 def test_a_path_that_goes_back_as_it_came_turns_inside_its_blend():
-    segments = (
-        LineSegment(pose=away((0.1, 0.0, 0.0)), blend=0.04),
-        LineSegment(pose=away((0.0, 0.0, 0.0))),
-    )
+    segments = (LineSegment(pose=away((0.1, 0.0, 0.0)), blend=0.04), LineSegment(pose=away((0.0, 0.0, 0.0))))
     positions = went(begun(), MovePath, segments=segments) - tool_pose(BENT, NO_TOOL)[0]
     assert 0.06 < positions[:, 0].max() < 0.1
     assert np.abs(positions[:, 1:]).max() < 1e-6
@@ -194,90 +140,6 @@ def test_poses_are_given_in_a_frame():
         np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
 
 
-def test_a_line_is_that_of_the_tool_centre_point():
-    robot = begun(tcp=TOOL)
-    goal = away((0.05, 0.2, 0.0), (0.5, 0.2, -0.3), tcp=TOOL)
-    assert isinstance(robot.send(MoveL, pose=goal), Accepted)
-    robot.until_rest()
-    start, end = tool_pose(BENT)[0], np.array(goal[:3])
-    along = (end - start) / np.linalg.norm(end - start)
-    for q in robot.references[::20]:
-        moved = tool_pose(q)[0] - start
-        assert np.linalg.norm(moved - (moved @ along) * along) < 1e-6
-
-
-def test_a_target_where_the_tool_is_ends_at_once():
-    robot = begun()
-    went(robot, MoveL, pose=away((0.0, 0.0, 0.0)))
-    assert [event.kind for event in robot.events][-2:] == ["motion_started", "motion_done"]
-    went(robot, MovePath, segments=(LineSegment(pose=away((0.0, 0.0, 0.0)), blend=0.1),) * 3)
-
-
-@pytest.mark.parametrize(
-    ("kind", "fields", "code", "where", "said"),
-    [
-        (MoveL, {"pose": away((5.0, 0.0, 0.0))}, "no_solution", "pose", "no joint positions"),
-        (MoveL, {"pose": away((0.7, 0.2, 0.2))}, "singular", "pose", "% of the way"),
-        (MoveL, {"pose": away((0.0, 0.0, -0.6))}, "collision", "pose", "% of the way"),
-        (
-            MoveC,
-            {"via": away((0.1, 0.0, 0.0)), "pose": away((0.2, 0.0, 0.0))},
-            "out_of_range",
-            "via",
-            "on a line",
-        ),
-        (
-            MoveC,
-            {"via": away((0.1, 0.0, 0.0)), "pose": away((0.0, 0.0, 0.0))},
-            "out_of_range",
-            "via",
-            "the same",
-        ),
-        (
-            MovePath,
-            {"segments": (LineSegment(pose=away((0.1, 0.0, 0.0))), LineSegment(pose=away((9.0, 0.0, 0.0))))},
-            "no_solution",
-            "segments[1].pose",
-            "no joint positions",
-        ),
-        (MovePath, {"segments": (JointSegment(q=(0.0,) * 5),)}, "out_of_range", "segments[0].q", "5 angles"),
-        (
-            MovePath,
-            {"segments": (JointSegment(q=(9.0,) * 6),)},
-            "limit_position",
-            "segments[0].q[0]",
-            "9 rad",
-        ),
-        (
-            MovePath,
-            {
-                "segments": (
-                    ArcSegment(via=away((0.1, 0.0, 0.0)), pose=away((0.1, 0.1, 0.0)), acceleration=1e-3),
-                )
-            },
-            "out_of_range",
-            "segments[0].acceleration",
-            "at least",
-        ),
-        (MoveL, {"pose": away((0.1, 0.0, 0.0)), "velocity": 1e-5}, "out_of_range", "velocity", "at least"),
-    ],
-)
-def test_what_cannot_be_done_is_refused_with_the_place_and_nothing_moves(kind, fields, code, where, said):
-    robot = begun()
-    reply = robot.send(kind, **fields)
-    assert isinstance(reply, Refused), reply
-    assert (reply.code, reply.where) == (code, where)
-    assert said in reply.why
-    robot.tick(10)
-    assert (np.array(robot.references) == BENT).all()
-
-
-def test_from_a_singular_posture_no_line_leads_on():
-    reply = begun(Q1).send(MoveL, pose=away((-0.1, 0.0, 0.0), q=Q1))
-    assert reply.code == "singular"
-    assert "move_j" in reply.why
-
-
 def test_a_joint_that_would_leave_its_range_is_named_with_the_share_of_the_way():
     near_the_end = BENT.copy()
     near_the_end[5] = 6.2
@@ -289,71 +151,82 @@ def test_a_joint_that_would_leave_its_range_is_named_with_the_share_of_the_way()
     assert "% of the way" in refused[0].why
 
 
-def test_a_change_of_the_tool_is_part_of_the_plan():
-    """A plan made before `set_tcp` was carried out does not hold after it."""
-    robot = begun()
-    controller = robot.controller
-    line = MoveL(token=robot.token, pose=away((0.05, 0.05, 0.0), tcp=TOOL))
-    stale = controller.plans.now(line)
-    assert controller.plans.hold(stale)
-    robot.send(SetTcp, offset=TOOL)
-    assert not controller.plans.hold(stale)
-    assert controller.plans.found(line, stale) is not stale.found, "it is made again"
-
-
-@pytest.mark.parametrize("radius", [1e-9, 1e-6, 1e-4])
-def test_a_blend_too_small_to_be_worthwhile_is_a_stop(radius):
-    robot = begun()
-    segments = (
-        LineSegment(pose=away((0.1, 0.0, 0.0)), blend=radius),
-        LineSegment(pose=away((0.1, 0.1, 0.0))),
-    )
-    positions = went(robot, MovePath, segments=segments)
-    assert [event.code for event in robot.events if event.kind == "warning"][-1] == "blend_skipped"
-    assert len(positions) * H < 2.0
-
-
-@pytest.mark.parametrize("rest", [1e-10, 1e-8, 1e-6, 1e-4])
-def test_a_sliver_between_two_blends_slows_nothing_down(rest):
-    corners = [(0.1, 0.0, 0.0), (0.1, 0.1, 0.0), (0.0, 0.1, 0.0)]
-    blends = (0.05, 0.05 - rest, 0.0)
-    segments = tuple(
-        LineSegment(pose=away(to), blend=blend) for to, blend in zip(corners, blends, strict=True)
-    )
-    positions = went(begun(), MovePath, segments=segments)
-    assert speeds(positions)[100:-100].min() > 0.1
-
-
-@pytest.mark.parametrize("duration", [1e-300, 3600.0])
-def test_any_duration_is_planned_within_a_moment(duration):
-    """Planning looks at the places where limits may bind, whose number does not grow with the duration."""
-    robot = begun()
-    segments = (
-        LineSegment(pose=away((0.1, 0.0, 0.0)), duration=duration),
-        JointSegment(q=tuple(BENT), duration=duration),
-    )
-    assert isinstance(robot.send(MovePath, segments=segments), Accepted)
-    assert isinstance(begun().send(MoveL, pose=away((0.1, 0.0, 0.0)), duration=duration), Accepted)
-    law = robot.controller.cycle.trajectory.law
-    assert len(law.moments) < 5000
-
-
-def test_a_redundant_arm_makes_blends_too():
-    description = chain(7)
-    q = np.linspace(0.5, 1.2, 7) * np.where(np.arange(7) % 2, 1.0, -1.0)
-    robot = Subject(description, q, paper_payload(description, 0.0), shaper="none")
-    tool = Arm(description)
-    rotation, position = tool.pose(q)
-    targets = [
-        position + np.array(moved) for moved in ((0.03, 0.0, 0.0), (0.03, 0.03, 0.0), (0.0, 0.03, 0.03))
+@pytest.mark.parametrize("seed", range(2))
+def test_slider_and_pauses_stay_on_the_path_and_lead_to_its_end(seed):
+    trip = journey([seed, 43], [name for name in SHAPERS if not name.startswith("um_")])
+    random = np.random.default_rng([seed, 44])
+    robot = trip.begin()
+    interfere(robot, random, 200, ["none", "zv", "zvd", "auto"])
+    robot.until_rest(500_000)
+    robot.tick(20)
+    q = np.array(robot.references)
+    assert_on_path(q, trip.legs)
+    assert np.abs(np.diff(q, axis=0)).max() / H <= 1.01 * min(UR5E.limits.velocity)
+    assert np.abs(np.diff(q, 2, axis=0)).max() / H**2 <= 1.01 * min(UR5E.limits.acceleration)
+    assert [event.kind for event in robot.events if event.kind in {"motion_done", "motion_stopped"}] == [
+        "motion_done"
     ]
-    segments = tuple(
-        LineSegment(pose=pose_of(to, Rotation.from_matrix(rotation)), blend=0.01, velocity=0.1)
-        for to in targets
+
+
+def two_parts(shaper: str = "zv"):
+    """A robot that moves along a path that stops at its corner, and is about to come to rest there."""
+    robot = begun(shaper=shaper)
+    robot.send(
+        MovePath, segments=tuple(LineSegment(pose=away(to)) for to in ((0.1, 0.0, 0.0), (0.1, 0.1, 0.0)))
     )
-    reply = robot.send(MovePath, segments=segments)
-    assert isinstance(reply, Accepted), reply
+    cycle = robot.controller.cycle
+    while cycle.trajectory.duration - cycle.trajectory.time > 0.02:
+        robot.tick()
+    return robot
+
+
+@pytest.mark.parametrize("again", [Pause, SimulationInject])
+def test_a_pause_between_two_parts_lasts_until_it_ends(again):
+    """The first part is about to end, so it does; the pause then holds the arm at the corner."""
+    robot = two_parts()
+    robot.send(Pause)
+    robot.tick(200)
+    assert robot.controller.cycle.mode.at_rest
+    assert robot.controller.motion.activity is Activity.PAUSED
+    robot.send(again, **({"fault": "safeguard_stop"} if again is SimulationInject else {}))
+    robot.tick(100)
+    assert robot.controller.cycle.mode.at_rest
+    robot.send(SimulationInject, fault="normal")
+    robot.send(Resume)
     robot.until_rest()
-    steps = np.abs(np.diff(robot.references, 2, axis=0)).max() / H**2
-    assert steps <= min(description.limits.acceleration)
-    assert np.linalg.norm(tool.pose(robot.references[-1])[1] - targets[-1]) < 1e-6
+    assert [event.kind for event in robot.events][-1] == "motion_done"
+
+
+def test_a_payload_is_checked_on_the_parts_that_have_not_begun():
+    robot = begun(shaper="none")
+    position = tool_pose(BENT, (0.0,) * 6)[0]
+    low = (0.0, 0.0, 0.2 - position[2])
+    reply = robot.send(
+        MovePath, segments=(LineSegment(pose=away((0.05, 0.0, 0.0))), LineSegment(pose=away(low)))
+    )
+    assert isinstance(reply, Accepted), reply
+    robot.tick(40)
+    robot.send(Pause)
+    robot.tick(300)
+    long = {"mass": 1.0, "com": (0.0, 0.0, 0.4), "inertia": (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)}
+    assert robot.send(SetPayload, **long).code == "collision"
+
+
+@pytest.mark.parametrize("kind", [MoveL, MoveJ])
+def test_a_motion_slow_by_its_duration_is_paused_at_once(kind):
+    robot = begun(shaper="zv")
+    target = {"pose": away((0.05, 0.1, 0.0))} if kind is MoveL else {"q": tuple(BENT + 0.2)}
+    assert isinstance(robot.send(kind, duration=300.0, **target), Accepted)
+    robot.tick(5000)
+    robot.send(Pause)
+    robot.tick(150)
+    before = robot.references[-1]
+    robot.tick(200)
+    assert np.abs(robot.references[-1] - before).max() < 1e-9
+    robot.send(Resume)
+    robot.tick(500)
+    assert np.abs(robot.references[-1] - before).max() > 1e-5
+    robot.send(Stop)
+    robot.tick(200)
+    assert robot.controller.cycle.mode.at_rest
+    assert [event.kind for event in robot.events if event.id is not None][-1] == "motion_stopped"

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.setup import paper_payload
 from tvist_protocol.commands import PowerOff, PowerOn
-from tvist_protocol.io import BITS, NUMBERS, Registers, SetIo, SetRegisters, SetTcp, SimulationSetInputs
+from tvist_protocol.io import BITS, Registers, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode
-from tvist_protocol.replies import Done, Refused
-from tvist_protocol.simulation import SimulationInject, SimulationReset
+from tvist_protocol.replies import Done
+from tvist_protocol.simulation import SimulationInject
 
-from .robots import Q1, UR5E, Robot
+from .robots import UR5E, Robot
 
 BITS18 = st.integers(0, 2**18 - 1)
 
@@ -54,18 +54,12 @@ def test_a_mask_decides_which_digital_outputs_change(steps):
 
 @given(st.integers(0, 3), st.integers(0, 3), st.floats(0, 1), st.floats(0, 1))
 def test_an_analog_output_is_a_share_of_its_range(mask, kind, first, second):
-    peripherals = bare()
-    peripherals.set_outputs(
-        SetIo(
-            token="",
-            standard_analog_output_mask=mask,
-            standard_analog_output_type=kind,
-            standard_analog_output_0=first,
-            standard_analog_output_1=second,
-        )
-    )
+    peripherals, shares = bare(), (first, second)
+    fields = {f"standard_analog_output_{number}": share for number, share in enumerate(shares)}
+    masks = {"standard_analog_output_mask": mask, "standard_analog_output_type": kind}
+    peripherals.set_outputs(SetIo(token="", **masks, **fields))
     io = told(peripherals)
-    for number, share in enumerate((first, second)):
+    for number, share in enumerate(shares):
         chosen = mask >> number & 1
         voltage = bool(chosen and kind >> number & 1)
         assert bool(io.analog_io_types >> (2 + number) & 1) == voltage
@@ -91,42 +85,9 @@ def test_bits_stand_in_words_of_32(bank, writes):
     assert getattr(told(peripherals), f"{other}_register") == [0] * 4
 
 
-def test_what_was_told_does_not_change_afterwards():
-    peripherals = bare()
-    before = told(peripherals)
-    peripherals.set_registers(SetRegisters(bank="input_int", values=(7,)))
-    assert before.input_int_register == [0] * NUMBERS
-    assert told(peripherals).input_int_register[0] == 7
-
-
-@pytest.mark.parametrize(
-    ("bank", "first", "values", "where"),
-    [
-        ("input_int", 47, (1, 2), "values"),
-        ("input_bit", 100, (True,) * 29, "values"),
-        ("input_double", 48, (1.0,), "values"),
-        ("input_int", 0, (1, 1.5), "values[1]"),
-        ("input_int", 0, (2**31,), "values[0]"),
-        ("input_int", 0, (True,), "values[0]"),
-        ("input_bit", 0, (True, 1), "values[1]"),
-        ("input_double", 0, (False,), "values[0]"),
-    ],
-)
-def test_what_a_register_cannot_hold_is_refused_and_changes_nothing(bank, first, values, where):
-    robot = Robot()
-    reply = robot.send(SetRegisters, bank=bank, first=first, values=values)
-    assert isinstance(reply, Refused)
-    assert (reply.code, reply.where) == ("out_of_range", where)
-    robot.tick()
-    io = robot.controller.io()
-    assert not any(any(getattr(io, name)) for name in io.__struct_fields__ if name.endswith("register"))
-
-
-def test_input_registers_take_no_control_and_output_registers_do():
+def test_input_registers_take_no_control():
     robot = Robot()
     assert robot.send(SetRegisters, bank="input_double", values=(1.5,), token=None) == Done()
-    refused = robot.send(SetRegisters, bank="output_double", values=(1.5,), token=None)
-    assert (refused.code, refused.where) == ("missing_field", "token")
     assert robot.send(SetRegisters, bank="output_double", values=(2,)) == Done()
     stale = robot.send(SetRegisters, bank="input_double", values=(2.5,), token="no")
     assert stale.code == "stale_token"
@@ -160,72 +121,24 @@ def test_the_tool_centre_point_moves_the_pose_and_nothing_else():
     assert np.allclose(placed.homogeneous, _placement(moved.actual_TCP_pose).homogeneous, atol=1e-12)
 
 
-def test_the_speed_of_the_tool_centre_point_is_the_derivative_of_its_pose():
-    from tvist_protocol.commands import MoveJ
-
-    robot = Robot()
-    robot.send(SetTcp, offset=(0.1, 0.0, 0.2, 0.0, 0.5, 0.0))
-    robot.send(MoveJ, q=tuple(UR5E.poses["Q2"]))
-    robot.tick(400)
-    poses, speeds = robot.column("actual_TCP_pose"), robot.column("actual_TCP_speed")
-    differences = (poses[2:, :3] - poses[:-2, :3]) / 0.004
-    assert np.abs(speeds[:, :3]).max() > 0.3
-    assert np.abs(differences - speeds[1:-1, :3]).max() < 2e-3
-
-
 def test_power_without_brakes_leaves_the_arm_idle():
-    robot = Robot()
-    robot.send(SimulationReset, mode="POWER_OFF")
-    assert robot.send(PowerOn, release_brakes=False) == Done()
-    assert robot.tick().robot_mode == RobotMode.IDLE
-    assert robot.send(PowerOn, release_brakes=False) == Done()
-    assert robot.tick().robot_mode == RobotMode.IDLE
-    assert robot.send(PowerOn) == Done()
-    assert robot.tick().robot_mode == RobotMode.RUNNING
-    assert robot.send(PowerOn, release_brakes=False) == Done()
-    assert robot.tick().robot_mode == RobotMode.RUNNING
-
-
-def test_a_quiet_arm_at_rest_says_the_same_from_tick_to_tick():
-    robot = Robot(UR5E.quiet())
-    from tvist_protocol.commands import MoveJ
-
-    robot.send(MoveJ, q=tuple(Q1 + 0.3))
-    robot.until_rest()
-    robot.tick(2500)
-    robot.states.clear()
-    robot.tick(500)
-    assert (robot.column("actual_q") == robot.column("actual_q")[0]).all()
-    assert np.ptp(robot.column("actual_tool_accelerometer"), axis=0).max() < 1e-6
-    assert np.ptp(robot.column("target_q"), axis=0).max() == 0.0
+    robot = Robot(mode="POWER_OFF")
+    for release, mode in ((False, "IDLE"), (False, "IDLE"), (True, "RUNNING"), (False, "RUNNING")):
+        assert robot.send(PowerOn, release_brakes=release) == Done()
+        assert robot.tick().robot_mode == RobotMode[mode]
 
 
 def _placement(pose):
     return pin.SE3(pin.exp3(np.array(pose[3:])), np.array(pose[:3]))
 
 
-def test_registers_of_several_banks_are_written_together_or_not_at_all():
+def test_registers_of_several_banks_are_written_together():
     robot = Robot()
-    also = [
+    more = (
         Registers(bank="input_double", first=3, values=(0.5, 1.5)),
         Registers(bank="input_bit", values=(True,)),
-    ]
-    assert robot.send(SetRegisters, bank="input_int", values=(7,), also=tuple(also)) == Done()
-    io = robot.controller.io()
-    assert (io.input_int_register[0], io.input_double_register[3:5], io.input_bit_register[0]) == (
-        7,
-        [0.5, 1.5],
-        1,
     )
-    wrong = Registers(bank="input_double", first=47, values=(1.0, 2.0))
-    assert isinstance(robot.send(SetRegisters, bank="input_int", values=(8,), also=(*also, wrong)), Refused)
-    assert robot.controller.io().input_int_register[0] == 7
-
-
-def test_output_registers_beside_input_registers_need_control():
-    robot = Robot()
-    also = (Registers(bank="output_int", values=(1,)),)
-    command = SetRegisters(bank="input_int", values=(1,), also=also)
-    reply = robot.controller.receive(command)
-    assert (reply.code, reply.where) == ("missing_field", "token")
-    assert robot.controller.io().input_int_register[0] == 0
+    assert robot.send(SetRegisters, bank="input_int", values=(7,), also=more) == Done()
+    io = robot.controller.io()
+    assert (io.input_int_register[0], io.input_bit_register[0]) == (7, 1)
+    assert io.input_double_register[3:5] == [0.5, 1.5]

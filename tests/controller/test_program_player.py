@@ -1,20 +1,19 @@
 """Programs: the controller carries them out by itself, line by line, with the authority of whoever played them."""
 
-from types import SimpleNamespace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_controller.programs.compiling import built_in
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationInject, SimulationReset
 
-from .robots import Q1, Q2, Q3, UR5E, Robot
+from .robots import Q1, Q2, Q3, Robot
 
+ALL = [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
+"""Where the program `paper.urp` goes."""
 LONG = 3000
 """Ticks that are enough for a line."""
 
@@ -57,51 +56,15 @@ def reached(robot):
     return [pytest.approx(state.target_q, abs=1e-6) for state in robot.states if state.tick in ends]
 
 
-def test_there_is_a_program_for_each_pose_and_one_through_all_of_them_and_back():
-    known = built_in(UR5E)
-    assert set(known) == {"wait_program.urp", "paper.urp", "Q1.urp", "Q2.urp", "Q3.urp"}
-    assert known["paper.urp"].count("movej(") == 5
-    assert f"movej({Q2.tolist()}, " in known["Q2.urp"]
-
-
-def test_an_arm_without_poses_can_only_wait():
-    assert set(built_in(SimpleNamespace(poses={}))) == {"wait_program.urp"}
-
-
 def test_a_program_makes_its_moves_in_order_each_in_the_tick_after_the_one_before_and_then_stops(robot):
     play(robot, "paper.urp")
     assert state(robot) == ("paper.urp", "PLAYING", 1)
     until(robot, stopped(robot))
-    assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
+    assert reached(robot) == ALL
     assert state(robot) == ("paper.urp", "STOPPED", 0)
     done = [event.tick for event in robot.events if event.kind == "motion_done"]
     started = [event.tick for event in robot.events if event.kind == "motion_started"]
     assert started == [1, *(tick + 1 for tick in done[:-1])]
-
-
-def test_what_it_does_is_told_in_io_before_the_tick_in_which_it_is_so(robot):
-    robot.controller.changed_io()
-    play(robot, "Q2.urp")
-    assert robot.controller.changed_io().program_state == "PLAYING"
-    until(robot, stopped(robot))
-    assert robot.controller.changed_io().program_state == "STOPPED"
-
-
-def test_it_can_be_played_again(robot):
-    for _ in range(2):
-        play(robot, "Q2.urp")
-        until(robot, stopped(robot))
-    assert len(reached(robot)) == 2
-
-
-@pytest.mark.parametrize(
-    ("mode", "code"), [("POWER_OFF", "wrong_mode"), ("IDLE", "wrong_mode"), ("RUNNING", None)]
-)
-def test_it_starts_where_the_arm_may_move(mode, code):
-    robot = Robot(mode=mode)
-    robot.send(ProgramLoad, name="wait_program.urp")
-    reply = robot.send(ProgramPlay)
-    assert reply == Done() if code is None else reply.code == code
 
 
 def test_what_was_not_loaded_cannot_play_and_what_is_not_there_cannot_be_loaded(robot):
@@ -117,55 +80,33 @@ def test_loading_and_stopping_are_for_anyone_and_playing_and_pausing_are_not(rob
     assert receive(ProgramLoad(name="Q2.urp")) == Done()
     assert receive(ProgramPlay(token="x")).code == "stale_token"
     robot.send(ProgramPlay)
-    assert receive(ProgramPause(token="x")).code == "stale_token"
-    assert receive(ProgramStop(token="x")).code == "stale_token"
+    for kind in (ProgramPause, ProgramStop):
+        assert receive(kind(token="x")).code == "stale_token"
     robot.tick(100)
     assert receive(ProgramStop()) == Done()
     assert state(robot)[1] == "STOPPED"
-    robot.tick(LONG)
+    robot.until_rest()
     assert moves(robot)[-1] == "motion_stopped"
-    assert robot.controller.cycle.mode.at_rest
 
 
-def test_a_move_that_cannot_be_made_ends_it_with_its_line(robot):
-    bad = f"def bad():\n  movej({Q2.tolist()})\n  movej([0.0, 0.9, 0.0, 0.0, 0.0, 0.0])\nend\n"
-    robot.send(ProgramLoad, name="bad.script", text=bad)
-    robot.send(ProgramPlay)
-    until(robot, stopped(robot))
-    (warning,) = (event for event in robot.events if event.kind == "warning")
-    assert (warning.program, warning.line, warning.column) == ("bad.script", 3, 3)
-    assert "mm apart" in warning.why
-    robot.tick(LONG)
-    assert len(reached(robot)) == 1
-
-
+@pytest.mark.parametrize(("name", "ticks"), [("paper.urp", 700), ("wait_program.urp", 10)])
 @pytest.mark.parametrize(
     ("kind", "fields"),
-    [(c.Stop, {}), (c.PowerOff, {}), (c.ReleaseControl, {}), (SimulationReset, {"q": tuple(Q1)})]
-    + [(SimulationInject, {"fault": fault}) for fault in ("emergency_stop", "power_loss", "violation")],
+    [(c.PowerOff, {}), (c.ReleaseControl, {}), (ProgramStop, {}), (SimulationReset, {"q": tuple(Q1)})]
+    + [(SimulationInject, {"fault": fault}) for fault in ("emergency_stop", "violation")],
 )
-def test_what_ends_a_motion_for_good_ends_the_program(robot, kind, fields):
-    play(robot, "paper.urp")
-    robot.tick(700)
+def test_what_ends_all_motions_ends_the_program_while_it_moves_and_while_it_waits(
+    robot, kind, fields, name, ticks
+):
+    play(robot, name)
+    robot.tick(ticks)
+    assert state(robot)[1] == "PLAYING"
     robot.send(kind, **fields)
     robot.tick(600)
     assert state(robot)[1] == "STOPPED"
     started = sum(event.kind == "motion_started" for event in robot.events)
     ended = sum(event.kind in {"motion_done", "motion_stopped"} for event in robot.events)
     assert started == ended
-
-
-@pytest.mark.parametrize(
-    ("kind", "fields"),
-    [(c.PowerOff, {}), (c.ReleaseControl, {}), (SimulationReset, {}), (ProgramStop, {})],
-)
-def test_a_program_that_waits_ends_with_power_and_control_too(robot, kind, fields):
-    play(robot, "wait_program.urp")
-    robot.tick(10)
-    assert state(robot)[1] == "PLAYING"
-    robot.send(kind, **fields)
-    robot.tick(10)
-    assert state(robot)[1] == "STOPPED"
 
 
 def test_no_line_begins_after_a_stop_that_was_sent_before_it(robot):
@@ -179,43 +120,6 @@ def test_no_line_begins_after_a_stop_that_was_sent_before_it(robot):
     robot.tick(10)
     assert state(robot) == ("paper.urp", "STOPPED", 0)
     assert moves(robot) == ["motion_started", "motion_done"]
-
-
-@pytest.mark.parametrize("paused", [True, False])
-def test_no_program_survives_an_arm_without_power_though_it_has_it_again_before_the_next_tick(robot, paused):
-    play(robot, "paper.urp")
-    if paused:
-        robot.send(ProgramPause)
-    robot.send(c.PowerOff)
-    robot.send(c.PowerOn)
-    assert state(robot)[1] == "STOPPED"
-    robot.tick(10)
-    assert moves(robot) == []
-
-
-def test_a_program_that_waits_is_not_ended_by_a_stop_of_another_motion(robot):
-    play(robot, "wait_program.urp")
-    robot.send(c.MoveJ, q=tuple(Q2))
-    robot.tick(100)
-    robot.send(c.Stop)
-    robot.tick(LONG)
-    assert state(robot)[1] == "PLAYING"
-
-
-def test_a_program_ends_with_the_client_that_has_control():
-    robot = Robot(clock="realtime", lease_s=0.5)
-    play(robot, "paper.urp")
-    robot.tick(400)
-    assert state(robot)[1] == "STOPPED"
-    assert any(event.kind == "lease_lost" for event in robot.events)
-
-
-def test_a_program_goes_on_for_the_client_that_control_is_handed_to(robot):
-    play(robot, "paper.urp")
-    robot.tick(100)
-    robot.send(c.HandOver, client="b")
-    until(robot, stopped(robot))
-    assert len(reached(robot)) == 5
 
 
 @pytest.mark.parametrize("fault", ["protective_stop", "nan"])
@@ -233,7 +137,7 @@ def test_a_protective_stop_pauses_it_and_playing_goes_on_with_the_line_that_was_
     assert state(robot) == ("paper.urp", "PAUSED", 3)
     assert robot.send(ProgramPlay) == Done()
     until(robot, stopped(robot))
-    assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
+    assert reached(robot) == ALL
 
 
 def test_pause_holds_the_motion_and_play_goes_on_with_it(robot):
@@ -264,65 +168,19 @@ def test_a_motion_that_ends_while_it_is_paused_leaves_the_next_line_to_play(robo
     robot.send(ProgramPlay)
     until(robot, stopped(robot))
     assert line in {3, 4}
-    assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
-
-
-def test_a_safeguard_holds_the_motion_and_the_program_waits_with_it(robot):
-    play(robot, "Q2.urp")
-    robot.tick(200)
-    robot.send(SimulationInject, fault="safeguard_stop")
-    robot.tick(1000)
-    assert state(robot)[1] == "PLAYING"
-    robot.send(SimulationInject, fault="normal")
-    until(robot, stopped(robot))
-    assert reached(robot) == [Q2.tolist()]
+    assert reached(robot) == ALL
 
 
 def test_a_safeguard_between_two_lines_has_the_next_one_wait(robot):
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)
-    assert robot.controller.cycle.mode.at_rest
     robot.send(SimulationInject, fault="safeguard_stop")
     robot.tick(100)
     assert state(robot)[1] == "PLAYING"
     assert moves(robot) == ["motion_started", "motion_done"]
     robot.send(SimulationInject, fault="normal")
     until(robot, stopped(robot))
-    assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
-
-
-def test_a_pause_of_the_program_leaves_a_motion_that_is_not_its_own(robot):
-    play(robot, "wait_program.urp")
-    own = robot.send(c.MoveJ, q=tuple(Q2)).id
-    robot.tick(100)
-    assert robot.send(ProgramPause) == Done()
-    robot.tick(LONG)
-    assert [(event.kind, event.id) for event in robot.events if event.id is not None] == [
-        ("motion_started", own),
-        ("motion_done", own),
-    ]
-    assert state(robot)[1] == "PAUSED"
-    assert robot.send(ProgramPlay) == Done()
-
-
-@pytest.mark.parametrize("playing", [True, False])
-def test_the_end_of_the_lease_has_io_told_where_it_ends_a_program(robot, playing):
-    robot.send(ProgramLoad, name="wait_program.urp")
-    if playing:
-        robot.send(ProgramPlay)
-    robot.tick()
-    assert robot.controller.changed_io() is not None
-    robot.send(c.ReleaseControl)
-    assert (robot.controller.changed_io() is not None) == playing
-
-
-def test_loading_another_stops_the_one_that_runs(robot):
-    play(robot, "paper.urp")
-    robot.tick(700)
-    robot.send(ProgramLoad, name="Q3.urp")
-    assert state(robot) == ("Q3.urp", "STOPPED", 0)
-    robot.tick(LONG)
-    assert moves(robot)[-1] == "motion_stopped"
+    assert reached(robot) == ALL
 
 
 COMMANDS = {
@@ -346,7 +204,7 @@ COMMANDS = {
 }
 
 
-@examples(40)
+@examples(30)
 @given(
     st.lists(st.tuples(st.sampled_from(sorted(COMMANDS)), st.sampled_from([0, 1, 3, 100, 600])), max_size=25)
 )
@@ -379,8 +237,7 @@ def test_whatever_happens_every_motion_ends_once_and_only_a_playing_program_begi
     assert sorted(ended) == sorted(ours | wanted)
 
 
-def test_the_label_that_the_program_has_passed_is_told_with_its_line_until_it_ends(robot):
-    text = """
+LABELS = """
 def p():
   thread t():
     $ 9 "Thread_1"
@@ -397,12 +254,15 @@ def p():
   sleep(0.2)
 end
 """
-    assert robot.send(ProgramLoad, name="p", text=text) == Done()
-    assert robot.send(ProgramPlay) == Done()
+
+
+def test_the_label_that_the_program_has_passed_is_told_with_its_line_until_it_ends(robot):
+    robot.send(ProgramLoad, name="p", text=LABELS)
+    robot.send(ProgramPlay)
     seen = []
     for _ in range(300):
         robot.tick()
         label, line = robot.controller.io().program_label, robot.controller.io().program_line
-        if not seen or seen[-1] != (line, label and (label.number, label.name)):
-            seen.append((line, label and (label.number, label.name)))
+        now = (line, label and (label.number, label.name))
+        seen += [now] if [now] != seen[-1:] else []
     assert seen == [(1, None), (8, (2, "Wait: 0.2")), (15, (3, "Wait: 0.2")), (0, None)]

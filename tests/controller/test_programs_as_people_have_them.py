@@ -1,14 +1,20 @@
 """Programs as PolyScope and others write them: the set-up before the program, what is not simulated, run states."""
 
+from pathlib import Path
+
 import pytest
 
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.programs.checking import check_program
+from tvist_controller.programs.functions.unsimulated import SUBJECTS
+from tvist_controller.programs.library import known_signatures
+from tvist_controller.programs.table import page
 from tvist_protocol.programs import ProgramPause, ProgramPlay
 from tvist_protocol.replies import Done
+from tvist_urscript import METHOD
 
 from .robots import UR5E
-from .scripts import URSIM, a_robot, failure, finish, playing, run, said, start
+from .scripts import URSIM, a_robot, failure, finish, playing, run, said, script, start
 
 PREAMBLE = """
 set_standard_analog_input_domain(0, 1)
@@ -57,35 +63,19 @@ def test_a_preamble_is_accepted_and_what_it_sets_shows_in_rtde():
     assert (snapshot.tool_digital_output0_mode, snapshot.tool_digital_output1_mode) == (2, 3)
 
 
-def test_the_older_call_for_ranges_of_inputs_knows_those_of_the_tool():
-    robot = run(
-        a_robot(),
-        *[f"set_analog_inputrange({port}, {which})" for port, which in ((0, 0), (1, 2), (2, 2), (3, 0))],
-    )
-    io = robot.controller.io()
-    assert failure(robot) is None
-    assert (io.analog_io_types & 3, io.tool_analog_input_types) == (3, 2)
-    assert "must be 0 or 2" in failure(run(robot, "set_analog_inputrange(0, 1)")).why
-
-
 @pytest.mark.parametrize(
     ("call", "why"),
     [
         ("set_tool_analog_input_domain(2, 0)", "port is 2: it must be from 0 to 1"),
         ("set_tool_output_mode(2)", "mode is 2: it must be from 0 to 1"),
-        ("set_tool_digital_output_mode(0, 0)", "mode is 0: it must be from 1 to 3"),
         ("set_tool_communication(True, 9601, 0, 1, 1.5, 3.5)", "baud_rate is 9601: it must be one of 9600"),
-        ("set_tool_communication(True, 9600, 3, 1, 1.5, 3.5)", "parity is 3"),
         ("set_tool_communication(True, 9600, 0, 1, 0.5, 3.5)", "rx_idle_chars is 0.5: it must be from 1 to 40"),
         ('set_gp_boolean_input_action(128, "default")', "port is 128: it must be from 0 to 127"),
         ('set_standard_digital_input_action(0, "stop")', 'action is stop: it must be "default" or "freedrive"'),
-        ("set_safety_mode_transition_hardness(2)", "type is 2"),
-        ("motion_version_set(3)", "version is 3: it must be from 1 to 2"),
         ("jerk_gain_scaling_set(0)", "gain is 0: it must be from 0.01 to 1"),
         ("set_base_acceleration([0.1, 0, 0])", "the simulated arm's base stands"),
         ("set_runstate_tool_digital_output_to_value(2, 1)", "outputId is 2: it must be from 0 to 1"),
         ("set_runstate_standard_digital_output_to_value(0, 6)", "whether the arm has power are not simulated"),
-        ("position_deviation_warning(True, 1.5)", "threshold is 1.5"),
         ("time(2)", "mode is 2; this controller has no clock of the day"),
         ('modbus_add_signal("1.2.3.4", 255, 0, 0, "x", True)', "does not simulate Modbus"),
         ("x = struct(a=1)\n  x.go(1)", "go: this controller does not simulate remote procedure calls and Ethernet/IP"),
@@ -110,15 +100,9 @@ def test_what_asks_for_something_that_is_not_there_is_said(call, why):
 
 
 def test_time_is_the_robots_and_random_the_same_in_each_run():
-    lines = (
-        "a = time()",
-        "sleep(1.5)",
-        "b = time()",
-        "textmsg(b.sec - a.sec + (b.nanosec - a.nanosec) / 1000000000)",
-    )
-    robot = run(a_robot(), *lines, "textmsg([random(), random()])")
-    again = run(robot, "textmsg([random(), random()])")
-    apart, first, second = said(again)
+    apart = "textmsg(b.sec - a.sec + (b.nanosec - a.nanosec) / 1000000000)"
+    robot = run(a_robot(), "a = time()", "sleep(1.5)", "b = time()", apart, "textmsg([random(), random()])")
+    apart, first, second = said(run(robot, "textmsg([random(), random()])"))
     assert (apart, first == second) == ("1.5", True)
     one, other = map(float, first.strip("[]").split(","))
     assert 0.0 <= one < 1.0 > other >= 0.0
@@ -134,49 +118,12 @@ def test_variables_of_rtde_are_those_that_clients_get():
         "tcp_offset",
         "payload",
     )
-    robot = a_robot()
-    start(robot, "write_output_integer_register(7, -9)", "write_output_boolean_register(64, True)", "sync()",
-          *(f'textmsg(get_rtde_value("{key}"))' for key in keys))  # fmt: skip
-    finish(robot)
-    assert failure(robot) is None
+    robot = run(a_robot(), "write_output_integer_register(7, -9)", "write_output_boolean_register(64, True)", "sync()",
+                *(f'textmsg(get_rtde_value("{key}"))' for key in keys), 'get_rtde_value("_kept")')  # fmt: skip
+    assert '"_kept"' in failure(robot).why
     q, *others = said(robot)
     assert [float(one) for one in q.strip("[]").split(", ")] == pytest.approx(URSIM, abs=1e-6)
     assert others == ["2", "-9", "True", "[0, 0, 0, 0, 0, 0]", "5"]
-
-
-@pytest.mark.parametrize("key", ["joint_temperatures", "state", "_kept", "output_int_register_48"])
-def test_a_variable_that_programs_do_not_get_is_refused_by_its_name(key):
-    assert f'"{key}"' in failure(run(a_robot(), f'x = get_rtde_value("{key}")')).why
-
-
-def test_a_check_names_all_that_is_missing_at_once():
-    text = """
-def library():
-  h = rpc_factory("xmlrpc", "http://127.0.0.1:8080")
-  x = h.weigh(modbus_get_error("a")).mass
-end
-def other():
-  write_port_bit(3, nowhere)
-  get_conveyor_tick_count()
-end
-"""
-    found = [(one.line, one.column, one.level, one.text.partition(":")[0]) for one in check_program(text)]
-    assert found == [
-        (3, 7, "warning", "rpc_factory"),
-        (4, 9, "warning", "weigh"),
-        (4, 15, "warning", "modbus_get_error"),
-        (7, 3, "warning", "write_port_bit"),
-        (7, 21, "error", "compile_error_name_not_found"),
-        (8, 3, "warning", "get_conveyor_tick_count"),
-    ]
-
-
-def test_a_library_is_checked_with_a_warning_that_it_does_nothing():
-    library = "def a(x):\n  return b(x)\nend\ndef b(x):\n  return x\nend\n"
-    assert [(one.level, one.text) for one in check_program(library)] == [
-        ("warning", "the text only defines functions: as a program, it ends at once")
-    ]
-    assert check_program(library + "a(1)\n") == []
 
 
 def outputs(robot):
@@ -214,20 +161,9 @@ def test_outputs_show_whether_the_program_runs_is_paused_or_has_ended():
     assert robot.controller.io().output_bit_register[3] == 0
 
 
-@pytest.mark.parametrize("how", ["error", "protective stop"])
+@pytest.mark.parametrize("how", ["x = [][0]", "protective_stop()"])
 def test_an_error_or_a_stop_shows_at_the_outputs_that_tell_of_it(how):
-    robot = a_robot()
-    assert (
-        start(robot, *CHOICES, "sleep(0.01)", "x = [][0]" if how == "error" else "protective_stop()")
-        == Done()
-    )
-    finish(robot)
-    assert outputs(robot) == [False, True, False, False, False]
-
-
-def test_outputs_are_left_alone_once_their_choice_is_taken_back():
-    robot = run(a_robot(), *CHOICES, *[one.replace(", 3)", ", 0)") for one in CHOICES if ", 3)" in one])
-    assert outputs(robot)[2] is True
+    assert outputs(run(a_robot(), *CHOICES, "sleep(0.01)", how)) == [False, True, False, False, False]
 
 
 def test_powerdown_ends_the_program_and_the_power():
@@ -235,3 +171,83 @@ def test_powerdown_ends_the_program_and_the_power():
     robot.tick(5)
     assert (said(robot), playing(robot)) == ([], False)
     assert robot.states[-1].robot_mode == 3
+
+
+def found(*lines):
+    return [(one.line, one.column, one.level) for one in check_program(script(*lines))]
+
+
+def test_a_program_that_can_run_has_nothing_wrong():
+    assert check_program(script("movej([0, 0, 0, 0, 0, 0])", 'textmsg("done")')) == []
+
+
+def test_every_error_is_found_in_the_order_of_the_text():
+    assert found("movj(1)", "x = 1", "movej(y)", 'textmsg("a", b=3)') == [
+        (2, 3, "error"), (4, 9, "error"), (5, 16, "error"),
+    ]  # fmt: skip
+
+
+def test_of_a_text_that_is_no_program_the_first_token_that_does_not_fit_is_found():
+    (finding,) = check_program("def prog():\n  if x\nend\n")
+    assert (finding.line, finding.level) == (2, "error")
+    assert finding.text.startswith("syntax_error_on_line:2:")
+
+
+def test_functions_that_are_not_simulated_are_warnings_beside_the_errors():
+    assert found("path_offset_enable()", "sleep(1)", "nope()", "end_freedrive_mode()", "path_offset_enable()") == [
+        (2, 3, "warning"), (4, 3, "error"), (6, 3, "warning"),
+    ]  # fmt: skip
+    (finding, *_) = check_program(script("path_offset_enable()"))
+    assert finding.text == "path_offset_enable: this controller does not simulate path offsets"
+
+
+THREAD = ("thread job():", "x = {}", "sync()", "end", "t = run job()")
+
+
+@pytest.mark.parametrize(
+    ("before", "value", "warned"),
+    [
+        ("hold = 0.5", "2 * hold + hold", True),
+        ("if True:\n hold = 0.5\nend", "[1, sin(hold)]", True),
+        ("hold = [1, 2]", "hold[0]", True),
+        ("global hold = 0.5", "hold", False),
+        ("hold = 1\nglobal hold = 2", "hold", False),
+        ("hold = 1", "1\nhold = 2\nx = hold", False),
+    ],
+)
+def test_a_variable_that_a_robot_does_not_find_in_a_thread_is_a_warning(before, value, warned):
+    text = script(*before.split("\n"), *(line.format(value) for line in THREAD))
+    warnings = [one for one in check_program(text) if "in the thread job" in one.text]
+    assert [one.level for one in warnings] == ["warning"] * warned
+    for one in warnings:
+        assert text.split("\n")[one.line - 1][one.column - 1 :].startswith("hold")
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("def p():\nwhile True:\nsync()\nend\nsleep(1)\nend\n", [4]),
+        ("# a\ndef p():\n  if True:\n    sync()\nend # if\n  sleep(1)\nend\n", [5]),
+        ("def f():\n  sync()\nend\ndef p():\ndef g():\nend\nf()\nend\np()\n", [6]),
+        ("def p():\n  while True:\n    sync()\n  end\nend_force_mode()\nend\n", []),
+        ("def p():\r\n  sync()\r\nend\r\n", []),
+    ],
+)
+def test_an_end_in_column_one_before_that_of_the_program_is_a_warning(text, lines):
+    warnings = [one for one in check_program(text) if "in column 1" in one.text]
+    assert [(one.line, one.column, one.level) for one in warnings] == [(line, 1, "warning") for line in lines]
+
+
+def test_every_function_that_is_not_simulated_is_warned_of():
+    for name in SUBJECTS.keys() - {METHOD}:
+        needed = [one.name for one in known_signatures()[name].parameters][
+            : known_signatures()[name].required
+        ]
+        (finding,) = check_program(script(f"{name}({', '.join('0' for _ in needed)})"))
+        assert (finding.line, finding.level) == (2, "warning")
+        assert finding.text.startswith(f"{name}: ")
+
+
+def test_the_page_of_the_functions_is_up_to_date():
+    reference = Path(__file__).parents[2] / "docs" / "reference" / "urscript-functions.md"
+    assert reference.read_text(encoding="utf-8") == page()

@@ -4,13 +4,15 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_controller.instruments import state_layout
 from tvist_controller.loopback import LoopbackHost
 from tvist_lab.in_process import free_setup
 from tvist_protocol.codec import decode, encode
-from tvist_protocol.commands import MoveJ, ServoStart, Setpoint, TakeControl
+from tvist_protocol.commands import MoveJ, TakeControl
+from tvist_protocol.io import Io
 from tvist_protocol.simulation import SimulationStep
 from tvist_protocol.stream import State
+
+from .robots import UR5E, Robot
 
 TICKS = (0, 1, 127, 128, 255, 256, 65535, 65536, 2**32 - 1, 2**32, 2**40)
 """Numbers on either side of every change of their encoded size."""
@@ -53,51 +55,12 @@ def test_in_motion_and_at_rest(shaper):
         assert_same(told.step(20))
 
 
-def test_of_another_arm():
-    told = Told(robot="ur3e")
-    assert_same(told.moving(40))
-
-
-def test_with_a_tool():
-    told = Told()
-    report = told.moving(40)
-    other = msgspec.structs.replace(
-        report,
-        arm=report.arm.with_tool((0.1, -0.2, 0.3, 1.0, 2.0, -0.5)),
-        made=None,
-        written=None,
-    )
-    assert_same(other)
-    assert other.state.actual_TCP_pose != report.state.actual_TCP_pose
-
-
-@pytest.mark.parametrize("plain", [False, True], ids=["compiled", "python"])
 @pytest.mark.parametrize("number", TICKS)
-def test_of_any_tick_and_set_point(number, plain, monkeypatch):
+def test_of_any_tick_and_set_point(number):
     report = Told().moving(30)
-    if plain:
-        for name, function in vars(state_layout).copy().items():
-            if hasattr(function, "py_func"):
-                monkeypatch.setattr(state_layout, name, function.py_func)
-        monkeypatch.setattr("tvist_controller.instruments.report.write_state", state_layout.write_state)
     for sequence in (None, 0, number):
-        changed = msgspec.structs.replace(
-            report, tick=number, sequence=sequence, missed=number, made=None, written=None
-        )
-        assert_same(changed)
-
-
-def test_one_layout_serves_until_something_else_changes():
-    told = Told()
-    layouts = told.moving(300).layouts
-    assert told.host.controller.report.encoded
-    ((key, known),) = layouts.items()
-    for _ in range(5):
-        assert told.step(10).encoded
-    assert layouts[key] is known
-    assert msgspec.structs.replace(told.step(), missed=7, written=None).encoded
-    assert len(layouts) == 1
-    assert key not in layouts
+        changed = {"tick": number, "sequence": sequence, "missed": number}
+        assert_same(msgspec.structs.replace(report, **changed, made=None, written=None))
 
 
 def test_a_number_of_any_kind_survives():
@@ -106,13 +69,35 @@ def test_a_number_of_any_kind_survives():
     assert report.encoded == encode(report.state)
 
 
-def test_with_set_points():
-    told = Told()
-    told.do(ServoStart(token=told.token, period=0.002))
-    q = np.array(told.host.controller.report.state.actual_q)
-    for number in range(300):
-        put = Setpoint(token=told.token, sequence=number, q=tuple((q + 1e-5 * number).tolist()))
-        told.host.put_setpoint("test", encode(put))
-        report = told.step()
-        assert_same(report)
-    assert report.state.setpoint_sequence == 299
+Q2 = UR5E.poses["Q2"]
+
+
+def test_before_the_first_tick_the_state_is_that_of_the_arm_at_rest_where_it_starts():
+    robot = Robot()
+    first = robot.controller.latest
+    assert (first.tick, first.timestamp) == (0, 0.0)
+    assert first.reference_q == first.target_q == list(UR5E.poses["Q1"])
+    assert set(first.target_qd + first.target_qdd) == {0.0}
+    after = robot.tick()
+    assert first.actual_q == pytest.approx(after.actual_q, abs=1e-9)
+    assert first.actual_moment == pytest.approx(after.actual_moment, abs=1e-6)
+    assert first.estimated_f_d == after.estimated_f_d
+    assert (first.robot_mode, first.safety_mode, first.runtime_state) == (
+        after.robot_mode,
+        after.safety_mode,
+        after.runtime_state,
+    )
+
+
+def test_who_subscribes_in_process_is_told_at_once_and_the_run_stays_the_same():
+    from tvist_controller.loopback import LoopbackHost
+
+    told = []
+    asked, unasked = LoopbackHost(free_setup()), LoopbackHost(free_setup())
+    for _ in range(3):  # to ask often changes as little as to ask once
+        asked.subscribe("state", lambda data: told.append(decode(State, data)))
+    asked.subscribe("io", lambda data: told.append(decode(Io, data)))
+    assert [message.tick for message in told] == [0, 0, 0, 1]
+    for host in (asked, unasked):
+        host.controller.tick()
+    assert asked.controller.latest == unasked.controller.latest

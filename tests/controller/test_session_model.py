@@ -10,12 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
-from hypothesis.stateful import (
-    RuleBasedStateMachine,
-    precondition,
-    rule,
-    run_state_machine_as_test,
-)
+from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
 from tests.examples import share
 
 from tvist_controller.controller import Controller
@@ -37,6 +32,18 @@ TOKENS = st.sampled_from(["own", "own", "own", "own", "own", "old", "none of our
 MOTION = {name: kind for name, (kind, _) in COMMANDS.items()}
 NUMBERED = {"move_j", "servo_j", "speed_j", "speed_l"}
 """Commands that are answered by the number of a motion."""
+INTERFERING = [
+    "pause",
+    "pause",
+    "resume",
+    "servo_stop",
+    "stop",
+    "power_off",
+    "servo_j",
+    "speed_j",
+    "stop_j",
+    "stop_l",
+]
 PUT = {"RUNNING": Activity.REST, "IDLE": Activity.IDLE, "POWER_OFF": Activity.POWER_OFF}
 ENDS = {"motion_done", "motion_stopped"}
 
@@ -71,8 +78,6 @@ class Sessions(RuleBasedStateMachine):
         self.running: set[int] = set()
         self.told: list[str] = []
         """Kinds of events that the next tick must tell of."""
-
-    # ---------------------------------------------------------------- the model
 
     def receive(self, command, session=None):
         """The reply to a command, which is counted."""
@@ -129,8 +134,6 @@ class Sessions(RuleBasedStateMachine):
 
     def session(self, client):
         return SESSION if client in self.present else None
-
-    # ---------------------------------------------------------------- control
 
     # Hypothesis chooses among rules alike, whatever they do: so there are more of those that lead somewhere.
 
@@ -216,8 +219,6 @@ class Sessions(RuleBasedStateMachine):
         assert (released.code, self.robot.session.clock) == ("no_control", None)
         assert self.robot.tick_number == before
 
-    # ---------------------------------------------------------------- motion
-
     @rule(command=st.sampled_from(sorted(MOTION)), whose=TOKENS, offset=st.sampled_from([0.0, 0.02, 0.4]))
     def command(self, command, whose, offset):
         fields = {
@@ -257,23 +258,7 @@ class Sessions(RuleBasedStateMachine):
             self.wait(ticks)
 
     @precondition(lambda self: self.activity.moving)
-    @rule(
-        command=st.sampled_from(
-            [
-                "pause",
-                "pause",
-                "resume",
-                "servo_stop",
-                "stop",
-                "power_off",
-                "servo_j",
-                "speed_j",
-                "stop_j",
-                "stop_l",
-            ]
-        ),
-        whose=TOKENS,
-    )
+    @rule(command=st.sampled_from(INTERFERING), whose=TOKENS)
     def interfere(self, command, whose):
         self.command(command, whose, 0.0)
 
@@ -300,8 +285,6 @@ class Sessions(RuleBasedStateMachine):
                 self.heard, self.lease.ends = self.robot.now, self.robot.now + self.lease.seconds
             self.tick()
 
-    # ---------------------------------------------------------------- faults
-
     @rule(whose=TOKENS, fault=st.sampled_from(["protective_stop", "nan", "reduced", "normal"]))
     def inject(self, whose, fault):
         if self.send(SimulationInject, whose, fault=fault) is None:
@@ -324,8 +307,6 @@ class Sessions(RuleBasedStateMachine):
             self.go(Activity.PROTECTIVE_STOP)
         else:
             self.go(Activity.REST if self.activity.moving else self.activity)
-
-    # ---------------------------------------------------------------- time
 
     @rule(ticks=st.sampled_from([1, 5, 60, 130, 400]))
     def wait(self, ticks):

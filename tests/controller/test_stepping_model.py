@@ -70,8 +70,6 @@ class Steps(RuleBasedStateMachine):
         self.fed = 0
         """Set-points that the robot took."""
 
-    # ---------------------------------------------------------------- the model
-
     def session(self, client):
         return f"session of {client}" if client in self.there else None
 
@@ -133,8 +131,6 @@ class Steps(RuleBasedStateMachine):
         assert len(self.sink.states) == self.robot.tick_number
         counters = self.robot.counters
         assert counters.setpoints_received - counters.setpoints_refused == self.fed
-
-    # ---------------------------------------------------------------- what clients do
 
     @rule(action=st.sampled_from(ACTIONS), client=st.sampled_from(CLIENTS), whose=TOKENS)
     def between(self, action, client, whose):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.controller.robots import Q2, UR5E, Robot
 
 from tvist_plant.description import Payload
 from tvist_plant.foreign import called
@@ -13,6 +12,8 @@ from tvist_protocol import commands as c
 from tvist_protocol.io import SetIo
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Refused
+
+from .robots import Q2, UR5E, Robot
 
 
 class OtherController:
@@ -24,16 +25,8 @@ class OtherController:
         self.q, self.holds, self.halt, self.forbids, self.ticks = np.array(Q2), False, None, None, 0
         self.sent = []
         still = Measurement(self.q, np.zeros(6), np.zeros(6), np.zeros(3))
-        self.sight = Sight(
-            0,
-            still,
-            np.array([self.q, *np.zeros((3, 6))]),
-            (7, 1, 1),
-            1.0,
-            0,
-            payload=self.payload,
-            slider=1.0,
-        )
+        shaped = np.array([self.q, *np.zeros((3, 6))])
+        self.sight = Sight(0, still, shaped, (7, 1, 1), 1.0, 0, payload=self.payload, slider=1.0)
 
     def described(self):
         return UR5E

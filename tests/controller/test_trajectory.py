@@ -1,18 +1,18 @@
 """Point-to-point motions."""
 
-from math import ceil
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Rest, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, quickest_motion
+from tvist_protocol import commands as c
+from tvist_protocol.modes import RuntimeState
+from tvist_protocol.replies import Accepted, Done
 
-from .robots import PAPER, Q1, Q2, Q3, H
+from .robots import PAPER, Q1, Q3, H, Robot
 
-MOTIONS = [(Q1, Q2, 1.8172), (Q1, Q3, 2.5153), (Q3, Q1, 2.5153)]
 angles = st.floats(-6.28, 6.28)
 
 
@@ -22,32 +22,6 @@ def played(motion: PlannedMotion, start) -> np.ndarray:
     while not motion.finished:
         points.append(motion.next())
     return np.array(points + [motion.next() for _ in range(3)])
-
-
-@pytest.mark.parametrize(("start", "target", "duration"), MOTIONS)
-def test_duration_follows_the_textbook(start, target, duration):
-    """Biagiotti and Melchiorri 2008, sec. 3.4, with the velocity limit reached."""
-    way = np.abs(target - start).max()
-    v, a, j = PAPER.velocity, PAPER.acceleration, PAPER.jerk
-    assert quickest_motion(JointLine(start, target), PAPER, H).duration == pytest.approx(
-        way / v + v / a + a / j, rel=1e-12
-    )
-
-
-@pytest.mark.parametrize(("start", "target", "duration"), MOTIONS)
-def test_on_the_tick_grid_the_target_is_reached_at_the_first_tick_after_the_end(start, target, duration):
-    points = played(quickest_motion(JointLine(start, target), PAPER, H), start)
-    arrived = np.flatnonzero((points == target).all(axis=1))[0]
-    assert arrived == ceil(duration / H)
-    assert (points[arrived:] == target).all()
-
-
-@pytest.mark.parametrize(("start", "target"), [(Q1, Q3), (np.zeros(6), np.array([1, -2, 3, 0, 1e-3, -0.5]))])
-def test_joints_are_in_phase(start, target):
-    points = played(quickest_motion(JointLine(start, target), PAPER, H), start)
-    share = (points - start) @ (target - start) / np.sum((target - start) ** 2)
-    assert np.abs(points - (start + share[:, None] * (target - start))).max() < 1e-12
-    assert (np.diff(share) > -1e-13).all()
 
 
 @examples(60)
@@ -74,19 +48,69 @@ def test_limits_hold_by_differences_and_the_end_is_exact(ends, velocity, acceler
     assert np.abs(np.diff(points, 3, axis=0) / H**3).max(initial=0) <= jerk * (1 + 1e-6) + 1e-4
 
 
-def test_a_way_of_zero_length_is_over_at_once():
-    motion = quickest_motion(JointLine(Q1, Q1), PAPER, H)
-    assert motion.finished
-    assert motion.duration == 0.0
-    assert (motion.next() == Q1).all()
+TOLERANCE = 1.002
+"""The double S itself has its acceleration as a difference over two ticks."""
 
 
-def test_a_motion_of_hours_is_an_error_with_the_limits_in_it():
-    with pytest.raises(ValueError, match="velocity 1e-05, acceleration 2, jerk 100"):
-        quickest_motion(JointLine(Q1, Q2), MotionLimits(1e-5, 2.0, 100.0), H)
+def with_speeds(speeds, limits=PAPER, most=20_000):
+    """A motion from Q1 to Q3 with the speed given at each tick; positions, and rates after each tick."""
+    motion = quickest_motion(JointLine(Q1, Q3), limits, H)
+    q, rates = [Q1, Q1], []
+    for tick in range(most):
+        motion.speed = speeds(tick)
+        q.append(motion.next())
+        rates.append(motion.rate)
+        if motion.finished:
+            break
+    q += [q[-1]] * 3
+    return np.array(q), np.array(rates)
 
 
-def test_rest_stays():
-    rest = Rest(Q2)
-    assert rest.finished
-    assert all((rest.next() == Q2).all() for _ in range(10))
+def accelerations(q):
+    return np.abs(np.diff(q, 2, axis=0)).max() / H**2
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_whatever_the_slider_does_acceleration_and_velocity_stay_inside_the_limits(seed):
+    random = np.random.default_rng(seed)
+    speeds = np.repeat(random.choice([0.0, 0.1, 0.5, 0.8, 1.0], 400), random.integers(5, 200, 400))
+    q, _ = with_speeds(lambda tick: float(speeds[tick]) if tick < len(speeds) else 1.0)
+    assert accelerations(q) <= PAPER.acceleration * TOLERANCE
+    assert np.abs(np.diff(q, axis=0)).max() / H <= PAPER.velocity * (1.0 + 1e-9)
+    assert np.array_equal(q[-1], Q3)
+
+
+def test_half_speed_from_the_start_takes_twice_as_long_on_the_same_way():
+    robot = Robot()
+    assert robot.send(c.SetSpeed, fraction=0.5) == Done()
+    robot.send(c.SetShaper, name="none")
+    assert robot.send(c.MoveJ, q=tuple(Q3)) == Accepted(id=1)
+    robot.until_rest()
+    started, done = (
+        next(e.tick for e in robot.events if e.kind == kind) for kind in ("motion_started", "motion_done")
+    )
+    assert (done - started) * H == pytest.approx(2.0 * 2.5153, abs=0.01)
+    way = (robot.column("reference_q") - Q1) @ (Q3 - Q1) / np.sum((Q3 - Q1) ** 2)
+    off = robot.column("reference_q") - Q1 - way[:, None] * (Q3 - Q1)
+    assert np.abs(off).max() < 1e-9
+    assert {state.speed_scaling for state in robot.states} == {0.5}
+
+
+def test_a_pause_brings_the_arm_to_rest_on_its_way_and_resume_takes_it_to_the_target():
+    robot = Robot()
+    robot.send(c.MoveJ, q=tuple(Q3))
+    robot.tick(500)
+    assert robot.send(c.Pause) == Done()
+    assert robot.tick().runtime_state == RuntimeState.PAUSING
+    robot.tick(1500)
+    paused = robot.states[-1]
+    assert paused.runtime_state == RuntimeState.PAUSED
+    assert paused.speed_scaling == 0.0
+    assert np.abs(robot.column("target_q")[-100:] - paused.target_q).max() < 1e-9
+    assert "motion_done" not in robot.kinds()
+    assert robot.send(c.MoveJ, q=tuple(Q1)).code == "busy"
+    assert robot.send(c.Resume) == Done()
+    robot.until_rest()
+    assert robot.kinds() == ["motion_started", "motion_done"]
+    assert np.allclose(robot.states[-1].target_q, Q3, atol=1e-7)
+    assert np.abs(robot.column("target_qdd")).max() <= 2.1

@@ -15,10 +15,7 @@ MOST = 1000
 @contextmanager
 def robot(path, *options, clock="lockstep"):
     """A served robot that records, and somebody with control of it."""
-    with (
-        Served("--clock", clock, "--record", str(path), *options) as served,
-        Wire(served.endpoint) as wire,
-    ):
+    with Served("--clock", clock, "--record", str(path), *options) as served, Wire(served.endpoint) as wire:
         wire.listen("event", "state")
         answer = wire.command("take_control", client="somebody", lease_s=30.0)
         yield Hand(wire, answer["token"], lockstep=clock == "lockstep")

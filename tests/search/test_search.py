@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.search import changes, draws, programs, sequences, stops, streams
+from tests.search import changes, draws, paths, programs, sequences, stops, streams
 from tests.search.subject import Subject, own_calibration, speeds
 
 from tvist_controller.api.line import paper_payload
@@ -51,6 +51,12 @@ def number(case):
 def test_a_stop_stays_on_the_way_behind_the_motion_and_keeps_the_limits(arm, number):
     outcome = stops.judge(arm, stops.draw(arm, number))
     assert outcome.kept, outcome
+
+
+@pytest.mark.search
+def test_a_path_of_the_tool_is_where_it_should_be_and_so_is_its_stop(number):
+    paths.judge(number)
+    paths.judge_stop(number)
 
 
 @pytest.mark.search

@@ -1,0 +1,69 @@
+"""Dumps of UR's real-time interface, port 30003: packets as they came over the socket, in a file."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from tvist_lab.recordings.checks import LogError
+from tvist_lab.recordings.packed import content
+from tvist_lab.recordings.table import BINARY, STRANGE, Table, reader
+
+SIZES = (1044, 1060, 1108, 1116, 1140, 1220)
+"""Lengths of a packet [bytes], from software 3.0 on; each later one begins like the earlier ones."""
+OLD = 812
+"""Length of a packet of software 1.8, in another order."""
+
+
+@reader(BINARY)
+def read_dump(path: Path) -> Table:
+    """Read a dump of port 30003 of any software from 3.0 on. It may begin and end within a packet."""
+    from tvist_server.gateways.ur.realtime import LAYOUT
+
+    data = content(path)
+    starts, size, skipped = _packets(path, data)
+    doubles = np.array([np.frombuffer(data, ">f8", (size - 4) // 8, at + 4) for at in starts])
+    names, places, first = list[str](), list[int](), 0
+    for name, count in LAYOUT:
+        if name is not None and first + count <= (SIZES[0] - 4) // 8:  # what packets of every software have
+            names += [name] if count == 1 else [f"{name}_{index}" for index in range(count)]
+            places += range(first, first + count)
+        first += count
+    notes = (f"{skipped} bytes outside complete packets were left out",) if skipped else ()
+    values = doubles[:, places].astype(np.float64)
+    values[~np.isfinite(values)] = np.nan
+    return Table(path, names, values, np.arange(1.0, len(starts) + 1.0), "packet", notes=notes, rtde=True)
+
+
+def _packets(path: Path, data: bytes) -> tuple[list[int], int, int]:
+    """First byte of each packet, the packets' length, and the number of bytes that belong to none."""
+    first, size = _first(path, data)
+    head = struct.pack(">i", size)
+    starts, at = [], first
+    while 0 <= at <= len(data) - size:
+        following = data[at + size : at + size + 4]
+        if data.startswith(head, at) and head.startswith(following):
+            starts.append(at)
+            at += size
+        else:  # bytes are missing: this packet is torn
+            at = data.find(head, at + 1)
+    return starts, size, len(data) - size * len(starts)
+
+
+def _first(path: Path, data: bytes) -> tuple[int, int]:
+    """First byte and length of the first packet that another one follows."""
+    for size in (*SIZES, OLD):
+        head = struct.pack(">i", size)
+        at = data.find(head)
+        while 0 <= at <= len(data) - size:
+            if at + size == len(data) or data[at + size : at + size + 4] == head[: len(data) - at - size]:
+                if size == OLD:
+                    raise LogError(
+                        f"{path} is a dump of software 1.8 (packets of {OLD} bytes); 3.0 and later are read"
+                    )
+                return at, size
+            at = data.find(head, at + 1)
+    raise LogError(
+        f"{path} {STRANGE}: no MCAP, no text, and no packets of port 30003 of "
+        f"{', '.join(map(str, SIZES))} bytes"
+    )

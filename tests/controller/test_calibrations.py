@@ -1,0 +1,118 @@
+"""A calibration belongs to the arm it was measured on, and a robot says so where it is another one."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from tvist_controller.about import info_of
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.sources.calibrations import available, default_for, estimator_of, load, modal_estimator
+from tvist_plant.description import fingerprint, robots
+from tvist_plant.description import load as load_robot
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_protocol import commands as c
+from tvist_shaping.errors import EstimatorError
+
+from .robots import UR5E, Robot
+
+REPLACE = msgspec.structs.replace
+SHIPPED = [load_robot(name) for name in robots()]
+SOFT = REPLACE(
+    UR5E, drives=REPLACE(UR5E.drives, gear_stiffness=tuple(0.5 * k for k in UR5E.drives.gear_stiffness))
+)
+RENAMED = REPLACE(
+    UR5E, robot=REPLACE(UR5E.robot, name="left"), limits=REPLACE(UR5E.limits, position=(3.2,) * 6)
+)
+
+
+def warnings(robot):
+    robot.tick()
+    return [event.why for event in robot.events if event.kind == "warning"]
+
+
+@pytest.mark.parametrize("name", available())
+def test_the_calibrations_of_the_package_are_of_its_robot(name):
+    calibration = load(name)
+    (arm,) = (arm for arm in SHIPPED if arm.robot.model == calibration.robot)
+    assert calibration.provenance.arm == fingerprint(arm)
+
+
+def test_where_the_arm_is_the_one_measured_nothing_is_said():
+    robot = Robot(RENAMED, calibration=load("ur5e_5kg"))
+    assert warnings(robot) == []
+    assert info_of(robot.controller).calibration.fits_arm is True
+
+
+def test_a_softer_arm_with_the_calibration_of_the_package_is_a_warning_at_the_start():
+    robot = Robot(SOFT, calibration=load("ur5e_5kg"))
+    (why,) = warnings(robot)
+    assert "'ur5e_5kg' was measured on a different arm" in why
+    assert "tvist identify" in why
+    assert info_of(robot.controller).calibration.fits_arm is False
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return load("ur5e_modal")
+
+
+def test_it_is_near_the_true_modes_with_any_payload(shipped):
+    """By chance a dozen noisy ring-downs may do worse; this is the file that ships."""
+    rng = np.random.default_rng(2025)
+    off = []
+    for _ in range(60):
+        q = rng.uniform([-np.pi, -np.pi, -2.6, -np.pi, 0, 0], [np.pi, 0, 2.6, 0, 0, 0])
+        payload = paper_payload(UR5E, float(rng.uniform(0.0, 5.0)))
+        true = FlexibleArm(UR5E, body(payload)).modes(q)
+        f_d, zeta = modal_estimator(shipped, UR5E, payload, 3).estimate(q)
+        off.append((np.abs(f_d / true.f_d[:3] - 1.0), np.abs(zeta / true.zeta[:3] - 1.0)))
+    f_d, zeta = np.median(off, axis=0)
+    assert (f_d < 0.02).all()
+    assert (zeta[:2] < 0.06).all()
+    assert zeta[2] < 0.25
+
+
+def test_a_calibration_without_the_model_asked_for_or_of_another_arm_is_refused(shipped):
+    for wrong, words in (
+        (REPLACE(shipped, robot="UR10e"), "'UR5e', which this arm"),
+        (load("ur5e_5kg"), "--model modal"),
+    ):
+        with pytest.raises(EstimatorError, match=words):
+            modal_estimator(wrong, UR5E, paper_payload(UR5E))
+    with pytest.raises(EstimatorError, match="polynomial"):
+        estimator_of(shipped)
+
+
+@pytest.mark.parametrize("quantity", ["gear_stiffness", "damping_time", "bending_stiffness"])
+def test_a_parameter_that_is_missing_or_said_twice_is_refused_by_name(shipped, quantity):
+    known = shipped.modal.parameters
+    one = [parameter for parameter in known if parameter.quantity == quantity]
+    for parameters in (tuple(other for other in known if other not in one), (*known, one[0])):
+        wrong = REPLACE(shipped, modal=REPLACE(shipped.modal, parameters=parameters))
+        with pytest.raises(EstimatorError, match=f"{quantity} of joints"):
+            modal_estimator(wrong, UR5E, paper_payload(UR5E))
+
+
+ONE_JOINT = load_robot("one-joint")
+
+
+@pytest.fixture
+def robot():
+    return Robot(ONE_JOINT, calibration=load(default_for(ONE_JOINT.robot.model)))
+
+
+def test_the_default_calibration_is_of_the_arm_itself_and_says_nothing_of_others(robot):
+    assert info_of(robot.controller).calibration.fits_arm is True
+    assert info_of(robot.controller).poses == ONE_JOINT.poses
+    assert (default_for("UR5e"), default_for("nobody's arm")) == ("ur5e_5kg", None)
+
+
+@pytest.mark.parametrize(("mass", "acceleration"), [(0.0, 10.0), (2.0, 2.0)])
+def test_the_first_move_after_a_rest_is_no_reason_to_doubt_the_payload(mass, acceleration):
+    """While the soft spring winds up, the motor carries nothing yet."""
+    for elbow in np.radians([-120.0, 0.0, 90.0]):
+        robot = Robot(ONE_JOINT, q=(0.0, elbow), payload=paper_payload(ONE_JOINT, mass), shaper="none")
+        robot.tick(1000)
+        robot.send(c.MoveJ, q=(-0.1, elbow - 0.1), acceleration=acceleration)
+        robot.until_rest()
+        assert "warning" not in robot.kinds()

@@ -1,0 +1,237 @@
+"""What is admitted, and that nothing else is even read."""
+
+import math
+from typing import get_args
+
+import msgpack
+import msgspec
+import pytest
+
+from tvist_controller.controller import Controller
+from tvist_controller.dispatch.admission import admit, admit_setpoint
+from tvist_controller.dispatch.rights import Authority, Lease, NoControlError, Presence, check_token
+from tvist_controller.dispatch.table import COMMANDS
+from tvist_controller.host import Host
+from tvist_controller.motion.setpoints import TIMEOUT
+from tvist_controller.planning.snapshot import MOTION
+from tvist_protocol import commands as c
+from tvist_protocol.channels import tag
+from tvist_protocol.codec import MAX_BYTES, encode
+from tvist_protocol.explain import EXPLAINED_BYTES
+from tvist_protocol.replies import Done, Refused
+from tvist_protocol.simulation import SimulationStep, StepSetpoint
+from tvist_protocol.transitions import TRANSITIONS, Activity
+
+from .robots import UR5E, H, Kept, setup
+
+LEASE = Lease("anna", "anna#1", 30.0, None)
+Q = (0.0,) * 6
+JUNK = [{}] * 100_000
+"""Takes a hundred ticks to read."""
+
+
+def refused(message, lease=LEASE):
+    reply = admit(message if isinstance(message, bytes) else msgpack.packb(message), lease)
+    assert isinstance(reply, Refused)
+    return reply.code, reply.where
+
+
+def test_the_holder_s_command_is_admitted_with_what_the_journal_keeps():
+    command = c.MoveJ(token="anna#1", q=Q)
+    admitted = admit(encode(command), LEASE)
+    assert admitted.command == command
+    assert admitted.content == msgspec.to_builtins(command)
+
+
+@pytest.mark.parametrize("token", ["", "anna#2", "bert#1"])
+def test_a_stranger_s_command_is_not(token):
+    assert refused(encode(c.MoveJ(token=token, q=Q))) == ("stale_token", "token")
+    assert refused(encode(c.MoveJ(token=token, q=Q)), None) == ("no_control", "token")
+    assert refused(encode(c.Stop(token=token))) == ("stale_token", "token")
+
+
+def test_anybody_may_stop_and_ask_for_control_that_is_free_or_his():
+    assert admit(encode(c.Stop()), LEASE).command == c.Stop()
+    assert admit(encode(c.TakeControl(client="bert")), None).command.client == "bert"
+    assert admit(encode(c.TakeControl(client="anna")), LEASE).command.client == "anna"
+    assert refused(encode(c.TakeControl(client="bert"))) == ("no_control", "token")
+
+
+LONG = {"type": "set_estimator", "token": "anna#1", "name": "polynomial", "calibration": {"a": JUNK}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "answer"),
+    [
+        ({"token": "x"}, ("stale_token", "token")),
+        ({"token": None}, ("missing_field", "token")),
+        ({"type": "move_j"}, ("malformed", "")),
+        ({"type": "nonsense"}, ("malformed", "")),
+        ({"type": None}, ("malformed", "")),
+        ({"type": JUNK}, ("malformed", "type")),
+        ({"token": JUNK}, ("malformed", "token")),
+        ({}, ("unknown_field", "calibration.a")),
+    ],
+)
+def test_of_a_long_message_little_is_read_before_its_sender_is_known(changes, answer):
+    data = msgpack.packb(LONG | changes)
+    assert EXPLAINED_BYTES < len(data) <= MAX_BYTES
+    assert refused(data) == answer
+
+
+def test_a_long_sentence_of_the_sender_s_is_cut():
+    reply = admit(msgpack.packb({"type": "x" * 100_000}), LEASE)
+    assert len(reply.why) < 200
+
+
+def test_a_step_of_a_thousand_setpoints_is_admitted():
+    setpoints = tuple(StepSetpoint(sequence=n, q=(3.0,) * 7) for n in range(1000))
+    command = SimulationStep(token="anna#1", ticks=1000, setpoints=setpoints)
+    assert admit(encode(command), LEASE).command == command
+
+
+def test_setpoints_are_the_holder_s_alone():
+    setpoint = {"type": "setpoint", "token": "anna#1", "sequence": 3, "q": Q}
+    assert admit_setpoint(msgpack.packb(setpoint), LEASE) == c.Setpoint(token="anna#1", sequence=3, q=Q)
+    assert admit_setpoint(msgpack.packb(setpoint), None) is None
+    for wrong in ({"token": "x"}, {"q": JUNK}):
+        assert admit_setpoint(msgpack.packb(setpoint | wrong), LEASE) is None
+    assert admit_setpoint(b"\xc1", LEASE) is None
+
+
+def authority(*, realtime=True, instance=""):
+    return Authority(lambda _: None, lambda *_, **__: None, realtime=realtime, instance=instance)
+
+
+@pytest.mark.parametrize("token", ["", "a", "a#2", "b#1", "a#1 "])
+def test_any_other_token_is_stale_and_renews_nothing(token):
+    session = authority()
+    session.take("a", 2.0, 0.0)
+    with pytest.raises(NoControlError, match="'a'") as caught:
+        session.renew(token, 1.0)
+    assert caught.value.reply.code == "stale_token"
+    assert session.ends == 2.0
+
+
+def test_without_timeouts_nothing_runs_out():
+    session = authority(realtime=False)
+    session.take("a", 0.1, 0.0)
+    assert session.ends == math.inf
+
+
+def test_a_token_of_before_a_restart_is_never_valid_again():
+    before, after = (authority(instance=instance) for instance in ("1f", "2e"))
+    old = before.take("a", 30.0, 0.0).token
+    new = after.take("a", 30.0, 0.0).token
+    assert (old, new) == ("a#1f.1", "a#2e.1")
+    with pytest.raises(NoControlError, match="not that of the current lease"):
+        check_token(after.lease, old)
+
+
+@pytest.mark.parametrize("second", ["2f", ""])
+def test_of_two_sessions_under_one_name_nobody_can_tell_who_asks(second):
+    presence = Presence()
+    presence.seen("a", "1f")
+    presence.seen("b", "1f")
+    assert (presence.session_of("a"), presence.session_of("c")) == ("1f", None)
+    assert presence.clients_of("1f") == ["a", "b"]
+    presence.seen("a", second)
+    with pytest.raises(NoControlError, match="'a'") as caught:
+        presence.session_of("a")
+    assert caught.value.reply.code == "no_control"
+    presence.gone("a", second)
+    presence.gone("a", second)  # once more changes nothing
+    assert presence.session_of("a") == "1f"
+    presence.gone("a", "1f")
+    assert presence.clients_of("1f") == ["b"]
+
+
+def test_every_command_has_a_row():
+    assert set(COMMANDS) == set(get_args(c.Command))
+
+
+def test_what_is_planned_on_the_arm_at_rest_is_what_moves_it_along_a_path():
+    """The row says on which state a command is planned, the table of transitions where it leads."""
+    planned = {tag(row.message) for row in COMMANDS.values() if row.plan and row.plan.needs is MOTION}
+    assert planned == {row.trigger for row in TRANSITIONS if row.target is Activity.MOVING} - {"resume"}
+
+
+Q1 = UR5E.poses["Q1"]
+SILENCE = round(TIMEOUT / H) + 1
+"""Ticks after which a stream without set-points is stopped."""
+
+
+@pytest.fixture
+def streaming():
+    """A host in real time whose client streams, and its sink."""
+    sink = Kept()
+    host = Host(Controller(setup(clock="realtime")), sink)
+    host.request(encode(c.TakeControl(client="a")))
+    host.request(encode(c.ServoStart(token=host.controller.session.lease.token)))
+    return host, sink
+
+
+def offered(host, **changes):
+    host.setpoint(encode(c.Setpoint(**{"token": "a#1", "sequence": 0, "q": Q1} | changes)))
+
+
+def end_of(host, sink):
+    for _ in range(SILENCE):
+        host.tick()
+    (event,) = [event for event in sink.events if event.kind == "stream_stopped"]
+    return event.why
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ({"q": Q1[:5]}, "q has 5 angles; the arm has 6"),
+        ({"q": (math.nan, *Q1[1:])}, "q[0] is NaN, not a number"),
+        ({"q": (*Q1[:5], math.inf)}, "q[5] is inf: must be at most 1000"),
+        ({"q": (*Q1[:5], 6.5)}, "q[5] is 6.5 rad; the joint goes to ±6.28319"),
+    ],
+)
+def test_the_end_of_a_silent_stream_names_the_last_refusal(streaming, fault, said):
+    host, sink = streaming
+    offered(host, token=host.controller.session.lease.token, sequence=1)
+    offered(host, **({"token": host.controller.session.lease.token} | fault))
+    assert end_of(host, sink) == f"no set-point for 0.25 s; the last one was refused: {said}"
+    assert host.controller.counters.setpoints_received == 2
+    assert host.controller.counters.setpoints_refused == 1
+
+
+@pytest.mark.parametrize("fault", [{}, {"q": Q1[:5]}, {"q": (math.nan, *Q1[1:])}])
+def test_a_stranger_s_set_points_are_not_blamed(streaming, fault):
+    host, sink = streaming
+    offered(host, token="other", **fault)
+    assert end_of(host, sink) == "no set-point for 0.25 s"
+    assert host.controller.counters.setpoints_refused == 1
+
+
+@pytest.mark.parametrize("fault", [{}, {"q": (math.nan, *Q1[1:])}])
+def test_the_lease_at_the_moment_of_carrying_out_counts(streaming, fault):
+    """A set-point may wait long after its admission: then it is none of the client's that has control meanwhile."""
+    host, sink = streaming
+    token = host.controller.session.lease.token
+    waiting = admit_setpoint(
+        encode(c.Setpoint(**{"token": token, "sequence": 1, "q": Q1} | fault)), host.standing.lease
+    )
+    host.request(encode(c.ReleaseControl(token=token)))
+    host.request(encode(c.TakeControl(client="b")))
+    known = len(sink.entries)
+    host.receive_setpoint(waiting)
+    assert len(sink.entries) == known
+    assert host.controller.counters.setpoints_received == 1
+    assert host.controller.counters.setpoints_refused == 1
+
+
+def test_what_was_refused_in_an_earlier_stream_is_not_blamed_for_the_end_of_the_next(streaming):
+    host, sink = streaming
+    token = host.controller.session.lease.token
+    offered(host, token=token, q=Q1[:5])
+    host.request(encode(c.ServoStop(token=token)))
+    for _ in range(200):
+        host.tick()
+    sink.events.clear()
+    assert host.request(encode(c.ServoStart(token=token))) == Done()
+    assert end_of(host, sink) == "no set-point for 0.25 s"
