@@ -63,7 +63,7 @@ def candidates(shell, folder, typed):
         case "zsh":
             words = ["zsh", "-f", ASKING_ZSH / "ask.zsh", typed]
     ended = subprocess.run(
-        words, capture_output=True, text=True, check=True, cwd=folder, timeout=60, env=PATHS
+        words, capture_output=True, text=True, check=True, cwd=folder, timeout=300, env=PATHS
     )
     return {line.partition("\t")[0] for line in ended.stdout.splitlines() if line}
 
