@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tvist_cli.output import out, print_json, table
+from tvist_lab.identification.calibrate import Found, ModeErrors
+from tvist_lab.identification.jogs import Jog, Measured
+from tvist_lab.identification.payload import PayloadFound
+from tvist_lab.identification.ring_downs import CONTRADICTS, unused
+from tvist_lab.identification.servo_response import ServoResponse
+from tvist_lab.identification.twin import Twin
+from tvist_lab.identification.twin_file import said
+from tvist_lab.recordings import Floats
+from tvist_protocol.calibration import ModalParameter, Spread
 
-if TYPE_CHECKING:
-    from tvist_lab.identification.from_logs import FromLogs
-    from tvist_lab.identification.identify import Identification
-    from tvist_lab.identification.modal import ModalIdentification
-    from tvist_lab.identification.payload import PayloadFound
-    from tvist_lab.identification.proposals import Proposal
-    from tvist_lab.recordings import Floats
-    from tvist_protocol.calibration import ModalParameter, Spread
+Modes = Sequence[tuple[Spread | None, Spread | None]]
 
 UNSEEN = "ring-downs at poses that were left out of the fit"
 QUANTITIES = {
@@ -33,66 +35,24 @@ FRICTION = {
 }
 
 
-def report_polynomial(done: "Identification", output: Path, options: str, *, json: bool) -> None:
-    """Print the deviations of a polynomial calibration, and how to serve with it.
-
-    Args:
-        done: The identification.
-        output: File of the calibration.
-        options: Options of `tvist serve` for the robot that was identified.
-        json: Whether to print one JSON object.
-    """
-    how = done.calibration.provenance
-    if json:
-        print_json(
-            {
-                "file": str(output),
-                "configurations": how.configurations,
-                "ring_downs": how.ring_downs,
-                "rejected": how.rejected,
-                "f_d_range_hz": how.measured_f_d_range,
-                "zeta_range": how.measured_zeta_range,
-                "error_f_d_percent": done.error_f_d.median,
-                "error_zeta_percent": done.error_zeta.median,
-                "error_f_d_p90_percent": done.error_f_d.p90,
-                "error_zeta_p90_percent": done.error_zeta.p90,
-                "against": done.against,
-                "cross_validated_f_d_percent": _median(how.cross_validated_f_d_percent),
-                "cross_validated_zeta_percent": _median(how.cross_validated_zeta_percent),
-                "poses": done.poses(),
-            }
-        )
-        return
-    low, high = how.measured_f_d_range
-    out.print(
-        f"{how.configurations} configurations, {how.ring_downs} ring-downs, {how.rejected} configurations rejected; "
-        f"f_d spans {low:.1f} to {high:.1f} Hz over the workspace (paper: 6 to 15 Hz)"
-    )
-    table(
-        "deviation of the calibration",
-        ("against", "f_d median %", "p90 %", "ζ median %", "p90 %"),
-        [
-            _row("its own measurements", how.residual_f_d_percent, how.residual_zeta_percent),
-            _row(
-                "measurements left out of the fit",
-                how.cross_validated_f_d_percent,
-                how.cross_validated_zeta_percent,
-            ),
-            *([_row(done.against, done.error_f_d, done.error_zeta)] if done.true_f_d is not None else []),
-        ],
-    )
-    out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
-
-
-def report_modal(done: "ModalIdentification", output: Path, options: str, *, json: bool) -> None:
-    """Print the parameters of a modal calibration and the deviations of its modes; see `report_polynomial`."""
-    how, model = done.calibration.provenance, done.calibration.modal
-    if model is None:
-        raise TypeError("an identification of springs and drives has a modal model")
+def report(
+    found: Found,
+    measured: Measured,
+    output: Path,
+    options: str,
+    true: list[ModeErrors] | None,
+    *,
+    json: bool,
+    more: Mapping[str, Any] | None = None,
+) -> None:
+    """Print what ring-downs tell, how sure it is, the jogs that would tell more, and how to serve with it."""
+    model, how = found.calibration.modal, found.calibration.provenance
+    assert model is not None, "each calibration has springs and drives"
     crossed = list(zip(model.cross_validated_f_d_percent, model.cross_validated_zeta_percent, strict=True))
-    true = [] if done.errors is None else [(mode.f_d, mode.zeta) for mode in done.errors]
-    judged = true or crossed
-    against = "true modes, unseen poses and payloads" if true else UNSEEN
+    judged: Modes = crossed if true is None else [(mode.f_d, mode.zeta) for mode in true]
+    against = UNSEEN if true is None else "true modes, unseen poses"
+    q, known = found.least_known
+    servo = measured.servo
     if json:
         print_json(
             {
@@ -100,6 +60,9 @@ def report_modal(done: "ModalIdentification", output: Path, options: str, *, jso
                 "configurations": how.configurations,
                 "ring_downs": how.ring_downs,
                 "rejected": how.rejected,
+                "stops": len(found.stops),
+                "used": found.used,
+                "unused": unused(found.stops),
                 "payloads_kg": [payload.mass for payload in model.payloads],
                 "f_d_range_hz": how.measured_f_d_range,
                 "zeta_range": how.measured_zeta_range,
@@ -107,109 +70,99 @@ def report_modal(done: "ModalIdentification", output: Path, options: str, *, jso
                 "error_f_d_percent": _median(judged[0][0]),
                 "error_zeta_percent": _median(judged[0][1]),
                 "against": against,
-                "modes": [_errors(number, *pair) for number, pair in enumerate(judged, 1)],
-                "cross_validated": [_errors(number, *pair) for number, pair in enumerate(crossed, 1)],
+                "modes": _modes(judged, found.amplitudes),
+                "cross_validated": _modes(crossed, found.amplitudes),
                 "parameters": model.parameters,
-                "no_friction": done.no_friction,
-            }
-        )
-        return
-    masses = " and ".join(f"{payload.mass:g}" for payload in model.payloads)
-    out.print(
-        f"{how.ring_downs} ring-downs in {how.configurations} configurations with {masses} kg; the fit leaves "
-        f"{model.residual_to_noise:.2f} times the noise of {model.noise:.3f} m/s²"
-    )
-    _springs(model.parameters)
-    rows = _friction([parameter for parameter in model.parameters if parameter.quantity in FRICTION])
-    if rows:
-        table("friction, 95 % from – to", ("joint", *FRICTION.values()), rows)
-    table(
-        f"deviation of the modes from {against}",
-        ("mode", "f_d median %", "p90 %", "ζ median %", "p90 %"),
-        [_row(str(number), *pair) for number, pair in enumerate(judged, 1)],
-    )
-    if true:
-        table(
-            f"the same from {UNSEEN}",
-            ("mode", "f_d median %", "p90 %", "ζ median %", "p90 %"),
-            [_row(str(number), *pair) for number, pair in enumerate(crossed, 1)],
-        )
-    if done.no_friction:
-        out.print(f"Without friction: {done.no_friction}.")
-    out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
-
-
-def report_from_logs(
-    done: "FromLogs", output: Path, options: str, *, json: bool, more: Mapping[str, Any] | None = None
-) -> None:
-    """Print what stops tell of springs and drives, and the moves that would tell more; see `report_polynomial`.
-
-    Args:
-        done: What was found.
-        output: File of the calibration.
-        options: Options of `tvist serve` for the robot that was identified.
-        json: Whether to print one JSON object.
-        more: What else that object contains.
-    """
-    model, how = done.calibration.modal, done.calibration.provenance
-    if model is None:
-        raise TypeError("an identification from logs has a modal model")
-    crossed = list(zip(model.cross_validated_f_d_percent, model.cross_validated_zeta_percent, strict=True))
-    q, known = done.least_known
-    if json:
-        print_json(
-            {
-                "file": str(output),
-                "stops": len(done.stops),
-                "used": done.used,
-                "unused": done.unused,
-                "payloads_kg": [payload.mass for payload in model.payloads],
-                "f_d_range_hz": how.measured_f_d_range,
-                "cross_validated": [_errors(number, *pair) for number, pair in enumerate(crossed, 1)],
-                "parameters": model.parameters,
-                "known_percent": done.known_percent,
+                "no_friction": measured.no_friction,
+                "no_polynomial": found.no_polynomial,
+                "known_percent": found.known_percent,
                 "least_known": {
                     "q": q.tolist(),
                     "f_d_hz": float(known.f_d[0]),
                     "interval_percent": float(known.f_d_percent[0]),
                 },
-                "no_polynomial": done.no_polynomial,
                 "proposals": [
                     {"way": [at.tolist() for at in one.way], "q": one.q.tolist(), "commands": _moves(one)}
-                    for one in done.proposals
+                    for one in found.proposals
                 ],
+                "robot_time_s": measured.seconds,
+                "servo_lag_s": None if servo is None else servo.lag,
+                "servo_gain": None if servo is None else servo.gain,
+                "servo_delay_s": None if servo is None else servo.delay,
                 **(more or {}),
             }
         )
         return
-    out.print(f"{done.used} of {len(done.stops)} stops were used", markup=False)
-    for reason, count in done.unused.items():
-        out.print(f"  {count} not: {reason}", markup=False)
+    masses = " and ".join(f"{payload.mass:g}" for payload in model.payloads)
+    took = f", in {measured.seconds:.0f} s of the robot's time" if measured.seconds else ""
+    out.print(
+        f"{found.used} of {len(found.stops)} ring-downs with {masses} kg were used{took}; the fit leaves "
+        f"{model.residual_to_noise:.2f} times the noise of {model.noise:.3f} m/s²"
+    )
+    for reason, count in unused(found.stops).items():
+        out.print(f"  {count} not: {reason}{_wrong(found) if reason == CONTRADICTS else ''}")
     _springs(model.parameters)
-    table(
-        f"deviation of the modes from {UNSEEN}",
-        ("mode", "f_d median %", "p90 %", "ζ median %", "p90 %"),
-        [_row(str(number), *pair) for number, pair in enumerate(crossed, 1)],
-    )
-    out.print(
-        f"f_d of the lowest mode is known within 5 % in {done.known_percent:.0f} % of the workspace. It is known least "
-        f"at {angles(q)}: {known.f_d[0]:.1f} Hz ± {known.f_d_percent[0]:.0f} %",
-        markup=False,
-    )
-    out.print(
-        f"Without polynomials: {done.no_polynomial}." if done.no_polynomial else "Polynomials are in it, too."
-    )
-    if done.proposals:
-        out.print(
-            f"These {len(done.proposals)} moves would tell most; record them, and give that recording with --from too:"
+    rows = _friction([parameter for parameter in model.parameters if parameter.quantity in FRICTION])
+    if rows:
+        table("friction, 95 % from – to", ("joint", *FRICTION.values()), rows)
+    else:
+        out.print(f"Without friction: {measured.no_friction}.")
+    for title, errors in ((against, judged), *(() if true is None else ((UNSEEN, crossed),))):
+        table(
+            f"deviation of the modes from {title}",
+            ("mode", "measured at m/s²", "f_d median %", "p90 %", "ζ median %", "p90 %"),
+            [
+                _row(str(number), amplitude, *pair)
+                for number, (amplitude, pair) in enumerate(zip(found.amplitudes, errors, strict=False), 1)
+            ],
         )
-    for one in done.proposals:
+    out.print(
+        f"f_d of the lowest mode is known within 5 % in {found.known_percent:.0f} % of the workspace. It is known "
+        f"least at {angles(q)}: {known.f_d[0]:.1f} Hz ± {known.f_d_percent[0]:.0f} %"
+    )
+    if found.no_polynomial:
+        out.print(f"Without polynomials: {found.no_polynomial}.")
+    else:
+        table(
+            "deviation of the polynomials",
+            ("from", "measured at m/s²", "f_d median %", "p90 %", "ζ median %", "p90 %"),
+            [
+                _row("their ring-downs", None, how.residual_f_d_percent, how.residual_zeta_percent),
+                _row(
+                    "those left out", None, how.cross_validated_f_d_percent, how.cross_validated_zeta_percent
+                ),
+            ],
+        )
+    _lag(servo, positions=bool(more))
+    if found.proposals:
+        out.print(
+            f"These {len(found.proposals)} jogs would tell most; record them, and identify from that recording:"
+        )
+    for one in found.proposals:
         for line in _moves(one):
             print(f"  {line}")  # in one line, to be copied
     out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
 
 
-def _moves(one: "Proposal") -> list[str]:
+def _lag(servo: ServoResponse | None, *, positions: bool) -> None:
+    """Print the lag of a robot that takes positions alone."""
+    if servo is not None:
+        low, high = (servo.lag * (1.0 + side * 1.96 * servo.errors[0]) for side in (-1.0, 1.0))
+        out.print(
+            f"The robot follows {1e3 * servo.lag:.1f} ms late ({1e3 * low:.1f} to {1e3 * high:.1f}), with a gain of "
+            f"{servo.gain:.0f} 1/s², and {1e3 * servo.delay:.0f} ms more for the way there and back."
+        )
+    elif positions:
+        out.print("The robot does not follow set-points as a servo with a lag does: nothing compensates it.")
+
+
+def _wrong(found: Found) -> str:
+    """Name the stops that contradict the others."""
+    names = [f"{stop.log}, motion {stop.motion}" for stop in found.stops if stop.reason == CONTRADICTS]
+    return f" ({'; '.join(names)}). Was the payload the declared one, and was the arm free?"
+
+
+def _moves(one: Jog) -> list[str]:
     """Commands that make a proposed move: to its start, and the jog."""
     there = [f"tvist move {angles(at)} --shaper none" for at in one.way]
     limits = one.limits
@@ -219,12 +172,12 @@ def _moves(one: "Proposal") -> list[str]:
     return [*there, f"tvist move {angles(one.q)} --shaper none {jog}"]
 
 
-def angles(q: "Floats") -> str:
+def angles(q: Floats) -> str:
     """Return angles as commands take them."""
     return ",".join(f"{angle:.3f}" for angle in q.tolist())
 
 
-def report_payload(found: "PayloadFound", *, declared: bool, json: bool) -> None:
+def report_payload(found: PayloadFound, *, declared: bool, json: bool) -> None:
     """Print the identified mass and centre of mass."""
     payload = found.payload
     if json:
@@ -274,7 +227,7 @@ def report_payload(found: "PayloadFound", *, declared: bool, json: bool) -> None
     )
 
 
-def _springs(parameters: "Sequence[ModalParameter]") -> None:
+def _springs(parameters: Sequence[ModalParameter]) -> None:
     """Print springs and drives, and which of them the ring-downs do not tell."""
     own = [parameter for parameter in parameters if parameter.quantity in QUANTITIES]
     table(
@@ -291,26 +244,30 @@ def _springs(parameters: "Sequence[ModalParameter]") -> None:
         )
 
 
-def _median(spread: "Spread | None") -> float | None:
+def _median(spread: Spread | None) -> float | None:
     return None if spread is None else spread.median
 
 
-def _errors(number: int, f_d: "Spread | None", zeta: "Spread | None") -> dict[str, float | None]:
-    return {
-        "mode": number,
-        "f_d_percent": _median(f_d),
-        "f_d_p90_percent": None if f_d is None else f_d.p90,
-        "zeta_percent": _median(zeta),
-        "zeta_p90_percent": None if zeta is None else zeta.p90,
-    }
+def _modes(errors: Modes, amplitudes: Sequence[float | None]) -> list[dict[str, float | None]]:
+    return [
+        {
+            "mode": number,
+            "measured_at_m_s2": amplitude,
+            "f_d_percent": _median(f_d),
+            "f_d_p90_percent": None if f_d is None else f_d.p90,
+            "zeta_percent": _median(zeta),
+            "zeta_p90_percent": None if zeta is None else zeta.p90,
+        }
+        for number, (amplitude, (f_d, zeta)) in enumerate(zip(amplitudes, errors, strict=False), 1)
+    ]
 
 
-def _row(name: str, f_d: "Spread | None", zeta: "Spread | None") -> tuple[str, ...]:
+def _row(name: str, amplitude: float | None, f_d: Spread | None, zeta: Spread | None) -> tuple[str, ...]:
     figures = [f"{v:.1f}" for s in (f_d, zeta) if s is not None for v in (s.median, s.p90)]
-    return (name, *(figures or ["–"] * 4))
+    return (name, "–" if amplitude is None else f"{amplitude:.2f}", *(figures or ["–"] * 4))
 
 
-def _parameter(parameter: "ModalParameter") -> tuple[str, ...]:
+def _parameter(parameter: ModalParameter) -> tuple[str, ...]:
     name, unit = QUANTITIES[parameter.quantity]
     low, high = (f"{end:.4g}" for end in parameter.interval)
     sure = ("", "") if parameter.status == "assumed" else (low, high)
@@ -318,7 +275,7 @@ def _parameter(parameter: "ModalParameter") -> tuple[str, ...]:
     return (name, _joints(parameter), f"{parameter.value:.4g}", *sure, unit, said)
 
 
-def _friction(parameters: "Sequence[ModalParameter]") -> list[tuple[str, ...]]:
+def _friction(parameters: Sequence[ModalParameter]) -> list[tuple[str, ...]]:
     """Rows of the table of friction; a dash where it was not identifiable."""
     rows: dict[int, dict[str, str]] = {}
     for parameter in parameters:
@@ -329,6 +286,78 @@ def _friction(parameters: "Sequence[ModalParameter]") -> list[tuple[str, ...]]:
     return [(str(joint + 1), *(row[quantity] for quantity in FRICTION)) for joint, row in rows.items()]
 
 
-def _joints(parameter: "ModalParameter") -> str:
+def _joints(parameter: ModalParameter) -> str:
     word = "link" if parameter.quantity == "bending_stiffness" else "joint"
     return f"{word} {', '.join(str(joint + 1) for joint in parameter.joints)}"
+
+
+def report_twin(twin: Twin, output: Path, *, json: bool) -> None:
+    """Print what a twin has beside the robot file, and how well it predicts."""
+    if json:
+        print_json(_twin_figures(twin, output))
+        return
+    table(
+        "what the twin has, beside the robot file",
+        ("parameter", "joint or link", "robot file", "twin", "±", ""),
+        _twin_rows(twin),
+    )
+    for line in said(twin):
+        out.print(line)
+    out.print(f"written to {output}; run it with: tvist serve --robot {output}")
+
+
+def _twin_rows(twin: Twin) -> list[tuple[str, ...]]:
+    links = twin.robot.link_flexibility.links
+    rows = []
+    for entry, told_, deviation in zip(twin.parameters.entries, twin.told, twin.deviations, strict=True):
+        if entry.table == "payload":
+            continue
+        before, after = (
+            getattr(getattr(one, entry.table), entry.key) for one in (twin.parameters.description, twin.robot)
+        )
+        place = entry.places[0]
+        values = [one[place] if isinstance(one, tuple) else one for one in (before, after)]
+        where = links[place] if entry.table == "link_flexibility" else place
+        name = "all" if len(entry.places) > 1 or entry.key == "damping_time" else str(where + 1)
+        rows.append(
+            (
+                entry.key.replace("_", " "),
+                name,
+                *(f"{value:.4g}" for value in values),
+                f"{100.0 * deviation:.0f} %",
+                "" if told_ else "not told by the logs",
+            )
+        )
+    return rows
+
+
+def _twin_figures(twin: Twin, output: Path) -> dict[str, object]:
+    carried = [
+        twin.parameters.payload(twin.values, number) for number in range(len(twin.parameters.payloads))
+    ]
+    return {
+        "file": str(output),
+        "motions": twin.motions,
+        "left_out": unused(twin.others),
+        "checked_by": "other logs" if twin.checked else "motions left out in turn",
+        "residual_error_percent": twin.error_percent(0.5),
+        "residual_error_p90_percent": twin.error_percent(0.9),
+        "predicted": [
+            {"log": one.log, "motion": one.motion, "measured_m_s2": one.measured, "twin_m_s2": one.twin}
+            for one in twin.predictions
+        ],
+        "too_quiet_to_compare": twin.quiet,
+        "payloads": [
+            {"declared_kg": said.mass, "carried_kg": found.mass, "com_m": found.com}
+            for said, found in zip(twin.parameters.payloads, carried, strict=True)
+        ],
+        "parameters": [
+            {
+                "table": entry.table, "key": entry.key, "places": entry.places, "deviation": float(deviation),
+                "told": told_,
+            }
+            for entry, deviation, told_ in zip(
+                twin.parameters.entries, twin.deviations, twin.told, strict=True
+            )
+        ],
+    }  # fmt: skip

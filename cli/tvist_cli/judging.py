@@ -10,7 +10,6 @@ from tvist_plant.plant import PERIOD
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tvist_lab.change import Change
     from tvist_lab.recordings import Recording
     from tvist_protocol.stream import Truth
     from tvist_view.beside import Run, Verdict
@@ -27,22 +26,13 @@ def judge(without: "Run", shaped: "Run") -> "Verdict":
 
     first, second = (Measured.of(_recording(run)) for run in (without, shaped))
     motions = compare(first, second).motions
-    if not motions:
-        return verdict(Change(None, None, None, None))
-    both = motions[0].first, motions[0].second
-    return verdict(Change(*(one.peak_m_s2 for one in both), *(one.still_after_ms for one in both)))
-
-
-def verdict(change: "Change") -> "Verdict":
-    """What a shaper changed, as the page is told."""
-    from tvist_view.beside import Verdict
-
-    return Verdict(change.less_percent, change.gain_ms, change.before, change.after)
+    change = motions[0].change if motions else Change(None, None, None, None)
+    return change.as_dict()
 
 
 def _recording(run: "Run") -> "Recording":
     """One motion as columns, by the truth, or by the sensor where few truths have come."""
-    from tvist_lab.recordings.recorded_columns import recording_of_messages
+    from tvist_lab.recordings.messages import recording_of_messages
 
     truths = sorted(run.truths, key=lambda truth: truth.tick)
     if len(truths) < MOST * len(run.states):

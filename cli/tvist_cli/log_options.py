@@ -46,7 +46,7 @@ class LogOptions:
             Failure: An option has nothing to act on, the numbers of files differ, or a file cannot be read or joined.
         """
         from tvist_lab.recordings import RecordingError, read
-        from tvist_lab.recordings.log_columns import ROBOT, ROBOT_OR_SENSOR
+        from tvist_lab.recordings.table import ROBOT, ROBOT_OR_SENSOR
 
         for name in ("imu_columns", "robot"):
             if self.imu is None and getattr(self, name) is not None:

@@ -27,7 +27,6 @@ LOG = {
     "advise": "Say from logs what rings, and which shaper to take.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
     "export": "Write a recording as CSV or Parquet, or for Foxglove.",
-    "fit": "Fit a robot file to logs, with which a simulated arm does what the robot did.",
     "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
 }
 """The commands of `tvist log`."""
@@ -54,7 +53,7 @@ GROUPS = {
     "Make and manage": {
         "demo": "Run the paper's experiment, in real time or simulated, and print its tables beside ours.",
         "lesson": "Open a page on which to try shaping.",
-        "identify": "Calibrate a robot from its own accelerometer, or from its logs.",
+        "identify": "Calibrate a robot by jogs or from its logs, weigh its payload, or fit a twin.",
         "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",
         "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
         "keys": "Create TLS certificates for a robot and its clients.",

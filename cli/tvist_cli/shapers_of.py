@@ -133,9 +133,7 @@ def modal_calibration(name: str) -> "Calibration":
     """
     known = calibration_of(name)
     if known.modal is None:
-        raise Failure(
-            f"calibration {known.name} has no modal model: make one with tvist identify --model modal", code=2
-        )
+        raise Failure(f"calibration {known.name} has no modal model: make one with tvist identify", code=2)
     return known
 
 

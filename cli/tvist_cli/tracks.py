@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.judging import judge, verdict
+from tvist_cli.judging import judge
 from tvist_cli.output import progress
 from tvist_cli.pages import Door, serve_page
 from tvist_cli.serving import compile_if_new
@@ -40,11 +40,7 @@ class Shows:
         return max(track.end for track in self.tracks) - min(track.start for track in self.tracks)
 
     def page(self, factor: float) -> str:
-        """The page that plays it back.
-
-        Args:
-            factor: Magnification of the bending to begin with.
-        """
+        """The page that plays it back."""
         from tvist_view.playback import playback
 
         return playback(self.tracks, self.title, factor=factor, result=self.result)
@@ -103,13 +99,13 @@ def repeated(file: Path) -> Shows:
             truths = [truth for truth in content.truths if first <= truth.tick <= last]
             begun = float(content.recording.time[motion.start]) - LEAD * PERIOD
             tracks.append(Track(Shown(label, look), states, truths, begun))
-    return Shows(f"{file.stem}: {best.name}", tracks, said(verdict(best.change), shaper, best.name))
+    return Shows(f"{file.stem}: {best.name}", tracks, said(best.change.as_dict(), shaper, best.name))
 
 
 def compared(shapers: Sequence[str], robot: str) -> Shows:
     """The same motion with each shaper, simulated now."""
     from tvist_controller.refusal import RefusalError
-    from tvist_lab.compared import run_beside
+    from tvist_lab.in_process import run_beside
     from tvist_plant.description import DescriptionError, load
     from tvist_server.option_values import StartError
     from tvist_view.beside import Run

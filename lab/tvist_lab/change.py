@@ -30,6 +30,12 @@ class Change:
             return None
         return round(self.still_before - self.still_after)
 
+    def as_dict(self) -> dict[str, float | None]:
+        """Return the numbers that the page of `tvist view` shows."""
+        return {
+            "less_percent": self.less_percent, "earlier_ms": self.gain_ms, "before": self.before, "after": self.after,
+        }  # fmt: skip
+
     def less(self) -> str:
         """How much less or more it vibrates."""
         percent = self.less_percent

@@ -22,7 +22,7 @@ class Collected:
 
         On a network the truth of a tick may come before or after its state.
         """
-        from tvist_lab.recordings.recorded_columns import recording_of_messages
+        from tvist_lab.recordings.messages import recording_of_messages
 
         states = self.states
         if self.truths:

@@ -33,12 +33,7 @@ REFUSAL = Refused(
 
 
 class PlaybackDesk(Desk):
-    """Describes the recorded robot and refuses everything else.
-
-    Args:
-        info: Description of the robot when its recording began.
-        name: Name under which it is published.
-    """
+    """Describes the recorded robot and refuses everything else."""
 
     def __init__(self, info: Info, name: str) -> None:
         self._info = msgspec.structs.replace(info, name=name, clock="realtime", control=None, stepper=None)
@@ -122,11 +117,7 @@ class Playback:
             raise
 
     async def run(self) -> None:
-        """Publish until the recording ends, or until this is cancelled.
-
-        Raises:
-            RecordingFileError: The file cannot be read any more.
-        """
+        """Publish until the recording ends, or until this is cancelled."""
         clock, began = asyncio.get_running_loop(), None
         try:
             for message in played(self._content, loop=self._loop):

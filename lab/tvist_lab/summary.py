@@ -14,14 +14,9 @@ from tvist_lab.recordings.mcap_records import files_of
 def summary(path: str | os.PathLike[str], recording: Recording) -> dict[str, Any]:
     """Describe a file that `tvist_lab.recordings.read` reads.
 
-    Args:
-        path: The file.
-        recording: What was read from it.
-
-    Returns:
-        Times in s on the recording's own clock. `complete`, `dropped`, `replayable`, `from_tick` and `messages` are
-        null for other files than recordings of a served robot. `from_tick` is the first tick of a recording that has
-        forgotten those before.
+    Times are in s on the recording's own clock. `complete`, `dropped`, `replayable`, `from_tick` and `messages` are
+    null for other files than recordings of a served robot. `from_tick` is the first tick of a recording that has
+    forgotten those before.
     """
     path = Path(path)
     content: mcap_file.RecordingFile | None = None

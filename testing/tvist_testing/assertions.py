@@ -18,8 +18,6 @@ WINDOW = 0.3
 """Time after the stop in which residual vibration is measured [s]."""
 BEYOND = 0.5
 """Time for which a robot is observed after the time allowed [s]."""
-GRAVITY = 9.81
-"""Acceleration of free fall that the simulated sensor feels [m/s²]."""
 TAIL = 0.2
 """Time at the end of the observed rest whose mean position is the attained position [s]."""
 AFTER_STOP = 0.01
@@ -231,33 +229,17 @@ def settling(rows: "Sequence[Row]", band: float) -> Settling:
 def vibration(rows: "Sequence[Row]", until: float) -> list[tuple[float, float]]:
     """Return the residual vibration: time after the stop [s] and |α| [m/s²] of each tick, from 10 ms after the stop on.
 
-    α = f - Rᵀ (0, 0, g), the specific force at the flange without the reaction to gravity.
-
     Args:
         rows: Ticks at rest, from the stop of the reference on.
         until: Last time after the stop [s].
     """
+    from tvist_plant.tool_acceleration import tool_acceleration, upward  # not in every run of pytest
+
     stop, slack = rows[0].time, 1e-9
-    return [
-        (row.time - stop, math.dist(row.acceleration, _reaction(row.pose[3:6])))
-        for row in rows
-        if AFTER_STOP + slack < row.time - stop <= until + slack
-    ]
-
-
-def _reaction(rotation: Sequence[float]) -> tuple[float, float, float]:
-    """Reaction to gravity in a frame that is turned by a rotation vector [rad]: Rᵀ (0, 0, g), by Rodrigues' formula."""
-    x, y, z = rotation
-    angle = math.hypot(x, y, z)
-    if angle == 0.0:
-        return 0.0, 0.0, GRAVITY
-    x, y, z = x / angle, y / angle, z / angle
-    sine, share = math.sin(angle), 1.0 - math.cos(angle)
-    return (
-        GRAVITY * (share * x * z - sine * y),
-        GRAVITY * (share * y * z + sine * x),
-        GRAVITY * (1.0 - share * (x * x + y * y)),
-    )
+    late = [row for row in rows if AFTER_STOP + slack < row.time - stop <= until + slack]
+    up = [upward(row.pose[3:6]) for row in late]
+    alpha = [math.hypot(*tool_acceleration(row.acceleration, one)) for row, one in zip(late, up, strict=True)]
+    return [(row.time - stop, one) for row, one in zip(late, alpha, strict=True)]
 
 
 @dataclass(frozen=True)

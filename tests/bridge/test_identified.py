@@ -1,4 +1,4 @@
-"""How well `tvist identify --plant` finds hidden robots that take positions alone, at poses that it never visited."""
+"""How well `tvist identify ur://…` finds hidden robots that take positions alone, where it never visited them."""
 
 import asyncio
 from dataclasses import replace
@@ -11,8 +11,8 @@ from tests.bridge.in_lockstep import HiddenRobot, Link, Port
 
 from tvist_controller.api.line import body, modal_estimator
 from tvist_controller.api.robot import OwnPlant
-from tvist_lab.identification.modal_plan import ModalPlan
-from tvist_lab.identification.positioned import JOG, identify_moved, make_moves, plan_moves
+from tvist_lab.identification.calibrate import calibrate
+from tvist_lab.identification.jogs import make_jogs, plan_jogs
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.workspace import identified, ranges
 from tvist_plant.description import load
@@ -44,8 +44,8 @@ class Rows(Port):
         return self._seen
 
 
-async def identified_in_lockstep(description, hidden, every):
-    """Identify one hidden robot behind the program, a link and our control line, as fast as it computes."""
+async def measured_in_lockstep(description, hidden, every):
+    """Make the jogs of one hidden robot behind the program, a link and our control line, as fast as it computes."""
     name = description.robot.name
     setup = free_setup(robot=name, truth=False, shaper="none", calibration="none")
     q, payload = np.array(STANDS), setup.payload
@@ -62,9 +62,8 @@ async def identified_in_lockstep(description, hidden, every):
     whole = replace(setup, description=capped, q=tuple(q.tolist()), plant=OwnPlant("lockstep", "", port))
     async with robot_in_process(whole) as robot, robot.control("identify") as control:
         await robot.advance(BEGINS)
-        moves = await plan_moves(robot, description, ModalPlan(seed=hidden, jog=JOG))
-        moved = await make_moves(robot, control, moves, lambda _: None)
-    return identify_moved(moves, moved, name="found", command="tvist identify", progress=lambda _: None)
+        plan = await plan_jogs(robot, description, seed=hidden, positions=True)
+        return await make_jogs(robot, control, plan, lambda _: None)
 
 
 def unseen(description, hidden, declared, seed):
@@ -88,26 +87,29 @@ def test_a_robot_that_takes_positions_alone_is_known_where_it_was_never_visited(
     name, hidden, every, measured
 ):
     description = load(name)
-    done = asyncio.run(identified_in_lockstep(description, hidden, every))
-    calibration, servo, true = done.found.calibration, done.servo, ServoLag.simulated()
+    measured_jogs = asyncio.run(measured_in_lockstep(description, hidden, every))
+    found = calibrate(
+        description, measured_jogs, name="found", command="tvist identify", progress=lambda _: None
+    )
+    calibration, servo, true = found.calibration, measured_jogs.servo, ServoLag.simulated()
     estimator = modal_estimator(calibration, description, calibration.payload, 1)
     errors, sure = [], []
     for q, f_d, zeta in unseen(description, hidden, calibration.payload, hidden):
         own_f_d, own_zeta = (values[0] for values in estimator.estimate(q))
-        known = done.found.forecast.at(q, 0)
+        known = found.forecast.at(q, 0)
         errors.append(np.abs(np.log((own_f_d / f_d, own_zeta / zeta))))
         sure.append((known.f_d_error[0], known.zeta_error[0]))
     median, p90 = 100.0 * np.quantile(errors, (0.5, 0.9), axis=0)
     held = 100.0 * np.mean(np.array(errors) < 1.96 * np.array(sure), axis=0)
     for what, value in {
-        "ring-downs": done.found.used, "time [s]": done.seconds, "known [%]": done.found.known_percent,
+        "ring-downs": found.used, "time [s]": measured_jogs.seconds, "known [%]": found.known_percent,
         "f_d, median [%]": median[0], "f_d, p90 [%]": p90[0], "f_d, interval holds [%]": held[0],
         "ζ, median [%]": median[1], "ζ, p90 [%]": p90[1], "ζ, interval holds [%]": held[1],
         "lag of servoj [%]": np.nan if servo is None else 100.0 * (servo.lag / true.time - 1.0),
         "gain of servoj [%]": np.nan if servo is None else 100.0 * (servo.gain / true.gain - 1.0),
     }.items():  # fmt: skip
         measured(what, f"{value:.3g}")
-    assert done.found.used <= 12
-    assert done.seconds <= 300.0
+    assert found.used <= 12
+    assert measured_jogs.seconds <= 300.0
     assert p90[0] <= (4.0 if every == 1 else 9.0)
     assert p90[1] <= (25.0 if every == 1 else 50.0)

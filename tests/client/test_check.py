@@ -4,9 +4,10 @@ import json
 import math
 import re
 from contextlib import ExitStack
+from itertools import product
 
-import msgspec
 import pytest
+from msgspec.structs import replace
 
 from tvist_cli.commands.check import check as check_command
 from tvist_cli.commands.watch import _load
@@ -15,12 +16,13 @@ from tvist_client import check as checking
 from tvist_client.__main__ import main
 from tvist_client.check import check
 from tvist_client.fleet import Fleet
-from tvist_protocol.codec import decode, encode
+from tvist_client.readiness import mode_name, readiness
+from tvist_protocol.codec import decode
 from tvist_protocol.info import Info, StopReason
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Done, Refused
 
-from .conftest import FakeRobot, serve
+from .conftest import serve
 
 
 @pytest.fixture(autouse=True)
@@ -40,13 +42,6 @@ def test_a_robot_that_works_is_well_and_unchanged(realtime, endpoint):
     assert [finding.what for finding in report.findings] == STEPS
     assert (report.overloaded, report.due_per_second) == (False, 10.0)
     assert {type(command).__name__ for command in realtime.robot.commands} == {"MoveJ"}
-    assert realtime.robot.motions == 0
-
-
-def test_in_lockstep_there_is_no_rate(lockstep, endpoint):
-    report = check(endpoint)
-    assert report.ok
-    assert report.state_rate_hz is None
 
 
 def test_json_is_one_object_with_what_is_promised(realtime, endpoint, capsys):
@@ -62,13 +57,8 @@ def test_a_person_reads_a_line_a_step(realtime, endpoint, capsys):
     assert [line.split()[:2] for line in lines] == [["ok", step] for step in STEPS]
 
 
-def test_what_a_robot_says_of_itself_gives_a_terminal_no_commands(realtime, endpoint, capsys, monkeypatch):
-    described = realtime.robot.info
-
-    def hostile():
-        return encode(msgspec.structs.replace(decode(Info, described()), model="\x1b]0;owned\x07"))
-
-    monkeypatch.setattr(realtime.robot, "info", hostile)
+def test_what_a_robot_says_of_itself_gives_a_terminal_no_commands(realtime, endpoint, capsys):
+    realtime.robot.told = {"model": "\x1b]0;owned\x07"}
     assert main(["check", endpoint]) == 0
     assert not set(capsys.readouterr().out) & set("\x1b\x07")
 
@@ -80,35 +70,19 @@ def test_nobody_there_is_a_failure_that_says_what_to_check(endpoint, capsys):
     assert json.loads(capsys.readouterr().out)["protocol"] is None
 
 
-def test_misuse_is_told_from_failure(capsys):
-    for arguments in ([], ["check", "--nonsense"], ["what"]):
-        with pytest.raises(SystemExit) as ended:
-            main(arguments)
-        assert ended.value.code == 2
-    capsys.readouterr()
-
-
-def test_a_name_that_is_none_is_a_failure(capsys):
-    assert main(["check", "--name", "Not A Name"]) == 1
-    assert "robot is 'Not A Name'" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("answer", "sentence"),
-    [
-        (Done(), "does not check control"),
-        (Refused(code="busy", where="", why="not now"), "busy: not now"),
-    ],
+    [(Done(), "does not check control"), (Refused(code="busy", where="", why="not now"), "busy: not now")],
 )
 def test_a_robot_that_does_not_guard_control_is_not_well(realtime, endpoint, answer, sentence):
-    realtime.robot.answers["move_j"] = encode(answer)
+    realtime.robot.answers["move_j"] = answer
     report = check(endpoint)
     assert not report.ok
     assert sentence in report.findings[-1].said
 
 
 def test_a_robot_of_another_protocol_is_not_well(realtime, endpoint):
-    realtime.robot.protocol = 2
+    realtime.robot.told = {"protocol": 2}
     report = check(endpoint)
     assert (report.ok, report.protocol) == (False, 2)
     assert "protocol 2" in report.findings[-1].said
@@ -116,7 +90,7 @@ def test_a_robot_of_another_protocol_is_not_well(realtime, endpoint):
 
 def test_a_robot_that_stands_still_is_neither_well_nor_alive(realtime, endpoint, monkeypatch):
     monkeypatch.setattr("tvist_client.connection.STATE_S", 0.1)
-    monkeypatch.setattr(realtime.robot, "pass_tick", lambda: None)
+    monkeypatch.setattr(realtime.robot, "tick", lambda: None)
     report = check(endpoint)
     assert not report.ok
     assert report.findings[-1].what == "state"
@@ -139,27 +113,16 @@ def test_a_robot_that_stands_is_not_ready_and_says_why_since_when_and_what_to_do
     assert json.loads(capsys.readouterr().out)["stop"]["code"] == "limit_torque"
 
 
-@pytest.mark.parametrize("mode", sorted({*SafetyMode} - {SafetyMode.NORMAL, SafetyMode.REDUCED}))
-def test_only_normal_and_reduced_are_ready(realtime, endpoint, mode):
-    realtime.robot.modes = (RobotMode.RUNNING, mode)
-    report = check(endpoint)
-    assert (report.ok, report.safety_mode) == (False, mode.name)
-    realtime.robot.modes = (RobotMode.RUNNING, SafetyMode.REDUCED)
-    assert check(endpoint).ready
-
-
-@pytest.mark.parametrize("mode", [RobotMode.POWER_OFF, RobotMode.IDLE])
-def test_an_arm_without_power_or_with_its_brakes_closed_is_not_ready(realtime, endpoint, mode):
-    realtime.robot.modes = (mode, SafetyMode.NORMAL)
-    report = check(endpoint)
-    assert not report.ok
-    assert f"robot_mode is {mode.name}" in report.findings[-1].said
-    assert "--power-on" in report.next
-
-
-def test_a_mode_nobody_knows_is_not_ready(realtime, endpoint):
-    realtime.robot.modes = (RobotMode.RUNNING, 99)
-    assert "safety_mode is 99" in check(endpoint).findings[-1].said
+def test_only_an_arm_with_power_in_normal_or_reduced_mode_is_ready(host):
+    info, ready = decode(Info, host.info()), {SafetyMode.NORMAL, SafetyMode.REDUCED}
+    for robot, safety in product([*RobotMode, 99], [*SafetyMode, 99]):
+        found = readiness(replace(info, robot_mode=robot, safety_mode=safety), None)
+        assert found.ready == (robot == RobotMode.RUNNING and safety in ready)
+        if safety not in ready:
+            assert f"safety_mode is {mode_name(SafetyMode, safety)}" in found.why
+        elif not found.ready:
+            assert f"robot_mode is {mode_name(RobotMode, robot)}" in found.why
+            assert "--power-on" in found.next
 
 
 def test_before_the_first_tick_info_alone_says_it(lockstep, endpoint):
@@ -169,7 +132,7 @@ def test_before_the_first_tick_info_alone_says_it(lockstep, endpoint):
 
 
 def test_alive_looks_at_the_server_alone(realtime, endpoint, capsys):
-    realtime.robot.modes = (RobotMode.POWER_OFF, SafetyMode.VIOLATION)
+    realtime.robot.told = {"robot_mode": RobotMode.POWER_OFF, "safety_mode": SafetyMode.VIOLATION}
     assert main(["check", "--alive", endpoint]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[1] for line in lines] == ["connect", "info", "state"]
@@ -222,14 +185,9 @@ def test_a_tick_that_waits_for_a_processor_for_long_is_named(realtime, endpoint,
 
 
 def test_the_rate_counts_states_received_and_not_their_numbers(realtime, endpoint, monkeypatch):
-    """A robot whose numbers run eight times as fast as its states come, as on a network that loses most of them."""
-    tick = realtime.robot.pass_tick
-
-    def leap():
-        realtime.robot.tick += 7
-        tick()
-
-    monkeypatch.setattr(realtime.robot, "pass_tick", leap)
+    """Of eight states one comes, as on a network that loses most of them."""
+    tells = realtime.robot.report
+    monkeypatch.setattr(realtime.robot, "report", lambda report: report.state.tick % 8 == 0 and tells(report))
     seen, measure = [], checking._rate
 
     async def noted(robot):
@@ -246,9 +204,9 @@ def test_a_robot_that_tells_nothing_of_its_load_is_judged_by_the_ticks_it_promis
     realtime, endpoint, monkeypatch
 ):
     monkeypatch.setattr("tvist_client.check.TELEMETRY_S", 0.01)
-    realtime.robot.promised, realtime.robot.rate_hz = None, 1e6
+    realtime.robot.promised, realtime.robot.told = None, {"rate_hz": 1e6}
     assert check(endpoint).overloaded
-    realtime.robot.rate_hz = 10.0
+    realtime.robot.told = {"rate_hz": 10.0}
     assert check(endpoint).ok
 
 
@@ -262,12 +220,10 @@ async def test_the_fleet_s_table_says_which_robot_is_overloaded(realtime, endpoi
     assert row.said.startswith("overloaded: 60 of 500 ticks/s. Next: ")
 
 
-def test_watch_shows_rate_missed_of_due_lateness_load_and_overload():
-    telemetry = FakeRobot().telemetry()
+def test_watch_shows_rate_missed_of_due_lateness_load_and_overload(host):
+    telemetry = host.telemetry()
     given = {"missed_ticks": 3, "due_ticks": 9, "late_p99_us": 7.0, "load": 0.25, "ticks_per_second": 60.0}
-    shown = [
-        str(_load([msgspec.structs.replace(telemetry, **given, overloaded=over)])) for over in (False, True)
-    ]
+    shown = [str(_load([replace(telemetry, **given, overloaded=over)])) for over in (False, True)]
     assert shown[0] == "60.0 ticks/s   missed 3 of 9   late p99 7 µs   load 25.0 %"
     assert shown[1] == f"{shown[0]}   overloaded"
 
@@ -302,13 +258,6 @@ def test_check_waits_for_a_robot_that_starts_and_tells_what_it_hears(starting, e
 @pytest.mark.parametrize("wait", [0.0, 1e-9])
 def test_it_waits_no_longer_than_it_may(starting, endpoint, wait):
     assert check(endpoint, wait=wait).starting
-
-
-def test_it_does_not_wait_for_a_robot_that_has_stopped(realtime, endpoint):
-    realtime.robot.told = {"robot_mode": 7, "safety_mode": 3, "stop": STOPPED}
-    told = []
-    assert not check(endpoint, wait=math.inf, tell=told.append).ready
-    assert told == []
 
 
 def test_it_waits_for_a_server(endpoint):

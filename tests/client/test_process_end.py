@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from tvist_protocol.stream import Event
+
 ASYNCHRONOUS = """
 import asyncio, sys
 from tvist_client import Robot
@@ -73,7 +75,7 @@ def test_an_interrupted_program_gives_control_back_and_ends(realtime, endpoint):
     )
     with program:
         assert program.stdout.readline() == "listens\n"
-        realtime.post(lambda: realtime.robot.end_stream("it waits"))
+        realtime.post(lambda: realtime.robot.put("event", Event(tick=1, kind="warning", why="it waits")))
         assert program.stdout.readline() == "it waits\n"
         program.send_signal(signal.SIGINT)
         out, err = program.communicate(timeout=100.0)

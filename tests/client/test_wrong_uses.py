@@ -23,29 +23,11 @@ from tvist_client import (
 )
 from tvist_client.blocking import Robot as BlockingRobot
 from tvist_client.transports.loopback import LoopbackTransport
-from tvist_controller.loopback import LoopbackHost
-from tvist_lab.in_process import free_setup
 from tvist_protocol.keys import check_robot_name
 
 POSE = (0.4, 0.1, 0.5, 0.0, 3.1, 0.0)
 Q1 = (0.0, -3.1, 0.0, -1.57, 0.0, 0.0)
 MSGSPEC = re.compile(r"Expected `|Object (missing|contains)|Invalid enum|at `\$")
-
-
-@pytest.fixture(autouse=True)
-def _no_blocking_calls_on_the_loop():
-    """A real robot in process computes on the event loop, and looks there which calibrations come with the package."""
-
-
-@pytest.fixture
-def host():
-    return LoopbackHost(free_setup())
-
-
-@pytest.fixture
-async def robot(host):
-    async with Robot.over(LoopbackTransport(host)) as robot:
-        yield robot
 
 
 COMMANDS = {

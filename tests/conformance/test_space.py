@@ -62,25 +62,6 @@ def test_a_line_is_straight_and_ends_at_its_pose(bent):
         assert at[3:] == pytest.approx(start[3:], abs=1e-5)
 
 
-def test_a_motion_takes_the_duration_that_was_asked_for_and_the_delay_of_the_shaper(bent):
-    wire, token, start = bent
-    for command in ({"type": "move_l", "pose": after(start, z=0.1)}, {"type": "move_j", "q": BENT}):
-        events, _ = played(wire, token, duration=1.5, **command)
-        taken = (events[-1]["tick"] - events[0]["tick"]) * 0.002
-        assert 1.5 <= taken <= 1.65
-
-
-def test_an_arc_passes_its_point(bent):
-    wire, token, start = bent
-    via, goal = after(start, 0.05, 0.05), after(start, 0.1)
-    _, states = played(wire, token, type="move_c", via=via, pose=goal)
-    places = [pose_at(wire, state["target_q"])[:3] for state in states[::5]]
-    assert places[-1] == pytest.approx(goal[:3], abs=1e-9)
-    assert min(math.dist(place, via[:3]) for place in places) < 2e-3
-    centre = after(start, 0.05)[:3]
-    assert all(math.dist(place, centre) == pytest.approx(0.05, abs=1e-5) for place in places)
-
-
 def test_a_blended_path_does_not_stop_and_keeps_to_its_corners(bent):
     wire, token, start = bent
     corner, goal = after(start, 0.1), after(start, 0.1, 0.1)
@@ -96,16 +77,6 @@ def test_a_blended_path_does_not_stop_and_keeps_to_its_corners(bent):
 
 def moves(state):
     return max(map(abs, state["target_qd"])) > 1e-3
-
-
-def test_overlapping_blends_are_told_in_a_warning(bent):
-    wire, token, start = bent
-    places = after(start, 0.1), after(start, 0.1, 0.1), after(start, 0.0, 0.1)
-    parts = [{"type": "line", "pose": pose, "blend": 0.06} for pose in places]
-    events, _ = played(wire, token, type="move_path", segments=parts)
-    assert [event["kind"] for event in events] == ["motion_started", "warning", "motion_done"]
-    assert events[1]["code"] == "blend_skipped"
-    assert "segments[1]" in events[1]["why"]
 
 
 def test_poses_are_read_in_a_frame(bent):

@@ -227,10 +227,7 @@ class TestWhatIsSaid:
 
 def test_truth_is_not_told_to_who_may_be_on_another_machine():
     port = free_endpoint().rpartition(":")[2]
-    with (
-        Served("--insecure", endpoint=f"tcp/0.0.0.0:{port}"),
-        Wire(f"tcp/127.0.0.1:{port}") as wire,
-    ):
+    with Served("--insecure", endpoint=f"tcp/0.0.0.0:{port}"), Wire(f"tcp/127.0.0.1:{port}") as wire:
         wire.listen("state", "truth")
         wire.until(wire.wait("state")["tick"] + 100)
         assert wire.received["truth"] == []

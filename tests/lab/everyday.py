@@ -6,7 +6,7 @@ import numpy as np
 
 from tvist_controller.api.line import body, paper_payload
 from tvist_lab.collect import collect
-from tvist_lab.identification.everyday_stops import Log
+from tvist_lab.identification.ring_downs import Log
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.metrics import RingDown, fit_ring_down, tool_acceleration
 from tvist_lab.recordings import Floats

@@ -14,9 +14,8 @@ from tests.lab.synthetic_logs import SyntheticLog
 from tvist_cli.commands.log.advise import advise as command_line
 from tvist_cli.failure import Failure
 from tvist_lab.advice import EACH, ONE, advise, as_dict, command, verdict
-from tvist_lab.advice.options import options
+from tvist_lab.advice.options import options, slowed, smoothed
 from tvist_lab.advice.ripple import WAVES, fitted, poles_of
-from tvist_lab.advice.slower import slowed, smoothed
 from tvist_lab.advice.stops import Stop
 from tvist_lab.metrics import Measured
 from tvist_lab.recordings import Recording

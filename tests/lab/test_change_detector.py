@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tvist_lab.metrics.change_detector import KEPT, ChangeDetector
-from tvist_lab.metrics.fit_monitor import GEAR, MASS, MODES, _of_gear, _of_mass, _of_modes
+from tvist_lab.metrics.changes import GEAR, MASS, MODES, _of_gear, _of_mass, _of_modes
 
 SCATTER = 0.05
 

@@ -16,7 +16,7 @@ from tvist_cli.failure import Failure
 from tvist_lab.recordings import RecordingError, read
 from tvist_lab.recordings.description import KEY, meaning_of, sidecar
 from tvist_lab.recordings.export import FORMATS, ExportError, export
-from tvist_lab.recordings.recorded_columns import recording_of_messages
+from tvist_lab.recordings.messages import recording_of_messages
 from tvist_protocol import Event, Info, Io, State, Truth
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.recorded import topics
@@ -143,7 +143,7 @@ class TestLayout:
 
     def test_tables_without_our_description_are_read_as_logs(self, tmp_path):
         count = 500
-        q = np.cumsum(np.random.default_rng(0).standard_normal((count, 6)), axis=0)
+        q = 0.01 * np.cumsum(np.random.default_rng(0).standard_normal((count, 6)), axis=0)
         time = np.arange(count) * 0.002
         np.savez(tmp_path / "own.npz", timestamp=time, actual_q=q)
         flat = {"timestamp": time} | {f"actual_q_{i}": q[:, i] for i in range(6)}

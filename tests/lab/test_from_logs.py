@@ -8,15 +8,21 @@ import pytest
 from tests.lab.everyday import everyday_logs, unseen
 
 from tvist_controller.api.line import CollisionModel, body, paper_payload
-from tvist_lab.identification.design import predicted
-from tvist_lab.identification.everyday_stops import CONTRADICTS, Log, noise_of, stops_of
+from tvist_lab.identification.calibrate import agreeing, calibrate, more_jogs
+from tvist_lab.identification.design import free_configurations, jog_of, predicted
 from tvist_lab.identification.forecast import Forecast
-from tvist_lab.identification.from_logs import identify_from_logs, more_moves, usable
-from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.jogs import Measured
 from tvist_lab.identification.modal_fit import describe, fit_modal, of_masses
-from tvist_lab.identification.modal_plan import ModalPlan, free_configurations
-from tvist_lab.identification.ring_downs import LEAST_NOISE, Jog
-from tvist_lab.identification.unknowns import SURE, ArmModes, unknowns_near
+from tvist_lab.identification.ring_downs import (
+    CONTRADICTS,
+    LEAST_NOISE,
+    IdentificationError,
+    Log,
+    noise_of,
+    stops_of,
+    unused,
+)
+from tvist_lab.identification.unknowns import SURE, ArmModes
 from tvist_lab.metrics import MotionRows, motions
 from tvist_lab.recordings import Recording, RecordingError
 from tvist_plant.description import load
@@ -56,11 +62,11 @@ def _noise(measured):
 @pytest.fixture(scope="module")
 def forecast():
     """A fit to ring-downs of the arm as its file has it, with noise."""
-    arm = ArmModes(ROBOT, PAYLOADS, unknowns_near(ROBOT))
+    arm = ArmModes(ROBOT, PAYLOADS)
     rng = np.random.default_rng(3)
     rings = []
-    for number, q in enumerate(free_configurations(ROBOT, PAYLOADS, 6, ModalPlan(6, PAYLOADS, seed=2))):
-        ring = predicted(arm, q, number % 2, Jog())
+    for number, q in enumerate(free_configurations(ROBOT, PAYLOADS, 6, 2)):
+        ring = predicted(arm, q, number % 2)
         rings.append(replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape)))
     fit = fit_modal(arm, rings)
     return Forecast(arm, fit, fit.covariance, of_masses(arm, rings, fit)), rings
@@ -90,7 +96,7 @@ def test_a_log_without_accelerometer_tells_nothing_and_says_so(logs):
     del columns["actual_tool_accelerometer"]
     blind = replace(logs[1], recording=replace(logs[1].recording, columns=columns))
     with pytest.raises(IdentificationError, match=r"0 of 7 stops.*actual_tool_accelerometer.*Record"):
-        usable(ROBOT, [blind], lambda _: None)
+        agreeing(ROBOT, [blind], lambda _: None)
 
 
 def test_a_stop_in_the_noise_is_not_used(logs):
@@ -122,14 +128,14 @@ def test_stops_with_another_payload_than_said_are_judged_out_and_no_others(logs)
     recording = asyncio.run(everyday_logs("ur5e", 21, 9))[2].recording
     third = int(recording["tick"][motions(recording)[2].start])
     wrong = Log("wrong", recording.between(0, third), PAYLOADS[0])
-    stops, *_ = usable(ROBOT, [*logs, wrong], lambda _: None)
+    stops, *_ = agreeing(ROBOT, [*logs, wrong], lambda _: None)
     assert [(s.log, s.motion) for s in stops if s.reason == CONTRADICTS] == [("wrong", 1), ("wrong", 2)]
 
 
 def test_intervals_hold_the_true_modes_of_the_arm_that_was_fitted(forecast):
     known, _ = forecast
     arm, held = known.arm, []
-    for q in free_configurations(ROBOT, PAYLOADS, 20, ModalPlan(6, PAYLOADS, seed=9)):
+    for q in free_configurations(ROBOT, PAYLOADS, 20, 9):
         f_d, zeta = describe(arm.drivetrain(arm.guess).poles(arm.mass(q, 1))[0][:2])
         there = known.at(q, 1, 2)
         held += [
@@ -141,7 +147,7 @@ def test_intervals_hold_the_true_modes_of_the_arm_that_was_fitted(forecast):
 
 def test_proposals_are_jogs_that_no_body_is_in_the_way_of(forecast):
     known, rings = forecast
-    found = more_moves(known, rings[-1])
+    found = more_jogs(known, rings[-1])
     assert len(found) == 3
     collisions, at = CollisionModel(ROBOT, body(PAYLOADS[1])), rings[-1].q
     for one in found:
@@ -150,15 +156,15 @@ def test_proposals_are_jogs_that_no_body_is_in_the_way_of(forecast):
                 collisions.meeting(at + share * (after - at)) is None for share in np.linspace(0.0, 1.0, 100)
             )
             at = after
-        assert one.q - one.way[-1] == pytest.approx(Jog().of(6))
+        assert one.q - one.way[-1] == pytest.approx(jog_of(6))
 
 
 def test_the_proposed_ring_downs_leave_less_of_what_is_uncertain(forecast):
     known, rings = forecast
     arm, more = known.arm, list(rings)
     rng = np.random.default_rng(5)
-    for one in more_moves(known, rings[-1]):
-        ring = predicted(arm, one.q, rings[-1].payload, Jog())
+    for one in more_jogs(known, rings[-1]):
+        ring = predicted(arm, one.q, rings[-1].payload)
         more.append(replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape)))
     before, after = (np.linalg.slogdet(fit_modal(arm, some).covariance)[1] for some in (rings, more))
     assert after < before - 1.0
@@ -166,8 +172,8 @@ def test_the_proposed_ring_downs_leave_less_of_what_is_uncertain(forecast):
 
 @pytest.mark.nightly
 def test_where_nobody_has_listened_a_hidden_robot_rings_within_the_intervals_that_are_given(logs):
-    found = identify_from_logs(ROBOT, logs, name="x", command="x", progress=lambda _: None)
-    assert found.used + sum(found.unused.values()) == 20
+    found = calibrate(ROBOT, Measured(tuple(logs)), name="x", command="x", progress=lambda _: None)
+    assert found.used + sum(unused(found.stops).values()) == 20
     assert "38 are needed" in found.no_polynomial
     held, sure = [], []
     for place in unseen(ROBOT, 21, 30, 0):

@@ -13,7 +13,7 @@ from tests.lab.two_device_logs import G, TwoDevices, flange, write
 from tvist_lab.recordings import RecordingError, read
 from tvist_lab.recordings.flange_motion import at_flange, by_sensor
 from tvist_lab.recordings.joined import joined
-from tvist_lab.recordings.log_columns import SENSOR
+from tvist_lab.recordings.table import SENSOR
 from tvist_lab.recordings.two_clocks import fits
 from tvist_plant.description import load
 

@@ -8,7 +8,7 @@ import pytest
 from tests.lab.synthetic_logs import SyntheticLog
 
 from tvist_lab.metrics import Measured, analyze, compare, motions
-from tvist_lab.recordings import RecordingError, read
+from tvist_lab.recordings import RecordingError, read, table
 
 MODE = (9.0, 0.12, 1.0)
 
@@ -501,6 +501,27 @@ def test_vectors_of_a_table_are_read_under_any_name_and_named_when_they_are_not(
         read(path)
     found = read(path, "time=stamp,q=observation.state_{}:rad")
     assert found["actual_q"] == pytest.approx(q)
+
+
+def test_a_format_of_ones_own_is_a_function_and_its_names_units_and_gaps_are_found(tmp_path, monkeypatch):
+    """A made-up program writes one number after another as text, in ms and degrees."""
+
+    def read_numbers(path):
+        values = np.array(path.read_text().split(), np.float64).reshape(-1, 3)
+        return table.Table(
+            path, ["time", "q_actual_0", "q_actual_1"], values, np.arange(1.0, len(values) + 1.0)
+        )
+
+    monkeypatch.setitem(table.READERS, ".numbers", read_numbers)  # as @reader(".numbers") does
+    t = 0.004 * np.delete(np.arange(500), slice(200, 260))
+    rows = np.column_stack([1e3 * t, 57.3 * np.sin(t), 57.3 * np.cos(t)])
+    (path := tmp_path / "log.numbers").write_text(" ".join(map(repr, rows.ravel().tolist())))
+    found = read(path)
+    assert found.time == pytest.approx(t)
+    assert found["actual_q"] == pytest.approx(np.radians(rows[:, 1:]))
+    assert found.missing_ticks == 60
+    for words in ("taken as ms", "taken as deg", "rows are missing"):
+        assert any(words in note for note in found.notes)
 
 
 @pytest.mark.filterwarnings("error")

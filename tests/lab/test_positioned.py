@@ -14,13 +14,11 @@ from tvist_controller.api.line import (
     paper_payload,
     quickest_motion,
 )
-from tvist_lab.identification.design import predicted
-from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.design import free_configurations, jog_of, predicted
+from tvist_lab.identification.jogs import plan_jogs
 from tvist_lab.identification.modal_fit import RAYLEIGH, describe, fit_modal, softened
-from tvist_lab.identification.modal_plan import ModalPlan, free_configurations
-from tvist_lab.identification.positioned import JOG, plan_moves
-from tvist_lab.identification.ring_downs import Jog
-from tvist_lab.identification.unknowns import ArmModes, unknowns_near
+from tvist_lab.identification.ring_downs import IdentificationError
+from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
@@ -32,7 +30,7 @@ STANDS = (0.2, -1.3, 1.4, -1.7, -1.5, 0.1)
 async def planned(q=STANDS, ring_downs=6, description=ROBOT):
     setup = replace(free_setup(calibration="none"), q=q)
     async with robot_in_process(setup) as robot:
-        return await plan_moves(robot, description, ModalPlan(ring_downs, seed=3, jog=JOG))
+        return await plan_jogs(robot, description, ring_downs, seed=3, positions=True)
 
 
 async def test_every_way_is_clear_and_leaves_base_and_outer_wrist_as_they_are():
@@ -46,7 +44,7 @@ async def test_every_way_is_clear_and_leaves_base_and_outer_wrist_as_they_are():
             assert all(collisions.meeting(q) is None for q in between)
             assert after[4:] == pytest.approx(STANDS[4:])
             at = after
-        assert jog.q - jog.way[-1] == pytest.approx(JOG.of(6))
+        assert jog.q - jog.way[-1] == pytest.approx(jog_of(6))
 
 
 async def test_no_joint_is_faster_than_the_robot_in_front_allows():
@@ -80,11 +78,11 @@ async def test_too_few_ring_downs_and_the_file_of_another_robot_are_refused():
 
 def rings(driven=(), softening=0.0):
     """Ring-downs of the arm of the file, whose poles change with the amplitude, after a servo's coming to rest."""
-    arm = ArmModes(ROBOT, (paper_payload(ROBOT, 5.0),), unknowns_near(ROBOT))
+    arm = ArmModes(ROBOT, (paper_payload(ROBOT, 5.0),))
     random, found = np.random.default_rng(2), []
-    for q in free_configurations(ROBOT, arm.payloads, 8, ModalPlan(8)):
-        ring = predicted(arm, q, 0, Jog(quickness=2.0))
-        time = PERIOD * np.arange(len(ring.force))
+    for q in free_configurations(ROBOT, arm.payloads, 8, 0):
+        ring = predicted(arm, q, 0)
+        time = ring.time
         poles = arm.drivetrain(arm.guess).poles(arm.mass(q, 0))[0][:1]
         amplitude = 3.0 * np.exp(poles[0].real * time)
         lost = softening * np.cumsum(amplitude) * PERIOD * RAYLEIGH / abs(poles[0])
@@ -92,7 +90,7 @@ def rings(driven=(), softening=0.0):
         for pole in driven:
             force += np.outer(np.exp(pole * time).real, [2.0, 1.0, -1.0])
         noisy = force + random.normal(0.0, 0.03, force.shape)
-        found.append(replace(ring, force=noisy, noise=0.03, time=time, driven=driven))
+        found.append(replace(ring, force=noisy, noise=0.03, driven=driven))
     return arm, found
 
 

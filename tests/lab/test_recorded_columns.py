@@ -9,7 +9,7 @@ import pytest
 
 from tvist_lab.recordings import mcap_file
 from tvist_lab.recordings.mcap_file import RecordingFileError, read
-from tvist_lab.recordings.recorded_columns import recording_of_messages
+from tvist_lab.recordings.messages import recording_of_messages
 from tvist_protocol import Event, Info, Io, State, Truth
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.recorded import topics

@@ -10,7 +10,7 @@ from tvist_cli.commands.log.analyze import analyze
 from tvist_lab.metrics import NotMeasurableError
 from tvist_lab.metrics.sensor_alone import free_vibrations
 from tvist_lab.recordings import RecordingError, read
-from tvist_lab.recordings.log_columns import ROBOT_OR_SENSOR
+from tvist_lab.recordings.table import ROBOT_OR_SENSOR
 
 
 def klipper(path, rate, alpha, seed=1):

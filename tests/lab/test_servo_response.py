@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tvist_lab.identification.servo_response import fresh, servo_response
+from tvist_lab.identification.ring_downs import fresh
+from tvist_lab.identification.servo_response import servo_response
 from tvist_lab.recordings import Recording
 from tvist_lab.study.line import point_to_point
 from tvist_plant.plant import PERIOD

@@ -95,7 +95,7 @@ def test_a_twin_of_a_hidden_robot_predicts_what_it_has_not_seen(logs, tmp_path):
     assert twin.error_percent(0.5) < 20.0
     assert twin.error_percent(0.9) < 40.0
     path = tmp_path / "twin.toml"
-    path.write_text(twin_file(twin, "tvist log fit"), encoding="utf-8")
+    path.write_text(twin_file(twin, "tvist identify --twin"), encoding="utf-8")
     served = load(path)
     assert replace(served, provenance=twin.robot.provenance) == twin.robot
     assert served.provenance["drives.coulomb_friction"].startswith("measured")

@@ -12,7 +12,7 @@ from tvist_controller.sources.calibrations import FRICTION, friction_law
 from tvist_controller.sources.calibrations import load as calibration
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.identification.friction import fit_friction, friction, identify_friction, unknown_friction
-from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.ring_downs import IdentificationError
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.case import Case

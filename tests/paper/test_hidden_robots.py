@@ -12,8 +12,8 @@ from tvist_client import make_payload
 from tvist_controller.setup import paper_payload
 from tvist_controller.sources.calibrations import load as calibration
 from tvist_controller.sources.own_plants import OwnPlant
-from tvist_lab.identification.modal import identify_modal
-from tvist_lab.identification.modal_plan import ModalPlan, jog_of
+from tvist_lab.identification.calibrate import calibrate
+from tvist_lab.identification.jogs import make_jogs, plan_jogs
 from tvist_lab.identification.payload import identify_payload
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.study.arms import ArmVariant
@@ -70,13 +70,11 @@ def identified(arm, mass):
             disc = paper_payload(ROBOT, mass)
             await control.reset(payload=make_payload(mass, disc.com, disc.inertia))
             began = (await robot.state()).tick
-            payload = await identify_payload(robot, control, ROBOT, progress=lambda: None)
+            payload = await identify_payload(robot, control, ROBOT, progress=lambda _: None)
             told = payload.payload
             await control.set_payload(told.mass, told.com, told.inertia)
-            done = await identify_modal(
-                robot, control, ROBOT, ModalPlan(jog=jog_of(ROBOT)), name="hidden", command="a test",
-                progress=lambda: None,
-            )  # fmt: skip
+            jogs = await make_jogs(robot, control, await plan_jogs(robot, ROBOT), lambda _: None)
+            done = calibrate(ROBOT, jogs, name="hidden", command="a test", progress=lambda _: None)
             return payload, done.calibration, 0.002 * ((await robot.state()).tick - began)
 
     return asyncio.run(run())

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tvist_client import make_payload
-from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.payload import identify_payload
+from tvist_lab.identification.ring_downs import IdentificationError
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
 
@@ -22,7 +22,7 @@ def found(mass, com, *, declared=2.0, poses=4, seed=0, description=ROBOT):
             await arm.reset(payload=make_payload(mass, com, INERTIA if mass else (0.0,) * 6))
             await arm.set_payload(declared, (0.0, 0.0, 0.04), INERTIA)
             return await identify_payload(
-                robot, arm, description, poses=poses, seed=seed, progress=lambda: None
+                robot, arm, description, poses=poses, seed=seed, progress=lambda _: None
             )
 
     return asyncio.run(run())

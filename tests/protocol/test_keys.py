@@ -39,22 +39,13 @@ def test_what_is_no_session_is_refused(session):
     assert (caught.value.code, caught.value.where) == ("out_of_range", "session")
 
 
-@pytest.mark.parametrize(
-    "key",
-    [
-        "tvist/ur5e/client/*",
-        "tvist/ur5e/client/a/",
-        "tvist/ur5e/client/a/x",
-        "tvist/ur5e/client/a/b/c",
-        "tvist/ur5e/client/a/**",
-        "tvist/ur5e/client//b",
-        "tvist/ur5e/client",
-        "tvist/ur10/client/a",
-        "tvist/ur5e/client/",
-        "x",
-        "",
-    ],
-)
+NO_CLIENTS = [
+    *(f"tvist/ur5e/client{rest}" for rest in ("/*", "/a/", "/a/x", "/a/b/c", "/a/**", "//b", "", "/")),
+    *("tvist/ur10/client/a", "x", ""),
+]
+
+
+@pytest.mark.parametrize("key", NO_CLIENTS)
 def test_a_key_that_is_no_clients_has_neither_name_nor_session(key):
     assert keys.client_name("ur5e", key) is None
     assert keys.client_session("ur5e", key) == ""
@@ -65,30 +56,13 @@ def test_robot_names(name):
     assert keys.check_robot_name(name) == name
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "",
-        "*",
-        "**",
-        "a*",
-        "$*",
-        "a/b",
-        "UR5e",
-        "_a",
-        "-a",
-        "a" * 65,
-        "a b",
-        "a\n",
-        "ä",
-        "a#",
-        "a?",
-        "@a",
-        None,
-        5,
-        b"a",
-    ],
-)
+NO_ROBOTS = [
+    *("", "*", "**", "a*", "$*", "a/b", "UR5e", "_a", "-a", "ä", "a#", "a?", "@a", "a b", "a\n", "a" * 65),
+    *(None, 5, b"a"),
+]
+
+
+@pytest.mark.parametrize("name", NO_ROBOTS)
 def test_what_is_no_robot_name_is_refused_by_every_key(name):
     for made in (partial(keys.key, leaf="state"), keys.any_client, keys.check_robot_name):
         with pytest.raises(ProtocolError) as caught:

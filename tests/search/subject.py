@@ -18,7 +18,7 @@ from tvist_controller.api.line import (
 )
 from tvist_controller.api.robot import Controller
 from tvist_controller.sources.calibrations import default_for
-from tvist_lab.identification.modal_calibration import mode_range
+from tvist_lab.identification.calibrate import mode_range
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import flexible_model

@@ -45,11 +45,6 @@ def test_a_wrong_file_is_refused_with_key_value_and_limit(tmp_path, right, wrong
     assert str(file) in str(refused.value)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(StartError, match="No such file"):
-        ServeConfig(cell=str(tmp_path / "cell.toml")).setup()
-
-
 def test_the_first_tool_is_carried_and_declared_unless_a_payload_is_given():
     plain, other = ServeConfig(cell=str(EXAMPLE)).setup(), ServeConfig(cell=str(EXAMPLE), payload=2.0).setup()
     assert (plain.payload.mass, plain.carried.mass) == (0.92, 0.92)

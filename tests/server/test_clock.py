@@ -76,16 +76,6 @@ def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
     assert seen == [*((number, 0) for number in range(100)), "last"]
 
 
-def test_a_job_that_posts_another_does_not_keep_the_tick_waiting():
-    robot = Mailbox(FakeHost())
-
-    def again():
-        robot.post(again)
-
-    again()
-    served([robot])
-
-
 def test_an_arm_that_does_not_begin_its_tick_keeps_no_client_waiting_and_is_told_of_once():
     paces = [True, False, False, True, False]
     robot = Mailbox(FakeHost(), pace=lambda timeout: paces.pop(0) if paces else time.sleep(timeout))
@@ -167,22 +157,6 @@ def test_an_arm_whose_call_never_returns_does_not_keep_the_server_from_ending(ca
     go_on.set()
 
 
-def test_real_time_priority_is_asked_for_by_the_tick_thread_itself(monkeypatch):
-    asked = []
-    monkeypatch.setattr(
-        os,
-        "sched_setscheduler",
-        lambda *arguments: asked.append((threading.current_thread().name, *arguments)),
-    )
-    served([Mailbox(FakeHost())], priority=True)
-    ((thread, which, policy, parameter),) = asked
-    # What a thread with this priority starts has none.
-    assert (thread, which, policy) == ("tvist-tick", 0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK)
-    assert parameter.sched_priority == punctual.PRIORITY
-    served([Mailbox(FakeHost())])
-    assert len(asked) == 1
-
-
 @pytest.fixture
 def recorder():
     """A thread that takes the messages of every tick."""
@@ -193,24 +167,24 @@ def recorder():
     ended.set()
 
 
-def test_a_thread_with_the_messages_of_every_tick_gets_the_priority_next_to_it(monkeypatch, recorder):
+def test_real_time_priority_is_asked_for_by_the_tick_thread_and_next_to_it_for_who_takes_its_messages(
+    monkeypatch, recorder
+):
     """Otherwise the tick waits for whatever program takes the processor from one that holds the interpreter's lock."""
     asked = []
-    monkeypatch.setattr(
-        os, "sched_setscheduler", lambda which, _, asks: asked.append((which, asks.sched_priority))
-    )
-    served([Mailbox(FakeHost())], priority=True)
-    assert asked == [(0, punctual.PRIORITY), (recorder.native_id, punctual.PRIORITY - 1)]
 
-
-@pytest.mark.usefixtures("recorder")
-def test_a_thread_that_has_just_ended_takes_no_priority_from_the_tick(monkeypatch):
-    def ask(which, *_):
-        if which != 0:
-            raise ProcessLookupError(3, "No such process")
+    def ask(which, policy, parameter):
+        asked.append((threading.current_thread().name, which, policy, parameter.sched_priority))
 
     monkeypatch.setattr(os, "sched_setscheduler", ask)
-    assert punctual.take_priority()
+    served([Mailbox(FakeHost())])
+    assert asked == []
+    served([Mailbox(FakeHost())], priority=True)
+    policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK  # what a thread with this priority starts has none
+    assert asked == [
+        ("tvist-tick", 0, policy, punctual.PRIORITY),
+        ("tvist-tick", recorder.native_id, policy, punctual.PRIORITY - 1),
+    ]
 
 
 def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypatch, caplog):

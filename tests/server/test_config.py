@@ -1,4 +1,4 @@
-"""Configuration: what is wrong is said in one sentence that names the key."""
+"""Configuration and profiles: what is wrong is said in one sentence that names the key, and what options change."""
 
 import json
 import tomllib
@@ -6,15 +6,19 @@ from importlib import resources
 
 import msgspec
 import pytest
-from tests.controller.robots import Q1, Q3, UR5E, calibration, cut, setup
+from tests.controller.robots import UR5E, Robot, calibration, cut, setup
 
+from tvist_controller.kinematics.postures import is_of_ur_form
 from tvist_controller.setup import Setup, paper_payload
 from tvist_controller.sources import calibrations
+from tvist_plant.description import load
 from tvist_plant.user_file import UserFileError
+from tvist_protocol import commands as c
 from tvist_protocol.calibration import calibration_to_json
 from tvist_server.config import ServeConfig, from_mapping
 from tvist_server.moving.servo_lag import ServoLag
-from tvist_server.option_values import StartError, read_start_file
+from tvist_server.option_values import MOST, StartError, members, read_start_file, recording_of
+from tvist_server.profiles import UR_START
 
 
 def config(**values) -> ServeConfig:
@@ -46,6 +50,10 @@ def sentence(action, *arguments):
         ({"listen": "tcp/127.0.0.1:7447"}, "listen"),
         ({"start": [0, "x"]}, "start"),
         ({"truth": "yes"}, "truth"),
+        ({"profile": "urzim"}, "profile"),
+        *(({"workers": workers}, "workers") for workers in (0, 257, "two")),
+        ({"robots": "ur5e*2", "name": "ur5e"}, "robots and name exclude each other"),
+        ({"robots": "ur5e*2", "robot": "ur5e"}, "robots and robot exclude each other"),
     ],
 )
 def test_a_key_or_value_that_cannot_be(values, named):
@@ -68,10 +76,39 @@ def test_a_key_or_value_that_cannot_be(values, named):
         ({"start": [0.0, 0.0]}, "start has 2 angles"),
         ({"calibration": "nowhere.json"}, "calibration 'nowhere.json'"),
         ({"calibration": "no\0where"}, "null"),
+        *(({"robots": text}, "a robot is missing") for text in ("", "ur5e,", "*3")),
+        *(
+            ({"robots": text}, repr(text))
+            for text in ("ur5e*", "ur5e*0", "ur5e*-1", "ur5e*1.5", "ur5e*2*2", "ur5e*²")
+        ),
+        ({"robots": "ur5e*65"}, "from 1 to 64"),
+        ({"robots": "ur5e*99999999999999999999"}, "from 1 to 64"),
+        ({"robots": "ur5e*40,ur5e*40"}, "at most 64"),
+        ({"robots": "My Robot.toml"}, "My Robot.toml"),
+        ({"robots": "ur5e*2,ur5e-1.toml"}, "ur5e-1"),
     ],
 )
 def test_what_does_not_fit_the_rest(values, named):
-    assert named in sentence(config(**values).setup)
+    assert named in sentence(lambda: config(**values).setups())
+
+
+def test_one_robot_has_the_name_of_its_file_and_several_have_numbers():
+    def names(text):
+        return [member.name for member in members(text)]
+
+    assert names("ur5e") == names("ur5e*1") == ["ur5e"]
+    assert names("ur5e*2,/a/b/other.toml") == ["ur5e-1", "ur5e-2", "other"]
+    assert names("ur5e, other.toml*2 ,ur5e") == ["ur5e-1", "other-1", "other-2", "ur5e-2"]
+    assert [member.robot for member in members("ur5e,x/other.toml*2")] == ["ur5e", *2 * ["x/other.toml"]]
+    assert len(members(f"ur5e*{MOST}")) == MOST
+
+
+def test_each_of_several_robots_has_a_seed_and_a_recording_of_its_own():
+    setups = from_mapping({"robots": "ur5e*3", "seed": 7, "shaper": "ei", "truth": True}, "").setups()
+    assert [(setup.name, setup.seed) for setup in setups] == [("ur5e-1", 7), ("ur5e-2", 8), ("ur5e-3", 9)]
+    assert all(setup.shaper == "ei" and setup.truth for setup in setups)
+    assert str(recording_of("a.b/out.mcap", "ur5e-3")) == "a.b/out-ur5e-3.mcap"
+    assert str(recording_of("out", "other")) == "out-other"
 
 
 def test_a_folder_for_the_last_second_that_is_none_is_refused_and_not_found_out_at_the_failure(tmp_path):
@@ -88,13 +125,6 @@ def test_the_defaults_are_the_paper_s():
     assert made.q == UR5E.poses["Q1"]
     assert made.payload == paper_payload(UR5E)
     assert (made.name, made.shaper, made.seed, made.clock, made.truth) == ("ur5e", "zv", 0, "realtime", False)
-
-
-def test_without_calibration_the_estimator_is_fixed():
-    made = config(calibration="none").setup()
-    assert made.calibration is None
-    f_d, zeta = made.estimator().estimate(Q1)
-    assert (f_d.tolist(), zeta.tolist()) == ([10.0], [0.2])
 
 
 @pytest.mark.parametrize(("robot", "name"), [("ur5e", "ur5e_5kg"), ("one-joint", "one-joint_1kg")])
@@ -128,10 +158,6 @@ def test_a_start_by_its_angles(start):
     assert config(start=start).setup().q == (0.1, -1.0, 2.0, 0.0, 0.0, 0.5)
 
 
-def test_a_start_by_its_name():
-    assert config(start="Q3").setup().q == tuple(Q3)
-
-
 @pytest.mark.parametrize("mass", [0.0, 2.5])
 def test_another_payload_is_the_same_disc_in_less_steel(mass):
     payload = config(payload=mass).setup().payload
@@ -162,12 +188,6 @@ def test_what_is_carried_may_be_above_the_rating(tmp_path):
     assert config(state=str(file)).setup().carried.mass == 20.0
 
 
-def test_a_calibration_file(tmp_path):
-    path = tmp_path / "mine.json"
-    path.write_bytes(calibration_to_json(calibration(name="mine")))
-    assert config(calibration=str(path)).setup().calibration.name == "mine"
-
-
 def test_a_calibration_of_another_robot(tmp_path):
     path = tmp_path / "other.json"
     path.write_bytes(calibration_to_json(calibration(robot="UR10e")))
@@ -194,13 +214,6 @@ def test_a_file_that_cannot_be_read_or_is_no_toml(tmp_path):
 def test_a_file_that_is_none_is_not_taken_for_a_wrong_value(key, tmp_path):
     with pytest.raises(UserFileError, match=f"{key}.*{tmp_path} is a directory"):
         config(**{key: str(tmp_path)}).setup()
-
-
-def test_a_file_is_read(tmp_path):
-    path = tmp_path / "tvist.toml"
-    path.write_text('shaper = "ei"\nseed = 7\nlisten = ["tcp/0.0.0.0:7447"]\n')
-    read = from_mapping(read_start_file(path, "configuration", dict), str(path))
-    assert (read.shaper, read.seed, read.listen) == ("ei", 7, ("tcp/0.0.0.0:7447",))
 
 
 @pytest.mark.parametrize("own", [None, calibration()])
@@ -269,10 +282,6 @@ def test_a_state_that_cannot_be(tmp_path, content, named):
     assert named in sentence(config(state=str(file)).setup)
 
 
-def test_a_state_that_is_not_there(tmp_path):
-    assert "No such file" in sentence(config(state=str(tmp_path / "no.toml")).setup)
-
-
 def test_a_machine_without_a_temporary_folder_serves_all_the_same(monkeypatch, tmp_path):
     def none():
         raise FileNotFoundError
@@ -284,11 +293,7 @@ def test_a_machine_without_a_temporary_folder_serves_all_the_same(monkeypatch, t
 
 @pytest.mark.parametrize(
     ("values", "lag"),
-    [
-        ({}, (0.05, 900.0)),
-        ({"servo_lag": "0.1,400"}, (0.1, 400.0)),
-        ({"calibration": "none"}, None),
-    ],
+    [({}, (0.05, 900.0)), ({"servo_lag": "0.1,400"}, (0.1, 400.0)), ({"calibration": "none"}, None)],
 )
 def test_the_servo_of_a_robot_that_is_moved_is_the_calibrations_unless_another_is_given(
     tmp_path, values, lag
@@ -304,3 +309,86 @@ def test_the_servo_of_a_robot_that_is_moved_is_the_calibrations_unless_another_i
     } | values
     moved = config(**given)
     assert moved.setup().plant.maker.keywords["lag"] == (lag and ServoLag(*lag))
+
+
+def test_without_a_profile_every_option_has_the_default_it_always_had():
+    made, shipped = ServeConfig().setup(), load("ur5e")
+    assert ServeConfig().profile_in_force is None
+    assert made.description == shipped
+    assert (made.q, made.payload, made.carried) == (shipped.poses["Q1"], paper_payload(shipped), None)
+    assert (made.shaper, made.compensate_sag, made.shape_servo) == ("zv", False, False)
+
+
+@pytest.mark.parametrize("options", [{"ur": True}, {"profile": "ursim"}, {"ur": True, "profile": "ursim"}])
+def test_ursim_is_the_profile_of_ur_s_interfaces(options):
+    made = config(**options).setup()
+    assert made.q == UR_START
+    assert made.payload.mass == 0.0
+    assert made.carried is None
+    assert (made.shaper, made.compensate_sag, made.shape_servo) == ("none", True, False)
+    assert made.description == UR5E.quiet().without_floor()
+
+
+@pytest.mark.parametrize("options", [{"profile": "real"}, {"ur": True, "profile": "real"}])
+def test_real_is_a_robot_without_a_profile_in_ur_s_posture(options):
+    made = config(**options).setup()
+    assert made.q == UR_START
+    assert msgspec.structs.asdict(made.payload) == msgspec.structs.asdict(config().setup().payload)
+    assert made.to_builtins() | {"q": None} == config().setup().to_builtins() | {"q": None}
+
+
+@pytest.mark.parametrize("profile", ["ursim", "real"])
+@pytest.mark.parametrize(
+    ("option", "read", "expected"),
+    [
+        ({"payload": 2.0}, lambda made: made.payload.mass, 2.0),
+        ({"start": "Q3"}, lambda made: made.q, UR5E.poses["Q3"]),
+        ({"shaper": "ei"}, lambda made: made.shaper, "ei"),
+        ({"quiet": True}, lambda made: made.description.sensors, UR5E.quiet().sensors),
+        ({"quiet": False}, lambda made: made.description.sensors, UR5E.sensors),
+        ({"floor": True}, lambda made: made.description.collision, UR5E.collision),
+        ({"floor": False}, lambda made: made.description.collision, UR5E.without_floor().collision),
+        ({"compensate_sag": True}, lambda made: made.compensate_sag, True),
+        ({"compensate_sag": False}, lambda made: made.compensate_sag, False),
+    ],
+)
+def test_an_explicit_option_takes_precedence(profile, option, read, expected):
+    assert read(config(profile=profile, **option).setup()) == expected
+
+
+def test_a_state_takes_precedence_too(tmp_path):
+    file = tmp_path / "state.toml"
+    file.write_text('q = [0.0, -1.5, 1.5, 0.0, 0.0, 0.0]\nshaper = "ei"\n')
+    made = config(ur=True, state=str(file)).setup()
+    assert (made.q, made.shaper, made.payload.mass) == ((0.0, -1.5, 1.5, 0.0, 0.0, 0.0), "ei", 0.0)
+
+
+def test_an_arm_that_is_not_of_ur_s_form_starts_in_its_own_posture():
+    made = from_mapping({"robot": "one-joint", "ur": True}, "tvist.toml").setup()
+    assert made.q == load("one-joint").poses["Q1"]
+    assert made.payload.mass == 0.0
+    assert [is_of_ur_form(arm) for arm in (UR5E, cut(5), load("one-joint"))] == [True, False, False]
+
+
+@pytest.mark.parametrize(("options", "reply"), [({}, "Accepted"), ({"floor": True}, "Refused")])
+def test_the_posture_of_all_zeros_is_reached_where_there_is_no_floor(options, reply):
+    made = config(profile="ursim", start="0,-0.5,-0.5,-1.6,1.6,0", **options).setup()
+    robot = Robot(made.description, q=made.q, payload=made.payload, shaper=made.shaper)
+    assert type(robot.send(c.MoveJ, q=(0.0,) * 6)).__name__ == reply
+
+
+def test_the_options_are_part_of_a_recording_and_older_ones_have_none():
+    made = setup(compensate_sag=True, shape_servo=True, description=UR5E.without_floor())
+    content = made.to_builtins()
+    assert Setup.from_builtins(content) == made
+    del content["compensate_sag"], content["shape_servo"], content["description"]["collision"]["has_floor"]
+    older = Setup.from_builtins(content)
+    assert (older.compensate_sag, older.shape_servo, older.description) == (False, False, UR5E)
+
+
+def test_a_robot_file_may_have_no_floor(tmp_path):
+    text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
+    path = tmp_path / "hanging.toml"
+    path.write_text(text.replace("floor  = 0.0 ", "has_floor = false\nfloor  = 0.0 "), encoding="utf-8")
+    assert config(robot=str(path)).setup().description == UR5E.without_floor()
+    assert not config(robot=str(path), floor=True).setup().description.collision.has_floor

@@ -65,13 +65,6 @@ def test_after_a_while_lines_come_through_again_behind_the_count_of_those_left_o
     assert throttle.take("5", WINDOW + 0.1) == ["5"]
 
 
-def test_where_nothing_was_left_out_nothing_is_counted():
-    throttle = Throttle(2, "stops")
-    throttle.take("0", 0.0)
-    assert throttle.due(2 * WINDOW) == []
-    assert throttle.rest() == []
-
-
 def test_a_console_that_nobody_reads_holds_up_neither_the_robot_nor_the_end(monkeypatch):
     stuck = threading.Event()
     monkeypatch.setattr("tvist_server.gateways.console.log.warning", lambda *_: stuck.wait(60.0))

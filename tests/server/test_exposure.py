@@ -60,12 +60,6 @@ def test_a_name_with_one_address_that_leaves_the_machine_is_not_local(monkeypatc
     assert not is_local("tcp/robot:7447")
 
 
-def test_local_endpoints_are_left_as_they_are():
-    endpoints, settings = guarded(LOCAL[:3], ["ur5e"], security=None, insecure=False)
-    assert endpoints == LOCAL[:3]
-    assert settings == {"access_control": open_access(["ur5e"])}
-
-
 def test_insecure_lets_everybody_in_and_still_limits_the_size_of_a_message():
     endpoints, settings = guarded(["tcp/0.0.0.0:7447"], ["ur5e"], security=None, insecure=True)
     assert endpoints == ["tcp/0.0.0.0:7447"]
@@ -97,11 +91,6 @@ class TestAccess:
             if rule["flows"] == [flow] and message in rule["messages"]
             for key in rule["key_exprs"]
         }
-
-    def test_what_is_not_allowed_is_denied(self):
-        made = access_control(["ur5e"], self.ROLES)
-        assert made["enabled"] is True
-        assert made["default_permission"] == "deny"
 
     def test_a_viewer_may_send_nothing_but_questions(self):
         sends = {message: self.granted("viewer", "ingress", message) for message in (*SENT, *ASKED)}

@@ -315,9 +315,9 @@ def test_an_arm_that_does_not_follow_ends_it(lag, why):
     assert robot.ended is (why or r.Ended.NOT)
 
 
-@pytest.mark.parametrize("how", ["pause", "stop"])
-@pytest.mark.parametrize("periods", [25, 400])
-@pytest.mark.parametrize("moment", [90, 160])
+@pytest.mark.parametrize(
+    ("how", "periods", "moment"), [("pause", 25, 90), ("stop", 25, 160), ("pause", 400, 160)]
+)
 def test_it_does_not_go_on_after_a_pause(how, periods, moment):
     """Of more than 40 ms: neither when the sender goes on meanwhile, since what has come counts no more."""
     path = swings(1500, 0.45)
@@ -339,15 +339,3 @@ def test_it_does_not_go_on_after_a_pause(how, periods, moment):
     assert robot.ended is r.Ended.LOST
     assert len(robot.told) == calls
     assert (robot.targets[-200:] == still).all()
-
-
-def test_a_period_of_8_ms_is_a_fourth_of_the_packages():
-    path = swings(300, 0.45, h=0.008)
-    robot = OnRobot(step=0.008)
-    begun = robot.tick
-    robot.play(packages(path, 250), [[k // 4] if k % 4 == 0 else [] for k in range(1000)])
-    np.testing.assert_allclose(robot.told, of_path(path, robot.numbers), rtol=0.0, atol=1e-9)
-    last = begun + 996
-    robot.until_ended()
-    assert robot.ended is r.Ended.SILENCE
-    assert robot.at[-1] + 4 <= last + PATIENCE

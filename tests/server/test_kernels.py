@@ -4,14 +4,11 @@ import subprocess
 import sys
 
 import pytest
+from tests import forked
 
 from tvist_server import kernels
 
-LISTED = "; print(*sorted(kernel.name for kernel in KERNELS))"
-ALONE = "from tvist_server.kernels import KERNELS" + LISTED
-AFTER_ALL = (
-    "import tvist_lab.demo, tvist_lab.studies.evaluate, tvist_view.live, tvist_server.workers;" + ALONE
-)
+ALONE = "from tvist_server.kernels import KERNELS; print(*sorted(kernel.name for kernel in KERNELS))"
 TICKING = """
 import sys
 from pathlib import Path
@@ -98,14 +95,6 @@ def test_the_share_grows_from_look_to_look(begun, monkeypatch):
     assert told[:5] == [(1, 3), (2, 3), (2, 3), (3, 3), (3, 3)]
 
 
-def test_no_more_processes_than_wanted_compile_at_once(begun):
-    begun[0].update(dict.fromkeys("abc", "pass"))
-    running = []
-    kernels.compile_ahead(1, lambda *_: running.append(sum(one.poll() is None for one in begun[1])))
-    assert len(begun[1]) == 3
-    assert max(running) <= 1
-
-
 def test_a_failure_is_told_in_one_sentence(begun):
     begun[0].update(a="pass", b="raise SystemExit(3)", c="print('noise'); raise SystemExit('no room')")
     with pytest.raises(kernels.KernelsError, match=r"^no room$"):
@@ -124,11 +113,10 @@ def test_a_signal_ends_the_processes_that_compile(begun):
 
 
 def test_the_kernels_of_a_robot_are_the_same_whatever_else_is_imported():
+    """What is forked comes from a process that has imported everything."""
     alone, after_all = (
-        subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, check=True
-        ).stdout.split()
-        for program in (ALONE, AFTER_ALL)
+        run([sys.executable, "-c", ALONE], capture_output=True, text=True, check=True).stdout.split()
+        for run in (subprocess.run, forked.run)
     )
     assert len(alone) > 50
     assert alone == after_all

@@ -4,7 +4,6 @@ import re
 import urllib.request
 from pathlib import Path
 
-import msgspec
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -54,19 +53,6 @@ def test_what_a_robot_says_is_on_the_page_with_its_place(metrics):
     (events,) = (sample for sample in families["tvist_events"].samples if sample.name.endswith("_total"))
     assert (events.labels, events.value) == ({**labels, "kind": "lease_lost"}, 2)
     assert {name for name, _, _ in COUNTERS} < set(families)
-
-
-def test_a_robot_that_has_said_nothing_has_no_figures(metrics):
-    metrics.gateway("", "left", nobody)
-    assert all(not family.samples for family in read(metrics).values())
-
-
-def test_in_lockstep_nothing_is_due(metrics):
-    telemetry = msgspec.structs.replace(TELEMETRY, due_ticks=None, load=None)
-    metrics.gateway("", "left", nobody).publish("telemetry", telemetry, b"")
-    families = read(metrics)
-    assert not families["tvist_due_ticks"].samples
-    assert families["tvist_missed_ticks"].samples
 
 
 def test_the_reference_names_every_figure_and_no_other(metrics):

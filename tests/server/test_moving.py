@@ -37,9 +37,9 @@ from tvist_server.moving.checks import (
     version_trouble,
 )
 from tvist_server.moving.interfaces import Configuration, NoAnswerError, ask, found, narrowed
-from tvist_server.moving.moved_robot import MOST, SILENT, MovedRobot, Pace
+from tvist_server.moving.moved_robot import SILENT, MovedRobot, Pace
 from tvist_server.moving.program import Ended
-from tvist_server.moving.run import HEEDS, Run, Upload
+from tvist_server.moving.run import Run, Upload
 from tvist_server.rtde.client import RtdeClient, RtdeError
 from tvist_server.rtde.codec import PackageKind, package
 from tvist_server.rtde.wire import Field, Wire
@@ -115,11 +115,6 @@ def test_a_configuration_that_is_cut_or_comes_after_others_is_found_once_it_is_w
     message = struct.pack(">iB", 5 + len(other), 20) + other
     assert found(message + sent) is not None
     assert found(message + sent[:cut]) is None
-
-
-@given(st.binary(max_size=200))
-def test_what_is_no_configuration_is_none(data):
-    assert found(data) is None
 
 
 @given(st.floats(0.05, 3.2), st.lists(st.floats(0.1, 6.0), min_size=24, max_size=24))
@@ -229,18 +224,6 @@ def test_periods_are_those_of_the_robot_s_clock_or_of_ours_while_it_is_silent(ga
     assert pace.tick >= first
 
 
-def test_time_that_was_long_away_is_not_made_up_for():
-    pace = Pace()
-    pace.row(1000, 0.0)
-    assert pace.row(1000 + MOST + 1, 0.01)
-    assert pace.owed == 0
-
-
-def test_other_ports_are_as_far_away_as_that_of_rtde():
-    assert place_of("ur://robot:31004").beside(29999) == ("robot", 30999)
-    assert place_of("ur://robot").beside(30001) == ("robot", 30001)
-
-
 class Written:
     """A robot whose program follows, and what is written to it."""
 
@@ -304,21 +287,6 @@ def test_a_period_of_the_robot_gets_one_set_point_and_begins_where_it_stands(run
     assert robot.written[-1][1] == -7
 
 
-def test_a_run_that_ends_before_its_first_set_point_tells_its_program(new_run):
-    run, robot = new_run
-    run.end()
-    assert robot.written[-1] == (0, -7, *(0.0,) * (len(r.INPUTS) - 2))
-
-
-def test_modes_have_some_rows_to_tell_why_the_program_has_ended(running):
-    run, _, playing = running
-    stopped = replace(playing, modes=(7, 1, RuntimeState.STOPPED))
-    run.take(stopped)
-    assert run.halt is None
-    run.take(replace(stopped, modes=(7, SafetyMode.ROBOT_EMERGENCY_STOP, RuntimeState.STOPPED)))
-    assert "emergency stop" in run.halt.why
-
-
 def test_a_program_that_stops_without_another_reason_is_told_within_20_ms(running):
     run, _, playing = running
     for _ in range(10):
@@ -352,15 +320,6 @@ def test_a_program_that_takes_the_place_of_ours_is_noticed(running, how):
         run.take(playing)
     assert "another program has replaced the one that follows set-points" in run.halt.why
     assert not run.ready
-
-
-def test_a_program_that_takes_the_place_of_ours_while_it_waits_is_noticed(running):
-    run, _, playing = running
-    for number in range(2 * HEEDS):
-        run.add(DriveCommand(Q, np.zeros(6), np.zeros(6)), played=True)
-        run.take(playing)
-        assert (run.halt is None) or number > HEEDS
-    assert "another program has replaced the one that follows set-points" in run.halt.why
 
 
 @pytest.mark.parametrize(

@@ -1,30 +1,31 @@
-"""Plants of one's own: found by their name, made for a robot, kept in a recording by their name, and replayed."""
+"""Plants of one's own and hidden robots: found, made for a robot, kept in a recording by name or seed, and replayed."""
 
 import json
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
+import numpy as np
 import pytest
 from tests.controller.robots import Q2, UR5E, setup
-from tests.own_arm import OwnArm
 
 from tvist_controller.about import info_of
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.setup import Setup, body
 from tvist_controller.sources.own_files import OwnFileError
-from tvist_controller.sources.own_plants import (
-    OwnPlant,
-    RecordedPlant,
-    load_plant,
-    named_plants,
-)
+from tvist_controller.sources.own_plants import OwnPlant, RecordedPlant, load_plant, named_plants
+from tvist_lab.in_process import free_setup
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
+from tvist_plant.plant import Plant
+from tvist_plant.variants import hidden, hidden_payload
 from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ServeConfig
 from tvist_server.ending import SignalExit
+from tvist_server.option_values import StartError
 from tvist_server.recording.recorder import Recorder
 from tvist_server.schedule import Followed
 from tvist_server.workers import _rehearse
@@ -106,18 +107,28 @@ def test_a_configuration_names_it_and_a_worker_finds_it_again(place):
         pickle.loads(other)  # noqa: S301  our own
 
 
-def recorded(folder, plant=None):
-    """The recording of a move."""
-    host, path = LoopbackHost(setup(plant=plant)), folder / "run.mcap"
+def moved(chosen: Setup, path=None, ticks: int = 700):
+    """The states of a move, and what its recorder was told; the recording is at the path."""
+    host = LoopbackHost(chosen)
     token = decode_reply(host.request("a", encode(c.TakeControl(client="a", lease_s=30.0)))).token
     assert decode_reply(host.request("a", encode(c.MoveJ(token=token, q=tuple(Q2.tolist()))))).id == 1
-    controller = host.controller
-    with Recorder(path, info_of(controller), controller.setup.to_builtins()) as recorder:
+    controller, states = host.controller, []
+    start = json.loads(json.dumps(controller.setup.to_builtins()))
+    if path is None:
+        return [controller.tick()[0] for _ in range(ticks)], start, info_of(controller)
+    with Recorder(path, info_of(controller), start) as recorder:
         for entry in host.entries:
             recorder.journal(entry)
-        for _ in range(300):
-            recorder.state(controller.tick()[0])
-    return read(path)
+        for _ in range(ticks):
+            states.append(controller.tick()[0])
+            recorder.state(states[-1])
+    return states, start, info_of(controller)
+
+
+def recorded(folder, plant=None):
+    """The recording of a move."""
+    moved(setup(plant=plant), folder / "run.mcap", ticks=300)
+    return read(folder / "run.mcap")
 
 
 def test_a_setup_survives_its_recording_and_a_run_its_replay(tmp_path, place):
@@ -130,13 +141,6 @@ def test_a_setup_survives_its_recording_and_a_run_its_replay(tmp_path, place):
     assert replay_file(content, plant=own).first_difference is None
     with pytest.raises(ReplayError, match=f"give --plant {place}"):
         replay_file(content)
-
-
-def test_a_replay_does_not_move_an_arm_that_gives_the_tick(tmp_path, place):
-    content = recorded(tmp_path, load_plant(place))
-    real = OwnPlant(place, "", OwnArm)
-    with pytest.raises(ValueError, match="the plant OwnArm gives the tick"):
-        replay_file(content, plant=real)
 
 
 def test_a_replay_of_a_real_arm_says_why_there_is_none(tmp_path, place):
@@ -167,3 +171,54 @@ def test_ticks_of_an_arm_are_late_by_what_they_exceed_a_period_and_missed_where_
     assert [number for number, _, _ in found] == [0, 0, 0, 0]
     assert [late for _, late, _ in found] == pytest.approx([0.0, 0.0005, 0.0, 0.0051], abs=1e-9)
     assert [missed for _, _, missed in found] == [0, 0, 0, 2]
+
+
+SEED = 314159
+"""Of a hidden robot."""
+
+
+def test_a_hidden_robot_replays_to_the_last_bit_and_moves_otherwise_than_its_file(tmp_path):
+    path = tmp_path / "hidden.mcap"
+    states, start, _ = moved(setup(hidden=SEED), path)
+    again = replay_file(read(path))
+    assert again.first_difference is None
+    assert not again.truths
+    plain, _, _ = moved(setup())
+    other, _, _ = moved(setup(hidden=SEED + 1))
+    for one in (plain, other):
+        assert np.abs(np.array(states[-1].actual_q) - one[-1].actual_q).max() > 1e-5
+    assert [state.target_q for state in states] == [state.target_q for state in plain]
+    assert Setup.from_builtins(start) == replace(setup(hidden=SEED))
+
+
+def test_only_the_seed_tells_of_it():
+    """Recorded setup and published info are those of the file, and no value that was drawn is in them or in a state."""
+    states, start, info = moved(setup(hidden=SEED), ticks=50)
+    _, plain_start, plain_info = moved(setup(), ticks=50)
+    assert start.pop("hidden") == SEED
+    assert (start, info) == (plain_start, plain_info)
+    truly, carried = hidden(UR5E, SEED), hidden_payload(body(setup().payload), SEED)
+    secrets = [*truly.drives.gear_stiffness, *truly.drives.velocity_gain, *carried.com, carried.mass]
+    told = msgspec.json.encode((start, info, states)).decode()
+    assert not [value for value in secrets if f"{value!r}"[:9] in told]
+
+
+def test_its_plant_has_no_ability_that_would_tell():
+    plant = setup(hidden=SEED).made_plant()
+    for ability in (Plant.truth, Plant.modes, Plant.held):
+        assert not plant.can(ability)
+    assert plant.payload == body(setup().payload)
+
+
+@pytest.mark.parametrize("given", [{"truth": True}, {"plant": load_plant("stribeck")}])
+def test_what_would_tell_is_refused(given):
+    with pytest.raises(ValueError, match=f"hidden is {SEED}, but .*: leave one of them out"):
+        setup(hidden=SEED, **given).check()
+
+
+def test_several_hidden_robots_are_different_ones():
+    config = ServeConfig(robots="ur5e*2", hidden=5)
+    assert [one.hidden for one in config.setups()] == [5, 6]
+    assert free_setup(hidden=5, truth=False).hidden == 5
+    with pytest.raises(StartError, match="hidden is 5, but truth is on"):
+        free_setup(hidden=5)

@@ -4,7 +4,7 @@ import threading
 from collections import deque
 
 import pytest
-from tests.controller.robots import Q2, Q3, Kept, Robot, calibration, setup
+from tests.controller.robots import Q2, Q3, Kept, Robot, setup
 
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.planner import Planner
@@ -12,10 +12,9 @@ from tvist_controller.host import Host
 from tvist_protocol import commands as c
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import encode
-from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
-from tvist_protocol.motions import MoveL
+from tvist_protocol.kinematics import ForwardKinematics
 from tvist_protocol.programs import ProgramLoad, ProgramStop
-from tvist_protocol.replies import Accepted, Done, Posture, Refused, ToolPose
+from tvist_protocol.replies import Accepted, Done, Refused, ToolPose
 from tvist_protocol.values import Payload
 from tvist_server.plan_ahead import MAX_WAITING, PlanAhead
 from tvist_server.program_folder import ProgramFolder
@@ -286,61 +285,6 @@ def test_a_plan_that_fails_is_a_refusal_and_the_next_one_is_made(served, monkeyp
         assert served.ask(served.of(c.SetShaper, name="zvd")).code == "wrong_mode"
     assert "ZeroDivisionError" in caplog.text
     assert served.ask(served.of(c.SetShaper, name="zvd")) == Done()
-
-
-def test_at_its_end_what_waits_is_refused(served):
-    for _ in range(5):
-        served.send(served.of(c.SetShaper, name="auto"))
-    served.ahead.end()
-    served.serve(6)
-    assert served.replies[-1].code == "busy"
-    served.empty()
-
-
-def test_info_is_made_once_between_two_ticks(served):
-    first = served.host.info()
-    assert served.host.info() is first
-    served.tick()
-    assert served.host.info() is not first
-    before = served.host.info()
-    served.ask(served.of(c.SetShaper, name="ei3"))
-    assert served.host.info() != before
-
-
-@pytest.mark.parametrize("shaper", ["zv", "auto"])
-def test_a_payload_that_no_body_can_be_is_refused_by_what_is_wrong_with_it(shaper, caplog):
-    """Nor is a filter planned for it, which takes an arm that could exist."""
-    served = Served(calibration=calibration(), shaper=shaper)
-    reply = served.ask(served.of(c.SetPayload, **LIGHT | {"inertia": (-1.0, 0.0, 0.0, -1.0, 0.0, -1.0)}))
-    assert (reply.code, reply.where) == ("out_of_range", "inertia")
-    served.ahead.end()
-    served.ahead.close()
-    assert not caplog.text
-
-
-def test_a_line_planned_beside_is_what_the_controller_would_have_done(served):
-    bent, pose = (0.2, -1.4, 1.7, -1.8, -1.5, 0.3), (-0.5, -0.15, 0.4, 2.2, 2.0, 0.0)
-    states = []
-    for robot in (served, Robot()):
-        send = robot.ask if robot is served else robot.controller.receive
-        token = robot.token
-        assert isinstance(send(c.SimulationReset(token=token, q=bent)), Done)
-        assert isinstance(send(MoveL(token=token, pose=pose)), Accepted)
-        robot.tick(400)
-        states.append([state.target_q for state in (robot.sink if robot is served else robot).states[-400:]])
-    assert states[0] == states[1]
-
-
-def test_a_question_from_anyone_is_answered_and_stays_out_of_the_journal(served):
-    before = len(served.sink.entries)
-    posture = served.ask(ForwardKinematics(q=(0.2, -1.4, 1.7, -1.8, -1.5, 0.3)))
-    assert isinstance(posture, ToolPose)
-    found = served.ask(InverseKinematics(pose=posture.pose, near=(0.0, -1.4, 1.7, -1.8, -1.5, 0.3)))
-    assert isinstance(found, Posture)
-    assert found.q == pytest.approx((0.2, -1.4, 1.7, -1.8, -1.5, 0.3), abs=1e-9)
-    refused = served.ask(InverseKinematics(pose=(9.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
-    assert (refused.code, refused.where) == ("no_solution", "pose")
-    assert len(served.sink.entries) == before
 
 
 def test_whoever_asks_leaves_room_for_commands(served):

@@ -13,7 +13,7 @@ from tvist_plant.user_file import UserFileError
 from tvist_protocol.codec import decode
 from tvist_protocol.info import Info
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad, ProgramStop
-from tvist_protocol.replies import Done, Refused
+from tvist_protocol.replies import Refused
 from tvist_server.config import from_mapping
 from tvist_server.option_values import StartError
 from tvist_server.polyscope import program, with_external_control
@@ -236,12 +236,6 @@ def test_references_are_followed_once_each_however_many_lead_to_them(folder, mon
     assert len(followed) <= hops + 500
 
 
-def test_what_is_no_file_is_refused(folder):
-    (folder.path / "folder.urp").mkdir()
-    with pytest.raises(UserFileError, match="is a directory"):
-        folder.read("folder.urp")
-
-
 def test_a_load_gets_the_text_of_the_file_and_other_commands_stay_as_they_are(folder):
     completed = folder.complete(admitted(ProgramLoad(name="pick.urp")))
     assert completed.command == ProgramLoad(name="pick.urp", text=TEXT)
@@ -256,13 +250,6 @@ def test_the_files_are_programs_of_the_robot_s_description(folder):
     assert {"pick.script", "place.urp", "Q1.urp"} <= set(programs)
     folder.path = folder.path / "nowhere"
     assert decode(Info, folder.listed(host.info())).programs == decode(Info, host.info()).programs
-
-
-def test_the_robot_takes_the_program_of_the_folder(folder):
-    robot = Robot()
-    completed = folder.complete(admitted(ProgramLoad(name="pick.urp")))
-    assert isinstance(robot.controller.receive(completed.command), Done)
-    assert robot.controller.programs.name == "pick.urp"
 
 
 def test_a_robot_has_the_folder_of_its_name_if_there_is_one(folder):

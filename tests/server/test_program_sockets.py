@@ -5,9 +5,9 @@ import contextlib
 
 import pytest
 
-from tvist_controller.programs.sockets import Close, Expire, Open, Send, Taken, Wait, Waited
+from tvist_controller.programs.sockets import Close, Expire, Open, Send, Taken, Wait
 from tvist_server.allowed_hosts import AllowedHosts
-from tvist_server.gateways.sockets import MAX_UNREAD, MAX_UNSENT, PATIENCE, ProgramSockets
+from tvist_server.gateways.sockets import MAX_UNREAD, MAX_UNSENT, ProgramSockets
 
 HERE = "127.0.0.1"
 
@@ -108,15 +108,11 @@ async def test_a_machine_that_does_not_answer_is_told(side, port):
 @pytest.mark.parametrize(
     ("origin", "address", "allowed", "well"),
     [
-        ("127.0.0.1", "127.0.0.1", (), True),
-        ("127.0.0.1", "localhost", (), True),
-        ("127.0.0.2", "127.0.0.1", (), True),
-        ("::1", "127.0.0.1", (), True),
+        ("127.0.0.2", "localhost", (), True),
         ("192.168.1.5", "127.0.0.1", (), False),
         (None, "127.0.0.1", (), False),
         (None, "127.0.0.1", ("127.0.0.0/8",), True),
-        (None, "localhost", ("localhost",), True),
-        ("192.168.1.5", "127.0.0.1", ("127.0.0.1",), True),
+        ("192.168.1.5", "localhost", ("localhost",), True),
     ],
 )
 async def test_a_program_reaches_the_machine_that_sent_it_and_those_that_are_allowed(
@@ -131,6 +127,7 @@ async def test_a_program_reaches_the_machine_that_sent_it_and_those_that_are_all
     ("name", "address", "origin", "well"),
     [
         ("h", "192.168.1.5", "192.168.1.5", True),
+        ("h", "127.0.0.1", "::1", True),
         ("h", "192.168.1.5", "::ffff:192.168.1.5", True),
         ("h", "192.168.1.6", "192.168.1.5", False),
         ("h", "0.0.0.0", "192.168.1.5", False),  # noqa: S104  a program's target
@@ -178,17 +175,6 @@ async def test_a_machine_that_does_not_read_is_disconnected(side):
     del reader
 
 
-async def test_a_time_out_waits_for_the_wall_and_only_for_waits_that_ask(side):
-    await side.connect()
-    side.sockets.carry_out([Wait(7, 1), Wait(8, 1), Expire(7, 1, 0.05)])
-    loop = asyncio.get_running_loop()
-    begun = loop.time()
-    await side.until(lambda: "expired" in side.changes())
-    assert loop.time() - begun >= 0.045
-    assert side.heard[-1].number == 7
-    side.sockets.carry_out([Waited(7), Waited(8)])
-
-
 async def test_what_has_arrived_is_told_before_a_time_out(side):
     await side.connect()
     _, writer = await side.accepted.get()
@@ -197,41 +183,6 @@ async def test_what_has_arrived_is_told_before_a_time_out(side):
     side.sockets.carry_out([Expire(7, 1, 0.0)])
     await side.until(lambda: "expired" in side.changes())
     assert side.changes() == ["opened", "received", "expired"]
-
-
-async def test_a_step_waits_for_a_socket_that_is_read_but_not_once_something_came(side):
-    sockets = side.sockets
-    assert sockets.patience() == 0.0
-    await side.connect()
-    sockets.carry_out([Wait(1, 1)])
-    assert 0.0 < sockets.patience() <= PATIENCE
-    _, writer = await side.accepted.get()
-    writer.write(b"x")
-    await side.until(side.received)
-    assert sockets.patience() > 0.0  # the controller does not know yet
-    sockets.note(side.heard[-1])
-    assert sockets.patience() == 0.0
-    sockets.carry_out([Waited(1)])
-    assert sockets.patience() == 0.0
-
-
-def test_what_is_asked_before_the_network_opens_is_done_then():
-    async def run():
-        heard = []
-        server = await asyncio.start_server(lambda _, writer: writer.close(), HERE, 0)
-        sockets = ProgramSockets(heard.append, heard.append, AllowedHosts([]))
-        sockets.carry_out([Open(1, HERE, HERE, server.sockets[0].getsockname()[1])])
-        await asyncio.sleep(0)
-        assert not heard
-        await sockets.open()
-        async with asyncio.timeout(60):
-            while not heard:  # noqa: ASYNC110
-                await asyncio.sleep(0)
-        assert heard[0].change == "opened"
-        await sockets.shut()
-        server.close()
-
-    asyncio.run(run())
 
 
 @pytest.mark.parametrize(

@@ -65,12 +65,6 @@ def test_a_gateway_that_fails_is_logged_and_the_others_get_the_message(caplog):
     assert topics(gateway) == ["io", "state"]
 
 
-def test_the_state_and_io_are_told_again_to_those_who_come_late():
-    gateway = NotingGateway()
-    publisher(gateway).repeat(REPORT, IO)
-    assert topics(gateway) == ["io", "state"]
-
-
 def test_what_no_gateway_takes_is_not_made():
     gateway = NotingGateway()
     made = publisher(gateway)

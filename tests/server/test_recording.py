@@ -113,21 +113,6 @@ def test_what_finds_the_queue_full_is_dropped_and_counted_and_the_rest_keeps_its
     assert dropped_in(path) == {"state": 5, "event": 1, "truth": 0, "io": 0, "journal": 1}
 
 
-def test_recording_goes_on_after_a_full_queue(path, gate):
-    recorder = Recorder(path, INFO, {}, queue_size=2)
-    recorder.state(state(0))
-    assert gate.reached.wait(60)
-    for tick in range(1, 5):
-        recorder.state(state(tick))
-    assert recorder.dropped == 2
-    gate.set()
-    recorder._wait_for_room()
-    recorder.state(state(5))
-    recorder.close()
-    assert [s.tick for s in read(path)["state"]] == [0, 1, 2, 5]
-    assert recorder.dropped == 2
-
-
 def test_closing_again_does_nothing_and_leaves_no_thread(path):
     before = set(threading.enumerate())
     recorder = Recorder(path, INFO, {})
@@ -137,14 +122,6 @@ def test_closing_again_does_nothing_and_leaves_no_thread(path):
     recorder.close()
     assert path.read_bytes() == content
     assert set(threading.enumerate()) == before
-
-
-def test_what_comes_after_closing_is_counted(path):
-    recorder = Recorder(path, INFO, {})
-    recorder.close()
-    recorder.state(state(1))
-    recorder.event(Event(tick=1, kind="warning"))
-    assert recorder.dropped == 2
 
 
 def test_a_file_that_exists_is_replaced_only_when_asked(path):
@@ -157,20 +134,13 @@ def test_a_file_that_exists_is_replaced_only_when_asked(path):
     assert len(read(path)["state"]) == 1
 
 
-@pytest.mark.parametrize("start", [{"x": float("nan")}, {"x": object()}])
-def test_a_start_that_cannot_be_written_costs_no_file(path, start):
-    path.write_bytes(b"precious")
-    with pytest.raises(RecorderError, match="cannot be started"):
-        Recorder(path, INFO, start, overwrite=True)
-    assert path.read_bytes() == b"precious"
-
-
 @pytest.mark.parametrize(
     ("where", "says"),
     [
         ("missing/run.mcap", "No such file or directory"),
         ("file/run.mcap", "Not a directory"),
         (".", "Is a directory"),
+        ("/dev/full", "No space left on device"),
     ],
 )
 def test_a_place_that_cannot_be_written_is_refused_before_anything_runs(tmp_path, where, says):
@@ -180,17 +150,6 @@ def test_a_place_that_cannot_be_written_is_refused_before_anything_runs(tmp_path
         Recorder(tmp_path / where, INFO, {}, overwrite=True)
     assert "\n" not in str(caught.value)
     assert threading.active_count() == before
-
-
-def test_a_full_disk_is_refused_before_anything_runs():
-    with pytest.raises(RecorderError, match="No space left on device"):
-        Recorder("/dev/full", INFO, {}, overwrite=True)
-
-
-def test_a_queue_without_room_is_refused(path):
-    with pytest.raises(RecorderError, match="queue_size is 0"):
-        Recorder(path, INFO, {}, queue_size=0)
-    assert not path.exists()
 
 
 class FullDisk(io.FileIO):
@@ -231,27 +190,6 @@ def test_a_disk_that_fills_up_stops_the_recording_and_is_told_once(path, monkeyp
     assert str(path) in recorder.error
     assert disk.closed
     assert set(threading.enumerate()) == before
-
-
-def test_a_disk_that_fills_up_at_the_end_is_told_too(path, monkeypatch):
-    disk = FullDisk(path, "w")
-    disk.room = 15_000
-    monkeypatch.setattr(type(path), "open", lambda *_: io.BufferedWriter(disk))
-    told = []
-    recorder = Recorder(path, INFO, {}, on_error=told.append)
-    disk.room = disk.tell() + 100
-    recorder.state(state(1))
-    recorder.close()
-    assert told == [recorder.error]
-
-
-def test_a_message_that_cannot_be_written_stops_the_recording_not_the_robot(path):
-    told = threading.Event()
-    recorder = Recorder(path, INFO, {}, on_error=lambda _: told.set())
-    recorder.state(msgspec.structs.replace(STATE, actual_q=[object()]))
-    assert told.wait(60)
-    recorder.close()
-    assert "object" in recorder.error
 
 
 @pytest.fixture
@@ -297,23 +235,6 @@ def test_one_that_is_moved_goes_on_where_it_is_and_says_so_once(path, tmp_path, 
     assert [one.tick for one in read(new)["state"]] == [1]
 
 
-def test_one_that_is_moved_there_and_back_is_where_it_was(path, tmp_path, looking):
-    told = queue.SimpleQueue()
-    recorder = Recorder(path, INFO, {}, on_moved=told.put)
-    path.rename(tmp_path / "new.mcap")
-    assert told.get(timeout=60)
-    (tmp_path / "new.mcap").rename(path)
-    recorder.close()
-    assert recorder.place == path
-
-
-def test_one_that_is_deleted_at_the_last_moment_is_not_taken_for_one_that_is_there(path):
-    recorder = Recorder(path, INFO, {})
-    path.unlink()
-    recorder.close()
-    assert "was deleted" in recorder.error
-
-
 def test_on_error_may_close(path):
     told = threading.Event()
 
@@ -329,40 +250,29 @@ def test_on_error_may_close(path):
 
 
 CHILD = """
-import os, resource, sys
+import os, sys
 import msgspec
 from tvist_protocol import Info, State
 from tvist_server.recording.recorder import Recorder
 
-path, info, state, size, limit = sys.argv[1:]
-if limit != "0":
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(limit), int(limit)))
+path, info, state, size = sys.argv[1:]
 recorder = Recorder(path, msgspec.json.decode(info, type=Info), {"seed": 5}, wait=True)
 state = msgspec.json.decode(state, type=State)
 tick = 0
 while os.path.getsize(path) < int(size) and recorder.error is None:
     tick += 1
     recorder.state(msgspec.structs.replace(state, tick=tick, timestamp=tick * 0.002, actual_q=[tick / 3] * 6))
-print(recorder.error or "recording", flush=True)
+print("recording", flush=True)
 sys.stdin.read()
-recorder.close()
 """
-
-
-def recording_process(path, size, limit=0):
-    arguments = [str(path), msgspec.json.encode(INFO).decode(), msgspec.json.encode(STATE).decode()]
-    return forked.Popen(
-        [sys.executable, "-c", CHILD, *arguments, str(size), str(limit)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
 
 
 def test_a_killed_process_leaves_its_complete_chunks_behind(path):
     from tvist_lab.recordings.mcap_file import read as read_file
 
-    with recording_process(path, size=60_000) as process:
+    described = [msgspec.json.encode(message).decode() for message in (INFO, STATE)]
+    command = [sys.executable, "-c", CHILD, str(path), *described, "60000"]
+    with forked.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "recording\n"
         os.kill(process.pid, signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL
@@ -373,25 +283,3 @@ def test_a_killed_process_leaves_its_complete_chunks_behind(path):
     assert found.dropped is None
     assert [s.tick for s in found.states] == list(range(1, len(found.states) + 1))
     assert len(found.states) > 100
-
-
-def test_a_file_that_may_grow_no_further_is_readable_up_to_there(path):
-    from tvist_lab.recordings.mcap_file import read as read_file
-
-    with recording_process(path, size=10**9, limit=100_000) as process:
-        assert process.stdout.readline().endswith("is incomplete: File too large\n")
-        process.stdin.close()
-        assert process.wait(60) == 0
-    found = read_file(path)
-    assert not found.complete
-    assert [s.tick for s in found.states] == list(range(1, len(found.states) + 1))
-    assert len(found.states) > 100
-
-
-def test_a_file_whose_first_name_is_gone_and_another_is_left_is_nowhere_that_could_be_said(path, tmp_path):
-    other = tmp_path / "kept.mcap"
-    recorder = Recorder(path, INFO, {})
-    other.hardlink_to(path)
-    path.unlink()
-    recorder.close()
-    assert recorder.place in {None, other}

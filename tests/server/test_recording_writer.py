@@ -12,7 +12,7 @@ from tvist_protocol import Event, Info, MoveJ, Setpoint, State, Truth
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.recorded import topics
-from tvist_server.recording.writer import CHUNK_SIZE, RecordingWriter, heading
+from tvist_server.recording.writer import RecordingWriter, heading
 
 START = {"seed": 3, "q": [0.1 + 0.2, -0.0], "nested": {"b": 1, "a": None}}
 
@@ -71,11 +71,6 @@ def test_the_plain_reader_opens_it(recording):
         for number, count in summary.statistics.channel_message_counts.items()
     }
     assert counts["tvist/ur5e/state"] == counts["tvist/ur5e/truth"] == 400
-
-
-def test_no_chunk_is_larger_than_a_chunk_and_a_message(recording):
-    chunks = make_reader(io.BytesIO(recording)).get_summary().chunk_indexes
-    assert all(chunk.uncompressed_size < CHUNK_SIZE + 4096 for chunk in chunks)
 
 
 def test_the_schemas_validate_every_message(recording):

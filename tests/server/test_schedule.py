@@ -42,21 +42,6 @@ def test_robots_that_take_less_than_their_share_wake_up_together_and_only_the_fi
     assert woken == 20
 
 
-def test_a_robot_is_late_by_what_those_before_it_took_beyond_their_share():
-    begun = played(4, 8, delay=lambda number: 0.6 * PERIOD if number == 1 else 0.0)
-    assert [late for _, _, late, _ in begun] == pytest.approx(
-        [0.0, 0.35 * PERIOD, 0.1 * PERIOD, 0.0, 0.0, 0.0, 0.0, 0.0], abs=1e-9
-    )
-
-
-def test_what_is_late_is_caught_up_and_the_deadlines_stay_where_they_were():
-    delayed = played(3, 300, delay=lambda number: 0.011 if number == 30 else 0.0)
-    punctual = played(3, 300)
-    assert delayed[-60:] == punctual[-60:]
-    late = [late for _, _, late, _ in delayed[30:33]]
-    assert late == pytest.approx([0.011, 0.011 - PERIOD / 3, 0.011 - 2 * PERIOD / 3])
-
-
 def test_each_robot_s_missed_ticks_are_its_own():
     """5.5 periods of nothing: each robot's ticks that begin a period late or more are missed, and no others."""
     robots, delay = 4, 5.5 * PERIOD
@@ -147,11 +132,3 @@ def test_between_the_two_limits_nothing_changes():
     assert [bool(second(overload, missed)) for missed in (24, 24, 24, 24, 25, 24, 24, 24, 24, 24)] == [
         False
     ] * 9 + [True]
-
-
-def test_one_long_pause_of_the_machine_is_no_overload():
-    overload, schedule = Overload(PERIOD), Schedule(1, PERIOD, 0.0)
-    loaded(overload, schedule, 0.0, 3.0, 0.0)
-    said, *_ = loaded(overload, schedule, 63.0, 10.0, 0.0)
-    assert not said
-    assert overload.missed > 29_000

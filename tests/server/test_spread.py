@@ -47,18 +47,6 @@ def test_what_excludes_several_processes_is_one_sentence(content, named):
         check_together(config, robots)
 
 
-@pytest.mark.parametrize("workers", [0, 257, "two"])
-def test_a_number_of_processes_that_is_none_is_refused(workers):
-    with pytest.raises(StartError, match="workers"):
-        from_mapping({"workers": workers}, "configuration")
-
-
-def test_more_processes_serve_more_robots():
-    assert len(from_mapping({"robots": "ur5e*65", "workers": 2}, "configuration").setups()) == 65
-    with pytest.raises(StartError, match="1 to 64"):
-        from_mapping({"robots": "ur5e*65"}, "configuration").setups()
-
-
 def test_only_the_own_protocol_may_speak_for_the_robots():
     access = with_robots_behind(open_access(["a"]), ["a"], "", "unixsock-stream")
     subjects = {subject["id"]: subject for subject in access["subjects"]}

@@ -1,11 +1,11 @@
-"""The clock is a right like control: one holder, who is named, and who has gone keeps it no longer."""
+"""The clock is a right like control: one holder, who is named; within a step others are served before the stepper."""
 
 import msgpack
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.controller.robots import UR5E, setup
 
-from tvist_client.blocking import Robot
-from tvist_client.transports.loopback import LoopbackTransport
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit
 from tvist_controller.dispatch.rights import Lease
@@ -15,7 +15,6 @@ from tvist_controller.loopback import LoopbackHost
 from tvist_lab.in_process import free_setup
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
-from tvist_protocol.errors import RefusedError
 from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
@@ -92,15 +91,6 @@ def test_the_clock_is_free_once_the_session_of_its_holder_has_gone():
     assert network.host.standing.clock is None
 
 
-def test_a_clock_that_is_given_to_one_who_has_gone_is_free_at_once():
-    network = Network()
-    network.reception.client_seen("bert", "1f")
-    network.send(c.TakeClock(client="bert"))
-    network.reception.client_gone("bert", "1f")
-    network.jobs.do_waiting()
-    assert network.host.standing.clock is None
-
-
 def test_the_end_of_one_session_ends_both_rights():
     network = Network()
     network.reception.client_seen("bert", "1f")
@@ -126,16 +116,46 @@ def test_a_step_in_a_callback_of_a_step_is_refused_and_other_commands_are_carrie
     assert stops == [2, 3], "the motion begins at tick 1 and has stopped at tick 2"
 
 
-def test_in_process_one_client_steps_and_another_moves():
-    host = LoopbackHost(free_setup(start="Q1"))
-    with Robot.over(LoopbackTransport(host)) as robot, Robot.over(LoopbackTransport(host)) as other:
-        with robot.clock_control("stepper") as stepper, other.control("mover") as arm:
-            motion = arm.move_j(Q2, wait=False)
-            with pytest.raises(RefusedError, match="'stepper'"):
-                other.advance(1)
-            assert robot.info().stepper == "stepper"
-            assert stepper.step(3000) == 3000
-            assert stepper.advance(2500) == 5500
-            assert motion.wait().done is not None
-            assert other.state().tick == 5500
-        assert robot.info().stepper is None
+CLIENTS = st.sampled_from(["stepper", "other", None])
+
+
+def test_what_comes_while_jobs_are_done_waits_for_the_next_time():
+    jobs, done = Jobs(), []
+    jobs.post(lambda: (done.append(1), jobs.post(lambda: done.append(2))))
+    jobs.do_waiting()
+    assert done == [1]
+    jobs.do_waiting()
+    assert done == [1, 2]
+
+
+def test_nothing_to_do_is_said():
+    assert not Jobs().do_next(timeout=0.0)
+
+
+@given(st.lists(st.lists(CLIENTS, max_size=5), max_size=8), st.lists(CLIENTS, max_size=5))
+def test_within_a_step_others_are_served_at_once_and_every_client_in_its_order(ticks, later):
+    """A step, before whose ticks these clients each send something; and what they send after it."""
+    jobs, done, sent = Jobs(), [], []
+
+    def post(client):
+        number = len(sent)
+        sent.append((number, client))
+        jobs.post(lambda: done.append((number, client)), client)
+
+    def step():
+        for clients in ticks:
+            for client in clients:
+                post(client)
+            jobs.do_others("stepper")
+            assert done == [job for job in sent if job[1] != "stepper"]
+
+    jobs.post(step, "stepper")
+    assert jobs.do_next(timeout=0.0)
+    for client in later:
+        post(client)
+    while jobs.do_next(timeout=0.0):
+        pass
+    assert sorted(done) == sent
+    for client in ("stepper", "other", None):
+        own = [job for job in done if job[1] == client]
+        assert own == sorted(own)

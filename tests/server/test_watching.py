@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from tvist_server.rtde.client import RtdeClient, RtdeError
 from tvist_server.rtde.codec import PackageKind, package
 from tvist_server.rtde.wire import Field, Wire
-from tvist_server.watching.place import place_of
 from tvist_server.watching.variables import RowCount
 
 NEEDED = {"timestamp": Field(Wire.DOUBLE), "q": Field(Wire.VECTOR3D)}
@@ -26,10 +25,7 @@ def data(*numbers):
     return package(PackageKind.DATA, b"\x01" + struct.pack(f">{len(numbers)}d", *numbers))
 
 
-@given(
-    st.lists(st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), max_size=20),
-    st.integers(1, 200),
-)
+@given(st.lists(st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), max_size=20), st.integers(1, 200))
 def test_rows_are_the_same_however_the_bytes_are_cut(rows, size):
     client = RtdeClient(NEEDED, OPTIONAL)
     stream = b"".join(
@@ -95,9 +91,3 @@ def test_after_a_restart_of_the_robot_ticks_go_on_by_our_clock(own):
     assert counted.missing == pytest.approx(1500, abs=2)
     assert counted.tick == pytest.approx(50_000 + 1500, abs=2)
     assert count.take(own + 0.002, 53.002).tick == counted.tick + 1
-
-
-def test_an_address_is_read_as_people_write_it():
-    assert place_of("ur://192.168.0.10") == ("192.168.0.10", 30004)
-    assert place_of("ur://[::1]:40") == ("::1", 40)
-    assert str(place_of("ur://robot:31004")) == "ur://robot:31004"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from tvist_lab.metrics import motions, peak_after_stop
-from tvist_lab.recordings.recorded_columns import recording_of_messages
+from tvist_lab.recordings.messages import recording_of_messages
 from tvist_protocol import decode
 from tvist_protocol.generate import FOLDER as PROTOCOL
 from tvist_protocol.modes import RuntimeState

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from tests.conformance.served import finished
 
-from tvist_view.beside import Verdict
 from tvist_view.playback import playback, said
 from tvist_view.track import Track, TrackError
 
@@ -46,7 +45,7 @@ def test_a_run_has_stops_where_its_reference_rests(tracks):
 
 def test_the_page_of_its_own_plays_seeks_and_asks_nothing_of_the_network(chromium, tracks, tmp_path):
     file = tmp_path / "page.html"
-    result = said(Verdict(94.0, 134.0, 0.61, 0.04), "zv", "Q1 → Q2")
+    result = said({"less_percent": 94.0, "earlier_ms": 134.0, "before": 0.61, "after": 0.04}, "zv", "Q1 → Q2")
     file.write_text(playback(tracks, "both", factor=100.0, result=result), encoding="utf-8")
     page = chromium.new_page(viewport={"width": 900, "height": 600})
     asked = []

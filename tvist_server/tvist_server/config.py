@@ -124,7 +124,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     rad in the flange frame; another one is refused [any: the robot's is taken over]."""
     servo_lag: str | tuple[float, ...] | None = None
     """With --enable-motion: lag of the robot's servoj, which set-points then make up for: T,k in s and 1/s², as
-    tvist identify --plant finds it, or simulated for a robot of tvist serve --ur [the calibration's, if it has one]."""
+    tvist identify finds it, or simulated for a robot of tvist serve --ur [the calibration's, if it has one]."""
     world: str | None = None
     """Scene in which the arm stands, and whose things it touches: table, wall, peg, pallet, or a file in MuJoCo's
     format, in the frame of the arm's base. The arm is then simulated by MuJoCo, and has a force sensor in its flange.

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,20 +36,9 @@ class Run:
     events: list[Event] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What shaping has changed; None is not measurable."""
-
-    less_percent: float | None
-    """By how much the largest acceleration after the stop is less [%]."""
-    earlier_ms: float | None
-    """By how much earlier the tool is at rest [ms]."""
-    before: float | None
-    """Largest acceleration after the stop without the shaper [m/s²]."""
-    after: float | None
-    """The same with it."""
-
-
+Verdict = Mapping[str, float | None]
+"""What shaping has changed about the largest acceleration after the stop [m/s²] and about rest: `before`, `after`,
+`less_percent`, `earlier_ms`; None is not measurable."""
 Judge = Callable[[Run, Run], Verdict]
 """Measures a motion without and with the shaper."""
 
@@ -91,7 +80,7 @@ def beside(
                     await robot.advance(REST)
                 runs.append(gathered)
             verdict = await asyncio.to_thread(judge, *runs)
-            done({**vars(verdict), "with": shaper, **_curves(look, *runs)})
+            done({**verdict, "with": shaper, **_curves(look, *runs)})
         finally:
             tell(None)
             with contextlib.suppress(RefusedError, ClientError, ProtocolError):  # the robot may have gone

@@ -151,4 +151,4 @@ class RealArm:
 def _identify(info: Info, place: str) -> Step:
     """The step to a calibration of its own."""
     own = info.calibration is not None and info.calibration.shipped is False
-    return own, "Identify it", f"tvist identify --plant {place}, then serve it with --calibration"
+    return own, "Identify it", f"tvist identify {place}, then serve it with --calibration"

@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 from tvist_view.beside import Verdict
@@ -35,7 +34,7 @@ def playback(
 
 def said(verdict: Verdict, shaper: str, motion: str) -> dict[str, Any]:
     """A verdict as the page writes it in large figures."""
-    return {**asdict(verdict), "with": shaper, "motion": motion}
+    return {**verdict, "with": shaper, "motion": motion}
 
 
 async def meet(tab: Tab) -> None:

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tvist_plant.tool_acceleration import tool_acceleration, upward
 from tvist_protocol.stream import State, Truth
 from tvist_view.look import Floats, Look
 
-GRAVITY = 9.81
-"""Gravity of the simulated world [m/s²]."""
 RESTS = 1e-9
 """Change of a reference within a tick that counts as none [rad]."""
 MOVING = 1e-3
@@ -64,12 +63,12 @@ def signals_of(look: Look, states: Sequence[State], truths: Mapping[int, Truth])
         known = [(place, truths[state.tick]) for place, state in enumerate(states) if state.tick in truths]
         if known:
             forces = np.array([truth.tool_acceleration for _, truth in known])
-            upward = _up(np.array([truth.flange_pose[3:] for _, truth in known]))
-            alpha[[place for place, _ in known]] = np.linalg.norm(forces - GRAVITY * upward, axis=1)
+            up = upward([truth.flange_pose[3:] for _, truth in known])
+            alpha[[place for place, _ in known]] = np.linalg.norm(tool_acceleration(forces, up), axis=1)
     else:
         measured = np.array([state.actual_tool_accelerometer for state in states]).reshape(-1, 3)
         angles = np.array([state.actual_q for state in states]).reshape(len(time), -1)
-        alpha = np.linalg.norm(measured - GRAVITY * up_in_flange(angles, look.turns), axis=1)
+        alpha = np.linalg.norm(tool_acceleration(measured, up_in_flange(angles, look.turns)), axis=1)
     return Signals(
         time=time,
         alpha=alpha,
@@ -190,20 +189,6 @@ def up_in_flange(q: Floats, turns: Sequence[Floats]) -> Floats:
         c, s = np.cos(angle), np.sin(angle)
         up = np.stack([c * up[:, 0] + s * up[:, 1], c * up[:, 1] - s * up[:, 0], up[:, 2]], axis=1) @ turn
     return up
-
-
-def _up(rotation: Floats) -> Floats:
-    """The upward direction in frames with rotation vectors, both of shape (T, 3)."""
-    angle = np.linalg.norm(rotation, axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        axis = np.where(angle[:, None] > 0.0, rotation / angle[:, None], 0.0)
-    up = np.array([0.0, 0.0, 1.0])
-    # Rodrigues' formula for the rotation by -angle.
-    return np.asarray(
-        np.cos(angle)[:, None] * up
-        - np.sin(angle)[:, None] * np.cross(axis, up)
-        + ((1.0 - np.cos(angle)) * (axis @ up))[:, None] * axis
-    )
 
 
 def _second_difference(time: Floats, q: Floats) -> Floats:

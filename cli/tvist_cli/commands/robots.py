@@ -59,7 +59,7 @@ def _measured(
 ) -> list[dict[str, Any]]:
     """Measure an arm as its file describes it, and stiffer and softer; empty if it has too few joints for auto."""
     from tvist_controller.sources.calibrations import load
-    from tvist_lab.identification.identify import IdentificationError
+    from tvist_lab.identification.ring_downs import IdentificationError
     from tvist_lab.studies.arms.measure import ALONE, measure
 
     if description.joints < ALONE:

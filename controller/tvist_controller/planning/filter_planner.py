@@ -146,7 +146,7 @@ class FilterPlanner:
             )
             raise RefusalError("out_of_range", where, why)
         if known is None or known.calibration is None:
-            why = f"{tvist.name} needs the arm's springs: identify them with tvist identify --model modal"
+            why = f"{tvist.name} needs the arm's springs: identify them with tvist identify"
             raise RefusalError("out_of_range", where, why)
         try:
             elastic = elastic_feed_forward(tvist, self._setup.description, known.calibration)

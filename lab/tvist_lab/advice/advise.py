@@ -1,16 +1,18 @@
 """Advice for a robot that shakes, from logs of its motions: what rings, and which shaper to take."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from statistics import median
 from typing import NamedTuple
 
-from tvist_lab.advice.options import EACH, ONE, ROBOT, Option, options
-from tvist_lab.advice.slower import slowed, smoothed
+import numpy as np
+
+from tvist_lab.advice.options import EACH, ONE, ROBOT, Option, options, slowed, smoothed
 from tvist_lab.advice.stops import Stop, grouped
-from tvist_lab.advice.weak import frequency_of_joints
 from tvist_lab.metrics import Measured, NotMeasurableError, shaper_of
-from tvist_lab.metrics.agreed_modes import NEAR
+from tvist_lab.metrics.agreed_modes import NEAR, agreed_modes
+from tvist_lab.metrics.measured_motion import still_driven
+from tvist_lab.metrics.ring_down import SKIP, WINDOWS
 from tvist_lab.recordings.recording import MissingColumnError
 
 EARLY = 0.15
@@ -19,6 +21,12 @@ CLOSE = 5.0
 """Vibration that it may leave beyond the least of these [%]."""
 SIMPLE = (ROBOT, ONE, EACH)
 """Where modes can come from, the simplest first."""
+RIPPLES = ("actual_qd", "actual_current", "actual_moment", "actual_q")
+"""Columns in which a joint shows that the arm shakes it."""
+LIGHTEST = 0.005
+"""Least damping ratio of an arm; what is damped less is a hum of the sensor [-]."""
+AGREED = 2
+"""Least number of motions that must show the same frequency."""
 
 
 class RingingMode(NamedTuple):
@@ -70,11 +78,7 @@ class Advice:
 
 
 def advise(logs: Sequence[Measured]) -> Advice:
-    """Judge by logs which shaper a robot needs.
-
-    Args:
-        logs: Measured logs of one robot, at least one.
-    """
+    """Judge by logs which shaper a robot needs."""
     stops, shaped, refused = _sorted_out(logs)
     loud = [one for one in stops if one.rings]
     quiet = [one for one in stops if not one.rings]
@@ -119,9 +123,7 @@ def recommended(found: Sequence[Option], still: float) -> Option | None:
     Of those that are still about as early as the earliest, and leave about as little as the least, it takes the one
     that needs to know least about the modes, and of these the shortest.
 
-    Args:
-        found: The options.
-        still: Time until still without a shaper [s].
+    `still` is the time until still without a shaper [s].
     """
     fair = [one for one in found if one.keeps_limits and one.left_percent < 100.0 - CLOSE]
     if not fair:
@@ -162,3 +164,35 @@ def ringing_modes(stops: Sequence[Stop]) -> list[RingingMode]:
 def _median(values: Iterable[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return median(known) if known else None
+
+
+def frequency_of_joints(logs: Sequence[Measured]) -> tuple[float, int] | None:
+    """Find the frequency with which encoders or currents swing after stops: weak evidence, they hardly feel the tool.
+
+    Returns f_d [Hz] and the number of motions that show it; None if no two motions agree within 7 %.
+    """
+    seen = [(place, f_d) for place, found in enumerate(_swings(logs)) for f_d in found]
+    groups = [[one for one in seen if abs(one[1] / middle - 1.0) <= NEAR] for _, middle in seen]
+    best = max(groups, key=lambda group: len({place for place, _ in group}), default=[])
+    count = len({place for place, _ in best})
+    return (median(f_d for _, f_d in best), count) if count >= AGREED else None
+
+
+def _swings(logs: Sequence[Measured]) -> Iterator[list[float]]:
+    """Frequencies that the joints show after each motion [Hz]."""
+    for log in logs:
+        recording = log.recording
+        for motion in log.motions:
+            stop = motion.arm_stop(recording)
+            time = recording.time[stop : motion.end] - recording.time[stop]
+            begin = max(SKIP, still_driven(recording, motion.start, stop))
+            found = []
+            for name in filter(recording.__contains__, RIPPLES):
+                values = recording[name][stop : motion.end]
+                shown = np.isfinite(values).all(axis=1)
+                if not shown.any() or time[shown][-1] < begin + WINDOWS[0]:
+                    continue
+                swing = values[shown] - values[shown][-len(values) // 3 :].mean(axis=0)
+                fit = agreed_modes(swing, time[shown], recording.period, begin)
+                found += [fit.f_d] if fit.ok and fit.zeta > LIGHTEST else []
+            yield found

@@ -16,12 +16,7 @@ NAMED = 3
 
 
 def verdict(advice: Advice, logs: Sequence[Measured]) -> list[str]:
-    """Return what to do in a sentence, and what that rests on in some more.
-
-    Args:
-        advice: The advice.
-        logs: The logs that it was made from.
-    """
+    """Return what to do in a sentence, and what that rests on in some more."""
     said = [_first(advice)]
     if advice.ringing:
         said.append(_ringing(advice))

@@ -1,4 +1,4 @@
-"""Shapers that could be used, each aimed at modes that were found in other motions than those it is judged by."""
+"""Shapers that could be used, aimed at modes of other motions than they are judged by, and what else would help."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -9,7 +9,7 @@ from statistics import median
 import numpy as np
 from scipy.optimize import minimize
 
-from tvist_lab.advice.stops import Left, Stop, shaped_by
+from tvist_lab.advice.stops import Left, Stop, followed, shaped_by
 from tvist_lab.metrics import NotMeasurableError
 from tvist_lab.metrics.ring_down import decay_rate
 from tvist_lab.recordings import Floats
@@ -31,6 +31,8 @@ ENOUGH = 12
 """Largest number of stops from which modes are found: of more, the loudest."""
 ONE, EACH, ROBOT = "one for all", "each its own", "the robot's calibration"
 """Where the modes come from: the same for all motions, others for each motion, what the robot estimated itself."""
+COPIES = 48
+"""Number of copies of the reference that stand for a running mean."""
 
 
 @dataclass(frozen=True)
@@ -102,11 +104,7 @@ class Option:
 
 
 def impulses_of(shaper: str, modes: Modes) -> Impulses:
-    """Impulses of a shaper of the catalogue for modes.
-
-    Raises:
-        ShaperRangeError: A mode has more damping than the shaper is defined for.
-    """
+    """Impulses of a shaper of the catalogue for modes."""
     return product([SHAPERS[shaper].function(f_d, zeta) for f_d, zeta in modes])
 
 
@@ -145,9 +143,7 @@ def by_the_modes(stop: Stop, impulses: Impulses) -> float | None:
 def left_of_modes(stop: Stop, left: Callable[[float, float], float]) -> float | None:
     """Root of the share of a stop's modes' energy that is left [-]; None if no modes are known.
 
-    Args:
-        stop: A recorded stop.
-        left: From f_d [Hz] and ζ of a mode, the share of its amplitude that is left [-].
+    `left` gives for f_d [Hz] and ζ of a mode the share of its amplitude that is left [-].
     """
     before = after = 0.0
     for mode in stop.result.modes:
@@ -156,6 +152,48 @@ def left_of_modes(stop: Stop, left: Callable[[float, float], float]) -> float | 
         before += energy
         after += energy * left(f_d, zeta) ** 2
     return math.sqrt(after / before) if before > 0.0 else None
+
+
+def smoothed(stop: Stop, added: float) -> float | None:
+    """What is left if the reference is smoothed by a running mean, which lowers its jerk [%].
+
+    The mean is as long as `added` [s], by which the motion ends later. None if too little rest was recorded.
+    """
+    try:
+        left = stop.left(np.full(COPIES, 1.0 / COPIES), np.linspace(0.0, added, COPIES))
+    except NotMeasurableError:
+        return None
+    return 100.0 * left.rms / stop.unshaped.rms
+
+
+def slowed(stop: Stop, added: float) -> float | None:
+    """What the modes of a stop would have left if the whole motion were slower, so that it takes longer [%].
+
+    A mode with poles λ is left with an amplitude in proportion to |∫ v(t) exp(λ* (t - T)) dt|, where v is the speed of
+    the reference and T its end. Slowed by a factor k, that is the same integral with k λ.
+
+    The motion takes longer by `added` [s]. None if no modes or no joint angles are known.
+    """
+    time, speed = _speed(stop)
+    if time[-1] <= time[0]:
+        return None
+    slower = 1.0 + added / float(time[-1] - time[0])
+
+    def excited(f_d: float, zeta: float, slowness: float) -> float:
+        pole = slowness * complex(decay_rate(f_d, zeta), 2.0 * math.pi * f_d)
+        return float(abs(np.trapezoid(speed * np.exp(pole * (time - time[-1])), time)))
+
+    share = left_of_modes(stop, lambda f_d, zeta: excited(f_d, zeta, slower) / excited(f_d, zeta, 1.0))
+    return None if share is None else 100.0 * share
+
+
+def _speed(stop: Stop) -> tuple[Floats, Floats]:
+    """Time until the reference stops [s], and the speed of the joint that moves farthest [rad/s]."""
+    recording, motion = stop.measured.recording, stop.motion
+    rows = slice(motion.start, motion.reference_stop + 2)
+    q, time = recording[followed(recording)][rows], recording.time[rows]
+    joint = int(np.argmax(np.ptp(q, axis=0)))
+    return time, np.asarray(np.gradient(q[:, joint], time))
 
 
 def _aims(stops: Sequence[Stop]) -> list[Aim]:
@@ -201,12 +239,7 @@ def best_modes(stops: Sequence[Stop], count: int) -> Modes:
     They are better for shaping than the modes of a fit: where an arm has more modes than a shaper, the best aim lies
     between them.
 
-    Args:
-        stops: At least one stop.
-        count: Number of modes.
-
-    Returns:
-        The modes, the lowest first.
+    They are in the order of frequency.
     """
     loudest = sorted(stops, key=lambda one: -one.unshaped.rms)[:ENOUGH]
     before = sum(one.unshaped.rms**2 for one in loudest)

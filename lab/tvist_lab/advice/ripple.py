@@ -44,10 +44,8 @@ class Ripple(NamedTuple):
     def along(self, q: Floats, ends: Floats, period: float) -> Floats:
         """Return the acceleration that the gears excite along a way of the joints [m/s²].
 
-        Args:
-            q: Joint angles, shape (T, n) [rad].
-            ends: Smallest and largest angle of each joint on the recorded way, shape (2, n) [rad].
-            period: Time between samples [s].
+        `q` [rad] has shape (T, n); `ends`, shape (2, n), are the smallest and largest angle of each joint on the
+        recorded way.
         """
         return np.asarray(np.column_stack(list(_excited(q, ends, self.poles, period))) @ self.weights)
 
@@ -60,14 +58,8 @@ def poles_of(modes: Sequence[tuple[float, float]]) -> Poles:
 def fitted(time: Floats, alpha: Floats, q: Floats, poles: Poles) -> Ripple | None:
     """Fit the gears' share of a recorded stop, beside what the reference excites.
 
-    Args:
-        time: Times after the stop, evenly spaced, shape (T,) [s].
-        alpha: Acceleration of the tool, shape (T, 3) [m/s²].
-        q: Joint angles of the reference, shape (T, n) [rad].
-        poles: Modes that ring.
-
-    Returns:
-        The share, in the direction in which the tool swings in each mode; None if no mode or no turning joint is known.
+    `time` after the stop [s], evenly spaced, has shape (T,), `alpha` [m/s²] (T, 3), `q` [rad] (T, n). None if no mode
+    or no turning joint is known.
     """
     period, ends = float(time[1] - time[0]), np.array([q.min(axis=0), q.max(axis=0)])
     gears = list(_excited(q, ends, poles, period))

@@ -74,11 +74,7 @@ class Stop:
 
     @classmethod
     def of(cls, measured: Measured, place: int, file: int = 0) -> "Stop":
-        """Cut a motion out of a measured log.
-
-        Raises:
-            NotMeasurableError: The log has no accelerometer, or too little rest.
-        """
+        """Cut a motion out of a measured log."""
         recording, motion = measured.recording, measured.motions[place]
         time, alpha = felt(recording, motion, slice(motion.start, motion.end))
         time = time - recording.time[motion.arm_stop(recording)]
@@ -142,10 +138,8 @@ class Stop:
     def after(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> Floats:
         """Acceleration if the reference were a sum of delayed copies, shape (T, 3) [m/s²].
 
-        Args:
-            sizes: Size of each copy, with the sum 1, shape (N,) [-].
-            delays: Its delay, the largest last, shape (N,) [s].
-            gears: Whether to count what the gears excite along the new way.
+        The copies have sizes with the sum 1 and delays [s], the largest last; `gears` counts what these excite along
+        the new way.
         """
         shaped = self._sum(self.alpha - self._of_gears, sizes, delays)
         if gears and self._ripple is not None:
@@ -157,11 +151,7 @@ class Stop:
         return np.asarray(np.tensordot(sizes, moved, axes=1).T)
 
     def left(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> Left:
-        """What would be felt; see `after`.
-
-        Raises:
-            NotMeasurableError: Too little rest is left after the last copy.
-        """
+        """What would be felt; see `after`."""
         shaped, late = self.after(sizes, delays, gears=gears), self.time - float(delays[-1]) - LATE
         counts = (late > 0.0) & (late <= COUNTED[1])
         if late[-1] < COUNTED[0]:

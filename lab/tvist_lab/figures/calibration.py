@@ -1,4 +1,4 @@
-"""Calibrations compared with the truth: at the configurations that were measured, and over the workspace."""
+"""Calibrations compared with what was measured, and over the workspace with the truth."""
 
 from typing import Any
 
@@ -9,12 +9,10 @@ from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from tvist_controller.api.line import estimator_of
 from tvist_lab.figures.style import (
     FAINT,
     INK,
     OF_SHAPED,
-    OF_UNSHAPED,
     UNSHAPED,
     explain,
     legend,
@@ -24,7 +22,6 @@ from tvist_lab.figures.style import (
 )
 from tvist_lab.identification.workspace_map import WorkspaceMap
 from tvist_lab.recordings import Floats
-from tvist_protocol.calibration import Calibration
 
 LABELS = {
     "f_d_hz": ("$f_d$", "damped frequency of the lowest mode", "Hz"),
@@ -37,52 +34,28 @@ LEVELS = 9
 """Largest number of levels of a map."""
 
 
-def identified_figure(
-    calibration: Calibration,
-    q: Floats,
-    f_d: Floats,
-    zeta: Floats,
-    true_f_d: Floats | None,
-    true_zeta: Floats | None,
-) -> Figure:
-    """Estimated against measured (f_d, ζ), one point per configuration, and against the truth if it is known.
+def identified_figure(name: str, measured: Floats, fitted: Floats) -> Figure:
+    """The lowest mode by fits that did not see a ring-down, against what that ring-down alone tells.
 
-    Args:
-        calibration: Calibration with polynomials.
-        q: Configurations, shape (N, n) [rad].
-        f_d: Measured damped frequencies, shape (N,) [Hz].
-        zeta: Measured damping ratios, shape (N,) [-].
-        true_f_d: Damped frequency of the lowest true mode, shape (N,) [Hz].
-        true_zeta: Damping ratio of the lowest true mode, shape (N,) [-].
+    Both have f_d [Hz] and ζ [-] of each ring-down, shape (2, N); the name is the calibration's.
     """
-    estimator = estimator_of(calibration)
-    estimated = np.array([np.concatenate(estimator.estimate(row)) for row in q]).T
     figure, axes = panels(2, 7.6, share_x=False)
-    for panel, estimate, measured, true, name in (
-        (axes[0], estimated[0], f_d, true_f_d, "$f_d$ (Hz)"),
-        (axes[1], estimated[1], zeta, true_zeta, r"$\zeta$ (–)"),
+    for panel, own, others, quantity in zip(
+        axes, measured, fitted, ("$f_d$ (Hz)", r"$\zeta$ (–)"), strict=True
     ):
-        ends = [float(np.min(measured)), float(np.max(measured))]
-        panel.plot(ends, ends, color=FAINT, linewidth=1.0, label="Equal")
-        if true is not None:
-            panel.plot(true, estimate, **OF_UNSHAPED.points(2.5, label="Against the true lowest mode"))
-        panel.plot(measured, estimate, **OF_SHAPED.points(2.5, label="Against the ring-down"))
-        panel.set(xlabel=f"Measured or true {name}", ylabel=f"Calibration's {name}")
-    title(axes[0], f"{calibration.name}: {len(q)} configurations")
+        panel.axline((own[0], own[0]), slope=1.0, color=FAINT, linewidth=1.0, label="Equal")
+        panel.plot(own, others, **OF_SHAPED.points(2.5, label="Lowest mode of a ring-down"))
+        panel.set(xlabel=f"Measured {quantity}", ylabel=f"Fitted to the others {quantity}")
+    title(axes[0], f"{name}: {measured.shape[1]} ring-downs")
     legend(figure, axes[0], {"$f_d$": "damped frequency", r"$\zeta$": "damping ratio"})
     return figure
 
 
 def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
-    """Draw one quantity as identified, as it truly is, and the error.
+    """Draw one quantity, "f_d_hz" or "zeta", as identified, as it truly is, and the error; `words` say of what.
 
-    The three maps are side by side, and in a narrow figure one below the other. White areas are left out, because the
-    arm would touch itself or the floor there.
-
-    Args:
-        found: The maps.
-        key: "f_d_hz" or "zeta".
-        words: What they are of, for the heading.
+    The three maps are side by side, and in a narrow figure one below the other. White areas are left out: the arm
+    would touch itself or the floor there.
     """
     symbol, meaning, unit = LABELS[key]
     if beside := rcParams["figure.figsize"][0] > NARROW:

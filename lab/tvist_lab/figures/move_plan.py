@@ -6,12 +6,12 @@ from matplotlib.figure import Figure
 
 from tvist_controller.api.line import body
 from tvist_lab.figures.style import INK, OF_SHAPED, OF_UNSHAPED, legend, note, panels, tint, title
-from tvist_lab.identification.positioned import MovePlan
+from tvist_lab.identification.jogs import JogPlan
 from tvist_lab.recordings import Floats
 from tvist_plant.model import rigid_model
 
 
-def move_plan_figure(plan: MovePlan) -> Figure:
+def move_plan_figure(plan: JogPlan) -> Figure:
     """Draw the arm from the side and from above: as it stands, in every posture on the way, and where it rings."""
     model = rigid_model(plan.arm.description, body(plan.arm.payloads[0]))
     data = model.createData()

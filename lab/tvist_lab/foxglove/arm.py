@@ -39,12 +39,8 @@ class Arm:
     def steps(self, q: Floats, bends: Floats) -> tuple[Floats, Floats]:
         """Return each link's frame in that of the link before.
 
-        Args:
-            q: Joint angles on the link side, shape (T, n) [rad].
-            bends: Two angles per link that bends, shape (T, 2 · links) [rad].
-
-        Returns:
-            Places, shape (T, n, 3) [m], and quaternions x y z w, shape (T, n, 4).
+        `q` [rad] of the link side has shape (T, n), `bends` two angles for each link that bends. Returns places, shape
+        (T, n, 3) [m], and quaternions x y z w, shape (T, n, 4).
         """
         places, quaternions = [], []
         for joint, (angle, shift) in enumerate(zip(q.T, self.shifts, strict=True)):
@@ -65,11 +61,7 @@ def _about(axis: Floats, angles: Floats) -> Rotation:
 
 
 def arm_of(content: RecordingFile) -> Arm:
-    """Return the arm of a recording by its robot file, which servers record.
-
-    Raises:
-        RecordingError: The file contains none, or one that does not fit its states.
-    """
+    """Return the arm of a recording by its robot file, which servers record."""
     if "description" not in (content.start or {}):
         raise RecordingError(
             f"{content.path} does not say what its robot looks like: record it with tvist serve --record"

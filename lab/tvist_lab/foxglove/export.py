@@ -48,17 +48,6 @@ def export(content: RecordingFile, path: Path) -> list[str]:
 
     The channels are `frames` (`foxglove.FrameTransforms`, 50 a second), `arm` (`foxglove.SceneUpdate`, once) and
     `curves` (every tick), each behind `tvist/<robot>/`. All else is as it was.
-
-    Args:
-        content: The recording.
-        path: File to write.
-
-    Returns:
-        Sentences about what the added channels lack.
-
-    Raises:
-        RecordingError: The recording does not say what its robot looks like.
-        ExportError: A file cannot be written. None has changed then, except that only the layout may be old.
     """
     arm, above = arm_of(content), topics(content.robot)[State].removesuffix("state")
     (stood, stiff), (drawn, lacking) = _stood(content, arm), _curves(content.recording)

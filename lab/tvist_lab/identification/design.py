@@ -1,4 +1,4 @@
-"""Choice of the few most informative ring-downs: greedy D-optimal design.
+"""Choice of the few most informative jogs: greedy D-optimal design.
 
 The guessed arm is made to ring at many configurations, and each ring-down gives an information matrix of the
 parameters. Ring-downs are chosen one after the other such that the determinant of the sum becomes as large as
@@ -11,40 +11,74 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import expm
 
-from tvist_controller.api.line import JointLine, MotionLimits, quickest_motion
+from tvist_controller.api.line import CollisionModel, JointLine, MotionLimits, body, quickest_motion
 from tvist_lab.identification.modal_fit import information
-from tvist_lab.identification.ring_downs import SAMPLES, SKIPPED, Jog, Ringing
+from tvist_lab.identification.ring_downs import BEGINS, LONGEST, Ringing
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats
+from tvist_lab.workspace import identified, ranges
+from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
+from tvist_protocol.values import Payload
 
+LENGTH, SHARES = 0.06, (0.6, 0.6, 1.0)
+"""Length of a jog for the fastest joint [rad], and shares of the joints from the base on: all big joints move at once,
+so that every mode is excited.
+"""
+LIMITS = MotionLimits(velocity=2.6, acceleration=6.1, jerk=540.0)
+"""Limits of the quickest jog: quicker than a client's `move_j`, so that an arm that a servo moves softly rings, too."""
+SKIPPED, SAMPLES = round(BEGINS / PERIOD), round(LONGEST / PERIOD)
 NOISE = 0.03
 """Assumed noise, rms per axis [m/s^2]."""
+
+
+def jog_of(joints: int) -> Floats:
+    """Return the displacement of the joints in a jog, shape (joints,) [rad]."""
+    jog = np.zeros(joints)
+    used = min(joints, len(SHARES))
+    jog[:used] = LENGTH * np.array(SHARES[:used])
+    return jog
+
+
+def free_configurations(
+    description: RobotDescription,
+    payloads: Sequence[Payload],
+    count: int,
+    seed: int,
+    like: Floats | None = None,
+) -> list[Floats]:
+    """Return configurations in which the arm is clear at both ends of a jog, with every payload.
+
+    Base and outer wrist joints, on which the modes hardly depend, are as in the configuration `like`, or else zero.
+    """
+    joints = description.joints
+    models = [CollisionModel(description, body(payload)) for payload in payloads]
+    jog = jog_of(joints)
+    found: list[Floats] = []
+    aside = np.zeros(joints) if like is None else like * [joint not in (1, 2, 3) for joint in range(joints)]
+    for q in identified(ranges(description), LENGTH).spread(20 * count, joints, seed) + aside:
+        if len(found) == count:
+            break
+        if all(model.meeting(end) is None for model in models for end in (q, q - jog)):
+            found.append(q)
+    return found
 
 
 def choose(
     arm: ArmModes,
     candidates: Sequence[Floats],
-    jog: Jog,
     counts: Sequence[int],
     known: tuple[Floats, Floats] | None = None,
 ) -> list[tuple[int, int]]:
     """Choose ring-downs.
 
-    Args:
-        arm: Guessed arm with its payloads.
-        candidates: Configurations, each of shape (n,) [rad].
-        jog: The move that excites the arm.
-        counts: Number of ring-downs with each payload; together at most the number of candidates.
-        known: Logarithms of the parameters and their covariance, shapes (P,) and (P, P); None for the guess.
-
-    Returns:
-        Indices of candidates and payloads, the most informative first, without repetition.
+    Return indices of candidates and payloads, the most informative first, without repetition. What is known are the
+    logarithms of the parameters and their covariance; None stands for the guess.
     """
     at, covariance = (arm.guess, np.diag(arm.deviation**2)) if known is None else known
     knowledge = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
     says = {
-        (number, payload): information(arm, predicted(arm, q, payload, jog, at), at)
+        (number, payload): information(arm, predicted(arm, q, payload, at), at)
         for number, q in enumerate(candidates)
         for payload in range(len(arm.payloads))
         if counts[payload] > 0
@@ -61,7 +95,7 @@ def choose(
     return chosen
 
 
-def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog, logarithms: Floats | None = None) -> Ringing:
+def predicted(arm: ArmModes, q: Floats, payload: int, logarithms: Floats | None = None) -> Ringing:
     """Predict the ring-down after a jog of an arm, linearized at its end, with perfect feed-forward."""
     flexible, mass = arm.flexible(payload), arm.mass(q, payload)
     drivetrain = arm.drivetrain(arm.guess if logarithms is None else logarithms)
@@ -73,7 +107,7 @@ def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog, logarithms: Floa
     system[N:, :N], system[N:, N:] = (-np.linalg.solve(inertia, part) for part in (stiffness, damping))
     move = expm(PERIOD * system)
     forced = np.linalg.solve(system, (move - np.eye(2 * N))[:, N:]) @ np.linalg.inv(inertia)
-    pushes = _pushes(drivetrain.rows[:, joints], mass[np.ix_(joints, joints)], jog.of(len(q)), jog.limits)
+    pushes = _pushes(drivetrain.rows[:, joints], mass[np.ix_(joints, joints)], jog_of(len(q)))
     full = np.zeros((len(pushes), N))
     full[:, motors] = pushes
     z, rates = np.zeros(2 * N), []
@@ -86,13 +120,14 @@ def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog, logarithms: Floa
         :3
     ]
     force = np.array(rates[-SAMPLES:]) @ jacobian.T
-    return Ringing(q=q, payload=payload, force=force, noise=NOISE)
+    time: Floats = PERIOD * np.arange(len(force), dtype=np.float64)
+    return Ringing(q, payload, force, NOISE, time)
 
 
-def _pushes(rows: Floats, rigid: Floats, jog: Floats, limits: MotionLimits) -> Floats:
+def _pushes(rows: Floats, rigid: Floats, jog: Floats) -> Floats:
     """Torques of the drives on their motors during and after a jog, shape (ticks, n) [N m]."""
     _, B, K_d, K_p, _ = rows
-    motion = quickest_motion(JointLine(np.zeros_like(jog), jog), limits, PERIOD)
+    motion = quickest_motion(JointLine(np.zeros_like(jog), jog), LIMITS, PERIOD)
     way = []
     while not motion.finished:
         way.append(motion.next())

@@ -12,8 +12,6 @@ from tvist_lab.recordings import Floats
 
 STEP = 1e-3
 """Step of a logarithm for finite differences [-]."""
-CERTAIN = (0.05, 0.2)
-"""Largest standard errors of a ring-down's own f_d and ζ for which a model is judged by them [-]."""
 LEAST = (0.015, 0.06)
 """Smallest assumed errors of f_d and ζ: joints that share a parameter differ, and neither friction nor gears are linear
 [-].
@@ -33,12 +31,6 @@ class LeftOut:
     """Shape (k,) [-]."""
     own: OwnPoles
     """The ring-down's own modes, the same ones."""
-
-    @property
-    def certain(self) -> list[int]:
-        """Indices of the modes that the ring-down itself tells accurately."""
-        errors = zip(self.own.f_d_error, self.own.zeta_error, strict=True)
-        return [k for k, (f_d, zeta) in enumerate(errors) if f_d < CERTAIN[0] and zeta < CERTAIN[1]]
 
 
 @dataclass(frozen=True)
@@ -100,7 +92,7 @@ class Forecast:
         squares: list[tuple[float, float]] = []
         for one in left:
             known = self.at(one.ringing.q, one.ringing.payload, MODES)
-            for k in (k for k in one.certain if k < len(known.f_d)):
+            for k in (k for k in one.own.certain if k < len(known.f_d)):
                 f_d = np.log(one.f_d[k] / one.own.f_d[k]) ** 2
                 zeta = np.log(one.zeta[k] / one.own.zeta[k]) ** 2
                 squares.append(

@@ -19,8 +19,8 @@ from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_controller.api.line import MotionLimits
 from tvist_lab.collect import collect
-from tvist_lab.identification.identify import IdentificationError
-from tvist_lab.identification.ring_downs import or_none, reach
+from tvist_lab.identification.ring_downs import IdentificationError
+from tvist_lab.identification.travel import or_none, reach
 from tvist_lab.identification.unknowns import Unknown, parameter
 from tvist_lab.metrics import motions
 from tvist_lab.metrics.coloured import widening
@@ -67,17 +67,7 @@ def unknown_friction(description: RobotDescription) -> tuple[tuple[Unknown, ...]
 async def identify_friction(
     robot: Robot, control: Arm, description: RobotDescription, places: Sequence[Floats]
 ) -> tuple[ModalParameter, ...]:
-    """Move all joints slowly there and back, and fit each one's friction.
-
-    Args:
-        robot: The robot; its shaper must be `none`.
-        control: The arm under control.
-        description: The arm, of which only the torque limits are used, for the first guess.
-        places: Configurations in the middle of the way to try, each of shape (n,) [rad].
-
-    Raises:
-        IdentificationError: There is no free way about any of them.
-    """
+    """Move all joints slowly there and back, and fit each one's friction."""
     recording = await _sweep(robot, control, places)
     speed, torque = there_and_back(recording)
     return tuple(
@@ -140,11 +130,7 @@ def fit_friction(unknown: Sequence[Unknown], speed: Floats, torque: Floats) -> t
 
     The ripple of the gears makes the noise, which grows with speed, so that each block has its own weight. It is
     correlated from block to block, which widens the intervals.
-
-    Args:
-        unknown: Its parameters before the measurement, in the order of `friction`.
-        speed: Speeds, shape (k,) [rad/s].
-        torque: Friction torques, shape (k,) [N m].
+    Speeds [rad/s] and torques [N m] have the shape (k,).
     """
     guess = np.log([one.guess for one in unknown])
     deviation = np.array([one.deviation for one in unknown])

@@ -26,7 +26,6 @@ from tvist_lab.identification.ring_downs import Ringing
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.metrics import SLOW_POLE
 from tvist_lab.recordings import Floats
-from tvist_plant.plant import PERIOD
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.poles import follow
 
@@ -45,6 +44,8 @@ INSIDE = 1e-3
 EVALUATIONS = 60
 SOFTENINGS = (0.0, 50.0, 100.0, 200.0, 300.0)
 """Softening by hysteresis that is tried [1/m]: 200 is 3 % for an amplitude of 1 m/s² at 13 Hz."""
+CERTAIN = (0.05, 0.2)
+"""Largest standard errors of a ring-down's own f_d and ζ for which a model is judged by them [-]."""
 STARTS = 4
 """Number of starting points of the search; the first one is the guess."""
 SPREAD = 0.35
@@ -77,8 +78,7 @@ class _Signal:
     def __init__(self, arm: ArmModes, ringing: Ringing) -> None:
         self.mass, self.force = arm.mass(ringing.q, ringing.payload), ringing.force
         self.noise = float(np.hypot(ringing.noise, ringing.inexact))
-        every = np.asarray(PERIOD * np.arange(len(self.force)))
-        self.time: Floats = every if ringing.time is None else ringing.time
+        self.time = ringing.time
         self._lost = np.zeros(len(self.force))
         if ringing.softening:
             self._lost = ringing.softening * cumulative_trapezoid(
@@ -89,10 +89,18 @@ class _Signal:
             [np.exp(-SLOW_POLE * self.time), np.ones(len(self.force)), still.real, still.imag]
         )
 
+    def _columns(self, poles: Complex) -> Floats:
+        ringing = np.exp(np.outer(self.time, poles) - np.outer(self._lost, RAYLEIGH / np.abs(poles)))
+        return np.column_stack([ringing.real, ringing.imag, self._always])
+
+    def amplitudes(self, poles: Complex) -> Floats:
+        """Length of each mode's vector of amplitudes at the beginning [m/s^2]."""
+        found = np.linalg.lstsq(self._columns(poles), self.force)[0][: 2 * len(poles)]
+        return np.asarray(np.sqrt(np.sum(found.reshape(2, len(poles), -1) ** 2, axis=(0, 2))))
+
     def left(self, poles: Complex) -> Floats:
         """Residual of the signal for some poles, divided by its noise, flattened."""
-        ringing = np.exp(np.outer(self.time, poles) - np.outer(self._lost, RAYLEIGH / np.abs(poles)))
-        orthonormal, _ = np.linalg.qr(np.column_stack([ringing.real, ringing.imag, self._always]))
+        orthonormal, _ = np.linalg.qr(self._columns(poles))
         return np.asarray((self.force - orthonormal @ (orthonormal.T @ self.force)).ravel() / self.noise)
 
     def heavier(self, drivetrain: Drivetrain, masses: Sequence[Floats]) -> Floats:
@@ -122,13 +130,7 @@ def _amplitude(ringing: Ringing, time: Floats) -> Floats:
 
 
 def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None = None) -> ModalFit:
-    """Estimate the parameters.
-
-    Args:
-        arm: Arm with the payloads of the ring-downs.
-        ringings: At least one ring-down.
-        start: Logarithms at which the search starts; None for the guess.
-    """
+    """Estimate the parameters."""
     signals = [_Signal(arm, r) for r in ringings]
 
     def residual(logarithms: Floats) -> Floats:
@@ -236,12 +238,20 @@ class OwnPoles:
     """Standard deviation of the logarithm of f_d, shape (k,) [-]."""
     zeta_error: Floats
     """Standard deviation of the logarithm of ζ, shape (k,) [-]."""
+    amplitude: Floats
+    """Largest |α| of each mode at the beginning, shape (k,) [m/s²]."""
     significance: float
     """Increase of the residual's sum of squares with the other poles, divided by the noise's variance; 8 by chance
     [-].
     """
     share: float
     """rms of the part that only these poles explain, relative to that of the vibration without its noise [-]."""
+
+    @property
+    def certain(self) -> list[int]:
+        """Indices of the modes that the ring-down itself tells accurately."""
+        errors = zip(self.f_d_error, self.zeta_error, strict=True)
+        return [k for k, (f_d, zeta) in enumerate(errors) if f_d < CERTAIN[0] and zeta < CERTAIN[1]]
 
 
 LOOSE = 0.5
@@ -270,9 +280,15 @@ def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
         zeta=zeta,
         f_d_error=f_d_error,
         zeta_error=zeta_error,
+        amplitude=signal.amplitudes(_poles(found.x)),
         significance=significance,
         share=float(np.sqrt(significance / max(nothing - signal.force.size, 1.0))),
     )
+
+
+def own_poles_near(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
+    """Fit a ring-down's own poles, starting from those of a fit."""
+    return own_poles(arm, ringing, fit.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES])
 
 
 def describe(poles: Complex) -> tuple[Floats, Floats]:

@@ -7,7 +7,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from tvist_controller.api.line import DrivenLine, body, respond
-from tvist_lab.identification.everyday_stops import INEXACT, Log, Stop, noise_of, objection
+from tvist_lab.identification.ring_downs import INEXACT, Log, Stop, noise_of, objection
 from tvist_lab.metrics import MotionRows, motions
 from tvist_lab.metrics.vibration import SENSOR
 from tvist_lab.recordings import Floats, RecordingError
@@ -78,11 +78,7 @@ class Observed:
 
 
 def observe(logs: Sequence[Log], payloads: Sequence[Payload]) -> tuple[list[Observed], list[Stop]]:
-    """Return the motions that a twin can repeat, and those that it cannot with the reason.
-
-    Raises:
-        RecordingError: A log has no target, so that nobody knows what the arm was to do.
-    """
+    """Return the motions that a twin can repeat, and those that it cannot with the reason."""
     found, others = [], []
     for log in logs:
         if "target_q" not in log.recording:
@@ -171,14 +167,7 @@ def mounting_of(pairs: Sequence[tuple[Floats, Floats]]) -> Floats:
 
 
 def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats) -> Floats:
-    """Difference of a twin's motion from the measured one, each part over its inaccuracy, flattened.
-
-    Args:
-        response: What the twin does.
-        motion: What was measured.
-        mounting: Rotation from the flange to the accelerometer.
-        torque: Largest torque of each joint, shape (n,) [N m].
-    """
+    """Difference of a twin's motion from the measured one, each part over its inaccuracy, flattened."""
     _, force, inaccuracy = motion.felt
     parts = [((felt_by(response, motion, mounting) - force) / inaccuracy).ravel()]
     own = (response.measured.q, np.full(len(torque), ANGLE)), (response.measured.moment, TORQUE * torque)

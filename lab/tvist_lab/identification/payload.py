@@ -9,7 +9,7 @@ determine the torques beyond gravity; friction and rotors are estimated along wi
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,9 +19,9 @@ from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.collect import collect
-from tvist_lab.identification.identify import IdentificationError
-from tvist_lab.identification.ring_downs import or_none, reach
-from tvist_lab.identification.unknowns import heavier
+from tvist_lab.identification.ring_downs import IdentificationError, Progress
+from tvist_lab.identification.travel import or_none, reach
+from tvist_lab.identification.unknowns import ball, heavier
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.workspace import ranges, workspace
 from tvist_plant.description import Payload as Body
@@ -49,16 +49,12 @@ LEAST_ERROR = 0.01
 """Smallest assumed error of a torque, as a share of the joint's friction [-]."""
 ROTOR = 3.0
 """Largest assumed inertia of a rotor [kg m^2]."""
-STEEL = 7850.0
-"""Density for estimating a payload's size [kg/m^3]."""
 DISAGREEMENT = (0.3, 4.0)
 """If masses at rest and in motion differ by more than this [kg] and by this many standard deviations, one is wrong."""
 CERTAIN = 4.0
 """Number of standard deviations for the bounds of a mass [-]."""
 LIGHT = 0.1
 """Mass below which the centre of mass is not reported [kg]."""
-
-Progress = Callable[[], None]
 
 
 @dataclass(frozen=True)
@@ -90,20 +86,7 @@ async def identify_payload(
     seed: int = 0,
     progress: Progress,
 ) -> PayloadFound:
-    """Identify the payload, as a client.
-
-    Args:
-        robot: The robot, on a network or in process.
-        control: The arm under control.
-        description: The arm's masses, geometry and friction.
-        poses: Number of poses to rest in, at least 3.
-        seed: Seed of the candidate poses.
-        progress: Called after each pose, and after the motion.
-
-    Raises:
-        IdentificationError: The description belongs to another robot, poses are too few or out of reach, or torques
-            at rest and in motion disagree.
-    """
+    """Identify the payload, as a client."""
     info = await robot.info()
     _check(info, description, poses)
     arm = _Regressor(description)
@@ -116,7 +99,7 @@ async def identify_payload(
         if held is None:
             continue
         rested += 1
-        progress()
+        progress(f"pose {rested} of {poses}")
         at, torque = held
         rows.append(arm.static(at))
         rested_at.append(at)
@@ -128,8 +111,8 @@ async def identify_payload(
     matrix = np.vstack(rows)
     found, deviations = arm.solve(matrix, np.concatenate(torques))
     deviations = np.hypot(deviations, arm.of_masses(matrix, rested_at))
+    progress("a short motion")
     in_motion, in_motion_deviation = arm.move(await _swing(robot, control, q, period))
-    progress()
     mass = max(float(found[0]), 0.0)
     apart = abs(in_motion - mass)
     if apart > DISAGREEMENT[0] + DISAGREEMENT[1] * math.hypot(deviations[0], in_motion_deviation):
@@ -219,9 +202,7 @@ class _Regressor:
     def of_masses(self, rows: Floats, poses: Sequence[Floats]) -> Floats:
         """Standard deviations of (m, m c) that wrong masses of the links cause, see `LINK_MASS`, shape (4,).
 
-        Args:
-            rows: Y of all poses, shape (n k, 4).
-            poses: The k poses, each of shape (n,) [rad].
+        The rows are Y of all k poses, shape (n k, 4).
         """
         weight = np.tile(1.0 / self._friction, len(poses))
         solved = np.linalg.pinv(rows * weight[:, None])
@@ -322,13 +303,6 @@ async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Record
             await robot.advance(round(LOOK / period))
         return collected.recording()
     raise IdentificationError("there is no room for a short motion: give the arm more")
-
-
-def ball(mass: float) -> tuple[float, float, float, float, float, float]:
-    """Inertia of a steel ball [kg m^2], since torques do not tell the payload's inertia from that of the rotors."""
-    radius = (3.0 * mass / (4.0 * math.pi * STEEL)) ** (1.0 / 3.0)
-    moment = 0.4 * mass * radius**2
-    return (moment, 0.0, 0.0, moment, 0.0, moment)
 
 
 def _three(values: Floats) -> tuple[float, float, float]:

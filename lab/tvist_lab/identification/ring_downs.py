@@ -1,67 +1,56 @@
-"""Measurement of ring-downs: make the arm vibrate at a configuration and record it."""
+"""Ring-downs after stops, from recordings of this controller and from logs of others: which can be used, and why not.
 
-from collections.abc import Awaitable
-from dataclasses import asdict, dataclass
-from typing import TypeVar
+A ring-down counts from where the arm is not driven any more until it moves again, if nothing shaped the motion and the
+vibration stands out of the noise.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tvist_client.arm import Arm
-from tvist_client.robot import Robot
-from tvist_controller.api.line import MotionLimits
-from tvist_lab.collect import collect
-from tvist_lab.metrics import RingDown, fit_ring_down, motions, tool_acceleration
-from tvist_lab.recordings import Floats, RecordingError
-from tvist_protocol.errors import RefusedError
+from tvist_client.errors import ClientError
+from tvist_lab.identification.unknowns import ball
+from tvist_lab.metrics import MotionRows, motions, still_driven
+from tvist_lab.metrics.vibration import SENSOR
+from tvist_lab.recordings import Floats, Recording, RecordingError
+from tvist_plant.plant import PERIOD
+from tvist_protocol.values import Payload
 
-Measured = TypeVar("Measured")
-
-LISTEN = 0.6
-"""Time recorded after a jog [s]."""
-PAUSE = 0.3
-"""Rest before the next jog [s]."""
-MODES = 2
-"""Number of modes that are fitted together."""
-SKIPPED = 7
-"""Ticks after the stop that a `Ringing` leaves out, since the end of the deceleration ramp is not a ring-down."""
-SAMPLES = 200
-"""Number of ticks in a `Ringing`."""
-QUIET = 75
-"""Number of ticks before a jog from which the noise is determined."""
+BEGINS = 7 * PERIOD
+"""Time after a stop that a ring-down leaves out, since the end of the deceleration ramp is not a ring-down [s]."""
+LONGEST, SHORTEST = 0.4, 0.2
+"""Longest and shortest ring-down that is used [s]."""
+SLOWEST = 0.01
+"""Longest time between samples that show an arm's vibration [s]."""
 LEAST_NOISE = 0.01
-"""Smallest assumed noise [m/s^2], since no model is more accurate than that."""
-SHARE = 0.25
-"""The first mode is the lowest one whose amplitude is at least this share of the largest [-]."""
+"""Smallest assumed noise, since no model is more accurate than that [m/s^2]."""
+QUIET = 1.15
+"""A ring-down whose rms is less than this times its noise contains no information [-]."""
+BEFORE = 0.15
+"""Time before a motion in which the noise is looked for [s]."""
+INEXACT = 0.1
+"""Share of an everyday ring-down that no linear model explains, since friction and gears are not linear [-]."""
+UNSHAPED = 1.5
+"""Number of ticks by which an unshaped reference may seem longer than it is."""
+CONTRADICTS = "it contradicts the others"
+"""Reason of a stop whose ring-down no springs and drives explain together with the others'."""
 
 
-@dataclass(frozen=True)
-class Jog:
-    """A short move to the configuration of interest, with all big joints at once, so that it excites every mode."""
+Progress = Callable[[str], None]
+"""Called before each step of an identification with what it does."""
 
-    length: float = 0.06
-    """Length of the jog for the fastest joint [rad]."""
-    shares: tuple[float, ...] = (0.6, 0.6, 1.0)
-    """Shares of the joints, from the base on [-]."""
-    quickness: float = 1.0
-    """Factor of the velocity; acceleration and jerk grow with its square and cube [-]."""
 
-    @property
-    def limits(self) -> MotionLimits:
-        """Return the limits of the jog: those of a client's `move_j`, and quicker ones for an arm that needs them."""
-        quick = self.quickness
-        return MotionLimits(velocity=1.5 * quick, acceleration=2.0 * quick**2, jerk=100.0 * quick**3)
-
-    def of(self, joints: int) -> Floats:
-        """Return the displacement of the joints, shape (joints,) [rad]."""
-        jog = np.zeros(joints)
-        used = min(joints, len(self.shares))
-        jog[:used] = self.length * np.array(self.shares[:used])
-        return jog
+class IdentificationError(ClientError):
+    """The robot could not be identified; the message says what to do."""
 
 
 @dataclass(frozen=True)
 class Ringing:
-    """Acceleration of the tool at a configuration after a jog."""
+    """Acceleration of the tool at a configuration after a stop."""
 
     q: Floats
     """Configuration, shape (n,) [rad]."""
@@ -71,8 +60,8 @@ class Ringing:
     """Specific force, beginning shortly after the stop, shape (T, 3) [m/s^2]."""
     noise: float
     """Noise of the force at rest, rms per axis [m/s^2]."""
-    time: Floats | None = None
-    """Times of the samples from the first on, shape (T,) [s]; None for one in each control period."""
+    time: Floats
+    """Times of the samples from the first on, shape (T,) [s]."""
     inexact: float = 0.0
     """What a linear model may leave of it beside the noise, rms per axis [m/s^2]."""
     driven: tuple[complex, ...] = ()
@@ -83,94 +72,153 @@ class Ringing:
     @property
     def rms(self) -> float:
         """Return the rms of the force without its mean, per axis [m/s^2]."""
-        return float(np.sqrt(np.mean((self.force - self.force.mean(axis=0)) ** 2)))
+        return self.rms_after(0.0)
+
+    def rms_after(self, late: float) -> float:
+        """Return the same some time after the first sample [m/s^2]."""
+        rest = self.force[self.time >= late]
+        return float(np.sqrt(np.mean((rest - rest.mean(axis=0)) ** 2)))
 
 
-async def or_none(measuring: Awaitable[Measured]) -> Measured | None:
-    """Wait for a motion or a measurement; return None if the robot refuses it because of a collision."""
-    try:
-        return await measuring
-    except RefusedError as error:
-        if error.reply.code != "collision":
-            raise
-        return None
+@dataclass(frozen=True)
+class Log:
+    """A recording of a robot, or a log of one, and how the ring-downs in it are to be read."""
 
+    name: str
+    """What people call it: the name of its file, or the number of a jog."""
+    recording: Recording
+    payload: Payload | None = None
+    """What the arm carried; None for what the recording says."""
+    begins: float = BEGINS
+    """Time after a stop that a ring-down leaves out [s]."""
+    inexact: float = INEXACT
+    """Share of a ring-down that no linear model explains [-]."""
+    driven: tuple[complex, ...] = ()
+    """Poles with which the set-point still comes to rest, one of each pair [1/s]."""
 
-async def reach(arm: Arm, q: Floats) -> None:
-    """Move to a configuration; if there would be a collision on the straight line, via the upright arm.
+    def carried(self, row: int) -> Payload:
+        """Return what the arm carried, or was said to carry, in a row.
 
-    Raises:
-        RefusedError: That way is not clear either; code `collision`.
-    """
-    if await or_none(arm.move_j(q)) is None:
-        upright = np.zeros_like(q)
-        upright[[joint for joint in (1, 3) if joint < len(q)]] = -np.pi / 2
-        await arm.move_j(upright)
-        await arm.move_j(q)
-
-
-async def measure(robot: Robot, arm: Arm, q: Floats, jog: Jog, repeats: int) -> RingDown:
-    """Measure (f_d, ζ) of the strongest mode after a jog to a configuration.
-
-    Equal jogs give equal vibrations, so their accelerations are averaged before the fit.
-
-    Args:
-        robot: The robot.
-        arm: Control of the robot; its shaper must be `none`.
-        q: Configuration, shape (n,) [rad].
-        jog: The move that excites the arm.
-        repeats: Number of jogs to average.
-
-    Raises:
-        RefusedError: The configuration cannot be reached; code `collision`.
-    """
-    start = q - jog.of(len(q))
-    await reach(arm, start)
-    period = 1.0 / (await robot.info()).rate_hz
-    rings = []
-    for _ in range(repeats):
-        await arm.move_j(start)
-        await robot.advance(round(PAUSE / period))
-        with collect(robot) as collected:
-            await robot.advance(1)
-            await arm.move_j(q, **asdict(jog.limits))
-            await robot.advance(round(LISTEN / period))
-        recording = collected.recording()
-        stop = motions(recording)[0].shaped_stop
-        rings.append(tool_acceleration(recording)[stop : stop + round(LISTEN / period)])
-    length = min(map(len, rings))
-    return fit_ring_down(np.mean([ring[:length] for ring in rings], axis=0), period, modes=MODES, share=SHARE)
-
-
-async def listen(robot: Robot, arm: Arm, q: Floats, payload: int, jog: Jog) -> Ringing:
-    """Jog to a configuration once, and record the ring-down.
-
-    Args:
-        robot: The robot.
-        arm: Control of the robot; its shaper must be `none`.
-        q: Configuration, shape (n,) [rad].
-        payload: Index of the carried payload, for the result.
-        jog: The move that excites the arm.
-
-    Raises:
-        RefusedError: The configuration cannot be reached; code `collision`.
-        RecordingError: States were lost.
-    """
-    start = q - jog.of(len(q))
-    await reach(arm, start)
-    period = 1.0 / (await robot.info()).rate_hz
-    with collect(robot) as collected:
-        await robot.advance(round(PAUSE / period))
-        await arm.move_j(q, **asdict(jog.limits))
-        await robot.advance(SKIPPED + SAMPLES + 50)
-    recording = collected.recording()
-    if recording.missing_ticks:
+        Raises:
+            RecordingError: Nobody says it.
+        """
+        recording = self.recording
+        if self.payload is not None:
+            return self.payload
+        if "payload" in recording and np.isfinite(recording["payload"][row]):
+            mass = float(recording["payload"][row])
+            com = recording["payload_cog"][row] if "payload_cog" in recording else np.zeros(3)
+            x, y, z = com.tolist()
+            return Payload(mass=mass, com=(x, y, z), inertia=ball(mass))
+        if recording.info is not None:
+            return cast("Payload", recording.info.payload)
         raise RecordingError(
-            f"{recording.missing_ticks} states were lost: the connection to the robot is too slow"
+            f"{self.name} does not say what the arm carried: give --payload MASS, 0 for nothing"
         )
-    force = recording["actual_tool_accelerometer"]
-    moved = motions(recording)[-1]
-    first = moved.shaped_stop + SKIPPED
-    before = force[max(moved.start - QUIET, 0) : moved.start]
-    noise = float(np.sqrt(np.mean((before - before.mean(axis=0)) ** 2)))
-    return Ringing(q, payload, force[first : first + SAMPLES], max(noise, LEAST_NOISE))
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A motion's stop, and the ring-down after it if it can be used."""
+
+    log: str
+    """Name of the log."""
+    motion: int
+    """Number of the motion in the log, from 1."""
+    ringing: Ringing | None
+    """The ring-down; None if it cannot be used."""
+    reason: str = ""
+    """Why it cannot be used: words that stops of the same kind share."""
+
+
+def stops_of(logs: Sequence[Log]) -> tuple[list[Stop], tuple[Payload, ...]]:
+    """Return the stops of all motions, and the payloads that their ring-downs refer to.
+
+    Raises:
+        RecordingError: A log has no joint angles, or does not say what the arm carried.
+    """
+    payloads: dict[Payload, int] = {}
+    stops = []
+    for log in logs:
+        for number, motion in enumerate(motions(log.recording), 1):
+            index = payloads.setdefault(log.carried(motion.shaped_stop), len(payloads))
+            stops.append(_stop(log, number, motion, index))
+    return stops, tuple(payloads)
+
+
+def unused(stops: Sequence[Stop]) -> dict[str, int]:
+    """Return each reason with the number of stops that were not used for it, the most frequent first."""
+    return dict(Counter(stop.reason for stop in stops if stop.ringing is None).most_common())
+
+
+def objection(recording: Recording, motion: MotionRows) -> str:
+    """Return why the arm's acceleration after a motion says little of the arm; empty if it may say something."""
+    if SENSOR not in recording:
+        return f"the log has no {SENSOR}"
+    if recording.period > SLOWEST:
+        return (
+            f"the log has a row every {1e3 * recording.period:.0f} ms, {1e3 * SLOWEST:.0f} ms show vibration"
+        )
+    if motion.stopped:
+        return "the motion was stopped before its target"
+    shaped = "reference_q" in recording and motion.delay(recording) > UNSHAPED * recording.period
+    if shaped or (
+        "shaper_delay" in recording and np.any(recording["shaper_delay"][motion.start : motion.end] > 0.0)
+    ):
+        return "the motion was shaped"
+    return ""
+
+
+def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> Stop:
+    recording = log.recording
+    reason = objection(recording, motion)
+    if reason:
+        return Stop(log.name, number, None, reason)
+    stop, begin = motion.arm_stop(recording), log.begins
+    if recording.foreign:
+        begin = max(begin, still_driven(recording, motion.start, stop))
+    seen, time = fresh(recording), recording.time
+    after = time[seen] - time[stop] - begin + 1e-9
+    rows = seen[(after >= 0.0) & (after < LONGEST) & (seen < motion.end)]
+    rows = rows[np.isfinite(recording[SENSOR][rows]).all(axis=1)]
+    if len(rows) < 2 or time[rows[-1]] - time[rows[0]] < SHORTEST - 1.5 * recording.period:
+        return Stop(
+            log.name, number, None, f"the arm rested for less than {SHORTEST:g} s, or states were lost"
+        )
+    q = recording["target_q" if "target_q" in recording else "actual_q"][stop]
+    late = time[rows] - time[rows[0]]
+    ringing = Ringing(
+        q, payload, recording[SENSOR][rows], noise_of(recording, motion), late, driven=log.driven
+    )
+    if ringing.rms < QUIET * ringing.noise:
+        return Stop(log.name, number, None, "the vibration does not stand out of the noise")
+    return Stop(log.name, number, replace(ringing, inexact=log.inexact * ringing.rms))
+
+
+def fresh(recording: Recording) -> NDArray[np.intp]:
+    """Indices of the rows with new measurements: a robot that sends fewer than it gets repeats the one before."""
+    return np.flatnonzero(np.append(True, np.any(np.diff(recording[SENSOR], axis=0) != 0.0, axis=1)))
+
+
+def noise_of(recording: Recording, motion: MotionRows) -> float:
+    """Noise of the accelerometer, rms per axis [m/s^2].
+
+    It is the smaller of two measures: the spread before the motion, if the arm was at rest by then, and what remains of
+    the whole motion's third differences, which a vibration of a tenth of the sampling rate hardly enters. Rows that
+    repeat the one before say nothing of it.
+    """
+    first = int(np.searchsorted(recording.time, recording.time[motion.start] - BEFORE))
+    before = _finite(recording[SENSOR][first : motion.start])
+    seen = fresh(recording)
+    whole = _finite(recording[SENSOR][seen[(seen >= motion.start) & (seen < motion.end)]])
+    found = []
+    if len(whole) > 3:
+        typical = np.median(np.abs(np.diff(whole, 3, axis=0)), axis=0)
+        found.append(float(np.sqrt(np.mean(typical**2) / 20.0)) / 0.6745)
+    if len(before) > 0.5 * BEFORE / recording.period:
+        found.append(float(np.sqrt(np.mean((before - before.mean(axis=0)) ** 2))))
+    return max(min(found, default=0.0), LEAST_NOISE)
+
+
+def _finite(values: Floats) -> Floats:
+    return np.asarray(values[np.isfinite(values).all(axis=1)])

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import least_squares
 
+from tvist_lab.identification.ring_downs import fresh
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.plant import PERIOD
 
@@ -45,11 +45,8 @@ class ServoResponse:
 def servo_response(moves: Sequence[Recording]) -> ServoResponse | None:
     """Fit the lag to moves of a joint that hardly bends, such as the last one.
 
-    Args:
-        moves: Recordings of our own robot whose plant is that robot: `target_q` are the set-points.
-
-    Returns:
-        The lag; None if the arm does not follow as such a servo does.
+    The recordings are of our own robot, whose `target_q` are the set-points. Return None if the arm does not follow as
+    such a servo does.
     """
     parts = [_part(move) for move in moves]
     way = max(float(np.ptp(target)) for target, *_ in parts)
@@ -96,9 +93,3 @@ def _part(move: Recording) -> tuple[Floats, Floats, Floats]:
     seen = fresh(move)
     every = np.interp(np.arange(ticks[-1] + 1.0), ticks, target[:, joint])
     return every, ticks[seen], move["actual_q"][seen, joint]
-
-
-def fresh(recording: Recording) -> NDArray[np.intp]:
-    """Indices of the rows with new measurements: a robot that sends fewer than it gets repeats the one before."""
-    force = recording["actual_tool_accelerometer"]
-    return np.flatnonzero(np.append(True, np.any(np.diff(force, axis=0) != 0.0, axis=1)))

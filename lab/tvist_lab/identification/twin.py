@@ -6,16 +6,15 @@ torques (output error; Ljung, System Identification, 1999, ch. 7). Gauss and New
 what the logs do not tell at the robot file's values.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_lab.identification.everyday_stops import CONTRADICTS, Log, Stop
-from tvist_lab.identification.from_logs import check_logs, usable
-from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.calibrate import agreeing, check_logs
 from tvist_lab.identification.modal_fit import fit_from_many
 from tvist_lab.identification.observed import Observed, apart, felt_by, mounting_of, observe, repeated
+from tvist_lab.identification.ring_downs import CONTRADICTS, IdentificationError, Log, Progress, Stop
 from tvist_lab.identification.twin_parameters import TOLD, TwinParameters
 from tvist_lab.identification.unknowns import FURTHEST
 from tvist_lab.metrics import motions
@@ -37,8 +36,6 @@ FEWEST = 4
 """Number of motions below which the twin consists of little more than the robot file."""
 AUDIBLE = 1.5
 """Smallest measured residual that a prediction is judged by, over the noise of three axes [-]."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -144,23 +141,15 @@ class _Fit:
 def fit_twin(
     description: RobotDescription, logs: Sequence[Log], checks: Sequence[Log], progress: Progress
 ) -> Twin:
-    """Fit a robot file to logs.
+    """Fit a robot file to logs with targets.
 
-    Args:
-        description: The robot file to start from.
-        logs: At least one log of the robot, with targets.
-        checks: Logs that the fit does not see and whose motions it predicts; if there is none, it predicts each motion
-            of the others by a fit without it.
-        progress: Called before each step with what it does.
-
-    Raises:
-        IdentificationError: Too few motions can be used; the message says why.
-        RecordingError: A log cannot be used.
+    The fit does not see the checks and predicts their motions; if there is none, it predicts each motion of the others
+    by a fit without it.
     """
     check_logs(description, [*logs, *checks])
-    stops, arm, _, agreeing = usable(description, logs, progress)
+    stops, arm, ringings = agreeing(description, logs, progress)
     progress("fitting springs and drives to the stops")
-    modal = arm.parameters(fit_from_many(arm, agreeing).logarithms)
+    modal = arm.parameters(fit_from_many(arm, ringings).logarithms)
     payloads = tuple(dict.fromkeys((*arm.payloads, *_carried(checks))))
     wrong = {(stop.log, stop.motion) for stop in stops if stop.reason == CONTRADICTS}
     seen, others = observe(logs, payloads)
@@ -217,8 +206,6 @@ def _begin(parameters: TwinParameters, modal: Sequence[ModalParameter]) -> Float
     values = np.zeros(len(parameters.entries))
     drives, links = parameters.description.drives, parameters.description.link_flexibility
     for one in modal:
-        if one.status == "assumed":
-            continue
         for joint in one.joints:
             table, key, place, guess = "drives", str(one.quantity), joint, 0.0
             match one.quantity:

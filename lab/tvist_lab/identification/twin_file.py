@@ -15,12 +15,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def twin_file(twin: Twin, command: str) -> str:
-    """Return the content of the robot file.
-
-    Args:
-        twin: The twin.
-        command: Command line that the user typed.
-    """
+    """Return the content of the robot file."""
     comments = [f"A twin of a {twin.robot.robot.model}, made by: {command}", *said(twin)]
     return "".join(f"# {line}\n" for line in comments) + toml_of(with_provenance(twin))
 

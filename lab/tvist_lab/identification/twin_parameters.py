@@ -8,8 +8,7 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
-from tvist_lab.identification.payload import ball
-from tvist_lab.identification.unknowns import ROTOR, SET, UNSURE
+from tvist_lab.identification.unknowns import ROTOR, SET, UNSURE, ball
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_protocol.values import Payload

@@ -1,6 +1,5 @@
 """Unknown parameters of an arm's springs and drives before a measurement, with typical values."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +19,8 @@ from tvist_shaping.estimators.drivetrain import Drivetrain
 
 LARGE = 3
 """Number of joints with large drives, counted from the base, of an arm of up to six; each has its own parameters."""
+TYPICAL_GAIN = (800.0, 300.0)
+"""Velocity gain of a large joint and of one of the wrist, over its torque, of an arm of about 5 kg payload [s/rad]."""
 UNSURE = 0.7
 """Standard deviation of a guess's logarithm: within a factor of four with 95 % probability [-]."""
 SET = 0.2
@@ -38,6 +39,8 @@ FURTHEST = 3.0
 """Number of deviations by which a parameter may differ from what a robot file says; beyond, it would stand for what the
 model lacks.
 """
+STEEL = 7850.0
+"""Density for estimating a payload's size [kg/m^3]."""
 SURE = 1.959963984540054
 """Number of standard deviations that contain a normal variable with 95 % probability [-]."""
 
@@ -52,108 +55,73 @@ class Unknown:
     guess: float
     """Guessed value [SI]."""
     deviation: float = UNSURE
-    """Standard deviation of its logarithm; 0 if it is assumed to be exact [-]."""
+    """Standard deviation of its logarithm [-]."""
 
 
 def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
     """Return the parameters of an arm's linear model: one per large joint, and one for all joints of the wrist.
 
-    The guesses are those for an arm of about 5 kg payload, scaled as `Scale` scales springs and drives. The rotors'
-    inertia has nearly the same effect on the visible frequencies as more link inertia, so its guess is a close one:
-    the description's, as in the drives' feed-forward.
+    The guesses are the robot file's values, of which a shared parameter has the geometric mean over its joints, so that
+    what measurements do not tell stays as the file has it. The deviations are wide all the same, for springs and drives
+    of a file are often assumed. A gain that a file leaves at zero is guessed as for an arm of about 5 kg payload. The
+    rotors' inertia has nearly the same effect on the visible frequencies as more link inertia, so its guess is close.
     """
     joints = range(description.joints)
     large = max(LARGE, description.joints - WRIST)
-    scale = Scale(description.kinematics, description.limits.torque)
-    groups: list[tuple[tuple[int, ...], float, float]] = [
-        ((joint,), 24_000.0, 800.0) for joint in joints[:large]
-    ]
-    if joints[large:]:
-        groups.append((tuple(joints[large:]), 8_000.0, 300.0))
-    found = []
-    for group, stiffness, gain in groups:
-        torque = scale.torque[group[0]]
-        rotor = float(np.mean([description.drives.rotor_inertia[joint] for joint in group]))
-        found += [
-            Unknown("gear_stiffness", group, stiffness * torque),
-            Unknown("velocity_gain", group, gain * torque * scale.time),
-            Unknown("rotor_inertia", group, rotor, ROTOR),
-        ]
-    found += [
-        Unknown("position_gain", tuple(joints), 12.0 / scale.time),
-        Unknown("damping_time", tuple(joints), 2e-4 * scale.time),
-    ]
-    # A beam is stiffer towards the base, where it is thicker.
-    links = description.link_flexibility.links
-    found += [
-        Unknown(
-            "bending_stiffness",
-            (link,),
-            (200_000.0 if link == min(links) else 100_000.0) * scale.torque[link],
-        )
-        for link in links
-    ]
-    return tuple(found)
-
-
-def unknowns_near(description: RobotDescription) -> tuple[Unknown, ...]:
-    """Return the same parameters with the robot file's values as guesses, for measurements that were not planned.
-
-    What such measurements do not tell then stays as the file has it. The deviations remain, for springs and drives of a
-    file are often assumed. A shared parameter has the geometric mean of its joints.
-    """
     drives, flexibility = description.drives, description.link_flexibility
-    K_g, D_g = np.array(drives.gear_stiffness), np.array(drives.gear_damping)
-    per_joint = {
-        "gear_stiffness": K_g,
-        "velocity_gain": np.array(drives.velocity_gain),
-        "rotor_inertia": np.array(drives.rotor_inertia),
-        "position_gain": np.array(drives.position_gain) + np.array(drives.integral_gain),
-        "damping_time": D_g / K_g,
-    }
-    bending = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
+    scale = Scale(description.kinematics, description.limits.torque)
+    stiffness, gain = np.array(drives.gear_stiffness), np.array(drives.velocity_gain)
+    rotor, loop = (
+        np.array(drives.rotor_inertia),
+        np.array(drives.position_gain) + np.array(drives.integral_gain),
+    )
+    groups = [(joint,) for joint in joints[:large]] + ([tuple(joints[large:])] if joints[large:] else [])
     found = []
-    for unknown in unknowns(description):
-        values = per_joint.get(unknown.quantity)
-        own = (
-            np.array([bending[link] for link in unknown.joints])
-            if values is None
-            else values[[*unknown.joints]]
-        )
-        positive = own[own > 0.0]
-        guess = float(np.exp(np.mean(np.log(positive)))) if len(positive) else unknown.guess
-        deviation = SET if unknown.quantity == "position_gain" else unknown.deviation
-        found.append(dataclasses.replace(unknown, guess=guess, deviation=deviation))
-    return tuple(found)
+    for group in groups:
+        own, typical = [*group], TYPICAL_GAIN[group[0] >= large] * scale.torque[group[0]] * scale.time
+        found += [
+            Unknown("gear_stiffness", group, _mean(stiffness[own])),
+            Unknown("velocity_gain", group, _mean(gain[own], typical)),
+            Unknown("rotor_inertia", group, _mean(rotor[own]), ROTOR),
+        ]
+    return (
+        *found,
+        Unknown("position_gain", tuple(joints), _mean(loop, 12.0 / scale.time), SET),
+        Unknown(
+            "damping_time", tuple(joints), _mean(np.array(drives.gear_damping) / stiffness, 2e-4 * scale.time)
+        ),
+        *(
+            Unknown("bending_stiffness", (link,), value)
+            for link, value in zip(flexibility.links, flexibility.stiffness, strict=True)
+        ),
+    )
+
+
+def _mean(values: Floats, typical: float = 1.0) -> float:
+    """Geometric mean of the positive values, or what is typical if there is none."""
+    positive = values[values > 0.0]
+    return float(np.exp(np.mean(np.log(positive)))) if len(positive) else typical
 
 
 class ArmModes:
     """Modes of an arm as functions of its unknown parameters, with each of several payloads.
 
     Args:
-        description: The robot; only kinematics, masses, rotors and the set of bending links are used.
+        description: The robot, at whose springs and drives the search begins.
         payloads: Carried payloads.
-        sought: The unknown parameters; None for those of `unknowns`.
     """
 
-    def __init__(
-        self,
-        description: RobotDescription,
-        payloads: Sequence[Payload],
-        sought: tuple[Unknown, ...] | None = None,
-    ) -> None:
+    def __init__(self, description: RobotDescription, payloads: Sequence[Payload]) -> None:
         self.description = description
         self.payloads = tuple(payloads)
-        self.unknowns = unknowns(description) if sought is None else sought
+        self.unknowns = unknowns(description)
         self._flexible: list[FlexibleModel] = [flexible_model(description, body(p)) for p in payloads]
         self._masses = [mass_matrix(flexible) for flexible in self._flexible]
-        self.sought = [number for number, unknown in enumerate(self.unknowns) if unknown.deviation > 0.0]
-        """Indices of the estimated unknowns, in the order of the parameter vector."""
-        self.guess: Floats = np.log([self.unknowns[number].guess for number in self.sought])
+        self.guess: Floats = np.log([unknown.guess for unknown in self.unknowns])
         """Logarithms of the guesses, shape (P,)."""
-        self.deviation: Floats = np.array([self.unknowns[number].deviation for number in self.sought])
+        self.deviation: Floats = np.array([unknown.deviation for unknown in self.unknowns])
         """Standard deviations of these logarithms, shape (P,)."""
-        self.furthest: Floats = (np.inf if sought is None else FURTHEST) * self.deviation
+        self.furthest: Floats = FURTHEST * self.deviation
         """Largest differences of these logarithms from the guesses, shape (P,)."""
 
     def flexible(self, payload: int) -> FlexibleModel:
@@ -174,20 +142,10 @@ class ArmModes:
         return drivetrain(self.parameters(logarithms), self.description, self._flexible[0])
 
     def parameters(self, logarithms: Floats, deviations: Floats | None = None) -> tuple[ModalParameter, ...]:
-        """Convert parameters to the form of a calibration.
-
-        Args:
-            logarithms: Logarithms of the estimated parameters, shape (P,).
-            deviations: Standard deviations of the logarithms, shape (P,); None if unknown.
-        """
-        values = {number: float(np.exp(log)) for number, log in zip(self.sought, logarithms, strict=True)}
-        errors = dict(zip(self.sought, deviations.tolist(), strict=True)) if deviations is not None else {}
-        return tuple(
-            parameter(unknown, values[number], errors.get(number, 0.0))
-            if number in values
-            else parameter(unknown)
-            for number, unknown in enumerate(self.unknowns)
-        )
+        """Convert parameters, and standard deviations of their logarithms, to the form of a calibration."""
+        errors = np.zeros(len(logarithms)) if deviations is None else deviations
+        values = np.exp(logarithms).tolist()
+        return tuple(map(parameter, self.unknowns, values, errors.tolist()))
 
 
 def heavier(description: RobotDescription, carried: Body) -> list[tuple[RobotDescription, Body]]:
@@ -208,20 +166,11 @@ def heavier(description: RobotDescription, carried: Body) -> list[tuple[RobotDes
     return [*found, (description, replace(carried, mass=carried.mass + more))]
 
 
-def parameter(unknown: Unknown, value: float | None = None, deviation: float = 0.0) -> ModalParameter:
-    """Convert a parameter to the form of a calibration.
-
-    Args:
-        unknown: What was known of it.
-        value: Its value [SI]; None for the guess, which then is assumed.
-        deviation: Standard deviation of its logarithm [-].
-    """
-    status: Status = "assumed"
-    if len(unknown.joints) > 1 and value is not None:
+def parameter(unknown: Unknown, value: float, deviation: float) -> ModalParameter:
+    """Convert a parameter's value [SI] and the standard deviation of its logarithm [-] to the form of a calibration."""
+    if len(unknown.joints) > 1:
         deviation = math.hypot(deviation, SCATTER)
-    if value is not None:
-        status = "identified" if deviation < NARROWER * unknown.deviation else "not identifiable"
-    value = unknown.guess if value is None else value
+    status: Status = "identified" if deviation < NARROWER * unknown.deviation else "not identifiable"
     return ModalParameter(
         quantity=unknown.quantity,
         joints=unknown.joints,
@@ -230,3 +179,10 @@ def parameter(unknown: Unknown, value: float | None = None, deviation: float = 0
         interval=(value * float(np.exp(-SURE * deviation)), value * float(np.exp(SURE * deviation))),
         status=status,
     )
+
+
+def ball(mass: float) -> tuple[float, float, float, float, float, float]:
+    """Inertia of a steel ball [kg m^2], since torques do not tell the payload's inertia from that of the rotors."""
+    radius = (3.0 * mass / (4.0 * math.pi * STEEL)) ** (1.0 / 3.0)
+    moment = 0.4 * mass * radius**2
+    return (moment, 0.0, 0.0, moment, 0.0, moment)

@@ -12,11 +12,10 @@ from tvist_lab.metrics.common_clock import (
     still_after,
     vibration_after_stop,
 )
-from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
+from tvist_lab.metrics.comparison import ComparedMotion, Comparison, Pair, compare, pairs, shaper_of
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
-from tvist_lab.metrics.pairing import Pair, pairs, shaper_of
 from tvist_lab.metrics.residual import Residual, residual
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, attained_position, distance, settling

@@ -66,15 +66,9 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
     what the others differ from the mean beyond their own noise (Hausman, Econometrica 46, 1978), and by what f_d and ζ
     of a real arm change while it rings.
 
-    Args:
-        alpha: Acceleration of the tool, shape (T, 3) [m/s²].
-        time: Times of the samples after the stop, shape (T,) [s].
-        period: Time between samples where none is missing [s].
-        begin: Time after the stop from which on the arm is not driven any more, as far as one knows [s].
-
-    Returns:
-        The mode that is strongest midway between the moments at which the fits begin; at the stop itself, amplitudes
-        are extrapolated. `ok` is false, with a `reason`, if the fits do not agree on one.
+    `alpha` [m/s²] has shape (T, 3) and `time` after the stop [s] (T,); the arm is driven until `begin` [s], as far as
+    one knows. The mode is the strongest one midway between the moments at which the fits begin; amplitudes are
+    extrapolated to the stop. `ok` is false, with a `reason`, if the fits do not agree.
     """
     first = int(np.searchsorted(time, begin - 1e-9))
     whole = Ring(alpha[first:], time[first:], period, (0.0,))

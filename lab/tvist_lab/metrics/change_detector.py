@@ -52,10 +52,9 @@ class ChangeDetector:
     outliers have less weight (Huber, Annals of Mathematical Statistics 35, 1964). After a change has been told, the
     measurements since are the new past.
 
-    Args:
-        prior: Standard deviation of the mean before, about 0, as far as it is known without any measurement.
-        scatter: Standard deviation that is expected between motions beyond the errors of their measurements.
-        least: Smallest change that is told.
+    `prior` is the standard deviation of the mean before, about 0, as far as it is known without any measurement;
+    `scatter` what is expected between motions beyond the errors of their measurements; `least` the smallest change that
+    is told.
     """
 
     def __init__(self, prior: float, scatter: float, least: float) -> None:
@@ -65,12 +64,7 @@ class ChangeDetector:
     def take(self, value: float, error: float) -> Change | None:
         """Take a measurement.
 
-        Args:
-            value: What was measured.
-            error: Its standard error.
-
-        Returns:
-            A change that has shown with this measurement; None if none has.
+        `error` is the standard error of the value. Returns a change that has shown with this measurement.
         """
         self._kept = [*self._kept[1 - KEPT :], (value, error)]
         found, surest = None, 0.0

@@ -13,10 +13,8 @@ def widening(residual: Floats, fitted: int = 0) -> float:
 
     r is the correlation of successive samples, as of a first-order autoregression, which has the same at all lags.
 
-    Args:
-        residual: Residual of a fit in the order of time, shape (T,) or (T, axes).
-        fitted: Number of slow functions of time that were fitted, each of which takes (1 + 3 r)/T from the correlation
-            that is found (Marriott and Pope, Biometrika 41, 1954, for the mean).
+    `residual` has shape (T,) or (T, axes), in the order of time. Each of the `fitted` slow functions of time takes (1 +
+    3 r)/T from the correlation that is found (Marriott and Pope, Biometrika 41, 1954, for the mean).
     """
     energy = float(np.sum(residual**2))
     if energy <= 0.0:

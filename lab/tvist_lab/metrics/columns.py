@@ -36,9 +36,7 @@ NAMED = 3
 def motion_cells(results: Sequence[MotionResult], origin: float) -> list[tuple[str, ...]]:
     """Return the rows of the table; an interval is a second line of its cell.
 
-    Args:
-        results: Figures of the motions.
-        origin: Time of the log that is written as zero [s].
+    `origin` is the time of the log that is written as zero [s].
     """
     return [
         (
@@ -66,6 +64,11 @@ def number(value: float | None, digits: int, interval: tuple[float, float] | Non
         return "–"
     text = f"{value:.{digits}f}"
     return text if interval is None else f"{text}\n({interval[0]:.{digits}f}–{interval[1]:.{digits}f})"
+
+
+def percent(change: float | None) -> str:
+    """Return a change as text with its sign; a dash if it is not known."""
+    return "–" if change is None else f"{round(change):+d} %"
 
 
 def grouped_notes(results: Sequence[MotionResult]) -> list[str]:

@@ -32,9 +32,6 @@ def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[floa
     """Largest |α| and largest envelope after the stop of the reference before shaping plus the declared delay [m/s²].
 
     In a log of another controller it is the arm's own stop that counts, and 10 ms more.
-
-    Raises:
-        NotMeasurableError: Nothing was recorded after that moment.
     """
     _, alpha = felt(recording, motion, _after_declared_stop(recording, motion), smooth=True)
     if len(alpha) < 2:
@@ -46,10 +43,6 @@ def still_after(recording: Recording, motion: MotionRows, threshold: float = STI
     """Last time at which |α| exceeds a threshold [m/s²], from the start of the reference before shaping [s].
 
     The truth channel is used if there is one, otherwise the sensor below 60 Hz.
-
-    Raises:
-        NotMeasurableError: |α| still exceeds the threshold when the recording ends or the next motion starts; or the
-            sensor's noise alone exceeds it, in a log of another controller.
     """
     time, alpha_xyz = felt(recording, motion, slice(motion.start, motion.end), smooth=True)
     alpha = amplitude(alpha_xyz)
@@ -73,22 +66,12 @@ def still_after(recording: Recording, motion: MotionRows, threshold: float = STI
 
 
 def peak_after_stop(recording: Recording, motion: MotionRows) -> float:
-    """Largest true |α| later than 10 ms after the shaped reference stops [m/s²], which `evaluate` uses.
-
-    Raises:
-        RecordingError: Truth was not recorded.
-        NotMeasurableError: Nothing was recorded after that moment.
-    """
+    """Largest true |α| later than 10 ms after the shaped reference stops [m/s²], which `evaluate` uses."""
     return peak_later_than(recording, motion, recording.time[motion.shaped_stop] + AFTER_STOP)
 
 
 def peak_later_than(recording: Recording, motion: MotionRows, moment: float) -> float:
-    """Largest true |α| later than a moment of the recording [m/s²].
-
-    Raises:
-        RecordingError: Truth was not recorded.
-        NotMeasurableError: Nothing was recorded after that moment.
-    """
+    """Largest true |α| later than a moment of the recording [m/s²]."""
     rows = _later_than(recording, motion, moment)
     return float(np.max(amplitude(tool_acceleration(recording, truth=True, rows=rows))))
 
@@ -110,12 +93,7 @@ def envelope(alpha: Floats, period: float) -> Floats:
     needs several cycles: at ζ = 0.03 the peak is 90 to 100 % of the amplitude, at ζ = 0.34 it is 40 to 85 %,
     depending on phase.
 
-    Args:
-        alpha: Acceleration of the tool, beginning at the moment of interest, shape (T, 3) [m/s²].
-        period: Time between samples [s].
-
-    Returns:
-        Envelope, shape (T,).
+    `alpha` [m/s²], shape (T, 3), begins at the moment of interest.
     """
     rows = len(alpha)
     mirrored = np.concatenate([alpha[:0:-1], alpha, alpha[-2::-1]])
@@ -128,11 +106,7 @@ def rigid_acceleration(recording: Recording, motion: MotionRows, kinematics: Kin
 
     It is the second central difference of the position at `target_q`.
 
-    Returns:
-        Acceleration, shape (N, 3), for the rows from the motion's start to its shaped stop.
-
-    Raises:
-        NotMeasurableError: Ticks are missing during the motion.
+    One row for each from the motion's start to its shaped stop, shape (N, 3).
     """
     first, past = max(motion.start, 1), min(motion.shaped_stop + 1, len(recording) - 1)
     ticks = recording["tick"][first - 1 : past + 1]
@@ -148,10 +122,7 @@ def rigid_acceleration(recording: Recording, motion: MotionRows, kinematics: Kin
 def in_motion_rms(recording: Recording, motion: MotionRows, rigid: Floats) -> float:
     """Vibration during the motion: rms of |α - α of the rigid arm| until the shaped reference stops [m/s²].
 
-    Args:
-        recording: Recording of the motion.
-        motion: Where it is in the recording.
-        rigid: What `rigid_acceleration` returns for it.
+    `rigid` is what `rigid_acceleration` returns.
     """
     first = max(motion.start, 1)
     alpha = best_tool_acceleration(recording)[first : first + len(rigid)]

@@ -20,17 +20,8 @@ def felt(
     In a log of another controller, gravity is what the sensor shows at the end of the rest, since nobody knows how
     its tool is mounted; rows in which the sensor shows nothing are left out.
 
-    Args:
-        recording: The recording.
-        motion: One of its motions.
-        rows: Rows of the recording, within the motion and its rest.
-        smooth: Whether to take the truth channel if there is one, or else the sensor below 60 Hz.
-
-    Returns:
-        Time of each row, shape (T,) [s], and α, shape (T, 3) [m/s²].
-
-    Raises:
-        NotMeasurableError: The sensor was not recorded, or there was too little rest to know gravity.
+    `smooth` takes the truth channel if there is one, or else the sensor below 60 Hz. Returns times, shape (T,) [s], and
+    α, shape (T, 3) [m/s²].
     """
     if not recording.foreign:
         if smooth:

@@ -97,9 +97,6 @@ def motions(recording: Recording) -> list[MotionRows]:
     angles: many robots publish the measured angles as a target while they rest. Motions without any movement are left
     out, and in logs of other controllers those of less than 5 mrad wherever noise could be taken for one. None goes on
     across a long gap of the log.
-
-    Raises:
-        RecordingError: There is neither `reference_q` nor `target_q` nor `actual_q`.
     """
     tick, (first, *others) = recording["tick"], parts(recording.time)
     if not others:

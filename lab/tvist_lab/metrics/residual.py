@@ -48,9 +48,6 @@ def residual(recording: Recording, motion: MotionRows) -> Residual:
     prominence of at least 0.1 m/s², are fitted by RV·exp(-λ(t - t_b)), λ ≥ 0, with least squares on a linear scale.
     Noise raises the later peaks and flattens the fit: small values have a floor of about 0.07 m/s² at 0.03 m/s² of
     noise.
-
-    Raises:
-        NotMeasurableError: The recording ends, or the next motion starts, within the window.
     """
     window = _window(recording, motion, WINDOW)
     stop = float(recording.time[window][0])

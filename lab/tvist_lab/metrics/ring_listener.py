@@ -42,10 +42,8 @@ FIRST = 8
 def unexplained(alpha: Floats, f_d: Floats, zeta: Floats) -> Floats:
     """Return what modes, a constant and a slow tail leave of a ring-down, for each factor in `SCALES` [m²/s⁴].
 
-    Args:
-        alpha: Readings of the accelerometer from `SKIP` ticks after the stop on, shape (T, 3) [m/s²].
-        f_d: Damped frequencies before they are scaled, shape (k,) [Hz].
-        zeta: Damping ratios, shape (k,) [-].
+    `alpha` [m/s²], shape (T, 3), begins `SKIP` ticks after the stop; `f_d` [Hz], before it is scaled, and `zeta` have
+    shape (k,).
     """
     time, left = PERIOD * np.arange(len(alpha)), np.empty(len(SCALES))
     common = [np.ones_like(time), np.exp(-SLOW_POLE * time)]
@@ -65,10 +63,6 @@ class RingListener:
     that each u has a sum of squares and, by that, a likelihood: a stop that hardly rings says little, and says so.
     Nobody knows how stiffly an arm is mounted. The model therefore stands on a base that yields, whose stiffness is
     found once, as the likeliest one for the first `FIRST` stops.
-
-    Args:
-        description: The robot, with its springs and drives.
-        payload: Payload that the arm carries.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -84,14 +78,9 @@ class RingListener:
     def study(self, alpha: Floats, q: Floats) -> list[tuple[float, float]]:
         """Compare a ring-down with the modes in a pose.
 
-        Args:
-            alpha: Readings of the accelerometer in the flange's axes, with gravity, from the stop on, shape (T, 3)
-                [m/s²].
-            q: Joint angles after it, shape (n,) [rad].
-
-        Returns:
-            u and its standard error [-]: none if the stop did not ring, or the base is yet to be found; of all stops
-            so far with the one by which it is found.
+        `alpha` [m/s²], shape (T, 3), are readings from the stop on, with gravity; `q` [rad] has shape (n,). Returns u
+        and its standard error [-]: none if the stop did not ring, or the base is yet to be found; of all stops so far
+        with the one by which it is found.
         """
         alpha = alpha[SKIP:]
         if not np.isfinite(alpha).all():  # as of a log in which the accelerometer has a gap

@@ -50,11 +50,7 @@ class FreeVibration:
 
 
 def free_vibrations(recording: Recording) -> list[FreeVibration]:
-    """Measure the ring-downs and sweeps of a log of an accelerometer, in order.
-
-    Raises:
-        NotMeasurableError: There is none.
-    """
+    """Measure the ring-downs and sweeps of a log of an accelerometer, in order."""
     found = []
     for rows in parts(recording.time):
         seen = np.isfinite(recording[SENSOR][rows]).all(axis=1)

@@ -28,10 +28,7 @@ def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
     Without measured angles it is the shift with which the target's accelerations explain the tool's best. None if there
     is neither, or the arm does not follow the target with any lag.
 
-    Args:
-        recording: The recording.
-        start: Row in which the target starts.
-        stop: Row in which it stops.
+    `start` and `stop` are the rows in which the target starts and stops.
     """
     if "target_q" not in recording:
         return None

@@ -35,20 +35,13 @@ def attained_position(recording: Recording, motion: MotionRows) -> Floats:
 
     The tool's position is the forward kinematics of the joint angles, as in the paper, so it does not include the
     bending of the links.
-
-    Raises:
-        NotMeasurableError: The recorded rest is shorter than that.
     """
     rows = _tail(recording, motion)
     return np.asarray(np.mean(recording["actual_TCP_pose"][rows, :3], axis=0), dtype=np.float64)
 
 
 def distance(recording: Recording, motion: MotionRows) -> Floats:
-    """E: distance of the tool from its attained position [m], for the rows from the motion's start to its end.
-
-    Raises:
-        NotMeasurableError: See `attained_position`.
-    """
+    """E: distance of the tool from its attained position [m], for the rows from the motion's start to its end."""
     position = recording["actual_TCP_pose"][motion.start : motion.end, :3]
     if not np.isfinite(position).all():
         raise NotMeasurableError("actual_TCP_pose is empty in some rows")
@@ -60,13 +53,8 @@ def distance(recording: Recording, motion: MotionRows) -> Floats:
 def settling(recording: Recording, motion: MotionRows, band: float = REPEATABILITY) -> Settling:
     """t_enter, t_stb, t_cycle and e_os as in section 4.2 of the paper; crossings are interpolated between ticks.
 
-    Args:
-        recording: The recording.
-        motion: One of its motions, which should be followed by at least a second of rest, since integrators creep.
-        band: Half-width of the band [m], by default the repeatability.
-
-    Raises:
-        NotMeasurableError: The tool never leaves the band, or had not settled at the end of the rest.
+    The motion should be followed by at least a second of rest, since integrators creep. `band` is the half-width of the
+    band [m].
     """
     E = distance(recording, motion)
     time = recording.time[motion.start : motion.end] - recording.time[motion.start]

@@ -189,11 +189,7 @@ def _suspicion(mode: Mode, modes: Sequence[Mode]) -> str:
 def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
     """Fit the modes that vibrate after the stop.
 
-    Returns:
-        The strongest one at the stop; if `ok` is false, it must not be used.
-
-    Raises:
-        NotMeasurableError: The accelerometer was not recorded, or too little rest.
+    It is the strongest one at the stop.
     """
     first = motion.arm_stop(recording)
     time, alpha = felt(recording, motion, slice(first, motion.end))
@@ -210,13 +206,8 @@ def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
 def table_2(runs: Mapping[str, Runs]) -> Table:
     """Means over the runs and the impact of shaping, in percent: 100 (mean shaped / mean unshaped - 1).
 
-    Args:
-        runs: Name of a motion (`Q1-Q2`) to its repetitions.
-
-    Returns:
-        A table with the structure and names of the paper's data. A mean leaves out runs in which the metric was not
-        measurable, and is None if that holds for all of them; an impact is None if one of its means is missing or it
-        is not defined.
+    A mean leaves out runs in which the metric was not measurable, and is None if that holds for all of them; an impact
+    is None if one of its means is missing or it is not defined.
     """
     table: Table = {}
     for name, repeated in runs.items():
@@ -267,10 +258,6 @@ class Measured:
 
     @classmethod
     def of(cls, recording: Recording) -> "Measured":
-        """Find and measure all motions.
-
-        Raises:
-            RecordingError: The recording has no joint angles.
-        """
+        """Find and measure all motions."""
         found = motions(recording)
         return cls(recording, found, [measure(recording, motion) for motion in found])

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.recordings.checks import LONG_GAP
-from tvist_plant.plant import GRAVITY
+from tvist_plant.tool_acceleration import tool_acceleration as without_gravity
 
 BAND = (3.0, 60.0)
 """Frequency range of an arm's vibrations [Hz]."""
@@ -29,7 +29,7 @@ def tool_acceleration(recording: Recording, *, truth: bool = False, rows: slice 
     """Acceleration of the flange in its own frame, α [m/s²].
 
     The sensor measures the specific force; at rest this is the reaction to gravity, which follows from the
-    orientation of the tool: α = f - Rᵀ (0, 0, g).
+    orientation of the tool.
 
     Args:
         recording: Recording with the sensor's column and `actual_TCP_pose`.
@@ -48,9 +48,7 @@ def tool_acceleration(recording: Recording, *, truth: bool = False, rows: slice 
     if not np.isfinite(force).all():
         raise NotMeasurableError(f"{name} is missing at some ticks")
     pose = recording[TRUE_POSE if truth and TRUE_POSE in recording else "actual_TCP_pose"]
-    orientation = Rotation.from_rotvec(pose[rows, 3:6])
-    up = orientation.inv().apply([0.0, 0.0, GRAVITY])
-    return np.asarray(force - up, dtype=np.float64)
+    return without_gravity(force, Rotation.from_rotvec(pose[rows, 3:6]).inv().apply([0.0, 0.0, 1.0]))
 
 
 def best_tool_acceleration(recording: Recording, rows: slice = ALL) -> Floats:
@@ -80,11 +78,7 @@ def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BA
 
     What stands before and after a long gap is filtered apart: to fill a day would take the memory.
 
-    Args:
-        time: Times of the samples, increasing, shape (T,) [s].
-        signal: The samples, shape (T, k).
-        period: Time between samples where none is missing [s].
-        cut_off: Cut-off frequency [Hz].
+    `time` [s] has shape (T,), `signal` (T, k); `period` [s] is that where none is missing, `cut_off` in Hz.
     """
     filtered = np.array(signal)
     for rows in parts(time):

@@ -11,7 +11,8 @@ import numpy as np
 
 from tvist_controller.api.robot import Controller, Sink, truth_of
 from tvist_plant.model import Floats
-from tvist_plant.plant import GRAVITY, PERIOD, Plant, Response
+from tvist_plant.plant import PERIOD, Plant, Response
+from tvist_plant.tool_acceleration import tool_acceleration
 from tvist_protocol.stream import Event, State
 
 AFTER_STOP = 5
@@ -305,4 +306,4 @@ def acceleration(specific_force: Floats, rotation: Floats) -> Floats:
         rotation: Orientation of the flange, shape (..., 3, 3).
     """
     up = rotation[..., 2, :]  # the world's z axis, in the frame of the flange
-    return np.asarray(np.linalg.norm(specific_force - GRAVITY * up, axis=-1))
+    return np.asarray(np.linalg.norm(tool_acceleration(specific_force, up), axis=-1))

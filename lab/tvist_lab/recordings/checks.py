@@ -78,10 +78,7 @@ def check_period(path: Path, period: float) -> None:
 def check_recording(path: Path, recording: Recording, places: Places | None = None) -> None:
     """Refuse a recording, whoever made it, with which the laboratory could not compute.
 
-    Args:
-        path: The file.
-        recording: The recording.
-        places: Where its rows stand in the file; None for their ticks.
+    `places` says where its rows stand in the file; by default, their ticks.
     """
     info, columns, tick, time = recording.info, recording.columns, recording["tick"], recording.time
     check_names(path, [*columns, *([] if info is None else [info.name, info.model, info.version])])

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,7 +11,8 @@ from typing import Annotated
 import msgspec
 
 from tvist_lab.recordings.checks import GYROSCOPE
-from tvist_lab.recordings.recording import TRUTH_PREFIX, Floats, Recording, RecordingError
+from tvist_lab.recordings.recording import TRUTH_PREFIX, Floats, Recording
+from tvist_plant.user_file import UserFileError, check_is_file
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Info
@@ -108,8 +110,17 @@ class Description(msgspec.Struct, frozen=True):
     foreign: bool = False
     """Whether another controller was recorded."""
 
-    def recording(self, columns: dict[str, Floats]) -> Recording:
-        """Return the recording with these arrays."""
+    def recording(self, names: Sequence[str], values: Floats) -> Recording | None:
+        """Return the recording of a table, shape (T, columns); None if the description is of other columns."""
+        places, columns = {name: at for at, name in enumerate(names)}, dict[str, Floats]()
+        for name, about in self.columns.items():
+            flat = [name] if about.width is None else [f"{name}_{index}" for index in range(about.width)]
+            if not places.keys() >= set(flat):
+                return None
+            found = values[:, [places.pop(one) for one in flat]]
+            columns[name] = found[:, 0] if about.width is None else found
+        if places:
+            return None
         return Recording(columns, tuple(self.events), self.info, tuple(self.notes), foreign=self.foreign)
 
 
@@ -139,24 +150,20 @@ def sidecar(path: Path) -> Path:
     return path.with_name(f"{path.name}-metadata.json")
 
 
-def described(text: str) -> Description:
-    """Read a description from JSON; see `checked_description`."""
+def beside(path: Path) -> Description | None:
+    """Return the description beside a CSV, if there is one."""
     try:
-        return checked_description(parse_json(text.encode()))
-    except ProtocolError as error:
-        raise RecordingError(f"has no valid description of its columns: {error.why}") from error
+        check_is_file(sidecar(path), "description")
+        (note, *_) = parse_json(sidecar(path).read_bytes())["notes"]
+        return described(json.dumps(note[KEY]).encode())
+    except (OSError, ProtocolError, UserFileError, LookupError, TypeError, ValueError):
+        return None
 
 
-def checked_description(content: object) -> Description:
-    """Read a description from plain values.
-
-    Raises:
-        RecordingError: It is none, or of a later version.
-    """
+def described(text: bytes) -> Description | None:
+    """Read a description from JSON; None if it is none, or of a later version."""
     try:
-        found = checked(content, Description)
-    except ProtocolError as error:
-        raise RecordingError(f"has no valid description of its columns: {error.why}") from error
-    if found.format != FORMAT:
-        raise RecordingError(f"has a description of format {found.format}; {FORMAT} can be read")
-    return found
+        found = checked(parse_json(text), Description)
+    except ProtocolError:
+        return None
+    return found if found.format == FORMAT else None

@@ -40,15 +40,6 @@ def export(recording: Recording, path: Path, kind: str) -> None:
     Scalars are columns of their own names, and vectors are columns NAME_0, NAME_1, …, as UR's record.py names them.
     `timestamp` comes first. Units, events and info stand in the metadata of Parquet, and in a file beside a CSV, as
     JSON.
-
-    Args:
-        recording: The recording.
-        path: File to write.
-        kind: One of `FORMATS`.
-
-    Raises:
-        ExportError: A file cannot be written, for example because the disk is full. No file has changed
-            then, except that a CSV may be new and its description old.
     """
     try:
         with whole_file(path) as stream:

@@ -48,10 +48,7 @@ class Felt:
 def by_sensor(time: Floats, vector: Floats, *, force: bool) -> Felt:
     """Return what a sensor has measured, in its own axes.
 
-    Args:
-        time: Times, shape (T,) [s].
-        vector: Angular velocity [rad/s] or specific force [m/s²], shape (T, 3).
-        force: Whether it is a force.
+    `vector` is an angular velocity [rad/s] or a specific force [m/s²], shape (T, 3).
     """
     grid, values, known = _resampled(time, vector)
     return _smoothed(grid, values, known, np.zeros((len(grid), 3, 3 if force else 0)))
@@ -63,11 +60,7 @@ def at_flange(robot: RobotDescription, time: Floats, q: Floats, *, force: bool) 
     ω = Rᵀ J_ω q̇, and f = Rᵀ (p̈ + g z) with the base standing upright. A sensor at r from the flange feels
     f + α x r + ω x (ω x r).
 
-    Args:
-        robot: The robot; for the rotation only the directions of its joints count.
-        time: Times, shape (T,) [s].
-        q: Joint angles, shape (T, n) [rad].
-        force: Return the specific force instead of the angular velocity.
+    `time` [s] has shape (T,), `q` [rad] shape (T, n); for the rotation only the directions of the joints count.
     """
     grid, angles, known = _resampled(*_measured(time, q))
     step = grid[1] - grid[0]

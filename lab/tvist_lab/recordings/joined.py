@@ -6,9 +6,9 @@ import numpy as np
 
 from tvist_lab.recordings.checks import ACCELEROMETER, GYROSCOPE, TIME
 from tvist_lab.recordings.flange_motion import RATE, Felt, at_flange, by_sensor
-from tvist_lab.recordings.log_columns import SENSOR, ticks_of
 from tvist_lab.recordings.read import read
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
+from tvist_lab.recordings.table import SENSOR, ticks_of
 from tvist_lab.recordings.two_clocks import Clocks, fits
 from tvist_lab.words import counted
 from tvist_plant.description import DescriptionError, RobotDescription, load, robots
@@ -51,19 +51,8 @@ def joined(
     Offset and drift are those with which the gyroscope, or without one the accelerometer, agrees best with the forward
     kinematics of the logged joint angles.
 
-    Args:
-        recording: The robot's log.
-        imu: The sensor's log, in any format that `read` reads.
-        imu_columns: Names of its columns, as `read` takes them.
-        robot: Name or file of the robot; None for that of the recording, or a UR5e.
-
-    Returns:
-        Columns of the robot, with `actual_tool_accelerometer` and `actual_tool_gyroscope` of the sensor, at the
-        sensor's rows within the robot's time; notes say how the clocks differ.
-
-    Raises:
-        JoinError: The robot is unknown or has another number of joints, or the clocks cannot be told well enough.
-        RecordingError: The sensor's log cannot be read.
+    `imu` is a file that `read` reads, with `imu_columns` for its names; `robot` a name or file, by default that of the
+    recording, or a UR5e. The rows are the sensor's within the robot's time; notes say how the clocks differ.
     """
     sensor = read(imu, imu_columns, SENSOR)
     arm, assumed = _robot(recording, robot)
@@ -118,11 +107,7 @@ def _robot(recording: Recording, robot: str | None) -> tuple[RobotDescription, l
 
 
 def _told(imu: Path, felt: Felt, sensor: Recording, *, force: bool) -> tuple[Clocks, float]:
-    """How the clocks differ, and the unit of the gyroscope in SI.
-
-    Raises:
-        JoinError: That cannot be told well enough.
-    """
+    """How the clocks differ, and the unit of the gyroscope in SI."""
     least, moved = MOVED[force]
     if (amount := float(felt.change.sum()) / RATE) < least:
         raise JoinError(f"{imu} cannot be joined: {moved.format(amount)}, which is too little: {REMEDY}")

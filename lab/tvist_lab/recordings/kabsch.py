@@ -8,8 +8,7 @@ from tvist_lab.recordings.recording import Floats
 def rotation(products: Floats) -> Floats:
     """Return the rotation R that minimizes Σ |a_i - R b_i|² (Kabsch, Acta Crystallographica A32, 1976), shape (3, 3).
 
-    Args:
-        products: Σ a_i b_iᵀ, shape (3, 3).
+    `products` is Σ a_i b_iᵀ.
     """
     left, _, right = np.linalg.svd(products)
     return np.asarray(left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right)

@@ -5,16 +5,14 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import islice
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
 from mcap.records import Channel, McapRecord, Message, Metadata
 
 from tvist_lab.recordings.checks import check_names, check_recording
-from tvist_lab.recordings.json_columns import Block, JsonColumns
 from tvist_lab.recordings.mcap_records import CUT, DAMAGE, MAGIC, TOPIC, all_records, files_of, opened
-from tvist_lab.recordings.recorded_columns import recording_of_blocks
+from tvist_lab.recordings.messages import Block, JsonColumns, recording_of_blocks
 from tvist_lab.recordings.recording import Recording, RecordingError
 from tvist_protocol.channels import tag
 from tvist_protocol.content import checked, parse_json
@@ -76,55 +74,33 @@ class RecordingFile:
 
     @cached_property
     def states(self) -> tuple[State, ...]:
-        """Recorded states, read from the file again; NaN for numbers that were not finite.
-
-        Raises:
-            RecordingFileError: The file cannot be read any more.
-        """
+        """Recorded states, read from the file again; NaN for numbers that were not finite."""
         return tuple(self.messages(State))
 
     @cached_property
     def truths(self) -> tuple[Truth, ...]:
-        """Recorded truth, read from the file again; empty unless the robot published it.
-
-        Raises:
-            RecordingFileError: The file cannot be read any more.
-        """
+        """Recorded truth; empty unless the robot published it."""
         return tuple(self.messages(Truth))
 
     @cached_property
     def io(self) -> tuple[Io, ...]:
-        """Recorded inputs, outputs and registers, read from the file again; empty in older files.
-
-        Raises:
-            RecordingFileError: The file cannot be read any more.
-        """
+        """Recorded inputs, outputs and registers; empty in older files."""
         return tuple(self.messages(Io))
 
     def messages(self, kind: type[_Kind]) -> Iterator[_Kind]:
-        """Read messages of a kind again, one after the other.
-
-        Raises:
-            RecordingFileError: The file cannot be read any more.
-        """
-        count = self.counts[tag(kind)]
-        found = 0
-        for message in islice(_again(self.files, (kind,)), count):
+        """Read messages of a kind again, one after the other."""
+        for message in self._again((kind,), kind):
             assert isinstance(message, kind)
-            found += 1
             yield message
-        if found < count:
-            raise RecordingFileError(f"{self.path} has changed since it was read")
 
     def published(self) -> Iterator[Published]:
-        """Read all that the robot published again, in its order, up to the last state.
+        """Read all that the robot published again, in its order, up to the last state."""
+        return self._again((State, Truth, Event, Io), State)
 
-        Raises:
-            RecordingFileError: The file cannot be read any more.
-        """
-        left = self.counts[tag(State)]
-        for message in _again(self.files, (State, Truth, Event, Io)):
-            left -= isinstance(message, State)
+    def _again(self, kinds: Sequence[type[Published]], counted: type[Published]) -> Iterator[Published]:
+        left = self.counts[tag(counted)]
+        for message in _again(self.files, kinds):
+            left -= isinstance(message, counted)
             if left < 0:
                 return
             yield message
@@ -274,11 +250,7 @@ class _Content:
                     raise self._error(f"has format {content.get('format')}; {FORMAT} can be read")
 
     def _decode(self) -> None:
-        """Decode the waiting messages.
-
-        Raises:
-            ProtocolError: One of them is invalid. Those before it are kept.
-        """
+        """Decode the waiting messages."""
         waiting, self.waiting = self.waiting, []
         try:
             self._keep(waiting)
@@ -346,9 +318,7 @@ class _Content:
     def _note(self, states: Block, dropped: Mapping[str, int] | None) -> str | None:
         notes = []
         if self.damage is not None:
-            tick = states["tick"].values
-            assert tick is not None
-            notes.append(f"{self.damage}; it could be read up to tick {int(tick[-1])}")
+            notes.append(f"{self.damage}; it could be read up to tick {int(states['tick'][-1])}")
         if lost := {kind: count for kind, count in (dropped or {}).items() if count}:
             counts = ", ".join(f"{count} of {kind}" for kind, count in lost.items())
             notes.append(f"lacks messages the recorder had no room for: {counts}")

@@ -93,12 +93,7 @@ def _records_of(chunk: Chunk) -> list[McapRecord]:
 
 
 def _unpacked(chunk: Chunk) -> bytes:
-    """Content of a chunk, of which never more is unpacked than it claims to have.
-
-    Raises:
-        ValueError: It claims too much or has something else, as the checksum shows.
-        ZstdError: It is damaged.
-    """
+    """Content of a chunk, of which never more is unpacked than it claims to have."""
     size, data = chunk.uncompressed_size, chunk.data
     if size > min(RECORD_LIMIT, LEAST + DENSEST * len(data)):
         raise ValueError(f"a chunk of {len(data)} bytes claims {size}")
@@ -119,13 +114,9 @@ def _unpacked(chunk: Chunk) -> bytes:
 def files_of(path: Path) -> tuple[Path, ...]:
     """Return the files of the recording that a path names, in order.
 
-    Args:
-        path: A file; a folder; a pattern, such as `run-2-part*.mcap`; or, if there is no such file, the name of a
-            recording with segments, for those of its latest run.
-
-    Raises:
-        RecordingError: These are files of several recordings, or none, or a segment between two is missing; the message
-            names them.
+    A path is a file, a folder, a pattern such as `run-2-part*.mcap`, or, if there is no such file, the name of a
+    recording with segments, for those of its latest run. Files of several recordings, or of none, and a missing segment
+    are refused.
     """
     if path.is_dir():
         found = list(path.glob("*.mcap"))
@@ -162,11 +153,7 @@ def _run_of(file: Path) -> str:
 
 @contextmanager
 def opened(files: Sequence[Path]) -> Iterator[Sequence[IO[bytes]]]:
-    """Open the files of a recording together: the oldest, which may be deleted meanwhile, can then be read to its end.
-
-    Raises:
-        OSError: A file cannot be opened.
-    """
+    """Open the files of a recording together: the oldest, which may be deleted meanwhile, is then read to its end."""
     with ExitStack() as stack:
         streams = []
         for file in files:

@@ -14,12 +14,7 @@ LEAST = 1 << 20
 
 
 def content(path: Path) -> bytes:
-    """Return what a file holds, decompressed; of a file that was cut off, the part that is there.
-
-    Raises:
-        LogError: The file is damaged, or would grow beyond a hundred times its size.
-        OSError: The file cannot be read.
-    """
+    """Return what a file holds, decompressed; of a file that was cut off, the part that is there."""
     data = path.read_bytes()
     if not data.startswith(GZIP):
         return data

@@ -1,31 +1,32 @@
 """Read a file of any known format; its content decides which."""
 
 import os
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 
-from tvist_lab.recordings.log_columns import ROBOT, Needs
-from tvist_lab.recordings.mcap_records import MAGIC as MCAP
+from tvist_lab.recordings import formats
 from tvist_lab.recordings.mcap_records import files_of
 from tvist_lab.recordings.packed import GZIP, content
 from tvist_lab.recordings.recording import Recording, RecordingError
+from tvist_lab.recordings.table import BINARY, READERS, ROBOT, TEXT, Needs, Reader, to_recording
 from tvist_plant.user_file import UserFileError, check_is_file
 
 SHOWN = 4096
 """Number of first bytes by which text is told from packets."""
-TABLES = (".parquet", ".npz")
-"""Endings of the names of files with named arrays."""
 
 
 def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs = ROBOT) -> Recording:
     """Read a recording of this controller, or a log of another one.
 
-    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet). Logs: CSV with RTDE's names, dumps of
-    UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
+    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet). Logs: CSV, Parquet and npz with RTDE's names or
+    others, dumps of UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
 
     Args:
         path: The file; or a folder, or a pattern such as `run-2-part*.mcap`, with the segments of one recording.
-        columns: How a CSV, or a table of another program, names what is needed, as in `time=t:ms,q=joint_{}:deg`; see
-            `named_columns.named`.
+        columns: How a CSV, or a table of another program, names what is needed, as in `time=t:ms,q=joint_{}:deg`: a
+            short name (time, q, qd, accelerometer, gyroscope, pose) or one of RTDE's, the column's name with `{}` for
+            the number or letter of an entry, or a position as in `q=2-7`, and its unit if it is not SI.
         needs: What a log must have.
 
     Returns:
@@ -36,30 +37,21 @@ def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs 
             the line.
     """
     path = Path(path)
+    for module in iter_modules(formats.__path__, f"{formats.__name__}."):
+        import_module(module.name)
     try:
-        return _read(path, columns, needs)
+        files = files_of(path)
+        found = READERS[".mcap"](path) if len(files) > 1 else _reader_of(*files)(*files)
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from error
     except UserFileError as error:
         raise RecordingError(str(error)) from error
+    if not isinstance(found, Recording):
+        return to_recording(found, columns, needs)
+    return found if columns is None else found.noted("its columns have names, so those given were not used")
 
 
-def _read(path: Path, names: str | None, needs: Needs) -> Recording:
-    if len(files := files_of(path)) > 1:
-        return _read_mcap(path, needs)
-    (path,) = files
-    named = _named(path, needs, names)
-    if named is not None:
-        used = names is None or path.suffix.lower() in TABLES
-        return named if used else named.noted("its columns have names, so those given were not used")
-    from tvist_lab.recordings.csv_log import read_csv
-    from tvist_lab.recordings.exported import with_sidecar
-
-    return with_sidecar(read_csv(path, names, needs), path)
-
-
-def _named(path: Path, needs: Needs, names: str | None) -> Recording | None:
-    """Read a file whose format says what its columns are; None for a CSV."""
+def _reader_of(path: Path) -> Reader:
     check_is_file(path, "recording")
     with path.open("rb") as stream:
         head = stream.read(SHOWN)
@@ -67,31 +59,7 @@ def _named(path: Path, needs: Needs, names: str | None) -> Recording | None:
         head = content(path)[:SHOWN]
     if not head:
         raise RecordingError(f"{path} is empty")
-    if path.suffix == ".mcap" and not head.startswith(MCAP):
-        raise RecordingError(f"{path} is no MCAP file")
-    if head.startswith(MCAP):
-        return _read_mcap(path, needs)
-    if path.suffix.lower() in TABLES:
-        from tvist_lab.recordings.exported import read_exported
-
-        return read_exported(path, needs, names)
-    if b"\0" in head:
-        from tvist_lab.recordings.realtime_dump import read_dump
-
-        return read_dump(path)
-    return None
-
-
-def _read_mcap(path: Path, needs: Needs) -> Recording:
-    from tvist_lab.recordings import mcap_file
-
-    try:
-        content = mcap_file.read_checked(path)
-    except mcap_file.RecordingFileError as error:
-        from tvist_lab.recordings.rosbag import has_ros, read_rosbag
-
-        if not path.is_file() or not has_ros(path):
-            raise error from None
-        return read_rosbag(path, needs)
-    recording = content.recording
-    return recording if content.note is None else recording.noted(content.note.removeprefix(f"{path} "))
+    for kind, reader in READERS.items():
+        if head.startswith(kind) if isinstance(kind, bytes) else path.suffix.lower() == kind:
+            return reader
+    return READERS[BINARY if b"\0" in head else TEXT]

@@ -10,42 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tvist_protocol.errors import one_line
+from tvist_protocol.stream import State
 
 Floats = NDArray[np.float64]
 
-STATE_COLUMNS = (
-    "tick",
-    "timestamp",
-    "robot_mode",
-    "safety_mode",
-    "runtime_state",
-    "setpoint_sequence",
-    "reference_q",
-    "target_q",
-    "target_qd",
-    "target_qdd",
-    "target_moment",
-    "actual_q",
-    "actual_qd",
-    "actual_moment",
-    "actual_TCP_pose",
-    "actual_TCP_speed",
-    "actual_tool_accelerometer",
-    "speed_scaling",
-    "estimated_f_d",
-    "estimated_zeta",
-    "shaper_delay",
-    "missed_ticks",
-    "shaper_clipped",
-    "unshaped_q",
-    "unshaped_qd",
-    "unshaped_qdd",
-    "motor_qd",
-    "motor_qdd",
-    "motor_moment",
-    "motor_limited",
-    "flange_wrench",
-)
+STATE_COLUMNS = State.__struct_fields__
 """Fields of a `state`, each of which becomes a column of the same name."""
 TRUTH_PREFIX = "truth_"
 """Prefix of the column names of fields of `truth`."""
@@ -112,11 +81,7 @@ class Recording:
         return name in self.columns
 
     def __getitem__(self, name: str) -> Floats:
-        """Return the values of a column, shape (T,) or (T, k).
-
-        Raises:
-            MissingColumnError: There is no column of that name.
-        """
+        """Return the values of a column, shape (T,) or (T, k)."""
         try:
             return self.columns[name]
         except KeyError:
@@ -143,11 +108,7 @@ class Recording:
 
     @cached_property
     def period(self) -> float:
-        """Time between ticks [s].
-
-        Raises:
-            RecordingError: There are fewer than two states.
-        """
+        """Time between ticks [s]."""
         if len(self) < 2:
             raise RecordingError("the period of a recording shows from two states on")
         tick, time = self["tick"], self.time
@@ -160,11 +121,7 @@ class Recording:
         return int(tick[-1] - tick[0]) + 1 - len(self) if len(self) else 0
 
     def between(self, first_tick: int, last_tick: int) -> "Recording":
-        """Return the rows and events in a range of ticks, both ends included.
-
-        Raises:
-            RecordingError: There is no row in the range.
-        """
+        """Return the rows and events in a range of ticks, both ends included."""
         tick = self["tick"]
         first, past = np.searchsorted(tick, [first_tick, last_tick + 1])
         if past <= first:

@@ -2,9 +2,10 @@
 
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr
 from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,10 @@ from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
 from tvist_lab.recordings.checks import ACCELEROMETER as SENSOR
-from tvist_lab.recordings.checks import GYROSCOPE, LogError
-from tvist_lab.recordings.log_columns import ROBOT, Needs, Rows, recording_of
+from tvist_lab.recordings.checks import GYROSCOPE, TIME, LogError
 from tvist_lab.recordings.mcap_records import DAMAGE, records
-from tvist_lab.recordings.recording import Floats, Recording
+from tvist_lab.recordings.recording import Floats
+from tvist_lab.recordings.table import Table
 from tvist_protocol.errors import quoted
 
 JOINTS, ACCELEROMETER, TARGET, POSE = "JointState", "Imu", "JointTrajectoryControllerState", "PoseStamped"
@@ -39,49 +40,56 @@ class _Topic:
     kind: str
     decode: Callable[[bytes], Any]
     times: list[float] = field(default_factory=list)
-    rows: list[dict[str, list[float]]] = field(default_factory=list)
-    joints: tuple[str, ...] | None = None
+    columns: dict[str, list[tuple[float, list[float]]]] = field(default_factory=dict)
+    """Times and values of the messages that have each column."""
+    joints: tuple[str, ...] = ()
     unstamped: int = 0
 
+    def at(self, times: Floats) -> Iterator[tuple[str, Floats]]:
+        """Yield each column at some times; NaN outside of its own."""
+        for name, rows in sorted(self.columns.items()):
+            if len(rows) == len(times) and self.times == times.tolist():
+                yield name, np.array([values for _, values in rows])
+                continue
+            rows.sort(key=itemgetter(0))
+            own, values = (np.array(part) for part in zip(*rows, strict=True))
+            axes = [np.interp(times, own, axis, left=np.nan, right=np.nan) for axis in values.T]
+            yield name, np.column_stack(axes)
 
-def read_rosbag(path: Path, needs: Needs = ROBOT) -> Recording:
+
+def read_rosbag(path: Path) -> Table:
     """Read a rosbag2 recording: `JointState`, `Imu`, `JointTrajectoryControllerState` and the TCP's `PoseStamped`.
 
     Of each type the topic with the most messages counts. Times are those of the headers. The rows are those of the
     accelerometer; joint angles between two messages are interpolated.
-
-    Raises:
-        LogError: There are no joint states, or messages that cannot be decoded; or see `recording_of`.
-        OSError: The file cannot be read.
     """
     topics, damage = _topics(path)
     notes = [damage] if damage else []
     chosen: dict[str, _Topic] = {}
-    for name, topic in sorted(topics.items(), key=lambda item: -len(item[1].rows)):
-        if not topic.rows:
-            continue
-        if topic.kind in chosen:
+    for name, topic in sorted(topics.items(), key=lambda item: -len(item[1].times)):
+        if topic.times and topic.kind in chosen:
             notes.append(f"{name} has fewer messages than another topic of {topic.kind} and was not read")
-            continue
-        chosen[topic.kind] = topic
-        if topic.unstamped:
-            notes.append(
-                f"{topic.unstamped} messages of {name} have no time in their header: the time of recording counts"
-            )
-    kinds = {"actual_q": JOINTS, "target_q": TARGET, SENSOR: ACCELEROMETER}
-    wanted, *others = (kind for column, kind in kinds.items() if column in needs.columns)
-    if not any(kind in chosen for kind in (wanted, *others)):
-        there = ", ".join(sorted(topics)) or "nothing that is read"
-        raise LogError(f"{path} has no sensor_msgs/msg/{wanted}; it has {there}")
-    base = chosen.get(ACCELEROMETER) or chosen.get(JOINTS) or chosen[TARGET]
-    columns = _columns(chosen, base)
-    names, values = ["timestamp"], [np.array(base.times)[:, None]]
-    for name, column in columns.items():
-        names += [f"{name}_{index}" for index in range(column.shape[1])]
-        values.append(column)
-    order = np.argsort(base.times, kind="stable")
-    table = np.hstack(values)[order]
-    return recording_of(Rows(path, names, table, order + np.float64(1.0), "message", tuple(notes), needs))
+        elif topic.times:
+            chosen[topic.kind] = topic
+            if topic.unstamped:
+                notes.append(
+                    f"{topic.unstamped} messages of {name} have no time in their header: the time of recording counts"
+                )
+    there = f"messages of {' and '.join(READ)} are read; it has {', '.join(sorted(topics)) or 'none of them'}"
+    base = next((chosen[kind] for kind in (ACCELEROMETER, JOINTS, TARGET) if kind in chosen), None)
+    if base is None:
+        raise LogError(f"{path} cannot be measured: {there}")
+    times = np.array(base.times)
+    columns: dict[str, Floats] = {}
+    for topic in chosen.values():
+        for name, values in topic.at(times):
+            columns.setdefault(name, values)
+    names = [TIME, *(f"{name}_{at}" for name, values in columns.items() for at in range(values.shape[1]))]
+    order = np.argsort(times, kind="stable")
+    table = np.column_stack([times, *columns.values()])[order]
+    return Table(
+        path, names, table, order + np.float64(1.0), "message", notes=tuple(notes), rtde=True, there=there
+    )  # fmt: skip
 
 
 def has_ros(path: Path) -> bool:
@@ -156,50 +164,48 @@ def _take(path: Path, topic: _Topic, record: Message) -> None:
         topic.unstamped += 1
         time = 1e-9 * record.log_time
     topic.times.append(time)
-    topic.rows.append(row)
+    for name, values in row.items():
+        topic.columns.setdefault(name, []).append((time, values))
 
 
 def _row(topic: _Topic, message: Any) -> dict[str, list[float]]:
     """Numbers of a message by column."""
     match topic.kind:
         case "JointState":
-            row = _joints(topic, message.name, message.position, "actual_q")
-            row |= _joints(topic, message.name, message.velocity, "actual_qd")
+            found = {"actual_q": message.position, "actual_qd": message.velocity}
+            return _joints(topic, message.name, found)
         case "JointTrajectoryControllerState":
             wanted = getattr(message, "reference", None) or message.desired
-            row = _joints(topic, message.joint_names, wanted.positions, "target_q")
-            row |= _joints(topic, message.joint_names, wanted.velocities, "target_qd")
+            found = {"target_q": wanted.positions, "target_qd": wanted.velocities}
+            return _joints(topic, message.joint_names, found)
         case "Imu":
-            force = message.linear_acceleration
-            row = {"actual_tool_accelerometer": list(map(float, (force.x, force.y, force.z)))}
-            turning = message.angular_velocity
-            if any(
-                speed := list(map(float, (turning.x, turning.y, turning.z)))
-            ):  # all zero: it has no gyroscope
-                row[GYROSCOPE] = speed
+            row = {SENSOR: _xyz(message.linear_acceleration)}
+            turning = _xyz(message.angular_velocity)
+            return row | ({GYROSCOPE: turning} if any(turning) else {})  # all zero: it has no gyroscope
         case _:
-            pose = message.pose
-            turn = pose.orientation
+            turn = message.pose.orientation
             vector = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_rotvec()
-            place = map(float, (pose.position.x, pose.position.y, pose.position.z))
-            row = {"actual_TCP_pose": [*place, *vector]}
-    return row
+            return {"actual_TCP_pose": [*_xyz(message.pose.position), *vector]}
 
 
-def _joints(topic: _Topic, names: list[str], values: Any, column: str) -> dict[str, list[float]]:
-    """Values in the order of the joints; nothing if the message has none, or not one for each joint.
+def _xyz(vector: Any) -> list[float]:
+    return [float(vector.x), float(vector.y), float(vector.z)]
 
-    Raises:
-        ValueError: There are more than `MOST_JOINTS`.
-    """
+
+def _joints(topic: _Topic, names: list[str], columns: dict[str, Any]) -> dict[str, list[float]]:
+    """Values in the order of the joints, of columns that have one for each joint."""
     if len(names) > MOST_JOINTS:
         raise ValueError(f"{len(names)} joints, at most {MOST_JOINTS} are read")
-    if len(values) != len(names) or not len(names):
-        return {}
-    if topic.joints is None:
-        topic.joints = tuple(sorted(names, key=_place))
-    by_name = dict(zip(names, values, strict=True))
-    return {column: [float(by_name.get(name, np.nan)) for name in topic.joints]}
+    topic.joints = topic.joints or tuple(sorted(names, key=_place))
+    by_name = {
+        column: dict(zip(names, values, strict=True))
+        for column, values in columns.items()
+        if names and len(values) == len(names)
+    }
+    return {
+        column: [float(values.get(name, np.nan)) for name in topic.joints]
+        for column, values in by_name.items()
+    }
 
 
 def _place(name: str) -> tuple[int, list[int | str]]:
@@ -207,25 +213,3 @@ def _place(name: str) -> tuple[int, list[int | str]]:
     known = [place for place, joint in enumerate(ORDER) if joint in name]
     digits = re.findall(r"\d{1,9}", name)
     return (known[0] if known else len(ORDER), [*map(int, digits), name] if not known else [])
-
-
-def _columns(chosen: dict[str, _Topic], base: _Topic) -> dict[str, Floats]:
-    """Each topic's values at the times of one of them; NaN outside of its own time."""
-    columns: dict[str, Floats] = {}
-    at = np.array(base.times)
-    for topic in chosen.values():
-        for name in sorted({name for row in topic.rows for name in row}):
-            rows = [
-                (time, row[name]) for time, row in zip(topic.times, topic.rows, strict=True) if name in row
-            ]
-            rows.sort(key=lambda row: row[0])
-            time = np.array([row[0] for row in rows])
-            values = np.array([row[1] for row in rows], dtype=np.float64)
-            if topic is base and len(rows) == len(at):
-                columns.setdefault(name, np.array([row[name] for row in topic.rows], dtype=np.float64))
-                continue
-            columns.setdefault(
-                name,
-                np.column_stack([np.interp(at, time, axis, left=np.nan, right=np.nan) for axis in values.T]),
-            )
-    return columns

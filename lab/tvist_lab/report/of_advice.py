@@ -54,14 +54,7 @@ def option_rows(advice: Advice) -> list[tuple[str, ...]]:
 
 @house_style()
 def advice_page(advice: Advice, logs: Sequence[Measured], paths: Sequence[Path], typed: str) -> Page:
-    """Build the page.
-
-    Args:
-        advice: The advice.
-        logs: The logs that it was made from.
-        paths: Their files.
-        typed: The command that makes the page, for its provenance.
-    """
+    """Build the page."""
     said, lines = verdict(advice, logs), command(advice, logs)
     sections = []
     if advice.best is not None:

@@ -22,7 +22,7 @@ from tvist_lab.metrics import (
     motion_cells,
     pairs,
 )
-from tvist_lab.metrics.columns import number
+from tvist_lab.metrics.columns import number, percent
 from tvist_lab.recordings import Recording, read
 from tvist_lab.recordings.mcap_records import files_of
 from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
@@ -31,16 +31,11 @@ from tvist_lab.words import counted
 
 PAIRED = ("motion", "shaper", "without\nm/s²", "with\nm/s²", "less\n%", "at rest\nms earlier", "longer\nΔ ms")
 """Columns of the table of motions that were made without and with a shaper."""
-CHANGES = (
-    "motions",
-    "vibration\nRV",
-    "peak",
-    "at rest",
-    "settling\nt_stb",
-    "cycle\nt_cycle",
-    "overshoot\ne_os",
-)
-"""Columns of the table of what differs between two files."""
+CHANGES = {
+    "vibration\nRV": "residual_vibration", "peak": "peak", "at rest": "still_after", "settling\nt_stb": "stabilisation",
+    "cycle\nt_cycle": "cycle", "overshoot\ne_os": "overshoot",
+}  # fmt: skip
+"""Columns of the table of what differs between two files, and the changes that they show."""
 OF_PAIRS = {
     "without": "Largest acceleration of the tool after the unshaped motion, later than 10 ms after its stop.",
     "with": "The same after the shaped motion.",
@@ -66,13 +61,7 @@ def recordings_page(
 ) -> Page:
     """Build the report of recordings or logs; the first one is what the others are compared with.
 
-    Args:
-        paths: Files of any format that `tvist_lab.recordings.read` reads, at least one.
-        command: The command that makes the report, for its provenance.
-        recordings: What was read from them already; None reads them.
-
-    Raises:
-        RecordingError: A file cannot be read, or has no joint angles; the message names it.
+    The first is what the others are compared with; `command` is for the provenance.
     """
     files = _files(paths, recordings)
     base, *others = files
@@ -148,28 +137,12 @@ def _pairs(file: _File) -> PageTable:
 
 def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
     rows = [
-        (
-            f"{one.a} and {one.b}",
-            *(
-                "–" if change is None else f"{round(change):+d} %"
-                for change in (
-                    one.impact_percent[name]
-                    for name in (
-                        "residual_vibration",
-                        "peak",
-                        "still_after",
-                        "stabilisation",
-                        "cycle",
-                        "overshoot",
-                    )
-                )
-            ),
-        )
+        (f"{one.a} and {one.b}", *(percent(one.impact_percent[name]) for name in CHANGES.values()))
         for one in comparison.motions
     ]
     for numbers, name in ((comparison.only_in_a, base.name), (comparison.only_in_b, other.name)):
-        rows += [(f"{number}, only in {name}", *["–"] * 6) for number in numbers]
-    return PageTable(CHANGES, rows, f"From {base.name} to {other.name}")
+        rows += [(f"{number}, only in {name}", *["–"] * len(CHANGES)) for number in numbers]
+    return PageTable(("motions", *CHANGES), rows, f"From {base.name} to {other.name}")
 
 
 def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[Shown]:

@@ -6,7 +6,7 @@ from itertools import groupby
 from statistics import median
 
 from tvist_lab.metrics import Comparison, MotionResult, Pair
-from tvist_lab.metrics.pairing import TICK_MS
+from tvist_lab.metrics.comparison import TICK_MS
 from tvist_lab.words import counted, either, sample, spread
 
 NOTICEABLE = 0.15
@@ -119,38 +119,28 @@ def verdict_on_two(
     said = [one.sentence for one in evidence]
     if not comparison.motions:
         return [f"{a} and {b} have no motion in common, so nothing is compared.", *said]
+    changes = [one.change for one in comparison.motions]
     peaks = [
-        (one.first.peak_m_s2, one.second.peak_m_s2)
-        for one in comparison.motions
-        if one.first.peak_m_s2 is not None and one.second.peak_m_s2 is not None
+        (one.before, one.after, percent)
+        for one in changes
+        if one.before is not None and one.after is not None and (percent := one.less_percent) is not None
     ]
     many = counted(len(peaks), "motion")
     if not peaks:
         return [f"The vibration of {a} and {b} could not be measured, so nothing is compared.", *said]
-    before, after = [peak for peak, _ in peaks], [peak for _, peak in peaks]
-    less = [100.0 * (1.0 - second_peak / first_peak) for first_peak, second_peak in peaks]
-    change = -median(less)
+    before, after, less = zip(*peaks, strict=True)
     numbers = f"{sample(len(peaks), 'motion')}: {spread(before, 'm/s²', 2)} and {spread(after, 'm/s²', 2)}"
     if max(median(before), median(after)) < NOTICEABLE:
         lead = f"Neither {a} nor {b} vibrates noticeably after its stops ({numbers})."
-    elif abs(change) >= CLEAR:
-        changed = either(less, "%", LESS)
-        lead = f"{b} vibrates {changed} after its stops than {a} ({numbers}){_sooner(comparison)}."
+    elif abs(median(less)) >= CLEAR:
+        gained = [one.gain_ms for one in changes if one.gain_ms is not None]
+        sooner = f" and is still {either(gained, 'ms', EARLIER)}" if gained else ""
+        lead = f"{b} vibrates {either(less, '%', LESS)} after its stops than {a} ({numbers}){sooner}."
     else:
         lead = f"{b} vibrates as much as {a} after its stops ({numbers}): nothing in it reduces vibration."
-    if change <= -CLEAR and evidence[1].shaped is False:
+    if median(less) >= CLEAR and evidence[1].shaped is False:
         said.append(f"So shaping is not the reason why {b} vibrates less.")
-    against = sum(second_peak > first_peak for first_peak, second_peak in peaks)
-    if 0 < against < len(peaks) and change <= -CLEAR:
+    against = sum(one < 0.0 for one in less)
+    if 0 < against < len(peaks) and median(less) >= CLEAR:
         said.append(f"In {against} of {many} it vibrates more.")
     return [lead, *said]
-
-
-def _sooner(comparison: Comparison) -> str:
-    """By how much earlier or later the second recording is still."""
-    gained = [
-        one.first.still_after_ms - one.second.still_after_ms
-        for one in comparison.motions
-        if one.first.still_after_ms is not None and one.second.still_after_ms is not None
-    ]
-    return f" and is still {either(gained, 'ms', EARLIER)}" if gained else ""

@@ -18,8 +18,8 @@ from tvist_controller.api.line import (
     paper_payload,
     wanted_modes,
 )
+from tvist_lab.frequency_error import robust_over
 from tvist_lab.recordings import Floats
-from tvist_lab.robust import robust_over
 from tvist_lab.study.line import samples_of
 from tvist_lab.study.moves import Move
 from tvist_lab.workspace import ranges, workspace
@@ -160,7 +160,7 @@ class Recipe:
         if modes > source.most:
             raise RecipeError(
                 f"shaper {self.shaper} needs {modes} modes, but calibration {known.name} has {source.most}"
-                + (": make one with tvist identify --model modal" if known.modal is None else "")
+                + (": make one with tvist identify" if known.modal is None else "")
             )
         right = source.estimator(modes, paper_payload(description, mass))
         return Mistaken(right, self.frequency_error) if self.frequency_error else right

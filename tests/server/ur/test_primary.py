@@ -362,7 +362,7 @@ REPORTS = {
 """What was sent until the connection ended, and the only line that the console is told."""
 
 
-@pytest.mark.parametrize("text", REPORTS)
+@pytest.mark.parametrize("text", REPORTS, ids=range(len(REPORTS)))
 def test_what_became_of_a_script_is_one_line_on_the_console(robot, control, sent, text):
     interface = session(robot, control, sent.append)
     interface.receive(text)

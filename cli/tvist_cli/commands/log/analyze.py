@@ -4,16 +4,25 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, Save, write
-from tvist_cli.log_comparison import compare
-from tvist_cli.log_facts import show_facts
 from tvist_cli.log_options import AS_IT_IS, LogOptions
-from tvist_cli.output import out, print_json, progress, say, table
+from tvist_cli.output import number, out, print_json, progress, say, table, words
 
 if TYPE_CHECKING:
-    from tvist_lab.metrics import MotionRows
+    from tvist_lab.metrics import ComparedMotion, MotionRows
     from tvist_lab.recordings import Recording
+
+OF_TWO = (
+    "motion of A", "of B", "RV m/s²: A", "B", "change", "peak m/s²: A", "B", "change", "still after ms: A", "B",
+    "change", "f_d Hz: A", "B",
+)  # fmt: skip
+"""Columns of the table of two files."""
+COMPARED = (
+    ("residual_vibration_m_s2", 2, "residual_vibration"), ("peak_m_s2", 2, "peak"),
+    ("still_after_ms", 0, "still_after"), ("f_d_hz", 2, ""),
+)  # fmt: skip
+"""Figures that it shows of both, their decimals, and the name of their change."""
 
 
 def analyze(
@@ -50,7 +59,7 @@ def analyze(
     if len(files) == 2:
         if figures is not None:
             raise Failure("--figures is for one file: leave it out", code=2)
-        compare(*files, logs, json=json)
+        _compare(*files, logs, json=json)
         return
     from tvist_lab.metrics import NotMeasurableError
     from tvist_lab.recordings import RecordingError
@@ -60,7 +69,8 @@ def analyze(
     (recording,) = logs.read(file, sensor=True)
     about = summary(file, recording)
     if not json:
-        show_facts(about)
+        out.print(about["file"], markup=False)
+        words(_facts(about))
     for note in recording.notes:
         say(f"{file}: {note}")
     try:
@@ -108,16 +118,16 @@ def _motions(
 
 def _sensor_alone(recording: "Recording", *, json: bool) -> dict[str, Any]:
     """Measure frequency and damping in a log that has no joint angles; see `_motions`."""
-    from tvist_lab.metrics.columns import number
+    from tvist_lab.metrics.columns import number as cell
     from tvist_lab.metrics.sensor_alone import free_vibrations
 
     found = free_vibrations(recording)
     if json:
         return {"motions": [], "free_vibrations": [asdict(one) for one in found]}
     rows = [
-        [cell.replace("\n", " ") for cell in (
-            one.kind, number(one.start_s - recording.origin, 3), number(one.f_d_hz, 2, one.f_d_interval_hz),
-            number(one.zeta, 3, one.zeta_interval),
+        [text.replace("\n", " ") for text in (
+            one.kind, cell(one.start_s - recording.origin, 3), cell(one.f_d_hz, 2, one.f_d_interval_hz),
+            cell(one.zeta, 3, one.zeta_interval),
         )]
         for one in found
     ]  # fmt: skip
@@ -140,3 +150,75 @@ def _draw(recording: "Recording", found: "list[MotionRows]", save: Save) -> None
                 write(save, {f"{kind}_{index}": figure_of(f"motion {index}", (recording, motion))})
             except NotMeasurableError as error:
                 say(f"motion {index}: no figure {kind}: {error}")
+
+
+def _facts(found: dict[str, Any]) -> dict[str, str]:
+    facts = {}
+    if found["robot"] is not None:
+        facts["robot"] = found["robot"] + (f", a {found['model']}" if found["model"] else "")
+    if found["version"] is not None:
+        facts["recorded by"] = f"tvist {found['version']}"
+    facts["time"] = f"{found['duration_s']:.3f} s from {found['start_s']:.3f} s on"
+    missing = found["missing_ticks"]
+    facts["rows"] = f"{found['rows']}, {missing or 'no'} tick{'' if missing == 1 else 's'} missing"
+    if found["complete"] is not None:
+        facts["closed"] = "yes" if found["complete"] else "no: cut off or damaged"
+        facts["replay"] = "yes" if found["replayable"] else f"no: it {_lack(found['from_tick'])}"
+        facts["messages"] = ", ".join(f"{count} {kind}" for kind, count in found["messages"].items())
+    facts["events"] = ", ".join(f"{count} {kind}" for kind, count in found["events"].items()) or "none"
+    if found["bytes"] is not None:
+        size = found["bytes"]
+        facts["size"] = f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.1f} kB"
+    facts["columns"] = ", ".join(map(_column, found["columns"]))
+    return facts
+
+
+def _column(column: dict[str, Any]) -> str:
+    _, *shape = column["shape"]
+    words = (column["name"], " × ".join(map(str, shape)), column["unit"] and f"[{column['unit']}]")
+    return " ".join(filter(None, words))
+
+
+def _lack(from_tick: int | None) -> str:
+    if from_tick is not None:
+        return f"has forgotten all before tick {from_tick}"
+    return "does not contain the robot's commands"
+
+
+def _compare(a: Path, b: Path, logs: LogOptions, *, json: bool) -> None:
+    """Print what changed between two recordings or logs, motion by motion."""
+    from tvist_lab.metrics import Measured
+    from tvist_lab.metrics import compare as compared
+    from tvist_lab.recordings import RecordingError
+
+    first, second = logs.read(a, b)
+    with told(RecordingError):
+        result = compared(Measured.of(first), Measured.of(second))
+    for file, recording in ((a, first), (b, second)):
+        for note in recording.notes:
+            say(f"{file}: {note}")
+    if json:
+        print_json(
+            {"a": str(a), "b": str(b), "motions": [motion.as_dict() for motion in result.motions],
+             "only_in_a": list(result.only_in_a), "only_in_b": list(result.only_in_b),
+             "notes": {"a": list(first.notes), "b": list(second.notes)}}
+        )  # fmt: skip
+        return
+    if result.motions:
+        table(f"A = {a}, B = {b}", OF_TWO, [_row(motion) for motion in result.motions])
+    else:
+        out.print("No motion of A starts and ends where one of B does.")
+    for name, numbers in (("A", result.only_in_a), ("B", result.only_in_b)):
+        if numbers:
+            out.print(f"only in {name}, not compared: motion {', '.join(map(str, numbers))}")
+
+
+def _row(motion: "ComparedMotion") -> tuple[str, ...]:
+    from tvist_lab.metrics.columns import percent
+
+    cells = [str(motion.a), str(motion.b)]
+    for field, digits, impact in COMPARED:
+        cells += [number(getattr(one, field), digits) for one in (motion.first, motion.second)]
+        if impact:
+            cells.append(percent(motion.impact_percent[impact]))
+    return tuple(cells)

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.api.line import Setup, body, modal_estimator, paper_payload
-from tvist_lab.identification.modal import identify_modal
-from tvist_lab.identification.modal_plan import ModalPlan, free_configurations, jog_of
+from tvist_controller.api.line import Setup, paper_payload
+from tvist_lab.identification.calibrate import calibrate, true_errors
+from tvist_lab.identification.design import free_configurations
+from tvist_lab.identification.jogs import make_jogs, plan_jogs
 from tvist_lab.in_process import robot_in_process
 from tvist_lab.studies.evaluate import feasible, jobs, report
 from tvist_lab.study.arms import stiffer
@@ -24,9 +25,7 @@ from tvist_plant.model import rigid_model
 from tvist_protocol.calibration import Calibration
 
 PLACES = 40
-"""Number of random configurations at which modes and sag are compared."""
-MODES = 3
-"""Number of modes that are compared."""
+"""Number of random configurations at which the sag is compared."""
 ALONE = 4
 """Least number of joints of an arm that auto can shape: it suppresses four modes."""
 TWIST = 1e-7
@@ -73,7 +72,7 @@ def measure(
     return {
         "stiffness": stiffness,
         "calibration": "identified" if calibration is None else known.name,
-        "f_d_error_percent": _mode_errors(arm, known, seed),
+        "f_d_error_percent": [one.f_d.median for one in true_errors(arm, known, (paper_payload(arm),), seed)],
         "moves": len(able),
         "too_weak": len(drawn) - len(able),
         "counted": summary["counted"],
@@ -84,7 +83,7 @@ def measure(
 
 
 async def _identified(arm: RobotDescription, seed: int) -> Calibration:
-    """Identify an arm in this process, as `tvist identify --model modal` does by default."""
+    """Identify an arm in this process, as `tvist identify` does by default."""
     carried = tuple(paper_payload(arm, mass) for mass in (0.0, arm.payload.mass))
     start = next(iter(arm.poses.values()))
     setup = Setup(
@@ -96,24 +95,11 @@ async def _identified(arm: RobotDescription, seed: int) -> Calibration:
         clock="free",
         truth=False,
     )
-    plan = ModalPlan(payloads=carried, seed=seed, jog=jog_of(arm))
     async with robot_in_process(setup) as robot, robot.control("robots") as control:
-        found = await identify_modal(
-            robot, control, arm, plan, name="identified", command="tvist robots", progress=lambda: None
-        )
+        plan = await plan_jogs(robot, arm, payloads=carried, seed=seed)
+        measured = await make_jogs(robot, control, plan, lambda _: None)
+    found = calibrate(arm, measured, name="identified", command="tvist robots", progress=lambda _: None)
     return found.calibration
-
-
-def _mode_errors(arm: RobotDescription, calibration: Calibration, seed: int) -> list[float]:
-    """Median error of the frequency of each mode at random configurations with the rated payload [%]."""
-    payload = paper_payload(arm)
-    estimator = modal_estimator(calibration, arm, payload, MODES)
-    plant = FlexibleArm(arm, body(payload))
-    errors = []
-    for q in free_configurations(arm, (payload,), PLACES, ModalPlan(seed=seed)):
-        f_d, _ = estimator.estimate(q)
-        errors.append(np.abs(f_d / plant.modes(q).f_d[:MODES] - 1.0))
-    return [100.0 * float(value) for value in np.median(errors, axis=0)]
 
 
 def sag_error(arm: RobotDescription, seed: int) -> float:
@@ -125,7 +111,7 @@ def sag_error(arm: RobotDescription, seed: int) -> float:
     plant, rigid = FlexibleArm(arm.clean(), arm.payload), rigid_model(arm, arm.payload)
     data, stiffness = rigid.createData(), np.array(arm.drives.gear_stiffness)
     zero, worst = np.zeros(arm.joints), 0.0
-    for q in free_configurations(arm, (paper_payload(arm),), PLACES, ModalPlan(seed=seed)):
+    for q in free_configurations(arm, (paper_payload(arm),), PLACES, seed):
         plant.reset(DriveCommand(q, zero, zero), seed=0)
         expected = -pin.computeGeneralizedGravity(rigid, data, q) / stiffness
         largest = float(np.abs(expected).max())

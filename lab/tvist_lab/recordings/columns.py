@@ -1,4 +1,4 @@
-"""Columns of a CSV whose names are not RTDE's, and numbers in other units than SI."""
+"""Names and units of a log's columns: RTDE's from those that a user gives, a vendor's program writes, or UR's do."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from tvist_lab.recordings.checks import ACCELEROMETER, GYROSCOPE, PERIODS, TIME, LogError
-from tvist_lab.recordings.log_columns import found_columns
 from tvist_lab.recordings.recording import Floats
 from tvist_protocol.errors import quoted
 
@@ -32,21 +31,100 @@ WIDEST = 7.0
 GRAVITY_IN_G = (0.8, 1.2)
 """Range of the length of an accelerometer's vector in units of gravity, at the median."""
 
+TIMES = (TIME, "time", "t")
+"""Names of the column of times."""
+REALTIME = {
+    "q_target": "target_q",
+    "qd_target": "target_qd",
+    "qdd_target": "target_qdd",
+    "M_target": "target_moment",
+    "q_actual": "actual_q",
+    "qd_actual": "actual_qd",
+    "tool_vector_actual": "actual_TCP_pose",
+    "TCP_speed_actual": "actual_TCP_speed",
+    "tool_accelerometer": "actual_tool_accelerometer",
+}
+"""Names of UR's real-time interface, and RTDE's for the same."""
+VENDORS = {
+    # franka::logToCSV, github.com/frankaemika/libfranka, src/log.cpp
+    "Franka's libfranka": "q=state.q[{}]:rad,target_q=state.q_d[{}]:rad,qd=state.dq[{}],target_qd=state.dq_d[{}]",
+    # AccelQueryHelper.write_to_file, github.com/Klipper3d/klipper, klippy/extras/adxl345.py
+    "Klipper's accelerometers": "time=time,accelerometer=accel_{}:mm/s2",
+    # abb::egm::EGMLogger, github.com/ros-industrial/abb_libegm, src/egm_logger.cpp: feedback and planned
+    "ABB's abb_libegm": "q=R_FB_POS_RJ{}:deg,target_q=R_PL_POS_RJ{}:deg,qd=R_FB_VEL_RJ{}:deg/s,"
+    "target_qd=R_PL_VEL_RJ{}:deg/s",
+    # github.com/rpiRobotics/abb_motion_program_exec, robot/HOME/motion_program_logger.mod
+    "abb_motion_program_exec": "q=J{}:deg",
+    # ClientApplication.collect_data, github.com/lbr-stack/pyfri, doc/examples.rst: measured and interpolated
+    "KUKA's FRI (pyfri)": "q=mp{}:rad,target_q=ip{}:rad",
+    # Tags and axes of KUKA.Ethernet RSI XML 1.1, joined by points as RSIPI (pypi.org/project/RSIPI) logs them
+    "KUKA's RSI": "time=IPOC,q=AIPos.A{}:deg,target_q=ASPos.A{}:deg",
+    "KUKA's RSI (RSIPI)": "time=Receive.IPOC,q=Receive.AIPos.A{}:deg,target_q=Receive.ASPos.A{}:deg",
+    # RobotStateRt.msg of dsr_msgs2, github.com/doosan-robotics/doosan-robot2; numbered like RTDE's, or in brackets
+    "Doosan's RobotStateRt": "time=time_stamp,q=actual_joint_position_{}:deg,qd=actual_joint_velocity_{}:deg/s,"
+    "target_q=target_joint_position_{}:deg,target_qd=target_joint_velocity_{}:deg/s",
+    "Doosan's RobotStateRt (brackets)": "time=time_stamp,q=actual_joint_position[{}]:deg,"
+    "qd=actual_joint_velocity[{}]:deg/s,target_q=target_joint_position[{}]:deg,target_qd=target_joint_velocity[{}]:deg/s",
+}
+"""Columns of each program, as `_given` takes them; joint angles or an accelerometer tell it.
+
+Only names that the source of a program which writes them shows are listed: xArm, Fanuc and others document what their
+controllers send, but no file with a header."""
+
 _SPAN = re.compile(r"(\d{1,6})(?:-(\d{1,6}))?", re.ASCII)
 
 
-def named(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """RTDE's names of a header's columns, and the units that were given.
+def rtde_names(
+    path: Path, header: Sequence[str], columns: str | None
+) -> tuple[list[str], dict[str, str], tuple[str, ...]]:
+    """RTDE's names of a header's columns, empty for others; units as far as they are known; and whose names they are.
 
-    Args:
-        path: The file, for messages.
-        columns: Such as `time=t:ms,q=joint_{}:deg,accelerometer=a{}:g`: a short name or one of RTDE's, the header's
-            name with `{}` for the number or the letter x, y, z of an entry, and after a colon the unit if it is not
-            SI. A position counted from 1, as in `time=1,q=2-7`, does as well.
-        header: Names of the file's columns.
+    Without `columns`, those of `VENDORS` and `REALTIME` are recognised; other names stay.
+    """
+    if columns is not None:
+        return *_given(path, columns, header), ()
+    own = [_own_name(name, header) for name in header]
+    vendor = _vendor_of(header)
+    if vendor is None:
+        return own, {}, ()
+    names, units = _given(path, vendor[1], header)
+    names = [name or ("" if other in names else other) for name, other in zip(names, own, strict=True)]
+    return names, units, (f"the columns have the names of {vendor[0]}",)
 
-    Raises:
-        LogError: The text cannot be understood, or names a column that is not there.
+
+def found_columns(names: Sequence[str], but: int | None = None) -> str:
+    """Return the names of a file's columns, but one, as the part of a sentence."""
+    there = [name for place, name in enumerate(names) if name and place != but]
+    return f"its columns are {', '.join(there[:24])}{', …' if len(there) > 24 else ''}"
+
+
+def _own_name(name: str, names: Sequence[str]) -> str:
+    if name.lower() in TIMES and TIME not in names:
+        return TIME
+    stem, _, index = name.rpartition("_")
+    return f"{REALTIME[stem]}_{index}" if stem in REALTIME else name
+
+
+def _vendor_of(header: Sequence[str]) -> tuple[str, str] | None:
+    """Whose names a header has, and the map of those columns that are there; None for others."""
+    for vendor, columns in VENDORS.items():
+        items = columns.split(",")
+        patterns = (item.partition("=")[2].partition(":")[0] for item in items)
+        there = [
+            item
+            for item, pattern in zip(items, patterns, strict=True)
+            if any(map(_entry_of(pattern).fullmatch, header))
+        ]
+        if any(item.startswith(("q=", "accelerometer=")) for item in there):
+            return vendor, ",".join(there)
+    return None
+
+
+def _given(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+    """Names and units by a text such as `time=t:ms,q=joint_{}:deg,accelerometer=a{}:g`, or `time=1,q=2-7`.
+
+    A short name or one of RTDE's is followed by the header's name with `{}` for the number or the letter x, y, z of
+    an entry, or a position counted from 1; and after a colon by the unit if it is not SI.
     """
     names, units = [""] * len(header), dict[str, str]()
     for item in columns.split(","):
@@ -66,15 +144,15 @@ def named(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], d
     return names, units
 
 
-def entry_of(pattern: str) -> re.Pattern[str]:
-    """Return what matches the names of one column, or of the entries of a vector."""
+def _entry_of(pattern: str) -> re.Pattern[str]:
+    """What matches the names of one column, or of the entries of a vector."""
     before, braces, after = pattern.partition("{}")
     return re.compile(re.escape(before) + (r"(\d{1,6}|[xyz])" if braces else "") + re.escape(after))
 
 
 def _places(path: Path, key: str, pattern: str, header: Sequence[str]) -> list[int]:
     """Places of one column, or of the entries of a vector in their order."""
-    entry, braces = entry_of(pattern), "{}" in pattern
+    entry, braces = _entry_of(pattern), "{}" in pattern
     hits = [(at, found) for at, name in enumerate(header) if (found := entry.fullmatch(name))]
     if not hits and (span := _SPAN.fullmatch(pattern)):
         first, last = int(span[1]), int(span[2] or span[1])

@@ -1,0 +1,293 @@
+"""Identify a robot from a source of ring-downs: one in this process, a served one, one at ur://, or logs."""
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+
+from tvist_cli.connection import Connection
+from tvist_cli.failure import Failure, told
+from tvist_cli.figure_files import FigureOptions, write
+from tvist_cli.identified import angles, report, report_payload, report_twin
+from tvist_cli.output import err, say, table, typed, waiting
+from tvist_cli.robot_logs import robot_file, robot_logs
+from tvist_client.arm import Arm
+from tvist_client.errors import MotionStoppedError
+from tvist_client.robot import Robot
+from tvist_controller.api.line import Setup, paper_payload
+from tvist_controller.setup import check_rating
+from tvist_lab.identification.calibrate import Found, ModeErrors, calibrate, true_errors
+from tvist_lab.identification.jogs import JogPlan, Measured, make_jogs, plan_jogs
+from tvist_lab.identification.payload import identify_payload
+from tvist_lab.identification.ring_downs import Progress
+from tvist_lab.identification.twin import fit_twin
+from tvist_lab.identification.twin_file import twin_file
+from tvist_lab.in_process import free_setup, robot_in_process
+from tvist_lab.recordings import RecordingError
+from tvist_lab.served import ServedError, served_robot
+from tvist_plant.description import DescriptionError, RobotDescription, load
+from tvist_protocol.calibration import calibration_to_json
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.modes import RobotMode
+from tvist_server.config import from_mapping
+from tvist_server.option_values import StartError
+from tvist_server.watching.place import place_of
+
+ROBOT = "ur5e"
+"""Robot that is identified unless another one is named."""
+READY = 30.0
+"""Longest wait for the robot to follow [s]."""
+MOVED = 0.01
+"""Distance of a joint from where the moves were planned from, from which on they are not made [rad]."""
+
+
+def from_logs(
+    files: Sequence[Path],
+    checks: Sequence[Path],
+    robot: str | None,
+    masses: tuple[float, ...] | None,
+    columns: str | None,
+    output: Path,
+    figures: Path | None,
+    look: FigureOptions,
+    *,
+    twin: bool,
+    json: bool,
+) -> None:
+    """Write a calibration that stops of logs tell, or a twin that makes their motions."""
+    arm, logs = robot_logs(
+        [*files, *checks], robot, None if masses is None else masses[0], columns, len(files)
+    )
+    with told(RecordingError, OSError), waiting("identifying") as step:
+        if twin:
+            made = fit_twin(arm, logs[: len(files)], logs[len(files) :], step)
+            output.write_text(twin_file(made, typed()), encoding="utf-8")
+        else:
+            found = _calibrated(arm, Measured(tuple(logs)), output, step)
+    if twin:
+        report_twin(made, output, json=json)
+        return
+    if figures is not None:
+        _draw(found, look, figures, arm, None)
+    named = robot or arm.robot.name
+    report(
+        found, Measured(tuple(logs)), output, "" if named == ROBOT else f" --robot {named}", None, json=json
+    )
+
+
+def _calibrated(arm: RobotDescription, measured: Measured, output: Path, step: Progress) -> Found:
+    found = calibrate(arm, measured, name=output.stem, command=typed(), progress=step)
+    output.write_bytes(calibration_to_json(found.calibration))
+    return found
+
+
+class Place:
+    """A robot that can be moved.
+
+    It is served, or at ur://, or in this process if there is no source.
+    """
+
+    def __init__(
+        self,
+        source: Connection | str | None,
+        robot: str | None,
+        masses: tuple[float, ...] | None,
+        ring_downs: int,
+        seed: int,
+        *,
+        sure: bool,
+    ) -> None:
+        self._source, self._robot, self._masses = source, robot, masses
+        self._ring_downs, self._seed, self._sure = ring_downs, seed, sure
+        self._setup: Setup | None = None
+        self._positions = isinstance(source, str)
+        if isinstance(source, str):
+            with told(ValueError, DescriptionError, code=2):
+                place_of(source)
+                load(robot or ROBOT)
+            if masses is not None and len(masses) > 1:
+                raise Failure("payload is several masses: name the one that the robot carries", code=2)
+            if not (sure or sys.stdin.isatty()):
+                raise Failure(
+                    "the arm is going to move, and there is no terminal to ask you on: look at the moves first on a "
+                    "terminal, or give --yes",
+                    code=2,
+                )
+        elif source is None:
+            content = {
+                "robot": robot or ROBOT,
+                "payload": None if masses is None else max(masses),
+                "overload": True,  # refused below, without the hint for who serves
+                "calibration": "none",
+                "clock": "free",
+                "seed": seed,
+            }
+            with told(StartError, ValueError, code=2):
+                self._setup = free_setup(from_mapping(content, "options"))
+                check_rating(self._setup.payload, self._setup.description)
+
+    def weigh(self, *, declare: bool, json: bool) -> None:
+        """Find the payload, and print it."""
+
+        async def run(step: Progress) -> None:
+            async with self._robot_and_file() as (client, arm), client.control("identify") as control:
+                found = await identify_payload(client, control, arm, seed=self._seed, progress=step)
+                new = found.payload
+                if declare:
+                    await control.set_payload(new.mass, new.com, new.inertia)
+            report_payload(found, declared=declare, json=json)
+
+        with told(OSError), waiting("weighing") as step:
+            asyncio.run(run(step))
+
+    def identify(self, output: Path, figures: Path | None, look: FigureOptions, *, json: bool) -> None:
+        """Make jogs, write the calibration that they tell, and print how good it is."""
+        picture = output.with_suffix(".moves.png")
+
+        async def run(step: Progress) -> tuple[RobotDescription, Measured]:
+            async with self._robot_and_file() as (client, arm):
+                step("planning the moves")
+                masses = self._masses
+                if masses is None and self._setup is not None:
+                    masses = tuple(sorted({0.0, arm.payload.mass}))
+                changed = () if masses is None or self._positions else masses
+                payloads = tuple(paper_payload(arm, mass) for mass in changed)
+                plan = await plan_jogs(
+                    client,
+                    arm,
+                    self._ring_downs,
+                    payloads=payloads,
+                    seed=self._seed,
+                    positions=self._positions,
+                )
+                if self._positions:
+                    return arm, await _agreed_jogs(client, plan, picture, step, sure=self._sure)
+                async with client.control("identify") as control:
+                    return arm, await make_jogs(client, control, plan, step)
+
+        with told(ServedError, OSError, RecordingError):
+            if self._positions:  # the question stands on the same screen
+                arm, measured = asyncio.run(run(say))
+                found = _calibrated(arm, measured, output, say)
+            else:
+                with waiting("identifying") as step:
+                    arm, measured = asyncio.run(run(step))
+                    found = _calibrated(arm, measured, output, step)
+        payloads = found.forecast.arm.payloads
+        true = None
+        if self._setup is not None:
+            true = true_errors(arm, found.calibration, payloads, self._seed, found.modes)
+        if figures is not None:
+            _draw(found, look, figures, arm, true)
+        options = f" --robot {self._robot}" if self._robot not in {None, ROBOT} else ""
+        if self._positions:
+            options = f" --robot {self._robot or ROBOT} --plant {self._source}"
+        more = {"picture": str(picture)} if self._positions else {}
+        report(found, measured, output, options, true, json=json, more=more)
+
+    @asynccontextmanager
+    async def _robot_and_file(self) -> AsyncIterator[tuple[Robot, RobotDescription]]:
+        async with AsyncExitStack() as stack:
+            if self._setup is not None:
+                yield await stack.enter_async_context(robot_in_process(self._setup)), self._setup.description
+            elif isinstance(self._source, Connection):
+                client = await stack.enter_async_context(await self._source.robot())
+                yield client, robot_file(self._robot, {(await client.info()).model}, "the robot")
+            else:
+                robot = self._robot or ROBOT
+                options = ["--plant", str(self._source), "--enable-motion", "--robot", robot]
+                options += ["--calibration", "none", "--shaper", "none"]
+                options += [] if self._masses is None else ["--payload", f"{self._masses[0]:g}"]
+                say(f"starting the server that moves the robot at {self._source}")
+                arm = load(robot)
+                client, _ = await stack.enter_async_context(served_robot(options, arm.robot.name))
+                yield client, arm
+
+
+def _draw(
+    found: Found, look: FigureOptions, folder: Path, arm: RobotDescription, true: list[ModeErrors] | None
+) -> None:
+    """Draw the measured modes and, where the truth is known, maps of the lowest one over the workspace."""
+    from tvist_lab.figures import identified_figure, workspace_map_figure
+    from tvist_lab.identification.workspace_map import QUANTITIES, workspace_map
+
+    measured, fitted = found.lowest_mode
+    mass = found.calibration.payload.mass
+    maps = None if true is None else workspace_map(arm, found.calibration, mass)
+    words = f"{arm.robot.name}, {mass:g} kg, calibration {found.calibration.name}"
+    with look.into(folder) as save:
+        drawn = (
+            {"identification": identified_figure(found.calibration.name, measured, fitted)}
+            if measured.size
+            else {}
+        )
+        if maps is not None:
+            drawn |= {
+                f"map_{name}": workspace_map_figure(maps, key, words) for key, name in QUANTITIES.items()
+            }
+        write(save, drawn)
+
+
+async def _agreed_jogs(
+    client: Robot, plan: JogPlan, picture: Path, step: Progress, *, sure: bool
+) -> Measured:
+    """Show the moves, ask and make them."""
+    from tvist_lab.figures import house_style, move_plan_figure, save
+
+    with house_style():
+        save(move_plan_figure(plan), picture)
+    _show(plan, picture)
+    if not sure and not await asyncio.to_thread(_agreed):
+        raise Failure("nothing was moved")
+    stops: list[str | None] = []
+    client.on_event(lambda event: stops.append(event.why) if event.kind.endswith("_stop") else None)
+    async with client.control("identify") as control:
+        await _ready(client, control, plan)
+        try:
+            return await make_jogs(client, control, plan, step)
+        except (RefusedError, MotionStoppedError) as error:  # the stop says why, what came after it does not
+            raise Failure(f"the moves were not finished: {stops[-1] if stops else error}") from error
+
+
+async def _ready(client: Robot, control: Arm, plan: JogPlan) -> None:
+    """Wait until the program on the robot follows, which shows by a move to where the arm stands."""
+    say("starting the program on the robot")
+    deadline = asyncio.get_running_loop().time() + READY
+    while True:
+        state = await client.state()
+        try:
+            if state.robot_mode == RobotMode.RUNNING:
+                if max(abs(q - there) for q, there in zip(state.target_q, plan.at, strict=True)) > MOVED:
+                    raise Failure(
+                        "the arm was moved since the moves were planned: nothing was moved, begin again"
+                    )
+                await control.move_j(state.target_q, velocity=plan.ways.velocity)
+                return
+            await control.power_on()
+        except RefusedError as error:
+            if error.reply.code != "wrong_mode" or asyncio.get_running_loop().time() > deadline:
+                raise Failure(f"the robot does not follow: {error}") from error
+        await client.advance(50)
+
+
+def _show(plan: JogPlan, picture: Path) -> None:
+    """Print the moves on stderr, where the question stands, too."""
+    rows = [
+        (str(number), " → ".join(map(angles, jog.way)), angles(jog.q))
+        for number, jog in enumerate(plan.jogs, 1)
+    ]
+    table("the moves", ("ring-down", "goes to rad", "rings at rad"), rows, on=err)
+    assert plan.turned is not None, "the plan is that of a robot that takes positions alone"
+    say(
+        f"First the last joint turns to {plan.turned[-1]:.2f} rad and back, twice. All ways were checked for "
+        "collisions of the arm with itself and the floor, not with what else stands around it."
+    )
+    say(
+        f"No joint is faster than {plan.speed:.2f} rad/s; it takes about {plan.seconds:.0f} s. Drawn in {picture}"
+    )
+
+
+def _agreed() -> bool:
+    say("Is there nothing in the way, and somebody at the emergency stop? Move the arm [y/N]")
+    return sys.stdin.readline().strip().lower() in ("y", "yes")

@@ -1,0 +1,329 @@
+"""Ring-downs in, calibration out: springs and drives, polynomials where covered, and how far all of it goes."""
+
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+
+import numpy as np
+from msgspec.structs import replace as with_fields
+
+from tvist_controller.api.line import body, modal_estimator, paper_payload
+from tvist_lab.identification.agreement import contradicting, cross_validate
+from tvist_lab.identification.design import free_configurations
+from tvist_lab.identification.forecast import Forecast, Known, LeftOut
+from tvist_lab.identification.jogs import LEAST, Jog, Measured, plan_ways
+from tvist_lab.identification.modal_fit import (
+    MODES,
+    ModalFit,
+    describe,
+    fit_from_many,
+    of_masses,
+    softened,
+)
+from tvist_lab.identification.polynomials import FitError, polynomials, spread
+from tvist_lab.identification.ring_downs import (
+    CONTRADICTS,
+    IdentificationError,
+    Log,
+    Progress,
+    Ringing,
+    Stop,
+    stops_of,
+    unused,
+)
+from tvist_lab.identification.unknowns import ArmModes
+from tvist_lab.recordings import Floats
+from tvist_lab.workspace import identified, ranges
+from tvist_plant.description import RobotDescription
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_protocol.calibration import (
+    Calibration,
+    ModalModel,
+    Provenance,
+    RingDownFit,
+    Spread,
+)
+from tvist_protocol.values import Payload
+from tvist_shaping.errors import EstimatorError
+from tvist_shaping.estimators.drivetrain import Drivetrain
+
+TOLD = 3
+"""Number of modes whose errors are reported."""
+MOST = 48
+"""Number of ring-downs that springs and drives are fitted to: more take longer and tell little more."""
+WORKSPACE = 200
+"""Number of configurations in which the range of the modes is determined."""
+MARGIN = 0.85
+"""Margin on the lowest frequency found over the workspace, and on the distance to the highest damping ratio [-]."""
+PLACES = 100
+"""Number of configurations of the workspace at which the calibration's accuracy is determined."""
+UNSEEN = 60
+"""Number of configurations at which it is compared with the truth."""
+KNOWN = 5.0
+"""A configuration is known if the 95 % interval of the lowest f_d is within this of it [%]."""
+PROPOSED = 3
+CANDIDATES = 40
+"""Number of configurations among which moves are proposed."""
+
+
+@dataclass(frozen=True)
+class ModeErrors:
+    """Errors of one mode [%]."""
+
+    f_d: Spread
+    zeta: Spread
+
+
+@dataclass(frozen=True)
+class Found:
+    """A calibration from ring-downs, and how far it goes."""
+
+    calibration: Calibration
+    stops: tuple[Stop, ...]
+    """All stops; those that contradict others have a reason, too."""
+    left: tuple[LeftOut, ...]
+    """The ring-downs that were fitted, and their modes by fits without them."""
+    forecast: Forecast
+    known_percent: float
+    """Share of the workspace in which f_d of the lowest mode is known within `KNOWN`, with the heaviest payload [%]."""
+    least_known: tuple[Floats, Known]
+    """Configuration of the workspace at which it is known least, and the mode there."""
+    proposals: tuple[Jog, ...]
+    """Jogs that would tell more."""
+    no_polynomial: str
+    """Why the calibration has no polynomials; empty if it has."""
+
+    @property
+    def used(self) -> int:
+        """Number of stops that were used."""
+        return sum(stop.ringing is not None for stop in self.stops)
+
+    @property
+    def modes(self) -> int:
+        """Number of modes that are reported: at most `TOLD`, fewer where fewer vibrate."""
+        return min(TOLD, *(len(one.f_d) for one in self.left))
+
+    @property
+    def lowest_mode(self) -> tuple[Floats, Floats]:
+        """f_d [Hz] and ζ [-] by each ring-down that tells them accurately, and by fits without it, shapes (2, N)."""
+        sure = [one for one in self.left if 0 in one.own.certain]
+        return (
+            np.array([(one.own.f_d[0], one.own.zeta[0]) for one in sure]).reshape(-1, 2).T,
+            np.array([(one.f_d[0], one.zeta[0]) for one in sure]).reshape(-1, 2).T,
+        )
+
+    @property
+    def amplitudes(self) -> list[float | None]:
+        """Median amplitude at which each reported mode was measured, that of |α| at the beginning [m/s²]."""
+        own = [[one.own.amplitude[k] for one in self.left if k in one.own.certain] for k in range(TOLD)]
+        return [float(np.median(one)) if one else None for one in own]
+
+
+def calibrate(
+    description: RobotDescription, measured: Measured, *, name: str, command: str, progress: Progress
+) -> Found:
+    """Fit springs and drives to all ring-downs that agree, and polynomials where they cover the workspace.
+
+    Args:
+        description: The robot file, at whose springs and drives the search begins.
+        measured: Jogs, or logs.
+        name: Name of the calibration.
+        command: Command line that the user typed.
+        progress: Called before each step with what it does.
+
+    Raises:
+        IdentificationError: Too few stops can be used, or they contradict each other; the message says why.
+        RecordingError: A log cannot be used.
+    """
+    stops, arm, ringings = agreeing(description, measured.logs, progress)
+    progress("fitting springs and drives")
+    fit = fit_from_many(arm, ringings)
+    left, jackknife = cross_validate(arm, ringings, fit)
+    forecast = Forecast(arm, fit, fit.covariance + jackknife, of_masses(arm, ringings, fit)).widened(left)
+    deviations = np.sqrt(
+        np.maximum(np.diag(fit.covariance), np.diag(jackknife)) + np.sum(forecast.moved**2, axis=1)
+    )
+    first = np.array(
+        [np.ravel(describe(fit.drivetrain.poles(arm.mass(r.q, r.payload))[0][:1])) for r in ringings]
+    )
+    (low_f, low_z), (high_f, high_z) = first.min(axis=0).tolist(), first.max(axis=0).tolist()
+    f_d_min, zeta_max = mode_range(description, fit.drivetrain)
+    unseen = _errors(left)
+    used = sum(stop.ringing is not None for stop in stops)
+    arms = {getattr(log.recording.info, "arm", None) for log in measured.logs}
+    calibration = Calibration(
+        name=name,
+        robot=description.robot.model,
+        payload=max(arm.payloads, key=lambda payload: payload.mass),
+        modal=ModalModel(
+            parameters=(*arm.parameters(fit.logarithms, deviations), *measured.friction),
+            f_d_min=f_d_min,
+            zeta_max=zeta_max,
+            payloads=arm.payloads,
+            ring_downs=tuple(
+                RingDownFit(
+                    q=tuple(r.q.tolist()), payload=r.payload, rms=r.rms, residual_to_noise=float(ratio)
+                )
+                for r, ratio in zip(ringings, fit.residual_to_noise, strict=True)
+            ),
+            noise=float(np.sqrt(np.mean([r.noise**2 for r in ringings]))),
+            residual_to_noise=float(np.sqrt(np.mean(fit.residual_to_noise**2))),
+            cross_validated_f_d_percent=tuple(None if mode is None else mode.f_d for mode in unseen),
+            cross_validated_zeta_percent=tuple(None if mode is None else mode.zeta for mode in unseen),
+        ),
+        servo_lag_s=None if measured.servo is None else measured.servo.lag,
+        servo_gain=None if measured.servo is None else measured.servo.gain,
+        provenance=Provenance(
+            command=command[:500],
+            version=version("tvist"),
+            seed=measured.seed,
+            configurations=len({stop.ringing.q.tobytes() for stop in stops if stop.ringing is not None}),
+            ring_downs=used,
+            rejected=len(stops) - used + measured.refused,
+            measured_f_d_range=(low_f, high_f),
+            measured_zeta_range=(low_z, high_z),
+            arm=arms.pop() if len(arms) == 1 else None,
+        ),
+    )
+    every = [replace(s.ringing, softening=ringings[0].softening) for s in stops if s.ringing is not None]
+    calibration, no_polynomial = _with_polynomials(calibration, arm, every, fit)
+    progress("looking for moves that would tell more")
+    places = identified(ranges(description)).spread(PLACES, description.joints, 1)
+    heaviest = max(range(len(arm.payloads)), key=lambda number: arm.payloads[number].mass)
+    known = [forecast.at(q, heaviest) for q in places]
+    half = np.array([one.f_d_percent[0] for one in known])
+    worst = int(np.argmax(half))
+    return Found(
+        calibration=calibration,
+        stops=tuple(stops),
+        left=tuple(left),
+        forecast=forecast,
+        known_percent=100.0 * float(np.mean(half <= KNOWN)),
+        least_known=(places[worst], known[worst]),
+        proposals=more_jogs(forecast, ringings[-1]),
+        no_polynomial=no_polynomial,
+    )
+
+
+def agreeing(
+    description: RobotDescription, logs: Sequence[Log], progress: Progress
+) -> tuple[list[Stop], ArmModes, list[Ringing]]:
+    """Return all stops, the arm with their payloads, and at most `MOST` ring-downs, which do not contradict each other.
+
+    The ring-downs have the hysteresis of the gears that explains all of them best.
+    """
+    check_logs(description, logs)
+    progress("looking for stops")
+    stops, payloads = stops_of(logs)
+    usable = [number for number, stop in enumerate(stops) if stop.ringing is not None]
+    if len(usable) < LEAST:
+        why = "; ".join(f"{count}: {reason}" for reason, count in unused(stops).items())
+        raise IdentificationError(
+            f"{len(usable)} of {len(stops)} stops can be used, at least {LEAST} are needed"
+            + (f" ({why})" if why else "")
+            + ". Record motions of the unshaped robot, as by tvist move --shaper none, each with half a second of rest"
+        )
+    progress("comparing ring-downs")
+    arm = ArmModes(description, payloads)
+    fitted = [usable[k * len(usable) // min(len(usable), MOST)] for k in range(min(len(usable), MOST))]
+    ringings = softened(arm, [ringing for number in fitted if (ringing := stops[number].ringing) is not None])
+    wrong = contradicting(arm, ringings)
+    for number in wrong:
+        stops[fitted[number]] = replace(stops[fitted[number]], ringing=None, reason=CONTRADICTS)
+    return stops, arm, [ringing for number, ringing in enumerate(ringings) if number not in wrong]
+
+
+def check_logs(description: RobotDescription, logs: Sequence[Log]) -> None:
+    """Check that the logs are of this arm."""
+    for log in logs:
+        info, joints = log.recording.info, log.recording.joints
+        if info is not None and info.model != description.robot.model:
+            raise IdentificationError(
+                f"{log.name} is of a {info.model}, the robot file of a {description.robot.model}: name its file"
+            )
+        if joints != description.joints:
+            raise IdentificationError(
+                f"{log.name} has {joints} joints, a {description.robot.model} has {description.joints}: name the "
+                "robot's file"
+            )
+
+
+def more_jogs(forecast: Forecast, last: Ringing) -> tuple[Jog, ...]:
+    """Propose jogs that would tell more than is known, from where the last ring-down was listened to."""
+    arm = forecast.arm
+    counts = [PROPOSED if number == last.payload else 0 for number in range(len(arm.payloads))]
+    candidates = free_configurations(arm.description, (arm.payloads[last.payload],), CANDIDATES, 0)
+    return tuple(plan_ways(arm, candidates, last.q, counts, (forecast.fit.logarithms, forecast.covariance)))
+
+
+def _with_polynomials(
+    calibration: Calibration, arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit
+) -> tuple[Calibration, str]:
+    """Add polynomials for the payload with most ring-downs, if they are accurate; else say why not."""
+    counted = Counter(r.payload for r in ringings)
+    payload = max(counted, key=lambda number: (counted[number], arm.payloads[number].mass))
+    try:
+        fit = polynomials(arm, [r for r in ringings if r.payload == payload], springs)
+    except FitError as error:
+        return calibration, f"with {arm.payloads[payload].mass:g} kg, {error}"
+    provenance = with_fields(
+        calibration.provenance,
+        residual_f_d_percent=fit.residual_f_d,
+        residual_zeta_percent=fit.residual_zeta,
+        cross_validated_f_d_percent=fit.cross_validated_f_d,
+        cross_validated_zeta_percent=fit.cross_validated_zeta,
+    )
+    held = arm.payloads[payload]
+    return with_fields(calibration, polynomial=fit.model, payload=held, provenance=provenance), ""
+
+
+def _errors(left: Sequence[LeftOut]) -> list[ModeErrors | None]:
+    """Errors of each mode, from configurations whose own ring-down is accurate enough."""
+    errors: list[ModeErrors | None] = []
+    for mode in range(TOLD):
+        pairs = [
+            (one.f_d[mode], one.own.f_d[mode], one.zeta[mode], one.own.zeta[mode])
+            for one in left
+            if mode in one.own.certain
+        ]
+        if len(pairs) < LEAST - 1:
+            errors.append(None)
+            continue
+        f_d, own_f_d, zeta, own_zeta = np.array(pairs).T
+        errors.append(ModeErrors(spread(f_d, own_f_d), spread(zeta, own_zeta)))
+    return errors
+
+
+def true_errors(
+    description: RobotDescription,
+    calibration: Calibration,
+    payloads: Sequence[Payload],
+    seed: int,
+    modes: int = TOLD,
+) -> list[ModeErrors]:
+    """Errors against the modes of the robot file's arm, at configurations that are not those of the calibration."""
+    pairs = []
+    for payload in payloads:
+        estimator = modal_estimator(calibration, description, payload, modes)
+        plant = FlexibleArm(description, body(payload))
+        for q in free_configurations(description, (payload,), UNSEEN // len(payloads), seed + 1):
+            true = plant.modes(q)
+            with suppress(EstimatorError):  # fewer modes vibrate there
+                pairs.append((*estimator.estimate(q), true.f_d[:modes], true.zeta[:modes]))
+    f_d, zeta, true_f_d, true_zeta = np.array(pairs).transpose(1, 2, 0)
+    return [ModeErrors(spread(f_d[k], true_f_d[k]), spread(zeta[k], true_zeta[k])) for k in range(len(f_d))]
+
+
+def mode_range(description: RobotDescription, drivetrain: Drivetrain) -> tuple[float, float]:
+    """Lowest f_d and highest ζ that a filter has to support up to the rated payload, with a margin."""
+    everywhere = identified(ranges(description)).spread(WORKSPACE, description.joints, 0)
+    lowest, highest = np.inf, 0.0
+    payloads = [paper_payload(description, mass) for mass in (0.0, description.limits.payload)]
+    whole = ArmModes(description, payloads)
+    for payload in range(2):
+        for q in everywhere:
+            f_d, zeta = describe(drivetrain.poles(whole.mass(q, payload))[0][:MODES])
+            lowest, highest = min(lowest, float(f_d.min())), max(highest, float(zeta.max()))
+    return MARGIN * lowest, 1.0 - MARGIN * (1.0 - highest)

@@ -1,0 +1,107 @@
+"""The paper's two multivariate polynomials of the lowest mode (section 3.3), fitted to ring-downs with one payload."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_lab.identification.modal_fit import ModalFit, own_poles_near
+from tvist_lab.identification.ring_downs import Ringing
+from tvist_lab.identification.unknowns import ArmModes
+from tvist_lab.recordings import Floats
+from tvist_protocol.calibration import PolynomialModel, Spread
+from tvist_shaping import terms
+
+FOLDS = 10
+"""Number of parts that the measurements are divided into for cross-validation."""
+DEGREES = (4, 3, 2)
+"""Degree of the polynomials in one, two or three joints; the fewer joints, the more configurations for each term."""
+ROUGH = 10.0
+"""A polynomial is kept if it misses at most this in nine of ten ring-downs that it did not see [%]."""
+
+
+class FitError(ValueError):
+    """The measurements are not sufficient for a model; the message says why."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model and its deviations from the measurements."""
+
+    model: PolynomialModel
+    residual_f_d: Spread
+    residual_zeta: Spread
+    cross_validated_f_d: Spread
+    """Deviation of each measurement from a fit that did not include it."""
+    cross_validated_zeta: Spread
+
+
+def polynomials(arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit) -> Fit:
+    """Fit polynomials to the lowest mode of each ring-down, which springs and drives tell from the higher ones.
+
+    Raises:
+        FitError: The ring-downs are too few, or cover too little of the workspace.
+    """
+    changing = tuple(joint for joint in (1, 2, 3) if joint < arm.description.joints) or (0,)
+    degree = DEGREES[len(changing) - 1]
+    _check_count(len(ringings), changing, degree)
+    own = [(ringing.q, own_poles_near(arm, ringing, springs)) for ringing in ringings]
+    kept = [(q, poles.f_d[0], poles.zeta[0]) for q, poles in own if 0 in poles.certain]
+    _check_count(len(kept), changing, degree)
+    q, f_d, zeta = (np.array(column) for column in zip(*kept, strict=True))
+    fit = fit_polynomials(q, f_d, zeta, joints=changing, degree=degree)
+    if fit.cross_validated_f_d.p90 > ROUGH:
+        raise FitError(
+            f"f_d would be off by {fit.cross_validated_f_d.p90:.0f} % and more at one stop in ten: they cover too "
+            "little of the workspace"
+        )
+    return fit
+
+
+def _check_count(configurations: int, joints: tuple[int, ...], degree: int) -> None:
+    """Check that there are one and a half times as many configurations as coefficients."""
+    size = terms(np.zeros((1, max(joints) + 1)), joints=joints, degree=degree).shape[1]
+    needed = math.ceil(1.5 * size)
+    if configurations < needed:
+        raise FitError(
+            f"{configurations} ring-downs are too few for {size} coefficients: at least {needed} are needed"
+        )
+
+
+def fit_polynomials(q: Floats, f_d: Floats, zeta: Floats, *, joints: tuple[int, ...], degree: int) -> Fit:
+    """Fit the relative deviation of f_d [Hz] and ζ [-], each of shape (N,), at q, shape (N, n) [rad]."""
+    design = terms(q, joints=joints, degree=degree)
+    coefficients = [_solve(design, y) for y in (f_d, zeta)]
+    fold = np.arange(len(design)) % FOLDS
+    unseen = np.empty((2, len(design)))
+    for part in range(FOLDS):
+        seen = fold != part
+        for row, y in zip(unseen, (f_d, zeta), strict=True):
+            row[~seen] = design[~seen] @ _solve(design[seen], y[seen])
+    model = PolynomialModel(
+        joints=joints,
+        degree=degree,
+        f_d_coefficients=tuple(coefficients[0].tolist()),
+        zeta_coefficients=tuple(coefficients[1].tolist()),
+        f_d_range=(0.7 * float(f_d.min()), 1.25 * float(f_d.max())),
+        zeta_range=(0.3 * float(zeta.min()), min(1.4 * float(zeta.max()), 0.95)),
+    )
+    return Fit(
+        model=model,
+        residual_f_d=spread(design @ coefficients[0], f_d),
+        residual_zeta=spread(design @ coefficients[1], zeta),
+        cross_validated_f_d=spread(unseen[0], f_d),
+        cross_validated_zeta=spread(unseen[1], zeta),
+    )
+
+
+def spread(estimated: Floats, true: Floats) -> Spread:
+    """Median and 90th percentile of the relative deviation [%]."""
+    median, p90 = np.percentile(100.0 * np.abs(estimated / true - 1.0), (50, 90))
+    return Spread(median=float(median), p90=float(p90))
+
+
+def _solve(design: Floats, y: Floats) -> Floats:
+    """Return the coefficients of the least relative deviation."""
+    return np.asarray(np.linalg.lstsq(design / y[:, None], np.ones_like(y))[0])

@@ -1,0 +1,35 @@
+"""Ways of an arm under a client's control to where it is measured."""
+
+from collections.abc import Awaitable
+from typing import TypeVar
+
+import numpy as np
+
+from tvist_client.arm import Arm
+from tvist_lab.recordings import Floats
+from tvist_protocol.errors import RefusedError
+
+Measured = TypeVar("Measured")
+
+
+async def or_none(measuring: Awaitable[Measured]) -> Measured | None:
+    """Wait for a motion or a measurement; return None if the robot refuses it because of a collision."""
+    try:
+        return await measuring
+    except RefusedError as error:
+        if error.reply.code != "collision":
+            raise
+        return None
+
+
+async def reach(arm: Arm, q: Floats) -> None:
+    """Move to a configuration; if there would be a collision on the straight line, via the upright arm.
+
+    Raises:
+        RefusedError: That way is not clear either; code `collision`.
+    """
+    if await or_none(arm.move_j(q)) is None:
+        upright = np.zeros_like(q)
+        upright[[joint for joint in (1, 3) if joint < len(q)]] = -np.pi / 2
+        await arm.move_j(upright)
+        await arm.move_j(q)

@@ -1,0 +1,140 @@
+"""Logs as text, in CSV and the like, as UR's record.py, ur_rtde and `tvist log export` write them."""
+
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from tvist_lab.recordings.checks import LogError
+from tvist_lab.recordings.description import beside
+from tvist_lab.recordings.packed import content
+from tvist_lab.recordings.recording import Floats
+from tvist_lab.recordings.table import STRANGE, TEXT, Table, reader
+from tvist_lab.words import counted
+
+SEPARATORS = (";", "\t", ",", " ")
+"""Characters between cells, in the order in which they are looked for in the header."""
+EMPTY = ("", "nan", "NaN", "NAN", "None", "null", "NULL", "NA", "-")
+"""Cells without a number."""
+_NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
+
+
+@reader(TEXT)
+def read_csv(path: Path) -> Table:
+    """Read lines of cells between spaces, commas, semicolons or tabs, below a header or without one.
+
+    Torn lines, which have too few or too many cells, are left out, and a note names the first. Numbers may have decimal
+    commas where these do not separate cells.
+    """
+    raw = content(path).removeprefix(b"\xef\xbb\xbf")
+    all_lines = raw.splitlines()
+    top, names, separator = _header(path, all_lines)
+    first = top + 1 if names else top
+    body = [
+        (at, line)
+        for at, line in enumerate(all_lines[first:], first + 1)
+        if line.strip() and not line.lstrip().startswith(b"#")
+    ]
+    if separator == " ":
+        body = [(at, b" ".join(line.split())) for at, line in body]
+    cells = np.array([line.count(separator.encode()) + 1 for _, line in body], dtype=np.int64)
+    width = len(names) or int(cells[0])
+    whole, notes = cells == width, list[str]()
+    torn = np.flatnonzero(~whole)
+    if body and separator == "," and np.mean(cells > width) > 0.5:
+        whole[:] = False
+        notes.append(
+            f"line {body[0][0]} has {cells[0]} cells under a header of {width}: are there decimal commas? "
+            "Write numbers with a decimal point"
+        )
+    elif torn.size:
+        notes.append(
+            f"{counted(torn.size, 'torn line')} left out, the first is line {body[torn[0]][0]} with "
+            f"{cells[torn[0]]} cells instead of {width}"
+        )
+    elif len(body) > 1 and not raw.endswith(b"\n"):
+        # Nobody knows whether the last number is complete.
+        whole[-1] = False
+        notes.append(f"line {body[-1][0]} has no end and was left out")
+    kept = [body[at] for at in np.flatnonzero(whole)]
+    text = b"\n".join(line for _, line in kept) + b"\n" if kept else b""
+    numbers = np.array([at for at, _ in kept], dtype=np.float64)
+    values, texts = _numbers(text if separator == "," else text.replace(b",", b"."), separator, width)
+    return Table(
+        path, names, values, numbers, "line", top + 1 if names else 0, tuple(notes),
+        {
+            place: f"{path}, line {numbers[row]:.0f}, column {names[place] if names else place + 1}: "
+            f"{cell[:40]!r} is no number"
+            for place, (row, cell) in texts.items()
+        },
+        description=beside(path),
+    )  # fmt: skip
+
+
+def _header(path: Path, lines: list[bytes]) -> tuple[int, list[str], str]:
+    """Index of the header, its names, and what separates them; without a header that of the first row, no names."""
+    top = _top(lines)
+    if top is None:
+        raise LogError(f"{path} holds no rows")
+    try:
+        header = lines[top].decode("utf-8").strip().lstrip("# ")
+    except UnicodeDecodeError:
+        raise LogError(f"{path} {STRANGE}: its line {top + 1} is no text") from None
+    separator = next((one for one in SEPARATORS if one in header), ",")
+    if len(cells := header.split()) > 1 and all(map(_NUMBER.fullmatch, cells)):
+        separator = " "  # and any comma is a decimal one
+    names = [
+        name.strip().strip('"') for name in (header.split() if separator == " " else header.split(separator))
+    ]
+    if len(names) == 1:
+        raise LogError(
+            f"{path} {STRANGE}: its line {top + 1} has one cell; a header names several, as in timestamp,actual_q_0"
+        )
+    return top, names if any(re.match(r"[^\W\d]", name) for name in names) else [], separator
+
+
+def _top(lines: list[bytes]) -> int | None:
+    """Index of the header: the first line that is no comment, or a comment with names right above numbers."""
+    filled = [at for at, line in enumerate(lines) if line.strip()]
+    above = None
+    for at in filled:
+        if not lines[at].lstrip().startswith(b"#"):
+            return at if above is None or re.search(rb"[A-DF-Za-df-z_]", lines[at]) else above
+        above = at if re.match(rb"[#\s]*\"?[A-Za-z_]\w*[\s\",;]", lines[at]) else None
+    return None
+
+
+def _numbers(text: bytes, separator: str, width: int) -> tuple[Floats, dict[int, tuple[int, str]]]:
+    """Values of all cells, shape (T, columns), NaN for an empty one; and the first text of each column with some."""
+    names = [str(place) for place in range(width)]
+    try:
+        frame = _frame(text, separator, dict.fromkeys(names, pl.Float64()))
+        return np.asarray(frame.to_numpy().astype(np.float64)), {}
+    except pl.exceptions.PolarsError:
+        cells = _frame(text, separator, dict.fromkeys(names, pl.String()))
+        cells = cells.select(pl.col(names).str.strip_chars().str.strip_chars('"'))
+        frame = cells.select(pl.col(names).cast(pl.Float64, strict=False))
+    bad = (
+        cells.select(pl.col(names).is_not_null() & ~pl.col(names).is_in(EMPTY)).to_numpy()
+        & np.array([column.is_null().to_numpy() for column in frame]).T
+    )
+    rows = {int(place): int(np.argmax(bad[:, place])) for place in np.flatnonzero(bad.any(axis=0))}
+    texts = {place: (row, str(cells[row, place])) for place, row in rows.items()}
+    return np.asarray(frame.to_numpy().astype(np.float64)), texts
+
+
+def _frame(text: bytes, separator: str, schema: dict[str, pl.DataType]) -> pl.DataFrame:
+    if not text:
+        return pl.DataFrame(schema=schema)
+    return pl.read_csv(
+        io.BytesIO(text),
+        has_header=False,
+        separator=separator,
+        quote_char=None,  # a quote that does not end would hide the lines after it
+        schema=schema,
+        null_values=list(EMPTY),
+        truncate_ragged_lines=True,
+        encoding="utf8-lossy",
+    )

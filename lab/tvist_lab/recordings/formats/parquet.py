@@ -1,0 +1,87 @@
+"""Tables in Parquet, read in a process of their own: a damaged file can crash the reader, and then only this one ends.
+
+`python -m tvist_lab.recordings.formats.parquet FILE` writes what `tvist log export` says of the columns in a line, and
+the numbers as Arrow; or says why it cannot.
+"""
+
+import io
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from tvist_lab.recordings.checks import LogError
+from tvist_lab.recordings.description import KEY, described
+from tvist_lab.recordings.table import Table, reader
+
+DENSEST = 2000
+"""Largest size of the content over that of its file; recordings reach a tenth of it."""
+LEAST_CONTENT = 1 << 20
+"""Size of the content that any file may have [bytes]."""
+
+
+@reader(".parquet")
+def read_parquet(path: Path) -> Table:
+    """Read the columns of numbers, and of lists of numbers, of a Parquet file."""
+    child = subprocess.run(  # noqa: S603  this program itself
+        [sys.executable, "-P", "-m", __name__, path],  # -P: import nothing from the folder one works in
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        capture_output=True,
+        check=False,
+    )
+    if child.returncode:
+        why = child.stdout.decode(errors="replace")
+        raise LogError(
+            f"{path} cannot be read: {why or f'its reader ended with {child.returncode}: it is damaged'}"
+        )
+    text, _, numbers = child.stdout.partition(b"\n")
+    frame = pl.read_ipc(io.BytesIO(numbers))
+    rows = np.arange(1.0, len(frame) + 1.0)
+    return Table(path, frame.columns, frame.to_numpy(), rows, description=described(text))
+
+
+def check_size(path: Path, numbers: int) -> None:
+    """Refuse a file that claims more numbers than can be packed into one of its size."""
+    most = (LEAST_CONTENT + DENSEST * path.stat().st_size) // 8
+    if numbers > most:
+        raise LogError(
+            f"{path} cannot be read: it claims {numbers:g} numbers, a file of its size holds at most {most}"
+        )
+
+
+def reason(error: BaseException) -> str:
+    """Return what an error of a library says, as the part of a sentence."""
+    said = (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
+    return textwrap.shorten(said, 300, placeholder=" …")
+
+
+def _numbers(path: Path) -> pl.DataFrame:
+    rows, columns = pl.scan_parquet(path).select(pl.len()).collect().item(), pl.read_parquet_schema(path)
+    check_size(path, rows * len(columns))
+    table = pl.read_parquet(path).with_columns(pl.selectors.array().arr.to_list())
+    for column in table.select(pl.selectors.list()):
+        width = int(np.max(column.list.len().fill_null(0).to_numpy(), initial=0))
+        check_size(path, rows * width)
+        entries = [column.list.get(at, null_on_oob=True).alias(f"{column.name}_{at}") for at in range(width)]
+        table = table.drop(column.name).hstack(entries)
+    numeric = pl.selectors.numeric() | pl.selectors.boolean()
+    return table.select(numeric.cast(pl.Float64).fill_null(np.nan))
+
+
+def _main(path: Path) -> int:
+    try:
+        text, table = pl.read_parquet_metadata(path).get(KEY, ""), io.BytesIO()
+        _numbers(path).write_ipc(table)
+    except (Exception, pl.exceptions.PanicException) as error:  # noqa: BLE001  a damaged file can raise nearly anything
+        sys.stdout.buffer.write(reason(error).encode())
+        return 1
+    sys.stdout.buffer.write(text.replace("\n", " ").encode() + b"\n" + table.getbuffer())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main(Path(sys.argv[1])))
