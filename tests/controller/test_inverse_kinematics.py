@@ -261,7 +261,7 @@ def test_the_nearest_posture_is_found_where_postures_merge_or_a_joint_is_free(ca
         assert error(description, pose, found) <= 1e-10
         distance = np.linalg.norm(found - near)
         assert distance <= np.linalg.norm(q - near) + 1e-6
-        for start in near + rng.uniform(-np.pi, np.pi, (12, 6)):
+        for start in near + rng.uniform(-np.pi, np.pi, (32, 6)):
             if approach(links, *pose, near, start) < 1e-9 and np.all(
                 np.abs(start) <= description.limits.position
             ):
