@@ -10,7 +10,7 @@ from tvist_server import kernels
 LISTED = "; print(*sorted(kernel.name for kernel in KERNELS))"
 ALONE = "from tvist_server.kernels import KERNELS" + LISTED
 AFTER_ALL = (
-    "import tvist_lab.demo, tvist_lab.studies.evaluate, tvist_view.live, tvist_server.workers;" + ALONE
+    "import tvist_lab.demo, tvist_lab.studies.moves, tvist_view.live, tvist_server.workers;" + ALONE
 )
 TICKING = """
 import sys

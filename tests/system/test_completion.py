@@ -26,7 +26,7 @@ CASES = {
     "tvist serve --robot a": {"arm.toml"},
     "tvist serve --profile u": {"ursim"},
     "tvist move Q": {"Q1", "Q2", "Q3"},
-    "tvist shaperbench --against zvd": {"zvd"},
+    "tvist study bench --shapers zvd": {"zvd", "zvdd", "zvddd"},
     "tvist move Q1 --shaper el": {"elastic", "elastic-auto", "elastic-position"},
 }
 """Typed lines with what completes their last word."""

@@ -41,7 +41,7 @@ def _option_values() -> dict[str, _Values]:
     from typing import get_args
 
     from tvist_controller.sources.own_plants import named_plants
-    from tvist_lab.study.menus import UNSHAPED, names
+    from tvist_lab.study.menus import rows
     from tvist_plant.description import robots
     from tvist_plant.world.scene_file import scenes
     from tvist_server.profiles import ProfileName
@@ -53,7 +53,7 @@ def _option_values() -> dict[str, _Values]:
         "robots": robot,
         "shaper": shaper,
         "sensitivity": _Values(tuple(SHAPERS), "py"),
-        "against": _Values((UNSHAPED, *names("bench"))),
+        "shapers": _Values(tuple(row.name for row in rows()), "py"),
         "plant": _Values(tuple(named_plants()), "py"),
         "world": _Values(tuple(scenes()), "xml"),
         "profile": _Values(get_args(ProfileName)),

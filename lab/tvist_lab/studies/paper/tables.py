@@ -4,16 +4,16 @@ from collections.abc import Sequence
 from typing import Any
 
 from tvist_lab.studies.paper.published import published
-from tvist_lab.study.tables import Shown, cells
+from tvist_lab.study.columns import Column, cells
 
 FIGURES = ("delay ms", "stabilisation ms", "cycle ms", "overshoot m", "RV m/s²")
 """Headings of the figures of Table 2."""
 IMPACTS = ("stabilisation", "cycle", "overshoot", "residual_vibration")
 """What shaping changes, in the order of these figures."""
 METHODS = (
-    Shown("method", "label"), Shown("delay ms", "delay_ms", 0), Shown("RV m/s²", "residual_vibration_m_s2", 3),
-    Shown("peak m/s²", "peak_m_s2", 3), Shown("less peak %", "peak_reduction_percent", 1),
-    Shown("still after ms", "still_after_ms", 0), Shown("peak q̈ / limit", "peak_acceleration_ratio", 3),
+    Column("method", "label"), Column("delay ms", "delay_ms", 0), Column("RV m/s²", "residual_vibration_m_s2", 3),
+    Column("peak m/s²", "peak_m_s2", 3), Column("less peak %", "peak_reduction_percent", 1),
+    Column("still after ms", "still_after_ms", 0), Column("peak q̈ / limit", "peak_acceleration_ratio", 3),
 )  # fmt: skip
 """Columns of a table of methods."""
 
