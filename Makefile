@@ -5,7 +5,7 @@ BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 # Processes that run tests side by side.
 WORKERS ?= auto
-# How many examples Hypothesis tries in `make test-all`: full, half or quick.
+# How many examples Hypothesis tries in `make test-all`: full, drawn freely, or quick, always the same fifth.
 PROFILE ?= full
 # Which of the cases that are not quick `make test-all` runs: all, or those of one turn, such as 1/2.
 TURN ?=

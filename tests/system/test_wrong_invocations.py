@@ -39,9 +39,8 @@ MISUSE = [
     (("router", "--robot", "left"), ["--rate"]),
     (("router", "--connect", "hall"), ["connect is 'hall'"]),
     (("router", "--listen", "tcp/0.0.0.0:7447"), ["--security", "--insecure"]),
-    (("watch", "tvist/*/state", "tvist/a/state"), ["one endpoint and one key"]),
-    (("watch", "tvist/*/event"), ["must end in /state"]),
-    (("watch", "tvist//*/state"), ["is not a key"]),
+    (("watch", "--states", "tvist/*/event"), ["must end in /state"]),
+    (("watch", "--states", "tvist//*/state"), ["is not a key"]),
     (("serve", "--namespace", "Hall 3"), ["namespace", "a-z 0-9"]),
     (("serve", "--connect", "hall"), ["connect is 'hall'"]),
     (

@@ -1,22 +1,20 @@
 """`tvist check`: check that a robot answers and is ready to be moved."""
 
 import math
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure
 from tvist_cli.output import out, print_json, waiting
+from tvist_client import check as client
 
 
 def check(
-    endpoint: str = "tcp/127.0.0.1:7447",
+    at: Connection = LOCAL,
     *,
-    name: str | None = None,
     alive: bool = False,
-    security: Path | None = None,
-    namespace: str = "",
     wait: Annotated[list[float] | None, Parameter(consume_multiple=(0, 1), allow_repeating=False)] = None,
     json: bool = False,
 ) -> None:
@@ -27,26 +25,21 @@ def check(
     Exit code 1: one of these does not hold; the message says why and what to do next.
 
     Args:
-        endpoint: Zenoh endpoint of the robot.
-        name: Name of the robot [ur5e; if there is none, the first robot at the endpoint, and all of them are listed].
+        at: Where the robot is.
         alive: Check only that the server answers and, in real time, ticks. A robot that has stopped passes, too, so
             that an orchestrator does not kill one that somebody is about to unlock.
-        namespace: Namespace of the robot, if it is served in one.
         wait: Try again for this many seconds while no robot answers or it is starting; without a number, until it is
             ready.
-        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         json: Print one JSON object.
     """
-    from tvist_client.check import check as run
-
     seconds = 0.0 if wait is None else wait[0] if wait else math.inf
-    with waiting(f"asking {name or 'the robot'} at {endpoint}, which takes seconds") as tell:
-        report = run(
-            endpoint,
-            name,
+    with waiting(f"asking {at.name or 'the robot'} at {at.endpoint}, which takes seconds") as tell:
+        report = client.check(
+            at.endpoint,
+            at.name,
             alive=alive,
-            security=security,
-            namespace=namespace,
+            security=at.security,
+            namespace=at.namespace,
             wait=seconds,
             tell=tell,
         )

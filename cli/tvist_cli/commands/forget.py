@@ -1,22 +1,16 @@
 """`tvist forget`: undo what a served robot has learnt of its payload."""
 
 import asyncio
-from pathlib import Path
-from typing import TYPE_CHECKING
 
+from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import told
 from tvist_cli.output import out, print_json
-
-if TYPE_CHECKING:
-    from tvist_protocol.io import Io
+from tvist_protocol.io import Io
 
 
 def forget(
     *,
-    endpoint: str = "tcp/127.0.0.1:7447",
-    name: str | None = None,
-    security: Path | None = None,
-    namespace: str = "",
+    at: Connection = LOCAL,
     json: bool = False,
 ) -> None:
     """Take control of a served robot, and undo what it has learnt of its payload.
@@ -25,22 +19,16 @@ def forget(
     it otherwise again. If another client has control, the command fails with exit code 1 and changes nothing.
 
     Args:
-        endpoint: Zenoh endpoint of the robot.
-        name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
-        namespace: Namespace of the robot, if it is served in one.
-        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
+        at: Where the robot is.
         json: Print one JSON object.
     """
-    from tvist_client.robot import NAME, Robot
-    from tvist_client.transports.zenoh import only_robot
 
-    async def run() -> tuple[str, "Io"]:
-        found = name if name is not None else await only_robot(endpoint, NAME, security, namespace)
-        async with await Robot.connect(endpoint, found, security=security, namespace=namespace) as robot:
+    async def run() -> tuple[str, Io]:
+        async with await at.robot() as robot:
             before = await robot.io()
             async with robot.control("tvist forget") as arm:
                 await arm.forget()
-            return found, before
+            return (await robot.info()).name, before
 
     with told():
         robot, before = asyncio.run(run())

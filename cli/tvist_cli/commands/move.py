@@ -1,17 +1,16 @@
 """`tvist move`: move a served robot to one pose."""
 
 import asyncio
-from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
+from typing import TypedDict
 
+from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import out, print_json, program
 from tvist_cli.poses import pose, tool_numbers
+from tvist_client.arm import Arm
+from tvist_client.motion import Motion
+from tvist_client.readiness import look
 from tvist_protocol.errors import RefusedError
-
-if TYPE_CHECKING:
-    from tvist_client.arm import Arm
-    from tvist_client.motion import Motion
 
 BENT = "0,-1.57,1.57,-1.57,-1.57,0"
 """A posture of arms like UR's that is far from any singular one [rad]."""
@@ -22,10 +21,7 @@ def move(
     *,
     line: bool = False,
     by: bool = False,
-    endpoint: str = "tcp/127.0.0.1:7447",
-    name: str | None = None,
-    security: Path | None = None,
-    namespace: str = "",
+    at: Connection = LOCAL,
     degrees: bool = False,
     velocity: float | None = None,
     acceleration: float | None = None,
@@ -43,10 +39,7 @@ def move(
         line: Move the tool on a straight line to the target.
         by: Read the target of --line as the distance dx,dy,dz in m from the present position, in the base frame:
             --line --by 0,0,-0.1 moves the tool 0.1 m down.
-        endpoint: Zenoh endpoint of the robot.
-        name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
-        namespace: Namespace of the robot, if it is served in one.
-        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
+        at: Where the robot is.
         degrees: Read the target's angles in degrees; the limits stay in rad.
         velocity: Velocity limit of every joint in rad/s [1.5], or of the tool in m/s with --line [0.25].
         acceleration: Acceleration limit of every joint in rad/s² [2], or of the tool in m/s² with --line [1.2].
@@ -56,23 +49,18 @@ def move(
         shaper: Shaper to select before the motion.
         json: Print one JSON object.
     """
-    from tvist_client.readiness import look, unlock_command
-    from tvist_client.robot import NAME, Robot
-    from tvist_client.transports.zenoh import only_robot
-
     given = _given(velocity, acceleration, jerk, duration)
     numbers = _numbers(target, line=line, by=by, degrees=degrees)
     held = False
 
     async def run() -> tuple[int, int, str | None]:
         nonlocal held
-        found = name if name is not None else await only_robot(endpoint, NAME, security, namespace)
-        async with await Robot.connect(endpoint, found, security=security, namespace=namespace) as robot:
+        async with await at.robot() as robot:
             info = await robot.info()
             q = () if line else pose(target, info.poses, "target", degrees=degrees)
-            standing = await look(robot, unlock_command(endpoint, found, security, namespace))
+            standing = await look(robot, at.unlock_command(info.name))
             if not standing.ready:
-                raise Failure(f"{found} is not ready: {standing.sentence}")
+                raise Failure(f"{info.name} is not ready: {standing.sentence}")
             async with robot.control("tvist move") as arm:
                 if shaper is not None:
                     await arm.set_shaper(shaper.lower())
@@ -147,9 +135,7 @@ def _numbers(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float
     return ()
 
 
-async def _line(
-    arm: "Arm", numbers: tuple[float, ...], limits: _Limits, *, by: bool, joints: int
-) -> "Motion":
+async def _line(arm: Arm, numbers: tuple[float, ...], limits: _Limits, *, by: bool, joints: int) -> Motion:
     """Move the tool to a position, with an orientation or its own, or by a distance."""
     goal = numbers
     if len(numbers) == 3:
@@ -165,7 +151,7 @@ async def _line(
         raise Failure(f"{error}. Next: move the joints to another posture first{example}") from error
 
 
-async def _stop(arm: "Arm") -> None:
+async def _stop(arm: Arm) -> None:
     """Bring the robot to rest, whether or not the motion has been answered."""
     await arm.stop()
     await arm.robot.rest()

@@ -1,22 +1,23 @@
 """`tvist stop`: stop one robot or all, whoever has control."""
 
 import asyncio
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import out, print_json
+from tvist_client.across import Place, place_of
+from tvist_client.fleet import Fleet, StopReport
+from tvist_client.halt import halt
 
 
 def stop(
     robot: str | None = None,
     *,
     everyone: Annotated[bool, Parameter(name="--all")] = False,
-    endpoint: str = "tcp/127.0.0.1:7447",
-    security: Path | None = None,
-    namespace: str = "",
+    at: Connection = LOCAL,
     json: bool = False,
 ) -> None:
     """Stop a served robot at once, whoever has control, and say what was stopped.
@@ -29,30 +30,22 @@ def stop(
     code is 1 if one did not answer or refused, and 0 if all have stopped.
 
     Args:
-        robot: Name of the robot, or NAMESPACE/NAME [the only robot at the endpoint, or ur5e].
+        robot: Name of the robot, as with --name, or NAMESPACE/NAME.
         everyone: Stop all robots that the router or server reaches; with --namespace, those in it or below it.
-        endpoint: Zenoh endpoint of the robot, or of a router.
-        namespace: Namespace of the robot, if it is served in one.
-        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
+        at: Where the robot is.
         json: Print one JSON object.
     """
+    called = robot or at.name
     if everyone:
-        if robot is not None:
-            raise Failure(f"give either --all or the robot {robot}", code=2)
-        _stop_all(endpoint, namespace, security, json=json)
+        if called is not None:
+            raise Failure(f"give either --all or the robot {called}", code=2)
+        _stop_all(at, json=json)
         return
-    from tvist_client.across import place_of
-    from tvist_client.halt import halt
-
     with told(code=2):
-        place = None if robot is None else place_of(robot)
+        place = Place(at.namespace, "") if called is None else place_of(called)
     with told():
-        report = halt(
-            endpoint,
-            None if place is None else place.robot,
-            security=security,
-            namespace=namespace if place is None else place.namespace or namespace,
-        )
+        within = place.namespace or at.namespace
+        report = halt(at.endpoint, place.robot or None, security=at.security, namespace=within)
     if json:
         print_json(report)
     else:
@@ -61,11 +54,9 @@ def stop(
         raise Failure(f"{report.robot} may still be moving: {report.why}")
 
 
-def _stop_all(endpoint: str, namespace: str, security: Path | None, *, json: bool) -> None:
-    from tvist_client.fleet import Fleet, StopReport
-
+def _stop_all(at: Connection, *, json: bool) -> None:
     async def run() -> list[StopReport]:
-        async with Fleet(endpoint, security=security, namespace=namespace) as fleet:
+        async with Fleet(at.endpoint, security=at.security, namespace=at.namespace) as fleet:
             return await fleet.stop(list(fleet.places))
 
     with told():

@@ -1,18 +1,15 @@
 """`tvist unlock`: make a stopped robot ready to be moved again."""
 
-from pathlib import Path
-
+from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import out, print_json
+from tvist_client import unlock as client
 
 
 def unlock(
-    endpoint: str = "tcp/127.0.0.1:7447",
+    at: Connection = LOCAL,
     *,
-    name: str | None = None,
     power_on: bool = False,
-    security: Path | None = None,
-    namespace: str = "",
     json: bool = False,
 ) -> None:
     """Take control of a served robot and clear what keeps it from moving.
@@ -22,17 +19,14 @@ def unlock(
     code is 0 if the robot is then ready to be moved; otherwise it is 1, and a message says why and what to do.
 
     Args:
-        endpoint: Zenoh endpoint of the robot.
-        name: Name of the robot [the only robot at the endpoint, or ur5e].
+        at: Where the robot is.
         power_on: If the arm has no power, switch it on and release the brakes.
-        namespace: Namespace of the robot, if it is served in one.
-        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         json: Print one JSON object.
     """
-    from tvist_client.unlock import unlock as run
-
     with told():
-        report = run(endpoint, name, power_on=power_on, security=security, namespace=namespace)
+        report = client.unlock(
+            at.endpoint, at.name, power_on=power_on, security=at.security, namespace=at.namespace
+        )
     if json:
         print_json(report)
     else:

@@ -5,21 +5,20 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import err
 from tvist_cli.pages import Door, serve_page
 from tvist_cli.tracks import MAGNIFY, Shows, compared, recorded, repeated
+from tvist_client.robot import NAME
 
 LONGEST_S = 120.0
 """Longest recording that is written as HTML [s]."""
 
 
 def view(
-    what: str = "tcp/127.0.0.1:7447",
+    at: Connection = LOCAL,
     *,
-    name: str = "ur5e",
-    security: Path | None = None,
-    namespace: str = "",
     beside: bool = False,
     compare: Annotated[tuple[str, ...] | None, Parameter(consume_multiple=True)] = None,
     robot: str = "ur5e",
@@ -31,14 +30,12 @@ def view(
 ) -> None:
     """Show a robot on a web page: the arm in three dimensions, its bending magnified, plots and controls.
 
-    WHAT is the endpoint of a served robot, which the page shows live, or a recording, which it plays back. --compare
-    needs neither: it simulates the same motion with two or three shapers and shows the arms beside each other.
+    ENDPOINT is that of a served robot, which the page shows live, or the name of a recording, which it plays back.
+    --compare needs neither: it simulates the same motion with two or three shapers and shows the arms beside each
+    other.
 
     Args:
-        what: Zenoh endpoint of a served robot, or MCAP file.
-        name: Name of the served robot that is shown at first.
-        namespace: Namespace of the robot, if it is served in one.
-        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
+        at: Where the robot is, or the MCAP file. Without a name, the page begins with the robot ur5e.
         beside: Of a recording, show the motion that it holds without and with a shaper, both at once.
         compare: Two or three shapers to simulate and to show beside each other: --compare none auto.
         robot: Name of the robot to simulate with --compare, or path of a robot file.
@@ -51,11 +48,11 @@ def view(
     if not 1.0 <= magnify <= 300.0:
         raise Failure(f"magnify is {magnify:g}: must be 1 to 300", code=2)
     door = Door(address, port, insecure)
-    shows = _recorded_or_simulated(what, compare, robot, both=beside)
+    shows = _recorded_or_simulated(at.endpoint, compare, robot, both=beside)
     if shows is None:
         if html is not None:
             raise Failure("--html needs a recording or --compare", code=2)
-        _live(what, name, security, namespace, magnify, door)
+        _live(at, magnify, door)
         return
     if html is None:
         shows.serve(magnify, door)
@@ -86,10 +83,10 @@ def _is_file(what: str) -> bool:
     return what.endswith(".mcap") or Path(what).exists()
 
 
-def _live(endpoint: str, name: str, security: Path | None, namespace: str, factor: float, door: Door) -> None:
+def _live(at: Connection, factor: float, door: Door) -> None:
     from tvist_cli.judging import judge
     from tvist_view.live import LivePage
     from tvist_view.shown_robot import Place
 
-    live = LivePage(Place(endpoint, security, namespace), name, judge, factor=factor)
+    live = LivePage(Place(at.endpoint, at.security, at.namespace), at.name or NAME, judge, factor=factor)
     serve_page(live.page, live.meet, door, live.run, live.meshes.content)

@@ -3,6 +3,7 @@
 import asyncio
 from pathlib import Path
 
+from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import print_json, say
 
@@ -10,10 +11,7 @@ from tvist_cli.output import print_json, say
 def record(
     file: Path,
     *,
-    endpoint: str = "tcp/127.0.0.1:7447",
-    name: str = "ur5e",
-    security: Path | None = None,
-    namespace: str = "",
+    at: Connection = LOCAL,
     seconds: float | None = None,
     keep: str | None = None,
     json: bool = False,
@@ -25,10 +23,7 @@ def record(
 
     Args:
         file: MCAP file to write.
-        endpoint: Zenoh endpoint of the robot.
-        name: Name of the robot.
-        namespace: Namespace of the robot, if it is served in one.
-        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
+        at: Where the robot is.
         seconds: Stop this many seconds after the first state.
         keep: Keep the last 90s, 10min or 2h, and at most a quarter more, and forget what was before [keep all]. FILE
             then names several files, as with tvist serve --keep.
@@ -36,7 +31,6 @@ def record(
     """
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
-    from tvist_client.robot import Robot
     from tvist_server.ending import Ending
     from tvist_server.option_values import ticks_of
     from tvist_server.recording import RecorderError
@@ -50,14 +44,15 @@ def record(
         ticks: list[int] = []
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
-        async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
-            with Recorder(file, await robot.info(), {}, keep=kept, on_error=say, on_moved=say) as recorder:
+        async with await at.robot() as robot:
+            info = await robot.info()
+            with Recorder(file, info, {}, keep=kept, on_error=say, on_moved=say) as recorder:
                 robot.on_state(recorder.state)
                 robot.on_state(lambda state: ticks.append(state.tick))
                 robot.on_event(recorder.event)
                 robot.on_truth(recorder.truth)
                 robot.on_io(recorder.io)
-                say(f"recording {name} into {file}; press Control+C to stop")
+                say(f"recording {info.name} into {file}; press Control+C to stop")
                 end = asyncio.ensure_future(ended.wait())
                 # The requested time begins with the first state, which may come a second later in lockstep.
                 first = asyncio.ensure_future(robot.state())
