@@ -29,8 +29,6 @@ ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s:/\[\]]+|\[[\da-fA-F:.]+\]):\d
 """Address of a scheduler."""
 PATIENCE = 10.0
 """Time within which a scheduler has to answer, and to have a worker [s]."""
-NAMED = 5
-"""Largest number of failed rows that are told one by one."""
 LISTED = 12
 """Largest number of motions that are printed one by one."""
 
@@ -167,14 +165,13 @@ def _tell(result: Result, *, json: bool) -> None:
         say(
             f"{values['too_weak']} of {values['rows']} rows were left out: the drives are too weak for their moves"
         )
-    for row in rows.filter(rows["status"] == FAILED).head(NAMED).iter_rows(named=True):
-        case = ", ".join(
-            f"{name} {row[name]}" for name in result.study.cases[0].axes if not isinstance(row[name], list)
+    for row in rows.filter(rows["status"] == FAILED).head(1).iter_rows(named=True):
+        axes = result.study.cases[0].axes
+        case = ", ".join(f"{name} {row[name]}" for name in axes if not isinstance(row[name], list))
+        raise Failure(
+            f"{values['failed']} of {values['rows']} rows failed, the first with {row['shaper']} at {case}: "
+            f"{row['error']}; with --output, rows.parquet has the reasons, and the same command tries again"
         )
-        say(f"{row['shaper']} failed at {case}: {row['error']}")
-    if values["failed"]:
-        again = "their column error says why; with --output, the same command tries them again"
-        raise Failure(f"{values['failed']} of {values['rows']} rows failed; {again}")
     if "failure" in values:
         raise Failure(values["failure"])
 

@@ -91,7 +91,7 @@ def later(f_d, zeta):
     (folder / "mine.py").write_text(MINE + later, encoding="utf-8")
     ended = tvist("study", "moves", "--moves", 1, "--shapers", "mine.py:later", cwd=folder)
     said = "the shaper returns NoneType instead of Impulses(A, tau) of tvist_shaping for f_d = "
-    ended.assert_failed(1, "later failed at move 1", said, "1 of 2 rows failed")
+    ended.assert_failed(1, "1 of 2 rows failed, the first with later at move 1", said)
 
 
 class TestServed:

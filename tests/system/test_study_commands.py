@@ -78,7 +78,7 @@ def with_each_error(told, folder):
     (zv,) = told["summary"]
     assert (zv["shaper"], told["moves_made"], told["calibration"]) == ("zv", 1, "ur5e_modal")
     springs = {one["arm"] for one in told["cells"]}
-    assert springs > {"calibrated", "springs+30", "springs-5", "combined"}
+    assert springs > {"calibrated", "springs_+30_percent", "springs_-5_percent", "combined"}
     assert {one["payload_error"] for one in told["cells"]} == {-0.2, -0.1, 0.0, 0.1, 0.2}
     kept = pl.read_parquet(folder / "kept" / "rows.parquet")
     assert len(kept) == told["rows"]

@@ -47,7 +47,7 @@ ONCE = pl.col("arm") == pl.col("arm").first()
 
 
 def _time(of: float, called: str) -> pl.Expr:
-    found = pl.col("time_ms").quantile(of, "higher")
+    found = pl.col("time_ms").quantile(of, "higher").round(6)  # equal times are ranked by what rings
     return pl.when(found.is_finite()).then(found).alias(f"time_until_still_ms_{called}")
 
 
@@ -195,7 +195,9 @@ def _rank(result: Result, asked: Asked, faults: Mapping[str, str]) -> None:
     if told := [one["shaper"] for one in entries if labels[one["shaper"]].told_target]:
         values["notes"].append(f"these shapers are given the target before each move: {', '.join(told)}")
     if faults:
-        values["failure"] = f"not ranked: {', '.join(faults)}"
+        values["failure"] = "; ".join(
+            f"shaper {name} is not ranked: it {why}" for name, why in faults.items()
+        )
     values["verdict"] = _verdict(entries, len(values["arms"]))
 
 

@@ -199,11 +199,12 @@ class Study:
         return grouped.agg(**COUNTS, **self._computed()).to_dicts()
 
     def _computed(self) -> dict[str, pl.Expr]:
-        drawn = (*of_measures(*self.show), *ends_of(*self.show)) if self.draw is None else ()
+        every = dict.fromkeys((*self.show, *(() if self.columns else self.measures)))
+        drawn = (*of_measures(*every), *ends_of(*every)) if self.draw is None else ()
         columns = (one.of for one in (*self.shown, *self.few, *drawn))
-        worst = map(p5, self.show) if self.draw is None else ()
-        every = (*(one for one in columns if isinstance(one, pl.Expr)), *worst, *self.more)
-        return {one.meta.output_name(): one for one in every}
+        worst = map(p5, every) if self.draw is None else ()
+        computed = (*(one for one in columns if isinstance(one, pl.Expr)), *worst, *self.more)
+        return {one.meta.output_name(): one for one in computed}
 
     def result(self, rows: pl.DataFrame, about: Mapping[str, Any]) -> Result:
         """Return what was found."""
