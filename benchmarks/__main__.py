@@ -14,10 +14,10 @@ from benchmarks.figure import Figure, Tell
 from benchmarks.lateness import lateness
 from benchmarks.line import line, streams
 from benchmarks.programs import programs
-from benchmarks.served import bridge, reader, robots, rtde
+from benchmarks.served import bridge, robots, rtde
 from benchmarks.start import start
-from tvist_lab.bench.machine import this_machine
-from tvist_lab.bench.one_robot import one_robot
+from tvist_lab.bench.served_robots import one_robot
+from tvist_lab.bench.speed import this_machine
 from tvist_server.ending import end_like_interrupted
 
 COMPUTED: Mapping[str, Callable[[Tell], dict[str, Figure]]] = {
@@ -25,7 +25,7 @@ COMPUTED: Mapping[str, Callable[[Tell], dict[str, Figure]]] = {
 }  # fmt: skip
 """The parts that serve no robot."""
 SERVED: Mapping[str, Callable[[float, Tell], Coroutine[Any, Any, dict[str, Any]]]] = {
-    "served": one_robot, "robots": robots, "reader": reader, "rtde": rtde, "lateness": lateness, "bridge": bridge,
+    "served": one_robot, "robots": robots, "rtde": rtde, "lateness": lateness, "bridge": bridge,
 }  # fmt: skip
 """The parts that serve robots in real time, besides `start`."""
 PARTS = (*COMPUTED, "start", *SERVED)

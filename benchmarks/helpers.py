@@ -13,26 +13,21 @@ import struct
 import sys
 import time
 from asyncio.subprocess import PIPE, Process, create_subprocess_exec
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.transports.session import close_session, open_session
-from tvist_controller.api.robot import Host, LoopbackHost
-from tvist_lab.in_process import free_setup
 from tvist_plant.plant import PERIOD
 from tvist_protocol import keys
 from tvist_protocol.codec import decode
 from tvist_protocol.stream import State
-from tvist_server.gateways.network import REALTIME, open_router
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
 from tvist_server.rtde.codec import PackageKind, PackageReader, package
 from tvist_server.schedule import Schedule
 
-ROBOT = "bare"
-"""Name of the robot of whose states `bare_tick` publishes the bytes."""
 SET_TIMER_SLACK = 29
 """Option of prctl for the largest delay with which this thread may be woken [ns]; a served robot sets it, too."""
 
@@ -151,41 +146,6 @@ def bare_send(address: str, port: str) -> None:
                     client.send(data)
                 except OSError:  # it has gone
                     del packages[client]
-
-
-def bare_tick(endpoint: str) -> None:
-    """Compute the line (`paced_line`) or publish the bytes of a state (`bare_put`) every 2 ms for some seconds.
-
-    The answer is the processor time of all threads for each tick [µs].
-    """
-    session = open_router([endpoint], [], REALTIME, None)
-    publisher = session.declare_publisher(keys.key(ROBOT, "state"))
-    robot, states = LoopbackHost(free_setup(truth=False, shaper="zv")), list[bytes]()
-    robot.subscribe("state", states.append)()
-    robot.subscribe("state", len)
-    parts: Mapping[str, Callable[[], object]] = {
-        "paced_line": Host(robot.controller, robot).tick,
-        "bare_put": lambda: publisher.put(states[0]),
-    }
-    for part in parts.values():
-        _paced(part, 1.0)
-    gc.collect()
-    gc.freeze()
-    print("ready", flush=True)
-    for line in sys.stdin:
-        name, seconds = line.split()
-        print(_paced(parts[name], float(seconds)), flush=True)
-    session.close()  # type: ignore[no-untyped-call]
-
-
-def _paced(part: Callable[[], object], seconds: float) -> float:
-    ticks, began = round(seconds / PERIOD), time.process_time()
-    due = time.monotonic()
-    for _ in range(ticks):
-        due += PERIOD
-        time.sleep(max(0.0, due - time.monotonic()))
-        part()
-    return 1e6 * (time.process_time() - began) / ticks
 
 
 def bare_thread() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.figure import CONFIDENCE, Tell
 from benchmarks.helpers import asked, helper
-from tvist_lab.bench.one_robot import punctuality
+from tvist_lab.bench.served_robots import punctuality
 from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
 

@@ -5,11 +5,10 @@ import time
 from typing import Any
 
 from benchmarks.figure import Figure, Tell, figure
-from benchmarks.helpers import ROBOT, asked, helper
-from tvist_lab.bench.many_robots import robots_at_500_hz
+from benchmarks.helpers import helper
 from tvist_lab.bench.moving import line_tick
-from tvist_lab.bench.one_robot import cpu_seconds, punctuality
-from tvist_lab.served import free_endpoint, free_port, served
+from tvist_lab.bench.served_robots import cpu_seconds, punctuality, robots_at_500_hz
+from tvist_lab.served import free_port, served
 from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RobotMode
 from tvist_server.moving.program import ALONE
@@ -18,14 +17,8 @@ from tvist_server.ur_ports import UrPorts
 IN_PROCESS = "the line in process"
 SHORTEST = 2.0
 """Shortest time of a measurement [s]: telemetry comes once a second."""
-OF_READER, OF_RTDE = 7, 5
+OF_RTDE = 5
 """Number of rounds of measurements."""
-READER = {
-    "one_robot": "a served robot that one client reads",
-    "paced_line": "the line alone, once every 2 ms",
-    "bare_put": "a bare put() of a state to one client, once every 2 ms",
-}
-"""What is measured in each round of the part `reader`."""
 CLIENTS = 10
 """Number of RTDE clients at 500 Hz."""
 KINDS = (
@@ -46,26 +39,6 @@ def in_process() -> float:
     run = line_tick("zv")
     run()
     return min(run() for _ in range(5))
-
-
-async def reader(seconds: float, tell: Tell) -> dict[str, Figure]:
-    """Measure a robot whose client reads each state, and in another process the line, and puts of as many bytes."""
-    part, endpoint = max(SHORTEST, seconds / OF_READER), free_endpoint()
-    found: dict[str, list[float]] = {name: [] for name in READER}
-    lines: list[float] = []
-    async with served([]) as server, helper("bare_tick", endpoint) as bare:
-        await server.robot.state()  # its client reads from now on
-        for number in range(OF_READER):
-            tell(f"round {number + 1} of {OF_READER}: a robot that one client reads, its line, and bare puts")
-            lines.append(in_process())
-            found["one_robot"].append(1e6 * PERIOD * (await punctuality(server, part))[1])
-            for name in ("paced_line", "bare_put"):
-                async with helper("observers", endpoint, ROBOT, "1"):
-                    found[name].append(await asked(bare, f"{name} {part:g}"))
-    return {
-        f"{name}_us_per_tick": figure(READER[name], "µs per tick", taken, IN_PROCESS, lines)
-        for name, taken in found.items()
-    }
 
 
 async def rtde(seconds: float, tell: Tell) -> dict[str, Figure]:

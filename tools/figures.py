@@ -5,6 +5,7 @@ both arms of the paper's experiment settle.
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -22,7 +23,7 @@ from tvist_controller.api.line import (
     quickest_motion,
 )
 from tvist_controller.api.robot import truth_of
-from tvist_lab.figures import FigureFiles
+from tvist_lab.figures import house_style, save
 from tvist_lab.figures.style import (
     ALPHA,
     INK,
@@ -45,7 +46,6 @@ from tvist_lab.studies.paper.published import ARMS, MOTIONS, published
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
 from tvist_shaping import BUILT_IN
-from tvist_shaping.base import Filter
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 LIMITS = MotionLimits(1.5, 2.0, 100.0)
@@ -53,7 +53,6 @@ SHOWN = (-0.12, 0.4)
 """Times shown of the rest after elastic feed-forward, from the stop of the unshaped reference [s]."""
 MODES = 3
 """Number of modes in the product of zero-vibration shapers."""
-NAMES = ("zv of three modes", "auto, its mean delay constant")
 TICKS_AFTER = 100
 """Number of ticks shown after the reference has stopped."""
 
@@ -64,18 +63,13 @@ def elastic_figure() -> Figure:
     Top: the tool's acceleration. Bottom: reference before and after the filter, which all have the same end.
     """
     figure, (forces, references) = panels(2, 4.2)
-    for name, label, style in (
-        ("none", "Unshaped", OF_UNSHAPED),
-        ("auto", "auto", OF_THIRD),
-        ("elastic", "elastic", OF_SHAPED),
-    ):
+    styles = {"none": OF_UNSHAPED, "auto": OF_THIRD, "elastic": OF_SHAPED}
+    for name, style in styles.items():
         time, force, left = _stop(name)
-        forces.plot(time, force, **style.line(1.2, label=label))
+        forces.plot(time, force, **style.line(1.2, label="Unshaped" if name == "none" else name))
         references.plot(time, left, **style.line(1.2))
-    forces.set_ylabel(ALPHA)
-    forces.set_ylim(-0.1, 2.1)
-    references.set_ylabel("Angle left to turn (mrad)")
-    references.set_xlabel("Time after the unshaped reference's stop (ms)")
+    forces.set(ylabel=ALPHA, ylim=(-0.1, 2.1))
+    references.set(xlabel="Time after the unshaped reference's stop (ms)", ylabel="Angle left to turn (mrad)")
     references.set(xlim=tuple(1e3 * time for time in SHOWN), ylim=(-0.2, 4.0))
     legend(figure, forces, OF_ALPHA)
     return figure
@@ -88,14 +82,9 @@ def _stop(name: str) -> tuple[Floats, Floats, Floats]:
     start, end = (np.array(description.poses[pose]) for pose in ("Q1", "Q2"))
     estimator = modal_estimator(calibration, description, payload, BUILT_IN.modes_of(name))
     tvist = choose_filter(name, estimator, description.joints)
+    elastic, carried = elastic_feed_forward(tvist, description, calibration), body(payload)
     cycle = ControlCycle(
-        description,
-        tvist,
-        elastic=elastic_feed_forward(tvist, description, calibration),
-        q=start,
-        declared=body(payload),
-        carried=body(payload),
-        seed=0,
+        description, tvist, elastic=elastic, q=start, declared=carried, carried=carried, seed=0
     )
     motion = quickest_motion(JointLine(start, end), LIMITS, PERIOD)
     stop = round(motion.duration / PERIOD)
@@ -104,11 +93,10 @@ def _stop(name: str) -> tuple[Floats, Floats, Floats]:
     for _ in range(stop + round(SHOWN[1] / PERIOD)):
         sample = cycle.step()
         force.append(truth_of(cycle.plant).specific_force)
-        left.append(float(end[0] - sample.target.q[0]))
-    felt = np.array(force)
-    time = 1e3 * PERIOD * np.arange(-stop, len(felt) - stop, dtype=np.float64)
-    away: Floats = np.sqrt(((felt - felt[-1]) ** 2).sum(axis=1))
-    return time, away, 1e3 * np.array(left)
+        left.append(1e3 * float(end[0] - sample.target.q[0]))
+    away = np.linalg.norm(np.array(force) - force[-1], axis=1)
+    time = 1e3 * PERIOD * np.arange(-stop, len(away) - stop, dtype=np.float64)
+    return time, away, np.array(left)
 
 
 def mean_delay_figure() -> Figure:
@@ -118,23 +106,22 @@ def mean_delay_figure() -> Figure:
     """
     description = load("ur5e")
     payload, calibration = paper_payload(description), load_calibration("ur5e_modal")
-    joints = description.joints
-    filters = [
-        BUILT_IN.make_filter(
-            name,
-            modal_estimator(calibration, description, payload, BUILT_IN.modes_of(name, MODES)),
-            joints=joints,
-        )
-        for name in ("zv", "auto")
-    ]
     start, end = (np.array(description.poses[name]) for name in ("Q3", "Q1"))
+    joint = int(np.argmax(np.abs(end - start)))
     figure, (delays, velocities, accelerations) = panels(3, 5.6)
-    for tvist, style, name in zip(filters, (OF_UNSHAPED, OF_SHAPED), NAMES, strict=True):
-        delay, q = _shape(tvist, start, end)
-        time = PERIOD * np.arange(len(q))
-        joint = int(np.argmax(np.abs(end - start)))
-        along = (q[:, joint] - start[joint]) / (end - start)[joint] * abs(end - start).max()
-        delays.plot(time, 1e3 * delay, **style.line(label=name))
+    drawn = {"zv": ("zv of three modes", OF_UNSHAPED), "auto": ("auto, its mean delay constant", OF_SHAPED)}
+    for name, (label, style) in drawn.items():
+        estimator = modal_estimator(calibration, description, payload, BUILT_IN.modes_of(name, MODES))
+        tvist = BUILT_IN.make_filter(name, estimator, joints=description.joints)
+        tvist.reset(start)
+        motion = quickest_motion(JointLine(start, end), LIMITS, PERIOD)
+        rows: list[tuple[float, float]] = []
+        while not motion.finished or len(rows) < motion.duration / PERIOD + TICKS_AFTER:
+            q = tvist.filter(motion.next())
+            rows.append((1e3 * tvist.mean_delay, abs(q[joint] - start[joint])))
+        delay, along = np.array(rows).T
+        time = PERIOD * np.arange(len(rows))
+        delays.plot(time, delay, **style.line(label=label))
         velocities.plot(time[1:], np.diff(along) / PERIOD, **style.line())
         accelerations.plot(time[1:-1], np.diff(along, 2) / PERIOD**2, **style.line())
     dashed(velocities, LIMITS.velocity)
@@ -142,22 +129,9 @@ def mean_delay_figure() -> Figure:
         dashed(accelerations, side * LIMITS.acceleration)
     delays.set_ylabel("Mean delay (ms)")
     velocities.set_ylabel("Velocity (rad/s)")
-    accelerations.set_ylabel("Acceleration (rad/s²)")
-    accelerations.set_xlabel("Time (s)")
+    accelerations.set(xlabel="Time (s)", ylabel="Acceleration (rad/s²)")
     legend(figure, delays)
     return figure
-
-
-def _shape(tvist: Filter, start: Floats, end: Floats) -> tuple[Floats, Floats]:
-    """Mean delay [s] and shaped reference [rad] at each tick of a motion, shapes (N,) and (N, joints)."""
-    motion = quickest_motion(JointLine(start, end), LIMITS, PERIOD)
-    tvist.reset(start)
-    delays: list[float] = []
-    references: list[Floats] = []
-    while not motion.finished or len(references) < motion.duration / PERIOD + TICKS_AFTER:
-        references.append(tvist.filter(motion.next()))
-        delays.append(tvist.mean_delay)
-    return np.array(delays), np.array(references)
 
 
 def tails_figure() -> Figure:
@@ -172,9 +146,9 @@ def tails_figure() -> Figure:
         for panel, key in zip(axes, places, strict=True):
             recording = done.first[key]
             motion = motions(recording)[0]
-            time = recording.time[motion.start : motion.end] - recording.time[motion.shaped_stop]
-            E = 1e3 * distance(recording, motion)
-            panel.plot(1e3 * time, np.maximum(E, 1e-4), color=style.color, linewidth=1.1, label=name)
+            time = 1e3 * (recording.time[motion.start : motion.end] - recording.time[motion.shaped_stop])
+            E = np.maximum(1e3 * distance(recording, motion), 1e-4)
+            panel.plot(time, E, color=style.color, linewidth=1.1, label=name)
     paper, limit = published(), 1e3 * REPEATABILITY
     for panel, (name, kind) in zip(axes, places, strict=True):
         row = paper["table_2"][name][kind]
@@ -182,9 +156,8 @@ def tails_figure() -> Figure:
         span, overshoot = (cycle - row["stabilisation_ms"], cycle), 1e3 * row["overshoot_m"]
         title(panel, f"{name} {kind}")
         dashed(panel, limit)
-        panel.plot(
-            span, [limit] * 2, "|-", color=INK, linewidth=2.6, markersize=9.0, label="Paper, outside 0.03 mm"
-        )
+        thick: Any = {"color": INK, "linewidth": 2.6, "markersize": 9.0, "label": "Paper, outside 0.03 mm"}
+        panel.plot(span, [limit] * 2, "|-", **thick)
         if overshoot > limit:
             panel.plot(span, [overshoot] * 2, ":", color=INK, linewidth=1.2, label="Paper, overshoot")
         panel.set(yscale="log", xlim=(-120.0, 1400.0), ylim=(1e-3, 3.0))
@@ -197,9 +170,13 @@ def tails_figure() -> Figure:
 
 def main() -> None:
     """Write all files."""
-    drawn = {"elastic": elastic_figure(), "mean_delay": mean_delay_figure(), "tails": tails_figure()}
-    for name, figure in drawn.items():
-        print(FigureFiles(IMAGES, "png").write(figure, name))
+    with house_style():
+        for name, draw in (
+            ("elastic", elastic_figure),
+            ("mean_delay", mean_delay_figure),
+            ("tails", tails_figure),
+        ):
+            print(save(draw(), IMAGES / f"{name}.png"))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tvist_lab.compared import run_beside
-from tvist_lab.one_joint.closed_form import FlexibleShoulder
+from tvist_lab.one_joint import FlexibleShoulder
 from tvist_lab.study.line import PAPER
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import SUBSTEPS_OF_A_PERIOD

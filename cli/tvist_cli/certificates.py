@@ -29,12 +29,8 @@ class CertificateError(ValueError):
     """A file contains no suitable certificate or key; the message names it."""
 
 
-def host(text: str) -> Host:
-    """Parse a host name or IP address under which clients reach a robot.
-
-    Raises:
-        ValueError: The text is neither.
-    """
+def host_of(text: str) -> Host:
+    """Parse a host name or IP address under which clients reach a robot."""
     try:
         return x509.IPAddress(ipaddress.ip_address(text))
     except ValueError:
@@ -59,11 +55,7 @@ class Pair:
         return self.certificate.not_valid_after_utc
 
     def write(self, certificate: Path, key: Path) -> None:
-        """Write both as PEM; only the owner may read the key.
-
-        Raises:
-            FileExistsError: One of the files exists already.
-        """
+        """Write both as PEM; only the owner may read the key."""
         form = serialization.PrivateFormat.PKCS8
         secret = self.key.private_bytes(serialization.Encoding.PEM, form, serialization.NoEncryption())
         write_new(key, secret, 0o600)
@@ -89,11 +81,7 @@ class CertificateAuthority(Pair):
 
     @classmethod
     def read(cls, certificate: Path, key: Path) -> Self:
-        """Read an existing authority.
-
-        Raises:
-            CertificateError: The files do not contain a certificate and its key.
-        """
+        """Read an existing authority."""
         pair = cls(read_certificate(certificate), _read_key(key))
         if pair.certificate.public_key() != pair.key.public_key():
             raise CertificateError(f"{key} is not the key of {certificate}")
@@ -102,17 +90,7 @@ class CertificateAuthority(Pair):
     def issue(
         self, name: str, usage: Literal["robot", "client"], *, days: int, hosts: tuple[Host, ...] = ()
     ) -> Pair:
-        """Sign a certificate.
-
-        Args:
-            name: Common name.
-            usage: Whether it is for a robot or a client.
-            days: Validity [days].
-            hosts: Names and addresses of a robot.
-
-        Raises:
-            CertificateError: It would outlast the authority.
-        """
+        """Sign a certificate."""
         key = ec.generate_private_key(ec.SECP256R1())
         mine = x509.SubjectKeyIdentifier.from_public_key(self.key.public_key())
         builder = (
@@ -145,11 +123,7 @@ def hosts_of(certificate: x509.Certificate) -> set[Host]:
 
 
 def read_certificate(path: Path) -> x509.Certificate:
-    """Read a certificate.
-
-    Raises:
-        CertificateError: The file cannot be read, or contains no certificate.
-    """
+    """Read a certificate."""
     try:
         return x509.load_pem_x509_certificate(path.read_bytes())
     except OSError as error:
@@ -159,11 +133,7 @@ def read_certificate(path: Path) -> x509.Certificate:
 
 
 def write_new(path: Path, content: bytes, mode: int) -> None:
-    """Write a new file and create it with its final permissions.
-
-    Raises:
-        FileExistsError: The file exists already.
-    """
+    """Write a new file and create it with its final permissions."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
     with open(descriptor, "wb") as file:  # noqa: PTH123  a descriptor, not a path
         file.write(content)

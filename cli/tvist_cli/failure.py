@@ -17,11 +17,7 @@ class Failure(Exception):  # noqa: N818  the plain word for it
 
 
 def interrupted(what: str) -> Failure:
-    """Return the failure for Control+C, which says what was done and what was not.
-
-    Args:
-        what: Text such as "the motion was stopped; the robot is at rest".
-    """
+    """Return the failure for Control+C, which says what was done and what was not."""
     return Failure(f"interrupted: {what}", code=130)
 
 

@@ -1,6 +1,7 @@
 """Options about the files of figures, the same on every command that writes some."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -13,7 +14,8 @@ from tvist_cli.output import say
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tvist_lab.figures import FigureFiles
+Save = Callable[["Figure", str], Path]
+"""Writes a figure to a file of this name, without its suffix, and returns its path."""
 
 
 @Parameter(name="*")
@@ -25,23 +27,23 @@ class FigureOptions:
     """Format of figures: png, pdf or svg [png]."""
     style: list[str] | None = None
     """Style of figures, repeatable: paper, with headings and explanations in a text beside each; slides, with larger
-    type; or a style file of matplotlib, FILE.mplstyle, which may also set width and resolution."""
+    type; or a style sheet of matplotlib, FILE.mplstyle, which may also set colors, width and resolution."""
 
-    def into(self, folder: Path) -> "FigureFiles":
-        """Return the folder together with what was asked for."""
-        from tvist_lab.figures import FigureFiles
-        from tvist_lab.figures.files import STYLES
+    @contextmanager
+    def into(self, folder: Path) -> Iterator[Save]:
+        """Set the style in which figures are drawn, and yield what writes them to a folder."""
+        from tvist_lab.figures import house_style, save
 
-        self.check(folder)
-        style = next((one for one in self.style or () if one in STYLES), "")
-        return FigureFiles(folder, self.format or "png", style)
+        with house_style(*self.style or ()):
+            yield lambda figure, name: save(figure, folder / f"{name}.{self.format or 'png'}")
 
-    def check(self, folder: Path | None, *files: Path | None) -> None:
+    def check(self, folder: Path | None, *files: Path | None, option: str = "--figures") -> None:
         """Refuse what cannot be done, before anything is computed.
 
         Args:
-            folder: Value of --figures; None where it was not given.
+            folder: Folder of the figures; None where it was not given.
             files: Other files that will be written at the end; None for those that were not given.
+            option: Option that names the folder.
 
         Raises:
             Failure: There is no such style, there are no figures to which an option could apply, or a file's folder
@@ -52,42 +54,23 @@ class FigureOptions:
                 raise Failure(f"{file} cannot be written: there is no folder {file.parent}")
         for name in ("format", "style"):
             if folder is None and getattr(self, name) is not None:
-                raise Failure(f"--{name} is about figures: give --figures DIR too, or leave it out", code=2)
+                raise Failure(f"--{name} is about figures: give {option} DIR too, or leave it out", code=2)
         if {"paper", "slides"} <= set(self.style or ()):
             raise Failure("style is paper and slides: give one of them", code=2)
-        for style in self.style or ():
-            _check_style(style)
         if folder is not None and folder.exists() and not folder.is_dir():
             raise Failure(f"{folder} exists already and is no folder: choose another name")
+        if self.style:
+            from tvist_lab.figures import StyleError
 
-
-def _check_style(style: str) -> None:
-    """Refuse what is no style; a style file is used from now on."""
-    from tvist_lab.figures.files import STYLES
-    from tvist_lab.figures.own_style import SUFFIX, StyleError, use
-
-    if style in STYLES:
-        return
-    if not style.endswith(SUFFIX):
-        raise Failure(
-            f"style is {style!r}: must be {', '.join(STYLES)} or a file that ends in {SUFFIX}", code=2
-        )
-    with told(StyleError, code=2):
-        idle = use(Path(style))
-    if idle:
-        say(f"{style}: no effect here have {', '.join(idle)}: tvist or its options set them")
+            with told(StyleError, code=2), self.into(Path()):
+                pass
 
 
 AS_USUAL = FigureOptions()
 """Nothing was asked for."""
 
 
-def write(files: "FigureFiles", figures: "Mapping[str, Figure]") -> None:
-    """Write figures and say the path of each.
-
-    Args:
-        files: Where to, and how.
-        figures: Name of the file, without its suffix, to the figure.
-    """
+def write(save: Save, figures: "Mapping[str, Figure]") -> None:
+    """Write figures, by the names of their files, and say the path of each."""
     for name, figure in figures.items():
-        say(str(files.write(figure, name)))
+        say(str(save(figure, name)))

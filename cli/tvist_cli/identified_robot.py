@@ -116,13 +116,14 @@ async def _moves(
 ) -> "tuple[MovePlan, Moved]":
     """Plan, show, ask and move as a client."""
     from tvist_client.errors import MotionStoppedError
-    from tvist_lab.figures import move_plan_figure, save
+    from tvist_lab.figures import house_style, move_plan_figure, save
     from tvist_lab.identification.positioned import make_moves, plan_moves
     from tvist_protocol.errors import RefusedError
 
     say("planning the moves")
     plan = await plan_moves(client, arm, wanted)
-    save(move_plan_figure(plan), picture)
+    with house_style():
+        save(move_plan_figure(plan), picture)
     _show(plan, picture)
     if not sure and not await asyncio.to_thread(_agreed):
         raise Failure("nothing was moved")

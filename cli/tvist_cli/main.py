@@ -48,8 +48,7 @@ GROUPS = {
         "study": "Compare shapers in simulation: on any moves, two of them, all of them, or by a study of your own.",
     },
     "Make and manage": {
-        "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
-        "paper": "Run the paper's experiment and print its tables beside ours.",
+        "demo": "Run the paper's experiment, in real time or simulated, and print its tables beside ours.",
         "lesson": "Open a page on which to try shaping.",
         "identify": "Calibrate a robot from its own accelerometer, or from its logs.",
         "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",

@@ -39,11 +39,7 @@ def lower(name: str | None) -> str | None:
 
 
 def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> None:
-    """Refuse fractions for whole numbers, which the parser would round.
-
-    Raises:
-        CoercionError: A value is not a whole number.
-    """
+    """Refuse fractions for whole numbers, which the parser would round."""
     for argument in arguments:
         if argument.hint is not int and int not in get_args(argument.hint):
             continue
@@ -53,11 +49,7 @@ def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> N
 
 
 def finite(_: Any, value: Any) -> None:
-    """Refuse NaN and infinity, which no option accepts.
-
-    Raises:
-        ValueError: The value is one of them.
-    """
+    """Refuse NaN and infinity, which no option accepts."""
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"is {value}: must be a finite number")
 

@@ -94,9 +94,6 @@ def progress(
         total: Number of steps.
         what: Name of the steps, in the plural.
         kept: What remains after Control+C.
-
-    Raises:
-        Failure: Control+C was pressed; the message says how many steps were done.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -125,12 +122,6 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], on:
     """Print a table with text aligned left and numbers aligned right.
 
     A table wider than the screen is printed in parts, one below the other, each with the first column.
-
-    Args:
-        title: Heading.
-        columns: Headings of the columns.
-        rows: Cells.
-        on: Where to print it.
     """
     from rich.table import Table
 
@@ -177,31 +168,19 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def write_json(path: Path, result: dict[str, Any]) -> None:
-    """Write a result to a file, indented for people.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Write a result to a file, indented for people."""
     path.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
 
 
 def default_output(path: Path) -> Path:
-    """Return the default path of a file, which must not exist: only a file that was named is replaced.
-
-    Raises:
-        Failure: It exists.
-    """
+    """Return the default path of a file, which must not exist: only a file that was named is replaced."""
     if path.exists():
         raise Failure(f"{path} exists already: choose the file with --output, which replaces what is there")
     return path
 
 
 def write_report(path: Path, page: "Page") -> None:
-    """Write a web page, all of it or nothing, and say where it is.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Write a web page, all of it or nothing, and say where it is."""
     from tvist_lab.report import render
     from tvist_lab.whole_file import whole_file
 

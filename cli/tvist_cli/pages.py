@@ -34,15 +34,7 @@ def serve_page(
     run: Callable[[], Awaitable[None]] | None = None,
     parts: Callable[[str], bytes | None] = lambda _: None,
 ) -> None:
-    """Serve a page until Control+C.
-
-    Args:
-        page: The page.
-        meet: Called for each tab.
-        door: Where it is served.
-        run: What is done while it is served; None: nothing.
-        parts: Content of a path that the page asks for; None: there is none.
-    """
+    """Serve a page until Control+C; `run` is done meanwhile, `parts` are what it asks for by paths."""
     from tvist_view.stage import StageError, open_stage
 
     logging.basicConfig(format="tvist: %(message)s", level=logging.WARNING)

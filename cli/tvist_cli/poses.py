@@ -17,9 +17,6 @@ def pose(
         poses: Named poses [rad].
         what: Name of the argument, for the message.
         degrees: Whether the angles are in degrees.
-
-    Raises:
-        Failure: The text is neither.
     """
     for name, q in poses.items():
         if name.lower() == text.strip().lower():
@@ -40,9 +37,6 @@ def tool_numbers(text: str, *, by: bool, degrees: bool = False) -> tuple[float, 
         text: Three numbers separated by commas, or six if it is not a distance.
         by: Whether it is a distance.
         degrees: Whether the rotation vector is in degrees.
-
-    Raises:
-        Failure: The text is neither.
     """
     numbers = _numbers(text)
     if len(numbers) not in ({3} if by else {3, 6}):

@@ -1,32 +1,92 @@
-"""Runs of programs in URScript: one after the other, what each says as it comes, and how it ended."""
+"""Programs in URScript: how they are read and checked, their runs one after the other, and how each ended."""
 
 import asyncio
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tvist_cli.failure import Failure, interrupted, told
-from tvist_cli.output import err, say
-from tvist_cli.scripts import named, placed
+from tvist_cli.output import err, print_json, say
 from tvist_cli.serving import compile_if_new, introduction, say_recorded, say_who_can_reach
+from tvist_controller.programs.checking import Finding, check_program
+from tvist_lab.programs.judging import Limits, Run, changes
+from tvist_lab.programs.results import Shortcoming, as_dict, summary
+from tvist_lab.programs.running import InputError, ProgramServer, run_in_lockstep
+from tvist_lab.programs.watch import ProgramWatch, Said
+from tvist_lab.words import counted
+from tvist_plant.user_file import LARGEST, UserFileError, read_text
 from tvist_protocol.errors import harmless
 from tvist_server.config import ServeConfig
+from tvist_server.ending import Ending
+from tvist_server.gateways.base import GatewayError
 from tvist_server.option_values import StartError
-
-if TYPE_CHECKING:
-    from tvist_lab.programs.baseline import Run
-    from tvist_lab.programs.expectations import Expectation
-    from tvist_lab.programs.limits import Limits, Shortcoming
-    from tvist_lab.programs.watch import ProgramWatch, Said
-    from tvist_server.server import Server
+from tvist_server.recording import RecorderError
+from tvist_server.server import Server
 
 SHOWN_EVERY = 0.1
 """Time between two changes of the progress line [s]."""
 _CLEAR = "\r\x1b[K"
 """Returns to the beginning of the terminal's line and clears it."""
+STDIN = "-"
+"""Name that stands for the standard input."""
+
+
+def named(file: Path) -> str:
+    """Return how messages call a file."""
+    return "<stdin>" if _is_stdin(file) else str(file)
+
+
+def read_script(file: Path) -> str:
+    """Read a program; `-` reads the standard input."""
+    if _is_stdin(file):
+        content = sys.stdin.buffer.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise Failure(
+                f"the standard input has more than {LARGEST >> 20} MiB: is it the right one?", code=2
+            )
+        try:
+            return content.decode()
+        except UnicodeDecodeError as error:
+            why = f"the standard input is not text in UTF-8 ({error.reason} at byte {error.start})"
+            raise Failure(why, code=2) from error
+    with told(OSError, code=2):
+        try:
+            return read_text(file, "program")
+        except UserFileError as error:
+            raise Failure(str(error), code=2) from error
+
+
+def placed(file: Path, finding: Finding) -> str:
+    """Return a finding as FILE:LINE:COLUMN: text, which editors understand."""
+    kind = "" if finding.level == "error" else f"{finding.level}: "
+    return f"{named(file)}:{finding.line}:{finding.column}: {kind}{finding.text}"
+
+
+def check_scripts(files: Sequence[Path], *, json: bool) -> None:
+    """Print what is wrong with programs."""
+    found = [(one, finding) for one in files for finding in check_program(read_script(one))]
+    errors = sum(finding.level == "error" for _, finding in found)
+    if json:
+        findings = [
+            {"file": named(one), "line": finding.line, "column": finding.column, "level": finding.level,
+             "text": finding.text}
+            for one, finding in found
+        ]  # fmt: skip
+        print_json({"ok": errors == 0, "files": len(files), "errors": errors, "findings": findings})
+    else:
+        for one, finding in found:
+            print(harmless(placed(one, finding)))
+    if errors:
+        programs = "1 program" if len(files) == 1 else f"{len(files)} programs"
+        raise Failure(f"{errors} {'error' if errors == 1 else 'errors'} in {programs}")
+
+
+def _is_stdin(file: Path) -> bool:
+    """Whether a file is the standard input; a blank before the name keeps it from being taken for an option."""
+    return str(file).strip() == STDIN
 
 
 @dataclass(frozen=True)
@@ -39,161 +99,8 @@ class Ran:
     """What it did, in a sentence."""
     failure: Failure | None = None
     """Why it has failed; None if it has not."""
-    server: "Server | None" = None
+    server: Server | None = None
     """Server of its robot; None in lockstep."""
-
-
-@dataclass(frozen=True)
-class Judged:
-    """What each run is measured by."""
-
-    limits: "Limits"
-    baseline: "Mapping[str, Run] | None" = None
-    """Earlier runs by the names of their programs; None if there is no baseline."""
-    expected: "Sequence[Expectation]" = ()
-    """What each is to leave behind."""
-
-
-def run_program(
-    file: Path,
-    text: str,
-    config: ServeConfig,
-    inputs: Sequence[str],
-    timeout: float | None,
-    judged: Judged,
-    tell: "Tell",
-) -> Ran:
-    """Run a program on a robot of its own, unless it does not compile, and judge what it did."""
-    if (refused := _checked(file, text)) is not None:
-        return refused
-    from tvist_lab.programs.account import as_dict, summary
-    from tvist_lab.programs.baseline import changes
-    from tvist_lab.programs.expectations import missed
-
-    job, lockstep = Job(file, text, inputs, timeout, tell), config.clock == "free"
-    watch, errors, server = job.in_lockstep(config) if lockstep else job.in_real_time(config)
-    tell(watch)
-    tell.clear()
-    result = {"file": named(file), "lockstep": lockstep, "recording": config.record, **as_dict(watch)}
-    found = [*judged.limits.broken(watch)]
-    elsewhere = missed(judged.expected, watch.plant)
-    changed = [] if judged.baseline is None else [*changes(judged.baseline[named(file)], result)]
-    failures = [*_ended(watch, errors), *found, *elsewhere, *changed]
-    result |= {"ok": not failures, "failures": [one.as_dict() for one in failures]}
-    failure = _failure(file, watch, errors)
-    for one in (*found, *elsewhere, *changed):
-        say(f"{named(file)}:{'' if one.line is None else f'{one.line}:'} {one.text}")
-    if failure is None and failures:
-        parts = [f"broke {_counted(found, 'limit')}"] if found else []
-        parts += [f"missed {_counted(elsewhere, 'expectation')}"] if elsewhere else []
-        parts += [f"differs from the baseline in {_counted(changed, 'point')}"] if changed else []
-        failure = Failure(f"{named(file)} {' and '.join(parts)}")
-    return Ran(result, summary(watch), failure, server)
-
-
-def _counted(found: Sequence[object], what: str) -> str:
-    from tvist_lab.words import counted
-
-    return counted(len(found), what)
-
-
-def _checked(file: Path, text: str) -> Ran | None:
-    """Say what is wrong with a program before anything is started for it; None if it can run."""
-    from tvist_controller.programs.checking import check_program
-
-    findings = check_program(text)
-    for finding in findings:
-        say(placed(file, finding))
-    errors = [finding for finding in findings if finding.level == "error"]
-    if not errors:
-        return None
-    first = {"line": errors[0].line, "column": errors[0].column, "text": errors[0].text}
-    failures = [{"kind": "compile_error", "line": one.line, "text": one.text} for one in errors]
-    result = {"file": named(file), "ok": False, "exit_reason": "compile_error", "error": first}
-    why = f"{named(file)} cannot run: it has {_counted(errors, 'error')}"
-    return Ran({**result, "failures": failures}, failure=Failure(why))
-
-
-def _ended(watch: "ProgramWatch", errors: list[str]) -> "list[Shortcoming]":
-    """What failed apart from limits and baseline: the program itself, or its recording."""
-    from tvist_lab.programs.limits import Shortcoming
-
-    found = [Shortcoming("recording", error) for error in errors]
-    if watch.reason != "finished":
-        line = None if watch.error is None else watch.error.line
-        found.insert(0, Shortcoming(watch.reason or "", watch.why or "", line))
-    return found
-
-
-def _failure(file: Path, watch: "ProgramWatch", errors: list[str]) -> Failure | None:
-    """Why the run itself has failed; None if it has not."""
-    after = f"after {watch.seconds:.3f} s of robot time"
-    match watch.reason:
-        case "finished":
-            return Failure("; ".join(errors)) if errors else None
-        case "runtime_error" if watch.error is not None:
-            say(f"{named(file)}:{watch.error.line}:{watch.error.column}: {watch.error.text}")
-            return Failure(f"{named(file)} ended with an error {after}")
-        case "signal" if watch.why is not None and watch.why.startswith("SIGINT"):
-            return interrupted(f"{named(file)} had run for {watch.seconds:.1f} s of robot time")
-    return Failure(f"{named(file)} failed {after}: {watch.why}")
-
-
-class Job:
-    """A program to run, and whom to tell."""
-
-    def __init__(
-        self, file: Path, text: str, inputs: Sequence[str], timeout: float | None, tell: "Tell"
-    ) -> None:
-        self.file, self.text, self.inputs, self.timeout, self.tell = file, text, inputs, timeout, tell
-
-    def in_lockstep(self, config: ServeConfig) -> "tuple[ProgramWatch, list[str], None]":
-        """Run it in this process; return what was observed, and errors of the recording."""
-        from tvist_lab.programs.in_lockstep import run_in_lockstep
-        from tvist_lab.programs.start import InputError
-        from tvist_server.recording import RecorderError
-
-        errors: list[str] = []
-        with told(StartError, InputError, code=2):
-            setup = config.setup()
-            compile_if_new()
-            with told(RecorderError):
-                watch = run_in_lockstep(
-                    setup,
-                    self.text,
-                    self.inputs,
-                    record=None if config.record is None else Path(config.record),
-                    timeout=self.timeout,
-                    attend=self.tell,
-                    on_record_error=errors.append,
-                )
-        if config.record is not None and not errors:
-            say(f"recorded into {config.record}")
-        return watch, errors, None
-
-    def in_real_time(self, config: ServeConfig) -> "tuple[ProgramWatch, list[str], Server]":
-        """Serve a robot that runs it; return what was observed, errors of the recording, and the server."""
-        from tvist_lab.programs.in_real_time import ProgramServer
-        from tvist_lab.programs.start import InputError
-        from tvist_server.ending import Ending
-        from tvist_server.gateways.base import GatewayError
-        from tvist_server.recording import RecorderError
-
-        ending = Ending()
-        with told(StartError, InputError, code=2), told(GatewayError, RecorderError), ending.at_once():
-            served = ProgramServer(config, self.text, self.inputs, ending, self.timeout, compile_if_new)
-        server = served.server
-
-        def ready() -> None:
-            setups = [robot.setup for robot in server.robots]
-            told_of = introduction(setups, config.profile_in_force)
-            say(f"{told_of} {config.place} while {named(self.file)} runs")
-
-        say_who_can_reach(server, config, 1)
-        asyncio.run(served.run(ready, self.tell))
-        ending.close()
-        self.tell.clear()
-        return served.watch, say_recorded(server.recordings), server
 
 
 class Tell:
@@ -209,7 +116,7 @@ class Tell:
         """Which of several programs it is, for the line with the progress."""
         self._shown, self._visible = 0.0, False
 
-    def __call__(self, watch: "ProgramWatch") -> None:
+    def __call__(self, watch: ProgramWatch) -> None:
         """Print what is new."""
         while watch.news:
             said = watch.news.popleft()
@@ -233,7 +140,7 @@ class Tell:
             self._visible = False
 
 
-def _print(said: "Said") -> None:
+def _print(said: Said) -> None:
     """Print a message on stdout, a warning on stderr."""
     match said.kind:
         case "text":
@@ -243,3 +150,121 @@ def _print(said: "Said") -> None:
             print(harmless(f"popup{level}: {said.title}: {said.text}"), flush=True)
         case "warning":
             say(f"warning: {said.text}")
+
+
+@dataclass(frozen=True)
+class Runner:
+    """Runs programs, each on a robot of its own, and judges what they did."""
+
+    config: ServeConfig
+    inputs: Sequence[str]
+    timeout: float | None
+    limits: Limits
+    baseline: Mapping[str, Run] | None
+    """Earlier runs by the names of their programs; None if there is no baseline."""
+    tell: Tell
+
+    def run(self, file: Path, text: str) -> Ran:
+        """Run a program, unless it does not compile."""
+        if (refused := _refused(file, text)) is not None:
+            return refused
+        lockstep = self.config.clock == "free"
+        errors, server = list[str](), None
+        with told(StartError, InputError, code=2), told(GatewayError, RecorderError):
+            if lockstep:
+                watch = self._in_lockstep(text, errors)
+            else:
+                watch, server = self._in_real_time(file, text, errors)
+        self.tell(watch)
+        self.tell.clear()
+        result = {
+            "file": named(file), "lockstep": lockstep, "recording": self.config.record, **as_dict(watch)
+        }  # fmt: skip
+        broken, missed = [*self.limits.broken(watch)], self.limits.missed(watch.plant)
+        changed = [] if self.baseline is None else [*changes(self.baseline[named(file)], result)]
+        failures = [*_ended(watch, errors), *broken, *missed, *changed]
+        result |= {"ok": not failures, "failures": [asdict(one) for one in failures]}
+        failure = _failure(file, watch, errors)
+        for one in (*broken, *missed, *changed):
+            say(f"{named(file)}:{'' if one.line is None else f'{one.line}:'} {one.text}")
+        if failure is None and failures:
+            parts = [f"broke {counted(len(broken), 'limit')}"] if broken else []
+            parts += [f"missed {counted(len(missed), 'expectation')}"] if missed else []
+            parts += [f"differs from the baseline in {counted(len(changed), 'point')}"] if changed else []
+            failure = Failure(f"{named(file)} {' and '.join(parts)}")
+        return Ran(result, summary(watch), failure, server)
+
+    def _in_lockstep(self, text: str, errors: list[str]) -> ProgramWatch:
+        """Run a program in this process; `errors` are those of the recording."""
+        record = self.config.record
+        with told(code=2):
+            setup = self.config.setup()
+        compile_if_new()
+        watch = run_in_lockstep(
+            setup,
+            text,
+            self.inputs,
+            record=None if record is None else Path(record),
+            timeout=self.timeout,
+            attend=self.tell,
+            on_record_error=errors.append,
+        )
+        if record is not None and not errors:
+            say(f"recorded into {record}")
+        return watch
+
+    def _in_real_time(self, file: Path, text: str, errors: list[str]) -> tuple[ProgramWatch, Server]:
+        """Serve a robot that runs a program; `errors` are those of the recording."""
+        config, ending = self.config, Ending()
+        with ending.at_once():
+            served = ProgramServer(config, text, self.inputs, ending, self.timeout, compile_if_new)
+        server = served.server
+
+        def ready() -> None:
+            listens = introduction([robot.setup for robot in server.robots], config.profile_in_force)
+            say(f"{listens} {config.place} while {named(file)} runs")
+
+        say_who_can_reach(server, config, 1)
+        asyncio.run(served.run(ready, self.tell))
+        ending.close()
+        self.tell.clear()
+        errors += say_recorded(server.recordings)
+        return served.watch, server
+
+
+def _refused(file: Path, text: str) -> Ran | None:
+    """Say what is wrong with a program before anything is started for it; None if it can run."""
+    findings = check_program(text)
+    for finding in findings:
+        say(placed(file, finding))
+    errors = [finding for finding in findings if finding.level == "error"]
+    if not errors:
+        return None
+    first = {"line": errors[0].line, "column": errors[0].column, "text": errors[0].text}
+    failures = [{"kind": "compile_error", "line": one.line, "text": one.text} for one in errors]
+    result = {"file": named(file), "ok": False, "exit_reason": "compile_error", "error": first}
+    why = f"{named(file)} cannot run: it has {counted(len(errors), 'error')}"
+    return Ran({**result, "failures": failures}, failure=Failure(why))
+
+
+def _ended(watch: ProgramWatch, errors: list[str]) -> list[Shortcoming]:
+    """What failed apart from limits and baseline: the program itself, or its recording."""
+    found = [Shortcoming("recording", error) for error in errors]
+    if watch.reason != "finished":
+        line = None if watch.error is None else watch.error.line
+        found.insert(0, Shortcoming(watch.reason or "", watch.why or "", line))
+    return found
+
+
+def _failure(file: Path, watch: ProgramWatch, errors: list[str]) -> Failure | None:
+    """Why the run itself has failed; None if it has not."""
+    after = f"after {watch.seconds:.3f} s of robot time"
+    match watch.reason:
+        case "finished":
+            return Failure("; ".join(errors)) if errors else None
+        case "runtime_error" if watch.error is not None:
+            say(f"{named(file)}:{watch.error.line}:{watch.error.column}: {watch.error.text}")
+            return Failure(f"{named(file)} ended with an error {after}")
+        case "signal" if watch.why is not None and watch.why.startswith("SIGINT"):
+            return interrupted(f"{named(file)} had run for {watch.seconds:.1f} s of robot time")
+    return Failure(f"{named(file)} failed {after}: {watch.why}")

@@ -10,6 +10,7 @@ from msgspec.structs import FieldInfo, fields
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.misuse import lower
+from tvist_cli.offered import PLANTS, PROFILES, ROBOTS, SHAPERS, WORLDS
 from tvist_protocol.schema import field_docs
 from tvist_server.config import ServeConfig, from_mapping
 from tvist_server.option_values import StartError, read_start_file
@@ -34,6 +35,9 @@ _BOX_OF = {
     for box in [Group.create_ordered(name)]
     for field in inside.split()
 }
+_OFFERED = {"robot": ROBOTS, "robots": ROBOTS, "shaper": SHAPERS, "plant": PLANTS, "world": WORLDS,
+            "profile": PROFILES}  # fmt: skip
+"""What a shell offers for the value of an option."""
 _IN_ANY_CASE = ("profile", "shaper", "clock")
 
 
@@ -89,9 +93,8 @@ def _option(field: FieldInfo) -> inspect.Parameter:
     # What a profile may switch on can be switched off.
     negative = f"--no-{name}" if read is bool and kind is not may_be else ()
     about = Parameter(name=f"--{name}", negative=negative, help=_help(field), group=_BOX_OF[field.name])
-    return inspect.Parameter(
-        field.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[read | None, about]
-    )
+    annotation = Annotated[read | None, _OFFERED.get(field.name, Parameter()), about]
+    return inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 
 def _help(field: FieldInfo) -> str:

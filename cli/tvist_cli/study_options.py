@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from tvist_cli.offered import COMPARED, PLANTS, ROBOTS
+
 SEVERAL = Parameter(consume_multiple=True)
 NAMES = ("moves", "bench", "robustness", "match")
 """Names of the studies that come with the package."""
@@ -20,13 +22,13 @@ class StudyOptions:
     """Number of random moves: over the workspace, 30 to 100 % of the way between two configurations, free
     of collisions. Or a JSON file with a list of maps with start and target, one angle per joint, and
     optionally payload in kg."""
-    shapers: Annotated[list[str] | None, SEVERAL] = None
-    """Names that tvist shapers or docs/reference/shaperbench.md list; FILE.py:NAME, which runs that file,
+    shapers: Annotated[list[str] | None, COMPARED, SEVERAL] = None
+    """Names that tvist shapers lists, or of simpler methods such as fixed_ei2; FILE.py:NAME, which runs that file,
     for a shaper of your own; or FILE.py with a class that has step(q_ref, info) -> q_star, and optionally
     reset(q) and delay in s [moves: zv; bench and robustness: those of the documentation's page]."""
     baselines: bool = False
     """Make the moves by the study's baselines, too, as it does if no shapers are named."""
-    plants: Annotated[list[str] | None, SEVERAL] = None
+    plants: Annotated[list[str] | None, PLANTS, SEVERAL] = None
     """With moves and match, arms with something that the controller does not know, such as stribeck,
     hysteresis, torsion, base, backlash, combined, springs-30 or springs+30 [moves: the arm as described;
     match: these]."""
@@ -36,7 +38,7 @@ class StudyOptions:
     payload: Annotated[list[float] | None, SEVERAL] = None
     """Mass of the disc on the flange in kg, both carried and declared; of two, each move has one between them
     [0 and the arm's rating]."""
-    robot: str = "ur5e"
+    robot: Annotated[str, ROBOTS] = "ur5e"
     """Name of a robot that comes with the package, or path of a robot file; with bench, if it is not ur5e,
     the two arms whose motors stick are left out."""
     calibration: str | None = None

@@ -17,6 +17,7 @@ from tvist_cli.output import out, print_json, progress, say, table, typed, words
 from tvist_cli.study_asked import preset_study, swept
 from tvist_cli.study_options import StudyOptions
 from tvist_cli.studying import check_range
+from tvist_lab.figures import house_style
 from tvist_lab.report import study_figures, study_page
 from tvist_lab.runners import processes as some_processes
 from tvist_lab.study import engine
@@ -65,14 +66,15 @@ def run(
     places.look.check(places.figures, places.report, options.save_moves)
     study = _study(name, file, options)
     result = _ran(study, places.rows, executor)
-    drawn = study_figures(result) if places.figures or places.report else {}
     with told(OSError):
         if places.rows is not None:
             write_json(places.rows / "result.json", result.values)
         if places.report is not None:
-            write_report(places.report, study_page(result, drawn, typed()))
-        if places.figures is not None:  # last, since a style changes the figures
-            write(places.look.into(places.figures), {name: figure for name, (figure, _) in drawn.items()})
+            with house_style():
+                write_report(places.report, study_page(result, study_figures(result), typed()))
+        if places.figures is not None:
+            with places.look.into(places.figures) as save:
+                write(save, {name: figure for name, (figure, _) in study_figures(result).items()})
     _tell(result, json=json)
 
 

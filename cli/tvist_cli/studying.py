@@ -59,17 +59,20 @@ class Places:
         draw: Callable[[], Figures] | None = None,
         web_page: "Callable[[Figures], Page] | None" = None,
     ) -> None:
-        """Write a result to all places."""
+        """Write a result to all places; figures are drawn in the style that is set then."""
         with told(OSError):
             if self.output is not None:
                 write_json(self.output, result)
-            if draw is None or self.figures is self.report is None:
+            if draw is None:
                 return
-            drawn = draw()
             if self.report is not None and web_page is not None:
-                write_report(self.report, web_page(drawn))
-            if self.figures is not None:  # last, since a style changes the figures
-                write(self.look.into(self.figures), drawn)
+                from tvist_lab.figures import house_style
+
+                with house_style():
+                    write_report(self.report, web_page(draw()))
+            if self.figures is not None:
+                with self.look.into(self.figures) as save:
+                    write(save, draw())
 
 
 def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, json: bool) -> None:

@@ -8,14 +8,18 @@ app = marimo.App(app_title="1: What changes with the pose")
 with app.setup:
     import marimo as mo
     import numpy as np
+    from matplotlib import rcParams
 
     from tvist_controller.api.line import estimator_of, load_calibration
+    from tvist_lab.figures import house_settings
     from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, note, panels, title
     from tvist_lab.studies.paper.published import pose
     from tvist_lab.study.menus import names
     from tvist_lab.workspace import identified, ranges
     from tvist_plant.description import load
     from tvist_shaping import residual, shaper
+
+    rcParams.update(house_settings())
 
 
 @app.cell(hide_code=True)

@@ -10,8 +10,10 @@ with app.setup:
 
     import marimo as mo
     import numpy as np
+    from matplotlib import rcParams
 
     from tvist_controller.api.line import OwnShaper, load_calibration
+    from tvist_lab.figures import house_settings
     from tvist_lab.figures.style import INK, SHAPED, THIRD, UNSHAPED, legend, panels
     from tvist_lab.study.case import Case
     from tvist_lab.study.menus import names
@@ -21,6 +23,8 @@ with app.setup:
     from tvist_lab.study.work import Job, measure
     from tvist_plant.description import load
     from tvist_shaping import Impulses, ShapingError, residual, shaper, shaper_of
+
+    rcParams.update(house_settings())
 
 
 @app.cell(hide_code=True)

@@ -17,18 +17,27 @@ import signal
 import socket
 import sys
 import threading
+from collections.abc import Callable
 from typing import Any
 
+from tvist_controller.controller import Controller
+from tvist_controller.instruments.report import Sink
 from tvist_controller.sources.own_plants import load_plant
+from tvist_plant.plant import PERIOD
 from tvist_plant.variants import Variant
+from tvist_protocol.commands import Command, ReleaseControl, TakeControl
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.programs import ProgramLoad
+from tvist_protocol.replies import Accepted, Refused, Reply
+from tvist_protocol.simulation import SimulationInject
+from tvist_protocol.stream import Event, State
 from tvist_server.config import from_mapping
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
 from tvist_server.robot import ServedRobot
 from tvist_server.server import Server
 from tvist_server.ur_ports import UrPorts
-from tvist_testing.preparation import Preparation
-from tvist_testing.wanted import WantedRobot
+from tvist_testing.wanted import WantedFault, WantedRobot
 
 LOOK = 0.05
 """Time between two looks at whether the last client has gone [s]."""
@@ -36,15 +45,98 @@ COMPLETING = 20.0
 """Longest wait for the end of the recording [s]."""
 ATTEMPTS = 50
 """Number of ports or addresses to try, since another process may take one just before the robot listens there."""
+CLIENT = "tvist_testing"
+"""Name under which faults are injected while nobody else has control."""
+log = logging.getLogger("robot")
+
+
+class Preparation:
+    """Prepares one robot."""
+
+    def __init__(self, wanted: WantedRobot) -> None:
+        self._wanted = wanted
+        self._later = sorted(
+            (fault for fault in wanted.faults if fault.after > 0.0), key=lambda one: one.after
+        )
+        self._controller: Controller | None = None
+        self._post: Callable[[Callable[[], None]], None] | None = None
+        self._request: Callable[[Command], Reply] | None = None
+
+    def observe(self, controller: Controller) -> Sink:
+        """Return the observer of the robot's messages; the server calls this."""
+        self._controller = controller
+        return _Observer(self)
+
+    def on(self, robot: ServedRobot) -> None:
+        """Do what comes before the first tick."""
+        self._post, self._request = robot.driven.post, robot.request
+        if self._wanted.program is not None:
+            name, text = self._wanted.program
+            _accepted(robot.request(ProgramLoad(name=name, text=text)))
+        for fault in self._wanted.faults:
+            if fault.after == 0.0:
+                self._inject(fault)
+
+    def tick(self, tick: int) -> None:
+        """Inject the faults that are due after a tick; called in the controller's thread."""
+        while self._later and tick * PERIOD >= self._later[0].after - 0.5 * PERIOD:
+            fault = self._later.pop(0)
+            assert self._post is not None
+            self._post(lambda fault=fault: self._inject_or_say(fault))  # type: ignore[misc]
+
+    def _inject_or_say(self, fault: WantedFault) -> None:
+        try:
+            self._inject(fault)
+        except RefusedError as error:
+            log.warning("the fault %s was refused: %s", fault.fault, error)
+
+    def _inject(self, fault: WantedFault) -> None:
+        assert self._controller is not None
+        assert self._request is not None
+        lease = self._controller.session.lease
+        token, borrowed = ("", True) if lease is None else (lease.token, False)
+        if borrowed:
+            reply = _accepted(self._request(TakeControl(client=CLIENT, lease_s=60.0)))
+            assert isinstance(reply, Accepted)
+            assert reply.token is not None
+            token = reply.token
+        _accepted(
+            self._request(
+                SimulationInject(
+                    token=token,
+                    fault=fault.fault,
+                    joint=fault.joint,
+                    seconds=fault.seconds,
+                    value=fault.value,
+                )
+            )
+        )
+        if borrowed:
+            _accepted(self._request(ReleaseControl(token=token)))
+
+
+class _Observer(Sink):
+    """Writes events into the log, and lets the preparation see each tick."""
+
+    def __init__(self, preparation: Preparation) -> None:
+        self._preparation = preparation
+
+    def event(self, event: Event) -> None:
+        why = f": {event.why}" if event.why else ""
+        log.info("tick %d: %s%s", event.tick, event.kind, why)
+
+    def state(self, state: State) -> None:
+        self._preparation.tick(state.tick)
+
+
+def _accepted(reply: Reply) -> Reply:
+    if isinstance(reply, Refused):
+        raise RefusedError(reply)
+    return reply
 
 
 def serve(wanted: WantedRobot, connection: socket.socket) -> int:
-    """Serve a robot until the test's process wants it to end; return the exit code of this process.
-
-    Args:
-        wanted: The robot.
-        connection: Socket to the test's process.
-    """
+    """Serve a robot until the test's process wants it to end; return the exit code of this process."""
     _log_into(wanted.log)
     ending = Ending()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the test's process is to hear it, and then ends this one

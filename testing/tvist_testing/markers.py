@@ -131,11 +131,7 @@ def described() -> list[str]:
 
 
 def combined(item: "pytest.Item") -> Part:
-    """Return what all markers of a test say together; of equal markers the nearest counts, but faults add up.
-
-    Raises:
-        MarkerError: A marker has arguments that it cannot have.
-    """
+    """Return what all markers of a test say together; of equal markers the nearest counts, but faults add up."""
     found: Part = {}
     injected: list[WantedFault] = []
     for name, function in MARKERS.items():

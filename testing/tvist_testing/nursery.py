@@ -9,22 +9,19 @@ close, and so the nursery and all its robots end.
 """
 
 import gc
-import json
 import os
 import signal
 import socket
 import sys
+
+import msgspec
 
 LONGEST = 4 << 20
 """Longest description of a robot [bytes]; its program may have a million characters."""
 
 
 def main(number: int) -> None:
-    """Make robots until the socket closes.
-
-    Args:
-        number: File descriptor of the socket.
-    """
+    """Make robots until the socket closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Control+C ends the test's process, and with it this one
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that no robot stays behind as a zombie
     warm_up()
@@ -82,7 +79,7 @@ def _become_robot(line: bytes, descriptor: int) -> None:
     code = 1
     try:
         with socket.socket(fileno=descriptor) as connection:
-            code = serve(WantedRobot.from_builtins(json.loads(line)), connection)
+            code = serve(msgspec.json.decode(line, type=WantedRobot), connection)
     finally:
         sys.stderr.flush()
         # Without the clean-up of the interpreter, which belongs to the process that was forked.

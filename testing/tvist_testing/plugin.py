@@ -13,8 +13,7 @@ import pytest
 
 if TYPE_CHECKING:
     from tvist_testing.fixture_robot import FixtureRobot, UrRobot
-    from tvist_testing.kept import RobotOfTest
-    from tvist_testing.serving import Serving
+    from tvist_testing.serving import RobotOfTest, Serving
 
 _ROBOTS = pytest.StashKey[list["RobotOfTest"]]()
 _SERVING = pytest.StashKey["Serving"]()

@@ -11,6 +11,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Self
 
+import msgspec
+
 from tvist_testing.wanted import WantedRobot
 
 PATIENCE = 300.0
@@ -108,18 +110,14 @@ class Robots:
         self._served: list[ServedRobot] = []
 
     def serve(self, wanted: WantedRobot) -> ServedRobot:
-        """Serve a robot; return it when it answers.
-
-        Raises:
-            CannotServeError: The robot cannot be served as wanted, or not on this machine.
-        """
+        """Serve a robot; return it when it answers."""
         if self._requests is None or (self._process is not None and self._process.poll() is not None):
             self._start()
         assert self._requests is not None
         ours, theirs = socket.socketpair()
         ours.settimeout(PATIENCE)
         with theirs:
-            line = json.dumps(wanted.to_builtins()).encode() + b"\n"
+            line = msgspec.json.encode(wanted) + b"\n"
             sent = socket.send_fds(self._requests, [line], [theirs.fileno()])
             self._requests.sendall(line[sent:])
         told = _line(ours)

@@ -1,7 +1,10 @@
-"""Robots for one session of tests: from a test's markers to a robot that is ready to be read."""
+"""Robots for one session of tests: from a test's markers to a robot, and what remains of a failed test."""
 
 import itertools
 import json
+import re
+import shutil
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -10,9 +13,8 @@ import pytest
 from tvist_protocol.errors import TvistError
 from tvist_server.own_folder import OwnFolder
 from tvist_testing.fixture_robot import FixtureRobot
-from tvist_testing.kept import RobotOfTest, folder_of
 from tvist_testing.markers import MarkerError, combined
-from tvist_testing.robots import CannotServeError, Robots
+from tvist_testing.robots import CannotServeError, Robots, ServedRobot
 from tvist_testing.wanted import WantedRobot
 
 NAME = "ur5e"
@@ -20,15 +22,76 @@ NAME = "ur5e"
 MOST = 100
 """Largest number of robots of a test."""
 R = TypeVar("R", bound=FixtureRobot)
+LONGEST_NAME = 120
+"""Longest name of a test's folder [characters]."""
+LOG_LINES = 10
+"""Number of lines of the log that a report shows."""
+
+
+@dataclass
+class RobotOfTest:
+    """A robot of a test, which may have ended.
+
+    Attributes:
+        served: The robot.
+        recording: File that it records into, in a folder that goes with the test.
+        log: File that it logs into, beside the recording.
+        kept: Folder that both are moved to if the test fails.
+        seed: Its seed.
+    """
+
+    served: ServedRobot
+    recording: Path
+    log: Path
+    kept: Path
+    seed: int
+
+    def keep(self) -> None:
+        """End the robot in order, and move its files to where they remain."""
+        self.served.close()
+        self.kept.mkdir(parents=True, exist_ok=True)
+        for file in (self.recording, self.log):
+            if file.exists():
+                (self.kept / file.name).unlink(missing_ok=True)
+                shutil.move(file, self.kept / file.name)
+
+    def discard(self) -> None:
+        """End the robot at once, and remove its files."""
+        self.served.discard()
+        for file in (self.recording, self.log):
+            file.unlink(missing_ok=True)
+
+    def properties(self) -> list[tuple[str, str]]:
+        """Names and values for JUnit."""
+        return [
+            ("tvist_recording", str(self.kept / self.recording.name)),
+            ("tvist_log", str(self.kept / self.log.name)),
+            ("tvist_seed", str(self.seed)),
+        ]
+
+    def described(self) -> str:
+        """Return what a report says about the robot of a failed test."""
+        recording = self.kept / self.recording.name
+        lines = [
+            f"recording: {recording}",
+            f"log:       {self.kept / self.log.name}",
+            f"seed:      {self.seed}",
+            f"next:      tvist log analyze {recording}; tvist log replay {recording}",
+        ]
+        try:
+            told = self.log.read_text(encoding="utf-8", errors="replace").splitlines()
+        except OSError:
+            told = []
+        return "\n".join([*lines, *(["its log ends with:", *told[-LOG_LINES:]] if told else [])])
+
+
+def folder_of(nodeid: str) -> str:
+    """Return the name of the folder for a test, which says which test it is."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", nodeid).strip("-")[-LONGEST_NAME:]
 
 
 class Serving:
-    """Makes robots.
-
-    Args:
-        kept: Folder for recordings and logs of failed tests.
-        seed: Seed of robots whose tests have no marker for it.
-    """
+    """Makes robots."""
 
     def __init__(self, kept: Path, seed: int) -> None:
         self._own = OwnFolder()
@@ -42,37 +105,21 @@ class Serving:
         self._robots.close()
         self._own.close()
 
-    def robot(self, kind: type[R], item: pytest.Item, *, ur: bool = False) -> tuple[R, RobotOfTest]:
-        """Make a test's robot; a robot that cannot be made fails the test with one sentence.
-
-        Args:
-            kind: Class of its client.
-            item: The test.
-            ur: Whether UR's interfaces are open, and time is real.
-        """
-        return self._made(kind, item, NAME, 0, ur=ur)
-
     def robots(
         self, kind: type[R], item: pytest.Item, count: int, before: int
     ) -> list[tuple[R, RobotOfTest]]:
-        """Make several robots of a test.
-
-        Args:
-            kind: Class of their clients.
-            item: The test.
-            count: Number of robots.
-            before: Number of robots that the test has already.
-        """
+        """Make several robots of a test."""
         if not isinstance(count, int) or not 1 <= count <= MOST - before:
             pytest.fail(
                 f"tvist_robots({count!r}): the number of a test's robots is 1 to {MOST}", pytrace=False
             )
         numbers = range(before, before + count)
-        return [self._made(kind, item, f"{NAME}-{number + 1}", number) for number in numbers]
+        return [self.robot(kind, item, f"{NAME}-{number + 1}", number) for number in numbers]
 
-    def _made(
-        self, kind: type[R], item: pytest.Item, name: str, number: int, *, ur: bool = False
+    def robot(
+        self, kind: type[R], item: pytest.Item, name: str = NAME, number: int = 0, *, ur: bool = False
     ) -> tuple[R, RobotOfTest]:
+        """Make a robot of a test; one that cannot be made fails the test with one sentence."""
         folder = self._own.path / str(next(self._numbers))
         folder.mkdir()
         recording, log = folder / f"{name}.mcap", folder / f"{name}.log"

@@ -84,7 +84,7 @@ def test_each_figure_of_what_is_computed_comes_with_its_reference(capsys):
 
 @pytest.mark.nightly
 @pytest.mark.realtime
-@pytest.mark.parametrize("part", ["reader", "rtde", "lateness", "bridge"])
+@pytest.mark.parametrize("part", ["rtde", "lateness", "bridge"])
 def test_the_parts_that_serve_robots_measure_something(part, capsys):
     assert main(["--only", part, "--seconds", "2", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)

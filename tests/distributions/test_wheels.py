@@ -199,7 +199,7 @@ class TestExtras:
     @pytest.mark.parametrize("version", PYTHONS)
     def test_the_laboratory_measures(self, fresh, version, tmp_path):
         python = fresh("tvist[lab]", version)
-        run(python, "-m", "tvist_cli", "paper", "--runs", "1", "--no-baselines", cwd=tmp_path)
+        run(python, "-m", "tvist_cli", "demo", "--runs", "1", "--no-baselines", cwd=tmp_path)
 
     @pytest.mark.parametrize("version", PYTHONS)
     def test_the_view_draws(self, fresh, version):

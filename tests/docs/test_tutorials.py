@@ -142,9 +142,9 @@ def until(sign, *words, cwd):
         assert process.wait() in (0, 130)
 
 
-@pytest.mark.parametrize("command", [name for name in EXAMPLES if name not in ("demo", "serve")])
+@pytest.mark.parametrize("command", [name for name in EXAMPLES if name != "serve"])
 def test_the_example_works(command, place, request):
-    """Those of `serve` and `demo` are run by the fixture, and by a test of the command line."""
+    """That of `serve` is run by the fixture."""
     words = shlex.split(EXAMPLES[command])[1:]
     if command in SERVED:
         endpoint = request.getfixturevalue("served").endpoint

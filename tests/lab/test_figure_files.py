@@ -67,7 +67,7 @@ def make(figures, recorded, found):
         "figure_7": figures.figure_7,
         "figure_8": figures.figure_8,
         "figure_12": lambda: figures.motion_figure("Q1-Q2", *recorded),
-        "observed": lambda: figures.observed_figure("motion 1", recorded[0]),
+        "observed": lambda: figures.motion_figure("motion 1", recorded[0]),
         "figure_15": lambda: figures.figure_15("Q1-Q2", *recorded),
         "figure_16": lambda: figures.figure_16({"Q1-Q2": recorded}),
         "after_stop": lambda: figures.after_stop_figure(*recorded, "Q1-Q2"),
@@ -118,38 +118,23 @@ def named(axis):
 
 
 @pytest.fixture
-def own_style():
-    """The module of style files; what a test uses is forgotten after it."""
-    import matplotlib as mpl
+def sheet(tmp_path):
+    """A style sheet with these lines."""
 
-    from tvist_lab.figures import own_style
+    def write(*lines):
+        path = tmp_path / "mine.mplstyle"
+        path.write_text("\n".join(lines))
+        return str(path)
 
-    with mpl.rc_context():
-        yield own_style
-    own_style._OWN.clear()
-
-
-@pytest.fixture
-def set_style(own_style, tmp_path):
-    """Use a style file with these lines."""
-
-    def use(*lines):
-        (tmp_path / "mine.mplstyle").write_text("\n".join(lines))
-        return own_style.use(tmp_path / "mine.mplstyle")
-
-    return use
+    return write
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(make, set_style, name):
+def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(figures, make, sheet, name):
     columns = 2 if "two" in name else 1
-    set_style(WIDTHS[columns])
-    figure = make(name)
-    from tvist_lab.figures.files import fit
-    from tvist_lab.figures.style import width
-
-    fit(figure, width())
-    figure.draw_without_rendering()
+    with figures.house_style(sheet(WIDTHS[columns])):
+        figure = make(name)
+        figure.draw_without_rendering()
     labels = [
         axis.label.get_text()
         for panel in figure.axes
@@ -158,7 +143,7 @@ def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(make, se
         if axis.label.get_text() and not named(axis)
     ]
     assert labels
-    assert all(UNIT.search(label.replace("\n", " ")) for label in labels), labels
+    assert all(UNIT.search(label) for label in labels), labels
     for panel in figure.axes:
         assert not panel.axison or panel.get_lines() or panel.collections or panel.patches, "an empty panel"
     lines = [line for panel in figure.axes for line in panel.get_lines()]
@@ -172,88 +157,92 @@ def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(make, se
 
 
 @pytest.mark.parametrize(("columns", "millimetres"), [(1, 89.0), (2, 183.0)])
-def test_a_file_has_the_width_and_resolution_of_the_style(figures, set_style, tmp_path, columns, millimetres):
+def test_a_file_has_the_width_and_resolution_of_the_style(figures, sheet, tmp_path, columns, millimetres):
     from PIL import Image
 
-    assert set_style(WIDTHS[columns], "savefig.dpi: 120") == ()
-    with Image.open(figures.FigureFiles(tmp_path / "new").write(figures.figure_4(), "figure")) as image:
+    with figures.house_style(sheet(WIDTHS[columns], "savefig.dpi: 120")):
+        png, svg, pdf = (
+            figures.save(figures.figure_4(), tmp_path / "new" / f"figure.{suffix}")
+            for suffix in ("png", "svg", "pdf")
+        )
+    with Image.open(png) as image:
         assert image.info["dpi"] == pytest.approx((120.0, 120.0), abs=0.1)
         assert 25.4 * image.width / 120.0 == pytest.approx(millimetres, abs=0.3)
-    svg = figures.FigureFiles(tmp_path, "svg").write(figures.figure_4(), "figure").read_text()
-    assert 25.4 / 72.0 * float(re.search(r'width="([\d.]+)pt"', svg)[1]) == pytest.approx(
-        millimetres, abs=0.1
-    )
-    pdf = figures.FigureFiles(tmp_path, "pdf").write(figures.figure_4(), "figure").read_bytes()
-    box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", pdf)
+    points = re.search(r'width="([\d.]+)pt"', svg.read_text())[1]
+    assert 25.4 / 72.0 * float(points) == pytest.approx(millimetres, abs=0.1)
+    box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", pdf.read_bytes())
     assert 25.4 / 72.0 * float(box[1]) == pytest.approx(millimetres, abs=0.1)
-    assert b"/Type3" not in pdf
+    assert b"/Type3" not in pdf.read_bytes()
 
 
 @pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
 def test_equal_figures_give_equal_files(figures, tmp_path, suffix):
-    first, second = (
-        figures.save(figures.figure_4(), tmp_path / f"{name}.{suffix}").read_bytes() for name in "ab"
-    )
+    with figures.house_style():
+        first, second = (
+            figures.save(figures.figure_4(), tmp_path / f"{name}.{suffix}").read_bytes() for name in "ab"
+        )
     assert first == second
-
-
-def test_a_figure_can_be_written_twice_without_shrinking(figures, set_style, tmp_path):
-    set_style(WIDTHS[1])
-    figure = figures.figure_4()
-    for _ in range(2):
-        figures.save(figure, tmp_path / "x.png")
-    assert figure.axes[0].xaxis.label.get_fontsize() == pytest.approx(0.8 * 9.0)
 
 
 @pytest.mark.parametrize("name", ["map", "after_stop", "ring_down", "robustness"])
 def test_in_print_headings_and_explanations_are_a_text_beside_the_figure(
-    figures, make, set_style, tmp_path, name
+    figures, make, sheet, tmp_path, name
 ):
-    set_style(WIDTHS[1])
-    plain, printed = make(name), make(name)
-    headings = [panel.get_title(loc="left") for panel in plain.axes if panel.get_title(loc="left")]
-    file = figures.FigureFiles(tmp_path, style="paper").write(printed, "x")
-    caption = file.with_suffix(".txt").read_text(encoding="utf-8")
+    narrow = sheet(WIDTHS[1])
+    with figures.house_style(narrow):
+        plain = make(name)
+    headings = [panel.get_title() for panel in plain.axes if panel.get_title()]
+    explained = plain.get_supxlabel()
+    with figures.house_style("paper", narrow):
+        printed = make(name)
+        caption = figures.save(printed, tmp_path / "x.png").with_suffix(".txt").read_text(encoding="utf-8")
     shown = [text.get_text() for text in words_of(printed)]
     for place, heading in enumerate(headings):
         assert heading in caption
         assert heading not in shown
         assert len(headings) == 1 or f"{'abc'[place]}: {heading}." in caption
-    assert not any(
-        ": " in text for box in printed.legends for text in [one.get_text() for one in box.get_texts()]
-    )
-    again = file.read_bytes(), caption
-    figures.FigureFiles(tmp_path, style="paper").write(printed, "x")
-    assert (file.read_bytes(), file.with_suffix(".txt").read_text(encoding="utf-8")) == again
+    assert not printed.get_supxlabel()
+    assert all(words in caption for words in explained.split("\u2003 ") if words)
 
 
-def test_on_slides_text_and_lines_are_larger(figures, tmp_path):
-    usual, slide = figures.figure_4(), figures.figure_4()
-    figures.save(usual, tmp_path / "usual.png")
-    for _ in range(2):
-        figures.save(slide, tmp_path / "slide.png", style="slides")
-    sizes = [one.axes[0].xaxis.label.get_fontsize() for one in (usual, slide)]
-    assert sizes[1] == pytest.approx(1.4 * sizes[0])
+def test_on_slides_text_and_lines_are_larger(figures):
+    with figures.house_style():
+        usual = figures.figure_4()
+    with figures.house_style("slides"):
+        slide = figures.figure_4()
+    labels = [one.axes[0].xaxis.label.get_fontsize() for one in (usual, slide)]
+    curves = [one.axes[0].get_lines()[0].get_linewidth() for one in (usual, slide)]
+    assert labels[1] == pytest.approx(1.4 * labels[0])
+    assert curves[1] == pytest.approx(1.4 * curves[0])
 
 
-def test_a_style_file_of_matplotlib_takes_precedence(figures, set_style, tmp_path):
+def test_a_style_sheet_of_matplotlib_takes_precedence(figures, sheet):
     lines = (
         "# a journal's",
         "font.family: serif",
         "font.size: 6",
         "axes.grid: False",
-        "lines.marker: o",
+        "backend: ps",
         WIDTHS[1],
     )
-    assert set_style(*lines) == ("lines.marker",)
-    assert set_style(*lines) == (), "said once"
-    figure = figures.figure_4()
-    figures.save(figure, tmp_path / "x.png")
+    colors = "axes.prop_cycle: cycler('color', ['112233', '445566'])"
+    with figures.house_style(sheet(*lines, colors)):
+        figure = figures.figure_4()
     panel = figure.axes[0]
-    assert panel.xaxis.label.get_fontsize() == pytest.approx(6.0 * 9.0 / 8.0)
+    assert panel.xaxis.label.get_fontsize() == pytest.approx(6.0), "not made smaller, though it is narrow"
     assert panel.get_xticklabels()[0].get_fontfamily() == ["serif"]
     assert not panel.xaxis.get_gridlines()[0].get_visible()
+    assert [line.get_color() for line in panel.get_lines()][:2] == ["#112233", "#445566"]
     assert 25.4 * figure.get_figwidth() == pytest.approx(89.0, abs=0.01)
+
+
+def test_a_style_ends_with_its_block(figures):
+    import matplotlib as mpl
+
+    before = mpl.rcParams.copy()
+    with figures.house_style("paper", "slides"):
+        assert mpl.rcParams != before
+    assert mpl.rcParams == before
 
 
 @pytest.mark.parametrize(
@@ -267,13 +256,12 @@ def test_a_style_file_of_matplotlib_takes_precedence(figures, set_style, tmp_pat
         ("figure.figsize: 1, 1\n", "figure.figsize to 1: must be 2 to 40"),
     ],
 )
-def test_a_style_file_that_is_none_is_refused_in_a_sentence(own_style, tmp_path, content, words):
+def test_a_style_file_that_is_none_is_refused_in_a_sentence(figures, tmp_path, content, words):
     path = tmp_path / "bad.mplstyle"
     if content is not None:
         path.write_text(content)
-    with pytest.raises(own_style.StyleError, match=words):
-        own_style.use(path)
-    assert not own_style.own()
+    with pytest.raises(figures.StyleError, match=words), figures.house_style(str(path)):
+        pass
 
 
 @pytest.mark.parametrize("shares", [("median", "p5", "p95"), ("min", "max")])

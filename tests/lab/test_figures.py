@@ -12,7 +12,7 @@ from tvist_lab.studies.moves import example
 from tvist_shaping import SHAPERS, custom, residual
 
 TICKS = 1500
-UNSHAPED = "#D55E00"
+UNSHAPED = "#d55e00"
 MODE = ("estimated_f_d", "estimated_zeta")
 DEUTERANOPIA = np.array(
     [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
@@ -26,6 +26,12 @@ XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1
 """Of linear RGB."""
 MAIN = list(itertools.combinations(range(3), 2))
 """Pairs of the main series."""
+
+
+@pytest.fixture(autouse=True)
+def _styled(figures):
+    with figures.house_style():
+        yield
 
 
 def texts(panel):
@@ -63,9 +69,9 @@ def test_figures_12_to_14_have_the_papers_five_panels_on_one_clock(figures, reco
         "(Hz)",
         "(–)",
     ]
-    series, symbols = ([text.get_text() for text in box.get_texts()] for box in figure.legends)
-    assert series == ["Unshaped", "Shaped"]
-    assert all(any(word.startswith(symbol) for word in symbols) for symbol in ("$E$", "$f_d$", r"$\zeta$"))
+    (box,) = figure.legends
+    assert [text.get_text() for text in box.get_texts()] == ["Unshaped", "Shaped"]
+    assert all(f"{symbol}: " in figure.get_supxlabel() for symbol in ("$E$", "$f_d$", r"$\zeta$"))
     assert len(figures.motion_figure("Q1 → Q2", *recorded).axes) == 3, "a mode that is constant has no panel"
     joints = texts(figure.axes[0])
     assert len(joints) == 3
@@ -88,7 +94,8 @@ def test_figure_16_draws_no_decay_through_noise(figures, recorded, one_motion):
     assert measured(noisy, found).fitted, "its peaks look like a decay"
     figure = figures.figure_16({"Q1-Q2": (recorded[0], (noisy, found))})
     (panel,) = figure.axes
-    decays = [line for line in panel.get_lines() if line.get_linewidth() == 1.4 and len(line.get_xdata())]
+    dashed = [line for line in panel.get_lines() if line.get_linestyle() == "--" and len(line.get_xdata())]
+    decays = [line for line in dashed if line.get_linewidth() == 1.4]
     assert [line.get_color() for line in decays] == [UNSHAPED]
     assert any("fitted to noise" in text for text in texts(panel))
 
@@ -171,9 +178,9 @@ def lab(rgb):
 
 
 @pytest.mark.parametrize(("one", "other"), MAIN)
-def test_the_three_main_colours_differ_in_grey_as_they_are_printed(style, one, other):
-    colors = [style.SERIES[place].color for place in (one, other)]
-    lightness = [lab(linear(style.IN_PRINT.get(color, color)))[0] for color in colors]
+def test_the_three_main_colours_differ_in_grey_as_they_are_printed(figures, style, one, other):
+    with figures.house_style("paper"):
+        lightness = [lab(linear(style.SERIES[place].color))[0] for place in (one, other)]
     assert abs(lightness[0] - lightness[1]) > 12.0
 
 
@@ -214,5 +221,5 @@ def test_labels_of_a_logarithmic_axis_are_plain_and_of_one_size(style):
 
 
 def test_a_tint_is_between_the_colour_and_white(style):
-    assert style.tint("#000000", 0.0) == "#FFFFFF"
-    assert style.tint("#0B4A85", 1.0) == "#0B4A85"
+    assert style.tint("#000000", 0.0) == "#ffffff"
+    assert style.tint("#0b4a85", 1.0) == "#0b4a85"

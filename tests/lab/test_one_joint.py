@@ -9,8 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from tvist_controller.api.line import body, estimator_of, load_calibration, paper_payload
-from tvist_lab.one_joint.closed_form import FlexibleShoulder
-from tvist_lab.one_joint.plucks import ANGLES, MASSES, pluck, pluck_all
+from tvist_lab.one_joint import ANGLES, MASSES, FlexibleShoulder, pluck, pluck_all
 from tvist_plant.description import load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
@@ -158,9 +157,10 @@ def test_the_page_says_what_was_found(done):
 
 
 def test_figure_2_draws_the_formula_the_simulated_points_and_the_three_arms(done):
-    from tvist_lab.figures import figure_2
+    from tvist_lab.figures import figure_2, house_style
 
-    figure = figure_2(done)
+    with house_style():
+        figure = figure_2(done)
     arms, frequencies, _ = figure.axes
     words = [text.get_text() for text in arms.texts]
     assert [word for word in words if word.startswith("$q$")] == [f"$q$ = {q}°" for q in (30, 90, 150)]

@@ -10,9 +10,8 @@ from tests.own_arm import STANDS, OwnArm
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.in_process import free_setup
 from tvist_lab.metrics import amplitude, motions, tool_acceleration
-from tvist_lab.programs.account import as_dict, largest_peak, summary
-from tvist_lab.programs.in_lockstep import run_in_lockstep
-from tvist_lab.programs.start import InputError, input_command
+from tvist_lab.programs.results import as_dict, largest_peak, summary
+from tvist_lab.programs.running import InputError, input_command, run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_protocol.errors import RefusedError

@@ -1,7 +1,6 @@
 """The demonstration's last words say what its figures say, whatever those are."""
 
 import re
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -91,14 +90,9 @@ def told(tmp_path, monkeypatch, capsys):
 
     def tell(**options):
         found = report(method(0.6, 2600.0), method(0.03, 2500.0, 32.0))
-        result = SimpleNamespace(
-            report=found,
-            overview=tmp_path / "overview.png",
-            recording=Path("tvist-demo/demo.mcap"),
-            difference=None,
-            equal=True,
-        )
-        monkeypatch.setattr("tvist_lab.demo.run_demo", lambda *_: result)
+        result = SimpleNamespace(report=found, difference=None, equal=True)
+        monkeypatch.setattr("tvist_lab.studies.paper.served.serve", lambda *_: result)
+        monkeypatch.setattr(demo, "_figures", lambda *_: tmp_path / "overview.png")
         demo.demo(output=tmp_path, **options)
         return capsys.readouterr().out
 

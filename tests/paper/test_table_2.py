@@ -9,9 +9,8 @@ from tools.tables.pages import page_of
 from tvist_lab.in_process import free_setup
 from tvist_lab.metrics import motions
 from tvist_lab.studies.paper.experiment import simulate
-from tvist_lab.studies.paper.origins import ADJUSTED, origins
 from tvist_lab.studies.paper.published import MOTIONS, published
-from tvist_lab.studies.paper.report import as_dict
+from tvist_lab.studies.paper.report import ADJUSTED, as_dict, origins
 
 LEAST_REDUCTION = {"Q1-Q2": 83.0, "Q1-Q3": 76.0, "Q3-Q1": 78.0}
 

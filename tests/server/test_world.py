@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from tests.controller.robots import UR5E, Robot
 
-from tvist_lab.programs.expectations import Expectation, ExpectationError, _is_inside, missed
-from tvist_lab.programs.in_lockstep import run_in_lockstep
+from tvist_lab.programs.judging import Limits, is_inside
+from tvist_lab.programs.running import run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.plant import Shape
@@ -75,12 +75,8 @@ def test_a_program_lifts_a_box_and_its_recording_does_the_same_again(tmp_path):
     (said,) = [said.text for said in watch.said if said.text.startswith("cell")]
     assert re.fullmatch(r"cell: the gripper holds something (59|60)\.\d mm wide", said)
     assert 3.0 < watch.hardest.speed < 100.0
-    expected = [
-        Expectation.of("box in left"),
-        Expectation.of("box in nowhere"),
-        Expectation.of("ball in left"),
-    ]
-    said = [one.text for one in missed(expected, watch.plant)]
+    expected = Limits(expect=["box in left", "box in nowhere", "ball in left"])
+    said = [one.text for one in expected.missed(watch.plant)]
     assert "which is not in left" in said[0]
     assert "has no area 'nowhere': it has left" in said[1]
     assert "has no body 'ball': it has finger left, finger right, box" in said[2]
@@ -195,11 +191,11 @@ def test_a_scene_that_has_changed_is_noted_and_one_that_has_gone_is_asked_for(tm
 )
 def test_areas_contain_what_their_shape_does(kind, size, inside, outside):
     area = Shape(kind, size, (0.0,) * 6, None, (0.0,) * 4)
-    assert _is_inside(area, np.array(inside))
-    assert not _is_inside(area, np.array(outside))
+    assert is_inside(area, np.array(inside))
+    assert not is_inside(area, np.array(outside))
 
 
 def test_what_is_expected_is_said_in_one_way():
-    assert Expectation.of("box 1 in place 2") == Expectation("box 1", "place 2")
-    with pytest.raises(ExpectationError, match="must be BODY in AREA"):
-        Expectation.of("box 1")
+    Limits(expect=["box 1 in place 2"]).check()
+    with pytest.raises(ValueError, match="must be BODY in AREA"):
+        Limits(expect=["box 1"]).check()

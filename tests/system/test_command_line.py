@@ -468,10 +468,9 @@ def test_the_demonstration_replays_equal_and_its_recording_gives_the_same_figure
 
 
 def test_the_paper_in_one_run_prints_its_tables(tmp_path):
-    both = tvist("paper", "--runs", 1, "--no-baselines", "--json").assert_done().json
-    one = (
-        tvist("paper", "--robot", "ur5e_stiction", "--runs", 1, "--no-baselines", "--json").assert_done().json
-    )
+    how = ("demo", "--runs", 1, "--no-baselines", "--json")
+    both = tvist(*how).assert_done().json
+    one = tvist(*how, "--robot", "ur5e_stiction").assert_done().json
     for said in (both, one):
         keys = {"robot", "seed", "runs", "shaper", "estimator", "table_1", "table_2", "baselines", "origins"}
         assert keys <= said.keys()

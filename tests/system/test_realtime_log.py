@@ -22,8 +22,7 @@ from tvist_lab.metrics.motion import JUMP
 from tvist_lab.recordings import Recording
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.served import served
-from tvist_lab.studies.paper.experiment import run
-from tvist_lab.studies.paper.methods import SHAPED, UNSHAPED
+from tvist_lab.studies.paper.experiment import SHAPED, UNSHAPED, run
 from tvist_lab.studies.paper.published import MOTIONS
 
 EXAMPLE = Path(__file__).parents[2] / "clients/examples/02_realtime_log.py"

@@ -16,8 +16,8 @@ from tvist_protocol.generate import FOLDER as PROTOCOL
 from tvist_protocol.modes import RuntimeState
 from tvist_protocol.stream import State, Truth
 from tvist_testing import assert_residual_vibration_below, assert_settles_within, assert_within_limits
+from tvist_testing.assertions import settling, vibration
 from tvist_testing.history import History
-from tvist_testing.measures import settling, vibration
 
 TARGET = [0.5, -3.1, 0.2, -1.6, 0.0, 0.0]
 PERIOD = 0.002

@@ -4,7 +4,7 @@ import numpy as np
 from tests.view.one_mass import swing
 
 from tvist_controller.api.line import DrivenLine, respond
-from tvist_lab.one_joint.closed_form import FlexibleShoulder
+from tvist_lab.one_joint import FlexibleShoulder
 from tvist_lab.study.line import RESTING, Unchanged, point_to_point
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm

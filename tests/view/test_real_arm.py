@@ -11,7 +11,7 @@ from tvist_lab.in_process import free_setup
 from tvist_protocol.info import StopReason
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import Event
-from tvist_view.real_arm import RealArm
+from tvist_view.described import RealArm
 
 
 @pytest.fixture(scope="module")

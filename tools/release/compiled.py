@@ -39,15 +39,7 @@ Requires-Dist: llvmlite=={llvmlite}
 
 
 def compiled_wheel(dist: Path, python: str) -> Path:
-    """Compile with the packages of a folder, and put the wheel beside them.
-
-    Args:
-        dist: Folder with the wheels just built.
-        python: The Python to compile for.
-
-    Raises:
-        FailedError: Something could not be installed or compiled.
-    """
+    """Compile with the packages of a folder, and put the wheel beside them."""
     with tempfile.TemporaryDirectory(prefix="tvist-compiled-") as folder:
         versions, where, kernels = (
             Path(folder) / name for name in ("constraints.txt", "environment", "kernels")

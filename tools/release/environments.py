@@ -16,11 +16,7 @@ class FailedError(Exception):
 
 
 def run(*words: str | Path, cwd: Path, env: dict[str, str] | None = None, seconds: float = 1800) -> str:
-    """Run a program to its end, and return what it printed on stdout.
-
-    Raises:
-        FailedError: Its exit code is not 0, or it took too long.
-    """
+    """Run a program to its end, and return what it printed on stdout."""
     try:
         ended = subprocess.run(
             [str(word) for word in words],
@@ -46,11 +42,7 @@ def clean() -> dict[str, str]:
 
 
 def install(what: str, where: Path, dist: Path, versions: Path, python: str) -> None:
-    """Make an environment of a Python with what a line names, by uv where there is one.
-
-    Raises:
-        FailedError: It could not be installed, or holds a distribution of ours that is not the one built.
-    """
+    """Make an environment of a Python with what a line names, by uv where there is one."""
     run(python, "-m", "venv", "--without-pip", where, cwd=dist)
     uv = shutil.which("uv")
     at: list[str | Path] = ["--python", where / "bin" / "python"]
@@ -61,11 +53,7 @@ def install(what: str, where: Path, dist: Path, versions: Path, python: str) -> 
 
 
 def check_is_built(wheel: Path, where: Path) -> None:
-    """Check that an environment holds the files of a wheel, if it holds its distribution at all.
-
-    Raises:
-        FailedError: It holds another one, as from a package index.
-    """
+    """Check that an environment holds the files of a wheel, if it holds its distribution at all."""
     record = "-".join(wheel.name.split("-")[:2]) + ".dist-info/RECORD"
     for found in where.glob(f"lib/python*/site-packages/{wheel.name.split('-')[0]}-*.dist-info/RECORD"):
         lines = zipfile.ZipFile(wheel).read(record).decode().splitlines()

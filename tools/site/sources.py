@@ -13,14 +13,7 @@ REPOSITORY = os.environ.get("TVIST_REPOSITORY", "")
 
 
 def to_repository(text: str, start: int, end: int, path: Path) -> str:
-    """Return a page's text with a link to a file or folder that is no page changed.
-
-    Args:
-        text: Text of the page.
-        start: Where the link's target begins.
-        end: Where it ends.
-        path: The file or folder.
-    """
+    """Return a page's text with a link to a file or folder that is no page changed."""
     if REPOSITORY:
         kind = "tree" if path.is_dir() else "blob"
         address = f"{REPOSITORY}/{kind}/main/{path.relative_to(ROOT).as_posix()}"

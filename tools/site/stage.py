@@ -21,17 +21,7 @@ PICTURE = "<picture>"
 
 
 def stage(folder: Path) -> Path:
-    """Write the sources of the site and MkDocs' configuration into an empty folder.
-
-    Args:
-        folder: Folder to write; what is in it is deleted.
-
-    Returns:
-        The configuration, a file in that folder.
-
-    Raises:
-        LinkError: A page links to something that is not in the repository.
-    """
+    """Write the sources of the site and MkDocs' configuration into an empty folder."""
     shutil.rmtree(folder, ignore_errors=True)
     pages, others = collect()
     to = folder / "pages"

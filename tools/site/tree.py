@@ -30,15 +30,7 @@ def links(text: str) -> list[re.Match[str]]:
 
 
 def linked(page: Path, target: str) -> Path:
-    """Return the file or folder that a link of a page leads to; a folder with a README is that README.
-
-    Args:
-        page: File that contains the link.
-        target: Target of the link, relative to the page, without an anchor; empty for the page itself.
-
-    Raises:
-        LinkError: There is no such file, or it is outside the repository.
-    """
+    """Return the file or folder that a link of a page leads to; a folder with a README is that README."""
     path = (page.parent / target).resolve() if target else page
     if not path.is_relative_to(ROOT) or not path.exists():
         raise LinkError(f"{page.relative_to(ROOT)} links to {target}, which is no file of the repository")
@@ -46,11 +38,7 @@ def linked(page: Path, target: str) -> Path:
 
 
 def collect() -> tuple[list[Path], list[Path]]:
-    """Return what the front page and the index reach over any number of links: pages, and all other files and folders.
-
-    Raises:
-        LinkError: A link is broken.
-    """
+    """Return what the front page and the index reach over any number of links: pages, and all other files."""
     pages, others, waiting = {HOME, INDEX}, set[Path](), [HOME, INDEX]
     while waiting:
         page = waiting.pop()

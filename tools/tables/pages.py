@@ -9,8 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from tools.tables.markdown import in_markdown, markdown_table
 from tvist_lab.studies import bench, robustness
 from tvist_lab.studies.arms.about import REDUCED, SIZE, frequencies
-from tvist_lab.studies.paper.origins import MEANINGS
-from tvist_lab.studies.paper.tables import FIGURES, METHODS, beside, methods, table_2
+from tvist_lab.studies.paper.report import FIGURES, MEANINGS, METHODS, beside, methods, table_2
 from tvist_lab.study.columns import Column, across
 from tvist_lab.study.held_out import said
 
@@ -102,7 +101,7 @@ class Page:
 
 
 PAGES = {
-    "paper": Page("docs/reference/paper.md", "tvist paper --runs 10 --seed 0", _paper),
+    "paper": Page("docs/reference/paper.md", "tvist demo --runs 10 --seed 0", _paper),
     "robots": Page("docs/reference/robots.md", "tvist robots --measure --vary 50", _robots),
     "stiction": Page(
         "docs/reference/stiction.md",

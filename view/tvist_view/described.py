@@ -1,4 +1,4 @@
-"""What a tab is told of a robot: how it is described, and its state in words."""
+"""What a tab is told of a robot: how it is described, its state in words, and the way to a real arm."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from tvist_protocol.faults import FAULTS
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode, SafetyMode
-from tvist_protocol.stream import State
+from tvist_protocol.stream import Event, State
 from tvist_view.look import Look
 from tvist_view.meshes import Meshes
 
@@ -14,6 +14,12 @@ NO_TRUTH = "this robot does not tell how it bends; a simulated one tells pages o
 REAL = "a real arm does not tell how it bends"
 USUAL = ("auto", "zv")
 """Shapers of which the first that the robot has is compared with none, while none is in use."""
+MOVES = 0.05
+"""A joint of a robot that is watched moves above this [rad/s]."""
+STOPS = {"protective_stop", "safety_stop"}
+
+Step = tuple[bool, str, str]
+"""Whether it is done, what to do, and how."""
 
 
 def described(info: Info, look: Look, robots: list[str], meshes: Meshes) -> dict[str, Any]:
@@ -79,3 +85,70 @@ def _word(kind: type[RobotMode] | type[SafetyMode], number: int) -> str:
         return kind(number).name
     except ValueError:
         return str(number)
+
+
+class RealArm:
+    """What a robot at the end of the line has been seen to do since the page shows it."""
+
+    def __init__(self) -> None:
+        self._seen: set[str] = set()
+
+    def hear(self, event: Event) -> None:
+        """Note an event."""
+        self._seen.add("stop" if event.kind in STOPS else event.kind)
+
+    def compared(self) -> None:
+        """Note that a motion was compared without and with the shaper."""
+        self._seen.add("compared")
+
+    def steps(self, info: Info, state: State, io: Io | None) -> list[Step]:
+        """Return the steps of a robot that is watched or moved through its own controller; none of any other."""
+        if io is not None and io.program_state == "PLAYING":
+            self._seen.add("program")
+        if max(map(abs, state.target_qd)) > MOVES:
+            self._seen.add("moved")
+        runs = state.robot_mode == RobotMode.RUNNING
+        well = runs and state.safety_mode in {SafetyMode.NORMAL, SafetyMode.REDUCED}
+        if info.watched is not None:
+            return self._watched(info, state, well=well)
+        return [] if info.moved is None else self._moved(info, well=well)
+
+    def _watched(self, info: Info, state: State, *, well: bool) -> list[Step]:
+        there = state.robot_mode != RobotMode.DISCONNECTED
+        again = "serve it again with --enable-motion and --calibration: this page goes on with it"
+        return [
+            (there, f"Connect {info.watched}", "see that it is on, and that this machine reaches it"),
+            (well, "Release its brakes and stops", "at its teach pendant"),
+            ("moved" in self._seen, "Let it move", "by its own programs; how its tool shakes is below"),
+            _identify(info, str(info.watched)),
+            (False, "Move it from here", again),
+        ]
+
+    def _moved(self, info: Info, *, well: bool) -> list[Step]:
+        seen, cap = self._seen, max(info.limits.velocity)
+        why = info.stop.why if info.stop is not None else ""
+        checked = "model, payload, tool, mounting, remote control, angles and safety are checked"
+        by_itself = "stop its program or press its emergency stop, read here why it stands, and hold it again"
+        return [
+            (well, f"Hold {info.moved}: {checked}", why),
+            _identify(info, str(info.moved)),
+            (
+                "motion_done" in seen,
+                f"Move it: no joint turns faster than {cap:.2g} rad/s (--speed-cap)",
+                "take control, see that its way is clear, and press a motion",
+            ),
+            ("motion_stopped" in seen, "Stop it in a motion", "press STOP"),
+            ("stop" in seen and well, "Stop it at the robot", by_itself),
+            ("compared" in seen, "Compare without and with shaping", "press A/B"),
+            (
+                "program" in seen,
+                "Run your program",
+                "serve with --ur, and give it this machine's address instead",
+            ),
+        ]
+
+
+def _identify(info: Info, place: str) -> Step:
+    """The step to a calibration of its own."""
+    own = info.calibration is not None and info.calibration.shipped is False
+    return own, "Identify it", f"tvist identify --plant {place}, then serve it with --calibration"

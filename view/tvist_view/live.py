@@ -16,14 +16,7 @@ MOST_SHOWN = 8
 
 
 class LivePage:
-    """The page: each tab shows one robot, and all tabs that show a robot share its connection.
-
-    Args:
-        place: Where the robots are.
-        first: Name of the robot that a tab shows at first.
-        judge: Measures a motion without and with a shaper.
-        factor: Magnification of the bending to begin with.
-    """
+    """The page: each tab shows one robot, and all tabs that show a robot share its connection."""
 
     def __init__(self, place: Place, first: str, judge: Judge, *, factor: float = 100.0) -> None:
         self._place, self._first, self._judge = place, first, judge

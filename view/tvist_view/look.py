@@ -28,11 +28,7 @@ class Look:
     payload: Payload
 
     def __post_init__(self) -> None:
-        """Check that it can be drawn.
-
-        Raises:
-            GeometryError: The description is of an unknown version, or its lists do not fit together.
-        """
+        """Check that it can be drawn."""
         geometry = self.geometry
         if geometry.version != GEOMETRY_VERSION:
             raise GeometryError(

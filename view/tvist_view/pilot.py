@@ -92,11 +92,7 @@ class Pilot:
                 await _close(held)
 
     async def heard(self, control: str | None) -> None:
-        """Compare with who has control by the robot's word: it may have taken it away.
-
-        Args:
-            control: Client that has control; None: nobody.
-        """
+        """Compare with who has control by the robot's word: it may have taken it away."""
         if self.holder is not None and not self._changing.locked() and control != self.client:
             self._say("the robot has ended this page's control")
             await self.give_back(self.holder)
@@ -140,13 +136,7 @@ class Pilot:
         return True
 
     def jog(self, tab: int, joint: int, direction: float) -> None:
-        """Jog a joint for the next quarter of a second; call it again and again while the button is down.
-
-        Args:
-            tab: The tab whose button is down.
-            joint: Number of the joint.
-            direction: 1 or -1.
-        """
+        """Jog a joint for the next quarter of a second; call it again and again while the button is down."""
         # The page shows who has control; a sentence for each message would be too many.
         if self.holder != tab or self._arm is None:
             return
@@ -236,11 +226,7 @@ async def go(arm: Arm, q: Sequence[float]) -> None:
 
 
 def motion(poses: Sequence[Sequence[float]]) -> Doing:
-    """A motion through poses: to the first one, if the arm is not there, and on to the last.
-
-    Args:
-        poses: Joint angles of each pose [rad].
-    """
+    """A motion through poses: to the first one, if the arm is not there, and on to the last."""
 
     async def run(arm: Arm) -> None:
         for place, q in enumerate(poses):

@@ -18,13 +18,11 @@ from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import Event
 from tvist_view import asked
-from tvist_view.beside import Judge
-from tvist_view.described import described, state_in_words
-from tvist_view.doing import Doer
+from tvist_view.beside import Doer, Judge
+from tvist_view.described import RealArm, described, state_in_words
 from tvist_view.look import GeometryError, Look
 from tvist_view.meshes import Meshes
 from tvist_view.pilot import Pilot
-from tvist_view.real_arm import RealArm
 from tvist_view.signals import Running
 from tvist_view.watcher import Watcher
 
@@ -53,14 +51,7 @@ class Place:
 
 
 class ShownRobot:
-    """A robot that tabs show; it is looked for until the task is cancelled.
-
-    Args:
-        place: Where it is.
-        name: Its name.
-        judge: Measures a motion without and with a shaper.
-        meshes: Where the files of its meshes are offered to the page.
-    """
+    """A robot that tabs show; it is looked for until the task is cancelled."""
 
     def __init__(self, place: Place, name: str, judge: Judge, meshes: Meshes) -> None:
         self._place, self.name, self._judge, self._meshes = place, name, judge, meshes
@@ -130,12 +121,7 @@ class ShownRobot:
                 self._introduce(watcher)
 
     async def _shows(self, robot: Robot, info: Info) -> None:
-        """Show the robot until it has gone.
-
-        Raises:
-            ClientError: It has.
-            GeometryError: It does not tell its geometry, or in a version that is not known.
-        """
+        """Show the robot until it has gone."""
         if info.geometry is None:
             raise GeometryError(
                 f"a {info.model} on a server of version {info.version} does not tell its geometry: update the server"

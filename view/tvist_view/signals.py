@@ -79,11 +79,7 @@ def signals_of(look: Look, states: Sequence[State], truths: Mapping[int, Truth])
 
 
 class Running:
-    """The newest signals and the newest moment of a running robot, whose states and truths come in any order.
-
-    Args:
-        look: The robot.
-    """
+    """The newest signals and the newest moment of a running robot, whose states and truths come in any order."""
 
     def __init__(self, look: Look) -> None:
         self._look = look

@@ -34,12 +34,7 @@ class StageError(RuntimeError):
 
 
 class Tab:
-    """One open tab.
-
-    Args:
-        number: Its number, which no other has.
-        connection: Its connection.
-    """
+    """One open tab."""
 
     def __init__(self, number: int, connection: ServerConnection) -> None:
         self.number, self._connection = number, connection
@@ -94,9 +89,6 @@ async def open_stage(
         port: Port to listen on; 0 takes a free one.
         insecure: Serve other machines, too: whoever opens the page can move the robot.
         parts: Content of a path that the page asks for, such as a mesh; None: there is none.
-
-    Raises:
-        StageError: The port is in use, the address is not this machine's, or other machines could reach it.
     """
     if not is_local(address) and not insecure:
         raise StageError(

@@ -41,9 +41,6 @@ class Track:
         states: Its states in the order of their ticks.
         truths: Its truths; a state without one is drawn stiff.
         origin: Simulation time from which the run counts [s].
-
-    Raises:
-        TrackError: There is no state.
     """
 
     def __init__(

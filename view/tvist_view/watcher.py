@@ -1,12 +1,28 @@
 """A tab of the live page, and what it has been told."""
 
 import asyncio
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from tvist_view.pictures import NOTES_EVERY, pictures
 from tvist_view.signals import Running, after_stop
 from tvist_view.stage import Tab
+
+FRAME_S = 1.0 / 30.0
+"""Time between two pictures [s]."""
+NOTES_EVERY = 6
+"""Pictures between two looks at what the last stop was like."""
+
+
+async def pictures() -> AsyncIterator[int]:
+    """Count pictures from 0, each when it is due; a picture that comes too late delays those after it."""
+    loop = asyncio.get_running_loop()
+    count, due = 0, loop.time()
+    while True:
+        yield count
+        count += 1
+        due = max(due + FRAME_S, loop.time())
+        await asyncio.sleep(due - loop.time())
 
 
 class Watched(Protocol):

@@ -1,8 +1,9 @@
 """`tvist bench`: how many robots this machine runs, how late these are, and how fast it computes one."""
 
-from typing import Any
+from typing import Annotated, Any
 
 from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.offered import SHAPERS
 from tvist_cli.output import err, out, print_json, table, words
 
 TERMS = {
@@ -12,7 +13,7 @@ TERMS = {
 }
 
 
-def bench(*, seconds: float = 10.0, shaper: str = "zv", json: bool = False) -> None:
+def bench(*, seconds: float = 10.0, shaper: Annotated[str, SHAPERS] = "zv", json: bool = False) -> None:
     """Measure how many robots this machine runs in real time, how late they are, and how fast it computes one.
 
     The figures hold under the machine's current load. A served robot has a recorder and a client that reads every

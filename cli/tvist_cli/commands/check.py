@@ -20,6 +20,8 @@ def check(
 ) -> None:
     """Check that a served robot answers and is ready to be moved, without changing anything.
 
+    Without a name, and if there are several robots but no ur5e, it is the first, and all of them are listed.
+
     Exit code 0: it answers, ticks on time, refuses commands without control, has power, and its safety system allows
     motion.
     Exit code 1: one of these does not hold; the message says why and what to do next.

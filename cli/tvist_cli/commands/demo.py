@@ -1,78 +1,153 @@
-"""`tvist demo`: the paper's motions over the network and in real time."""
+"""`tvist demo`: the paper's experiment, on a robot served in real time or simulated as fast as possible."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import out, print_json, program, progress, words
 from tvist_cli.pages import Door
+from tvist_cli.paper_tables import print_paper
 from tvist_cli.serving import compile_if_new
-from tvist_cli.tables import print_paper
+from tvist_cli.studying import give
 from tvist_cli.tracks import MAGNIFY, recorded
+
+if TYPE_CHECKING:
+    from tvist_lab.studies.paper.served import Served
 
 PORT = 8080
 """Port of the page of --view."""
+FOLDER = Path("tvist-demo")
+"""Folder for recording and figures."""
+ANSWERED = "Q1-Q3"
+"""Motion of which the overview is drawn: on its way the arm's frequency doubles, and its vibration is seen to ring."""
 
 
 def demo(
     *,
-    output: Path = Path("tvist-demo"),
+    output: Path | None = None,
     seed: int = 0,
     tables: bool = False,
     view: bool = False,
+    runs: int | None = None,
+    robot: str | None = None,
+    calibration: str | None = None,
+    baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
     look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
-    """Serve a robot, run the paper's motions on it over Zenoh in real time, unshaped and shaped, and say what happened.
+    """Run the paper's three motions, unshaped and shaped: once over Zenoh in real time, and say what happened.
+
+    With --runs, instead simulate them as fast as possible, and print the paper's tables beside ours.
 
     Args:
-        output: Folder for the recording and the figures.
-        seed: Seed of sensor noise and gear errors.
+        output: Folder for the recording and figures 12 to 16 [tvist-demo]; with --runs, folder for figures 1 to 4, 7, 8
+            and 12 to 16 and the spectrogram of a ring-down, those of motions being the first arm's [none are drawn].
+        seed: Seed of sensor noise and gear errors; with --runs, of the first repetition.
         tables: Print the paper's tables beside those of this run as well.
         view: Show the motions afterwards on a web page, with the arm's bending drawn 100 times larger.
+        runs: Simulate as fast as possible, with this number of repetitions, each with other noise and gear errors.
+        robot: With --runs, name of a robot that comes with the package, or path of a robot file, to be the only arm
+            [ur5e, which was fitted to Table 1, and ur5e_stiction, which was tuned to Table 2 as well].
+        calibration: With --runs, name of a calibration that comes with the package, or path of a calibration file, with
+            polynomials [that of each arm]; without --robot, ur5e is then the only arm.
+        baselines: With --runs, run the baselines for comparison as well, on the first arm.
         look: How to write the figures.
         json: Print one JSON object with all results.
     """
-    files = look.into(output)
-    from tvist_lab.demo import ANSWERED, DemoError, run_demo
-    from tvist_lab.studies.paper.answer import answer, checks, terms
+    if runs is None:
+        if robot is not None or calibration is not None or not baselines:
+            raise Failure(
+                "--robot, --calibration and --no-baselines are for --runs: give it, or leave them out", code=2
+            )
+        _in_real_time(FOLDER if output is None else output, seed, look, tables=tables, view=view, json=json)
+        return
+    if view:
+        raise Failure("--view shows what was recorded in real time: leave --runs out", code=2)
+    look.check(output, option="--output")
+    if runs < 1:
+        raise Failure(f"runs is {runs}: must be at least 1", code=2)
+    from tvist_lab.in_process import free_setup
+    from tvist_lab.studies.paper.experiment import count, simulate
+    from tvist_lab.studies.paper.published import ARMS
+    from tvist_lab.studies.paper.report import as_dict
+    from tvist_server.option_values import StartError
+
+    names = ARMS if robot is calibration is None else (robot or ARMS[0],)
+    with told(StartError, code=2):
+        setups = [free_setup(robot=name, calibration=calibration, seed=seed) for name in names]
+    compile_if_new()
+    wanted = [baselines, *(False for _ in names[1:])]
+    with told(code=2), progress(sum(count(runs, baselines=one) for one in wanted), "motions") as bar:
+        arms = [
+            simulate(setup, runs=runs, seed=seed, baselines=one, progress=lambda what: bar(1, what))
+            for setup, one in zip(setups, wanted, strict=True)
+        ]
+    first, *others = map(as_dict, arms)
+    if output is not None:
+        from tvist_lab.studies.paper.drawing import draw
+
+        with told(OSError), look.into(output) as save:
+            write(save, draw(arms[0], all_figures=True))
+    give({**first, "others": others}, print_paper, json=json)
+
+
+def _in_real_time(
+    folder: Path, seed: int, look: FigureOptions, *, tables: bool, view: bool, json: bool
+) -> None:
+    look.check(folder, option="--output")
+    from tvist_lab.metrics import NotMeasurableError
+    from tvist_lab.recordings import RecordingError
     from tvist_lab.studies.paper.experiment import count
+    from tvist_lab.studies.paper.served import serve
 
     compile_if_new()
+    recording = folder / "demo.mcap"
+    errors = (RuntimeError, NotMeasurableError, RecordingError, OSError)
     with (
-        progress(count(1, baselines=False), "motions", f"the recording so far is in {output}") as bar,
-        told(DemoError, OSError),
+        progress(count(1, baselines=False), "motions", f"the recording so far is in {folder}") as bar,
+        told(*errors),
     ):
-
-        def advance(what: str) -> None:
-            bar(1, what)
-
-        result = run_demo(files, seed, advance)
+        result = serve(recording, seed, lambda what: bar(1, what))
+        overview = _figures(result, folder, look)
     if json:
         print_json(result.report)
     else:
         if tables:
             print_paper(result.report)
-        for line in answer(result.report, ANSWERED):
-            out.print(line, markup=False)
-        out.print(f"\n  look at {result.overview}", soft_wrap=True, markup=False)
-        out.print(
-            f"  ({output} also holds the paper's figures and the recording)\n", soft_wrap=True, markup=False
-        )
-        words({**terms(result.report, ANSWERED), **checks(result.report, result.difference)})
-        _print_next(result.recording)
+        _say(result, overview, recording)
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
     if view:
-        recorded(result.recording).serve(MAGNIFY, Door("127.0.0.1", PORT, insecure=False))
+        recorded(recording).serve(MAGNIFY, Door("127.0.0.1", PORT, insecure=False))
 
 
-def _print_next(recording: Path) -> None:
-    """Print four commands that work as they stand; each is one line, however narrow the terminal, to be copied."""
+def _figures(result: "Served", folder: Path, look: FigureOptions) -> Path:
+    """Draw the paper's figures and, last, one of a motion that shows the answer at a glance, whose path is returned."""
+    from tvist_lab.studies.paper.drawing import draw, overview
+
+    with look.into(folder) as save:
+        for name, figure in draw(result.done, all_figures=False).items():
+            save(figure, name)
+        return save(overview(result.done, ANSWERED), "vibration-with-and-without-shaping")
+
+
+def _say(result: "Served", overview: Path, recording: Path) -> None:
+    """Print the answer, and four commands that work as they stand, each in one line to be copied."""
+    from tvist_lab.studies.paper.answer import answer, checks, terms
+
+    for line in answer(result.report, ANSWERED):
+        out.print(line, markup=False)
+    out.print(f"\n  look at {overview}", soft_wrap=True, markup=False)
+    also = f"  ({recording.parent} also holds the paper's figures and the recording)\n"
+    out.print(also, soft_wrap=True, markup=False)
+    words({**terms(result.report, ANSWERED), **checks(result.report, result.difference)})
     name = program()
     commands = {
         f"{name} view {recording} --beside": "shows a motion without and with shaping on a web page, magnified",
-        f"{name} paper --runs 1 --no-baselines": "prints the paper's tables beside ours",
+        f"{name} demo --runs 1 --no-baselines": "prints the paper's tables beside ours",
         f"{name} serve": "starts a robot: leave it running, and in a second terminal",
         f"{name} move Q3 --shaper none": "moves it, unshaped; with --shaper zv, shaped",
     }

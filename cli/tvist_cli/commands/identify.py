@@ -292,11 +292,14 @@ def _polynomial(
     if figures is not None:
         from tvist_lab.figures import identified_figure
 
-        identification = identified_figure(
-            done.calibration, done.q, done.f_d, done.zeta, done.true_f_d, done.true_zeta
-        )
-        maps = _maps(arm, done.calibration, done.calibration.payload.mass) if place.endpoint is None else {}
-        write(look.into(figures), {"identification": identification, **maps})
+        with look.into(figures) as save:
+            identification = identified_figure(
+                done.calibration, done.q, done.f_d, done.zeta, done.true_f_d, done.true_zeta
+            )
+            maps = (
+                _maps(arm, done.calibration, done.calibration.payload.mass) if place.endpoint is None else {}
+            )
+            write(save, {"identification": identification, **maps})
     found, own = done.calibration.payload.mass, arm.payload.mass
     options = place.options if found == own else f"{place.options} --payload {found:g}"
     report_polynomial(done, output, options, json=json)
@@ -330,7 +333,8 @@ def _modal(
     done: ModalIdentification = place.calibrate(ring_downs, doing, output)
     if figures is not None:
         mass = arm.payload.mass if place.mass is None else place.mass
-        write(look.into(figures), _maps(arm, done.calibration, mass))
+        with look.into(figures) as save:
+            write(save, _maps(arm, done.calibration, mass))
     report_modal(done, output, place.options, json=json)
 
 

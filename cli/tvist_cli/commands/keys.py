@@ -1,17 +1,26 @@
 """`tvist keys`: certificates for a robot and its clients."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from tvist_cli.certificates import (
+    CertificateAuthority,
+    CertificateError,
+    Host,
+    common_name,
+    host_of,
+    hosts_of,
+    read_certificate,
+    write_new,
+)
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import out, print_json
-
-if TYPE_CHECKING:
-    from tvist_cli.certificates import CertificateAuthority, Host
-    from tvist_server.gateways.access import Role
+from tvist_client.transports import certificates as of_client
+from tvist_protocol.keys import check_robot_name
+from tvist_server.gateways.access import Role
+from tvist_server.gateways.exposure import AUTHORITY, CERTIFICATE, CLIENTS, KEY, roles_in
+from tvist_server.option_values import StartError
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 """Allowed client names. They have no dot, so that a client's folder cannot collide with the files beside it."""
@@ -50,14 +59,6 @@ def keys(
         days: Number of days that the new certificates are valid.
         json: Print one JSON object.
     """
-    try:
-        import cryptography  # noqa: F401  only here for a clear sentence
-    except ImportError as error:
-        raise Failure("keys needs the package cryptography: pip install 'tvist[server]'") from error
-    from tvist_cli.certificates import CertificateError
-    from tvist_protocol.keys import check_robot_name
-    from tvist_server.option_values import StartError
-
     if not 1 <= days <= 3650:
         raise Failure(f"days is {days}: must be 1 to 3650", code=2)
     with told(ValueError, code=2):
@@ -71,7 +72,7 @@ def keys(
                 "router": uplink or [],
             }
         )
-        hosts = _hosts(host or [])
+        hosts = tuple(dict.fromkeys(host_of(name) for name in host or []))
     with told(CertificateError, StartError, OSError):
         ring = _KeyRing(folder, days)
         ring.look(robot, hosts, asked)
@@ -87,7 +88,7 @@ def keys(
         out.print(line, soft_wrap=True, markup=False)
 
 
-def _next(folder: Path, asked: "dict[str, Role]") -> list[str]:
+def _next(folder: Path, asked: dict[str, Role]) -> list[str]:
     """Return the next steps: how to use the new files."""
     return [
         f"robot:  tvist serve --security {folder} --listen tls/ADDRESS:7447",
@@ -104,13 +105,10 @@ class _KeyRing:
     days: int
     made: list[str] = field(default_factory=list)
     kept: list[str] = field(default_factory=list)
-    roles: "dict[str, Role]" = field(default_factory=dict)
+    roles: dict[str, Role] = field(default_factory=dict)
 
-    def look(self, robot: str | None, hosts: "tuple[Host, ...]", asked: "dict[str, Role]") -> None:
+    def look(self, robot: str | None, hosts: tuple[Host, ...], asked: dict[str, Role]) -> None:
         """Check that nothing is missing and that no existing file differs from what was asked for."""
-        from tvist_cli.certificates import common_name, hosts_of, read_certificate
-        from tvist_server.gateways.exposure import AUTHORITY, CERTIFICATE, CLIENTS, roles_in
-
         there = [(self.folder / name).exists() for name in (AUTHORITY, AUTHORITY_KEY)]
         if there == [True, False]:
             why = f"{self.folder / AUTHORITY_KEY} is missing: put it back to create more certificates"
@@ -142,10 +140,8 @@ class _KeyRing:
                     f"{self.folder / name} exists but {CLIENTS} does not list {name}: use another name"
                 )
 
-    def make(self, robot: str | None, hosts: "tuple[Host, ...]", asked: "dict[str, Role]") -> None:
+    def make(self, robot: str | None, hosts: tuple[Host, ...], asked: dict[str, Role]) -> None:
         """Create the files that are missing."""
-        from tvist_server.gateways.exposure import CERTIFICATE, KEY
-
         self.folder.mkdir(parents=True, exist_ok=True)
         authority = self._authority()
         if robot is not None and not (self.folder / CERTIFICATE).exists():
@@ -155,10 +151,7 @@ class _KeyRing:
         for name, role in asked.items():
             self._client(authority, name, role)
 
-    def _authority(self) -> "CertificateAuthority":
-        from tvist_cli.certificates import CertificateAuthority
-        from tvist_server.gateways.exposure import AUTHORITY
-
+    def _authority(self) -> CertificateAuthority:
         certificate, key = self.folder / AUTHORITY, self.folder / AUTHORITY_KEY
         if certificate.exists():
             return CertificateAuthority.read(certificate, key)
@@ -167,11 +160,7 @@ class _KeyRing:
         self.made.append(f"{certificate}: authority, until {authority.until:%Y-%m-%d}")
         return authority
 
-    def _client(self, authority: "CertificateAuthority", name: str, role: "Role") -> None:
-        from tvist_cli.certificates import write_new
-        from tvist_client.transports.certificates import AUTHORITY, CERTIFICATE, KEY
-        from tvist_server.gateways import exposure
-
+    def _client(self, authority: CertificateAuthority, name: str, role: Role) -> None:
         own = self.folder / name
         if own.exists():
             self.kept.append(f"{own}: {role}")
@@ -180,14 +169,12 @@ class _KeyRing:
         if name not in self.roles:
             self._note(name, role)
         own.mkdir(mode=0o700)
-        pair.write(own / CERTIFICATE, own / KEY)
-        write_new(own / AUTHORITY, (self.folder / exposure.AUTHORITY).read_bytes(), 0o644)
+        pair.write(own / of_client.CERTIFICATE, own / of_client.KEY)
+        write_new(own / of_client.AUTHORITY, (self.folder / AUTHORITY).read_bytes(), 0o644)
         self.made.append(f"{own}: {role}, until {pair.until:%Y-%m-%d}")
 
-    def _note(self, name: str, role: "Role") -> None:
+    def _note(self, name: str, role: Role) -> None:
         """Append a line to the file of roles, which may have been edited by hand."""
-        from tvist_server.gateways.exposure import CLIENTS
-
         path = self.folder / CLIENTS
         before = path.read_text(encoding="utf-8") if path.exists() else HEAD
         gap = "" if before.endswith("\n") or not before else "\n"
@@ -195,7 +182,7 @@ class _KeyRing:
         self.roles[name] = role
 
 
-def _roles(names: "dict[Role, list[str]]") -> "dict[str, Role]":
+def _roles(names: dict[Role, list[str]]) -> dict[str, Role]:
     asked: dict[str, Role] = {}
     for role, several in names.items():
         for name in several:
@@ -208,9 +195,3 @@ def _roles(names: "dict[Role, list[str]]") -> "dict[str, Role]":
                 raise ValueError(f"{name} cannot be both {asked[name]} and {role}{more}")
             asked[name] = role
     return asked
-
-
-def _hosts(names: Sequence[str]) -> "tuple[Host, ...]":
-    from tvist_cli.certificates import host
-
-    return tuple(dict.fromkeys(host(name) for name in names))

@@ -1,10 +1,11 @@
 """`tvist move`: move a served robot to one pose."""
 
 import asyncio
-from typing import TypedDict
+from typing import Annotated, Any
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.offered import POSES, SHAPERS
 from tvist_cli.output import out, print_json, program
 from tvist_cli.poses import pose, tool_numbers
 from tvist_client.arm import Arm
@@ -17,7 +18,7 @@ BENT = "0,-1.57,1.57,-1.57,-1.57,0"
 
 
 def move(
-    target: str,
+    target: Annotated[str, POSES],
     *,
     line: bool = False,
     by: bool = False,
@@ -27,7 +28,7 @@ def move(
     acceleration: float | None = None,
     jerk: float | None = None,
     duration: float | None = None,
-    shaper: str | None = None,
+    shaper: Annotated[str | None, SHAPERS] = None,
     json: bool = False,
 ) -> None:
     """Move a served robot to a pose and print how long it took; Control+C stops the motion.
@@ -49,7 +50,7 @@ def move(
         shaper: Shaper to select before the motion.
         json: Print one JSON object.
     """
-    given = _given(velocity, acceleration, jerk, duration)
+    given = _limits(velocity=velocity, acceleration=acceleration, jerk=jerk, duration=duration)
     numbers = _numbers(target, line=line, by=by, degrees=degrees)
     held = False
 
@@ -97,31 +98,12 @@ def move(
             out.print(limited, markup=False)
 
 
-class _Limits(TypedDict, total=False):
-    """The limits or the duration that the user has set."""
-
-    velocity: float
-    acceleration: float
-    jerk: float
-    duration: float
-
-
-def _given(
-    velocity: float | None, acceleration: float | None, jerk: float | None, duration: float | None
-) -> _Limits:
-    """The limits, or the duration instead."""
-    limits = _Limits()
-    if velocity is not None:
-        limits["velocity"] = velocity
-    if acceleration is not None:
-        limits["acceleration"] = acceleration
-    if jerk is not None:
-        limits["jerk"] = jerk
-    if duration is None:
-        return limits
-    if limits:
+def _limits(**given: float | None) -> dict[str, Any]:
+    """The limits that the user has set, or the duration instead."""
+    limits = {name: value for name, value in given.items() if value is not None}
+    if "duration" in limits and len(limits) > 1:
         raise Failure(f"--{next(iter(limits))} and --duration exclude each other: give one of them", code=2)
-    return _Limits(duration=duration)
+    return limits
 
 
 def _numbers(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float, ...]:
@@ -135,7 +117,9 @@ def _numbers(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float
     return ()
 
 
-async def _line(arm: Arm, numbers: tuple[float, ...], limits: _Limits, *, by: bool, joints: int) -> Motion:
+async def _line(
+    arm: Arm, numbers: tuple[float, ...], limits: dict[str, Any], *, by: bool, joints: int
+) -> Motion:
     """Move the tool to a position, with an orientation or its own, or by a distance."""
     goal = numbers
     if len(numbers) == 3:

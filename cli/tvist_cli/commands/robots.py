@@ -1,8 +1,9 @@
 """`tvist robots`: the arms that there are, what is known of them, and how well their vibration is suppressed."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tvist_cli.failure import Failure, told
+from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, progress, say, table, words
 from tvist_cli.studying import check_range, check_seed, give, show
 
@@ -14,7 +15,7 @@ VARIED = 50.0
 
 
 def robots(
-    *robot: str,
+    *robot: Annotated[str, ROBOTS],
     measure: bool = False,
     random: int = 100,
     vary: float = 0.0,

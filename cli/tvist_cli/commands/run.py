@@ -1,7 +1,8 @@
 """`tvist run`: run programs in URScript, each on a robot of its own."""
 
+import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,19 +10,21 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import print_json, say
-from tvist_cli.program_runs import Judged, Ran, Tell, run_program
+from tvist_cli.program_runs import Ran, Runner, Tell, check_scripts, named, read_script
 from tvist_cli.robot_options import configuration, content_of, with_robot_options
-from tvist_cli.run_options import NO_FILES, NO_LIMITS, RunFiles, RunLimits, check_positive
-from tvist_cli.scripts import check_scripts, named, read_script
 from tvist_cli.serving import leave
+from tvist_lab.programs.judging import BaselineError, Limits, Run, read_baseline
+from tvist_lab.programs.results import junit as junit_of
 from tvist_server.config import ServeConfig
 from tvist_server.option_values import StartError
+from tvist_server.server import Server
 
 OPTIONS = {
     "robot", "profile", "payload", "overload", "adapt", "shaper", "shape_servo", "plant", "hidden", "start",
     "seed", "record", "truth", "listen", "ur", "ur_allow", "cell", "world",
 }  # fmt: skip
 """Options of `tvist serve` that one robot which ends with its program can do with."""
+NO_LIMITS = Limits()
 
 
 @with_robot_options(OPTIONS)
@@ -31,8 +34,9 @@ def run(
     lockstep: bool = False,
     inputs: Annotated[list[str] | None, Parameter(name="--input")] = None,
     timeout: float | None = None,
-    limits: RunLimits = NO_LIMITS,
-    files: RunFiles = NO_FILES,
+    limits: Annotated[Limits, Parameter(name="*")] = NO_LIMITS,
+    junit: Path | None = None,
+    baseline: Path | None = None,
     config: str | None = None,
     json: bool = False,
     **given: Any,
@@ -64,69 +68,64 @@ def run(
         timeout: End the run after this time in s as the robot counts it, with exit code 1 [the program may run for
             ever].
         limits: What the runs must keep.
-        files: What they are compared with and written to.
+        junit: File to write the results to as JUnit XML, with a test case for each program.
+        baseline: What an earlier --json of the same programs printed in lockstep: fail if times, stops, shake, speeds
+            or warnings differ beyond rounding, and say which.
         config: TOML file with any options of tvist serve for one robot; options on the command line take precedence.
         json: Print one JSON object at the end instead of messages; of several programs, it has a list of programs.
         given: Fields of `ServeConfig`.
     """
     if check:
-        if (
-            given
-            or lockstep
-            or inputs
-            or config
-            or timeout is not None
-            or limits.given
-            or limits.expect
-            or files.given
-        ):
+        if any((given, lockstep, inputs, config, timeout is not None, limits != NO_LIMITS, junit, baseline)):
             raise Failure(
                 "--check runs nothing, so that only --json goes with it: leave the others out", code=2
             )
         check_scripts(file, json=json)
         return
     _check_files(file, lockstep=lockstep)
-    check_positive("timeout", timeout)
-    compared = files.checked(list(map(named, file)), lockstep=lockstep)
-    judged = Judged(limits.checked(), compared, limits.expected())
+    if timeout is not None and not 0.0 < timeout < math.inf:
+        raise Failure(f"timeout is {timeout:g} s: must be finite and more than 0", code=2)
+    _check_written(junit, baseline)
+    before = None if baseline is None else _baseline(baseline, file, lockstep=lockstep)
+    with told(ValueError, code=2):
+        limits.check()
     texts = [read_script(one) for one in file]
     checked = _configuration(given, config, lockstep=lockstep)
     if checked.record is not None and len(file) > 1:
         raise Failure(f"record is {checked.record}: it keeps one run, and these are {len(file)}", code=2)
-    ran = _run_all(file, texts, checked, inputs or (), timeout, judged, json=json)
+    runner = Runner(checked, inputs or (), timeout, limits, before, Tell(quiet=json))
+    ran = _run_all(runner, file, texts)
     results = [one.result for one in ran]
     failure = ran[0].failure if len(file) == 1 else _of_several(ran, len(file))
     if json:
         print_json(results[0] if len(file) == 1 else _together(results, failure))
     elif failure is None:
         say(ran[0].account if len(file) == 1 else f"{len(file)} programs ran as they should")
-    files.write(results)
+    if junit is not None:
+        with told(OSError):
+            junit.write_bytes(junit_of(results))
+        say(f"the results are in {junit}")
     sys.stdout.flush()
-    server = ran[0].server
-    if server is not None and not server.left:
-        if failure is not None:
-            say(f"tvist: {failure}")
-        leave(server, 0 if failure is None else failure.code)
+    _leave(ran[0].server, failure)
     if failure is not None:
         raise failure
 
 
-def _run_all(
-    files: Sequence[Path],
-    texts: Sequence[str],
-    config: ServeConfig,
-    inputs: Sequence[str],
-    timeout: float | None,
-    judged: Judged,
-    *,
-    json: bool,
-) -> list[Ran]:
+def _leave(server: Server | None, failure: Failure | None) -> None:
+    """End the process here if the network would keep it."""
+    if server is not None and not server.left:
+        if failure is not None:
+            say(f"tvist: {failure}")
+        leave(server, 0 if failure is None else failure.code)
+
+
+def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str]) -> list[Ran]:
     """Run programs one after the other; of several, say at once how each ended."""
-    tell, ran = Tell(quiet=json), list[Ran]()
+    ran: list[Ran] = []
     for number, (file, text) in enumerate(zip(files, texts, strict=True), 1):
         if len(files) > 1:
-            tell.which = f"{number} of {len(files)}: "
-        ran.append(run_program(file, text, config, inputs, timeout, judged, tell))
+            runner.tell.which = f"{number} of {len(files)}: "
+        ran.append(runner.run(file, text))
         failure = ran[-1].failure
         if len(files) > 1:
             say(f"{named(file)}: {ran[-1].account}" if failure is None else f"{failure}")
@@ -168,6 +167,27 @@ def _check_files(files: Sequence[Path], *, lockstep: bool) -> None:
     names = [named(one) for one in files]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise Failure(f"{twice} is given twice: give each program once", code=2)
+
+
+def _check_written(junit: Path | None, baseline: Path | None) -> None:
+    """Refuse a file that cannot be written, before anything runs."""
+    if junit is None:
+        return
+    if junit.is_dir() or not junit.parent.is_dir():
+        why = "that is a folder" if junit.is_dir() else f"there is no folder {junit.parent}"
+        raise Failure(f"junit is {junit}: {why}", code=2)
+    if baseline is not None and junit.absolute() == baseline.absolute():
+        raise Failure("junit and baseline are the same file: give each its own", code=2)
+
+
+def _baseline(path: Path, files: Sequence[Path], *, lockstep: bool) -> Mapping[str, Run]:
+    """The baseline's runs by the names of their programs."""
+    if not lockstep:
+        raise Failure(
+            "--baseline needs --lockstep, in which equal programs run alike to the last bit", code=2
+        )
+    with told(BaselineError, OSError, code=2):
+        return read_baseline(path, list(map(named, files)))
 
 
 def _configuration(given: dict[str, Any], file: str | None, *, lockstep: bool) -> ServeConfig:

@@ -4,7 +4,7 @@ import asyncio
 import gc
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -20,12 +20,15 @@ from tvist_cli.serving import (
     say_recorded,
     say_who_can_reach,
 )
+from tvist_controller.setup import Setup
 from tvist_server.config import ServeConfig
+from tvist_server.ending import Ending
+from tvist_server.gateways.base import GatewayError
+from tvist_server.kernels import KernelsError
 from tvist_server.option_values import StartError
-
-if TYPE_CHECKING:
-    from tvist_controller.setup import Setup
-    from tvist_server.ending import Ending
+from tvist_server.recording import RecorderError
+from tvist_server.server import Server
+from tvist_server.workers import Workers, WorkersError
 
 
 @with_robot_options()
@@ -53,11 +56,6 @@ def serve(
             raise Failure("--compile serves nothing: leave the other options out", code=2)
         _compile(*compile_only)
         return
-    from tvist_server.ending import Ending
-    from tvist_server.gateways.base import GatewayError
-    from tvist_server.recording import RecorderError
-    from tvist_server.server import Server
-
     gc.freeze()
     gc.enable()
     checked = configuration(given, config)
@@ -90,8 +88,6 @@ def serve(
 
 def _compile(processes: int | None = None) -> None:
     """Compile ahead, in this number of processes."""
-    from tvist_server.kernels import KernelsError
-
     if processes is not None and processes < 1:
         raise Failure(f"compile is {processes}: must be at least 1", code=2)
     with told(KernelsError):
@@ -99,11 +95,8 @@ def _compile(processes: int | None = None) -> None:
     say(f"everything is compiled, after {time.monotonic() - BEGAN:.0f} s")
 
 
-def _several(config: ServeConfig, ending: "Ending") -> None:
+def _several(config: ServeConfig, ending: Ending) -> None:
     """Serve the robots in several processes."""
-    from tvist_server.gateways.base import GatewayError
-    from tvist_server.workers import Workers, WorkersError
-
     with told(WorkersError, GatewayError):
         with ending.at_once():
             workers = Workers(config, compile_if_new)
@@ -117,7 +110,7 @@ def _several(config: ServeConfig, ending: "Ending") -> None:
         raise Failure("; ".join(errors))
 
 
-def _say_ready(setups: "Sequence[Setup]", config: ServeConfig) -> None:
+def _say_ready(setups: Sequence[Setup], config: ServeConfig) -> None:
     took = time.monotonic() - BEGAN
     spread = f" in {config.workers} processes" if config.workers > 1 else ""
     say(

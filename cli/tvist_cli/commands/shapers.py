@@ -8,6 +8,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.offered import SHAPERS as OFFERED
 from tvist_cli.output import out, table
 from tvist_cli.sensitivity import print_sensitivity
 from tvist_cli.shapers_of import load_given
@@ -31,8 +32,8 @@ def shapers(
     *,
     f_d: float = F_D,
     zeta: float = 0.0,
-    shaper: list[str] | None = None,
-    sensitivity: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    shaper: Annotated[list[str] | None, OFFERED] = None,
+    sensitivity: Annotated[list[str] | None, OFFERED, Parameter(consume_multiple=True)] = None,
     errors: tuple[float, float] = ERRORS,
     output: Path | None = None,
     figures: Path | None = None,

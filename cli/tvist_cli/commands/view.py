@@ -7,6 +7,7 @@ from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, told
+from tvist_cli.offered import ROBOTS, SHAPERS
 from tvist_cli.output import err
 from tvist_cli.pages import Door, serve_page
 from tvist_cli.tracks import MAGNIFY, Shows, compared, recorded, repeated
@@ -20,8 +21,8 @@ def view(
     at: Connection = LOCAL,
     *,
     beside: bool = False,
-    compare: Annotated[tuple[str, ...] | None, Parameter(consume_multiple=True)] = None,
-    robot: str = "ur5e",
+    compare: Annotated[tuple[str, ...] | None, SHAPERS, Parameter(consume_multiple=True)] = None,
+    robot: Annotated[str, ROBOTS] = "ur5e",
     magnify: float = MAGNIFY,
     html: Path | None = None,
     address: str = "127.0.0.1",
@@ -32,10 +33,10 @@ def view(
 
     ENDPOINT is that of a served robot, which the page shows live, or the name of a recording, which it plays back.
     --compare needs neither: it simulates the same motion with two or three shapers and shows the arms beside each
-    other.
+    other. Without a name, a live page begins with the robot ur5e.
 
     Args:
-        at: Where the robot is, or the MCAP file. Without a name, the page begins with the robot ur5e.
+        at: Where the robot is, or the MCAP file.
         beside: Of a recording, show the motion that it holds without and with a shaper, both at once.
         compare: Two or three shapers to simulate and to show beside each other: --compare none auto.
         robot: Name of the robot to simulate with --compare, or path of a robot file.

@@ -50,11 +50,7 @@ class Arm(Protocol):
 
 
 def line_tick(shaper: str) -> Run:
-    """Return what measures a tick of the whole line, from messages to encoded states, with a shaper by its name.
-
-    Raises:
-        StartError: There is no such shaper.
-    """
+    """Return what measures a tick of the whole line, from messages to encoded states, with a shaper by its name."""
     host, token, send = _robot(shaper)
     host.subscribe("state", len)
 

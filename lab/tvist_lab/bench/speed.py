@@ -1,22 +1,46 @@
-"""All that `tvist bench` measures."""
+"""All that `tvist bench` measures, and the machine that it measures."""
 
 import asyncio
+import os
+import platform
+import sys
 from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from statistics import median
 from typing import Any
 
 import msgspec
+from msgspec import Struct
 
-from tvist_lab.bench.machine import this_machine
-from tvist_lab.bench.many_robots import robots_at_500_hz
 from tvist_lab.bench.moving import Run, cycle_tick, line_tick, plant_tick
-from tvist_lab.bench.one_robot import one_robot
+from tvist_lab.bench.served_robots import one_robot, robots_at_500_hz
 from tvist_plant.plant import PERIOD
+from tvist_server.punctual import processors
 
 REPETITIONS = 7
 """Number of runs of which the median counts, after a first one that does not."""
 OF_MANY = 0.4
 """Time for which each number of robots is measured, as a share of the time for one robot [-]."""
+LIBRARIES = ("tvist", "eclipse-zenoh", "mcap", "msgspec", "mujoco", "numba", "numpy", "pin", "ruckig")
+"""Distributions whose versions matter for speed."""
+
+
+class Machine(Struct, frozen=True):
+    """What figures depend on besides the program itself."""
+
+    cpu: str
+    """Name of the processor."""
+    cores: int
+    """Number of cores that this process may use."""
+    system: str
+    """Operating system with its release."""
+    python: str
+    """Version of Python."""
+    libraries: dict[str, str]
+    """Versions of the libraries."""
+    load: float
+    """Number of processes that ran on average in the minute before the start."""
 
 
 def speed(seconds: float, shaper: str, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -26,9 +50,6 @@ def speed(seconds: float, shaper: str, tell: Callable[[str], None]) -> dict[str,
         seconds: Duration of each measurement in real time [s]; 0 to serve no robot.
         shaper: Name of the robots' shaper.
         tell: Called with a description of each measurement before it starts.
-
-    Raises:
-        StartError: There is no such shaper.
     """
     result: dict[str, Any] = {
         "machine": msgspec.to_builtins(this_machine()),
@@ -53,3 +74,31 @@ def speed(seconds: float, shaper: str, tell: Callable[[str], None]) -> dict[str,
 def _usual(run: Run) -> float:
     run()
     return median(run() for _ in range(REPETITIONS))
+
+
+def this_machine() -> Machine:
+    """Describe this machine as it is now."""
+    return Machine(
+        cpu=_processor(),
+        cores=processors(),
+        system=f"{platform.system()} {platform.release()} {platform.machine()}",
+        python=platform.python_version(),
+        libraries={name: found for name in LIBRARIES if (found := _version(name)) is not None},
+        load=os.getloadavg()[0],
+    )
+
+
+def _processor() -> str:
+    if sys.platform == "linux":
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+            name, _, value = line.partition(":")
+            if name.strip() == "model name":
+                return value.strip()
+    return platform.processor() or platform.machine()
+
+
+def _version(distribution: str) -> str | None:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return None

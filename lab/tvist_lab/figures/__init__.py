@@ -2,17 +2,15 @@
 
 from tvist_lab.figures.after_stop import Shown, after_stop_figure, compared_figure, vibration_figure
 from tvist_lab.figures.calibration import identified_figure, workspace_map_figure
-from tvist_lab.figures.convolution import figure_3
-from tvist_lab.figures.delay_filter import figure_8
-from tvist_lab.figures.discretisation import figure_7
-from tvist_lab.figures.files import FORMATS, FigureFiles, save
 from tvist_lab.figures.flexibility import figure_1
 from tvist_lab.figures.move_plan import move_plan_figure
+from tvist_lab.figures.one_filter import figure_3, figure_7, figure_8
 from tvist_lab.figures.one_joint import figure_2
 from tvist_lab.figures.paper_metrics import figure_15, figure_16
 from tvist_lab.figures.pareto import pareto_figure, settling_figure
-from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
+from tvist_lab.figures.recorded import Recorded, motion_figure
 from tvist_lab.figures.ring_down import ring_down_figure
+from tvist_lab.figures.sheets import FORMATS, STYLES, StyleError, house_settings, house_style, save
 from tvist_lab.figures.studies import residual_by_move_figure, robustness_figure, study_figure, sweep_figure
 from tvist_lab.figures.wrong_frequency import (
     catalogue_figure,
@@ -23,9 +21,10 @@ from tvist_lab.figures.wrong_frequency import (
 
 __all__ = [
     "FORMATS",
-    "FigureFiles",
+    "STYLES",
     "Recorded",
     "Shown",
+    "StyleError",
     "after_stop_figure",
     "catalogue_figure",
     "compared_figure",
@@ -37,10 +36,11 @@ __all__ = [
     "figure_8",
     "figure_15",
     "figure_16",
+    "house_settings",
+    "house_style",
     "identified_figure",
     "motion_figure",
     "move_plan_figure",
-    "observed_figure",
     "pareto_figure",
     "residual_by_move_figure",
     "ring_down_figure",

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
@@ -15,13 +16,11 @@ from tvist_lab.figures.style import (
     OF_SHAPED,
     OF_UNSHAPED,
     UNSHAPED,
-    color_bar,
     explain,
     legend,
     note,
     panels,
     title,
-    width,
 )
 from tvist_lab.identification.workspace_map import WorkspaceMap
 from tvist_lab.recordings import Floats
@@ -32,8 +31,6 @@ LABELS = {
     "zeta": (r"$\zeta$", "damping ratio of the lowest mode", "–"),
 }
 """Key of a map to its symbol, its meaning and its unit."""
-SMALL = 7.0
-"""Size of labels within a map [pt]."""
 NARROW = 5.0
 """Width up to which maps are one below the other [inch]."""
 LEVELS = 9
@@ -79,8 +76,8 @@ def identified_figure(
 def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
     """Draw one quantity as identified, as it truly is, and the error.
 
-    The three maps are side by side, and in a figure that is to be narrow one below the other. White areas are left out,
-    because the arm would touch itself or the floor there.
+    The three maps are side by side, and in a narrow figure one below the other. White areas are left out, because the
+    arm would touch itself or the floor there.
 
     Args:
         found: The maps.
@@ -88,21 +85,20 @@ def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
         words: What they are of, for the heading.
     """
     symbol, meaning, unit = LABELS[key]
-    beside = width() > NARROW
-    figure, axes = (
-        panels(1, 3.0, columns=3, share_x=False, share_y=True) if beside else panels(3, 8.4, share_x=True)
-    )
-    both = np.array([found.identified[key], found.true[key]])
-    levels = _levels(float(np.nanmin(both)), float(np.nanmax(both)))
+    if beside := rcParams["figure.figsize"][0] > NARROW:
+        figure, axes = panels(1, 3.0, columns=3, share_x=False, share_y=True)
+    else:
+        figure, axes = panels(3, 8.4)
+    identified, true = found.identified[key], found.true[key]
     error = np.abs(found.error(key))
-    for panel, values, heading in zip(axes, both, ("Identified", "True"), strict=False):
-        drawn = _map(panel, found, values, levels, labelled=True)
-        title(panel, heading)
-    bar: dict[str, Any] = {"pad": 0.02, "aspect": 25.0, "format": lambda value, _: _short(value)}
-    color_bar(figure, drawn, axes[:2], f"{symbol} ({unit})", **bar)
-    drawn = _map(axes[2], found, error, _levels(0.0, float(np.nanmax(error))), labelled=False)
-    title(axes[2], "Size of the error")
-    color_bar(figure, drawn, axes[2:], "Error (%)", **bar)
+    levels = _levels(float(np.nanmin([identified, true])), float(np.nanmax([identified, true])))
+    _map(axes[0], found, identified, levels, "Identified", labelled=True)
+    drawn = _map(axes[1], found, true, levels, "True", labelled=True)
+    bar: dict[str, Any] = {"pad": 0.02, "aspect": 25.0, "format": lambda value, _: f"{value:.3g}"}
+    figure.colorbar(drawn, ax=axes[:2], label=f"{symbol} ({unit})", **bar)
+    levels = _levels(0.0, float(np.nanmax(error)))
+    drawn = _map(axes[2], found, error, levels, "Size of the error", labelled=False)
+    figure.colorbar(drawn, ax=axes[2:], label="Error (%)", **bar)
     rows, across = (name.replace("_", " ").capitalize() for name in found.names)
     for panel in axes if beside else axes[-1:]:
         panel.set_xlabel(f"{across} (°)")
@@ -113,9 +109,10 @@ def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
 
 
 def _map(
-    panel: Axes, found: WorkspaceMap, values: Floats, levels: Floats, *, labelled: bool
+    panel: Axes, found: WorkspaceMap, values: Floats, levels: Floats, heading: str, *, labelled: bool
 ) -> QuadContourSet:
     """Filled contours, with lines between them, and the robot's poses."""
+    title(panel, heading)
     rows, across = (np.degrees(angles) for angles in found.angles)
     panel.grid(visible=False)
     drawn = panel.contourf(across, rows, values, levels=levels, cmap="cividis", extend="neither")
@@ -123,16 +120,22 @@ def _map(
     # White on the dark half of the colours, ink on the light one.
     colors = ["white" if place < 0.6 * len(inner) else INK for place in range(len(inner))]
     lines = panel.contour(across, rows, values, levels=inner, colors=colors, linewidths=0.7)
-    for label in panel.clabel(lines, list(inner[::2]) if labelled else [], fmt=_short, fontsize=SMALL):
+    small = 7.0 / 8.0 * rcParams["font.size"]
+    for label in panel.clabel(lines, list(inner[::2]) if labelled else [], fmt="%.3g", fontsize=small):
         label.set_rotation(0.0)
     at: dict[tuple[float, float], list[str]] = {}
     for name, (row, column) in found.poses.items():
         at.setdefault((float(np.degrees(column)), float(np.degrees(row))), []).append(name)
-    for (x, y), names in at.items():
-        panel.plot(
-            [x], [y], "o", color=UNSHAPED, markeredgecolor="white", markersize=5.0, clip_on=False, zorder=5
-        )
-        note(panel, ", ".join(names), (x, y), (5, 4), fontsize=SMALL)
+    for place, names in at.items():
+        dot: Any = {
+            "color": UNSHAPED,
+            "markeredgecolor": "white",
+            "markersize": 5.0,
+            "clip_on": False,
+            "zorder": 5,
+        }
+        panel.plot(*place, "o", **dot)
+        note(panel, ", ".join(names), place, (5, 4), fontsize=small)
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_locator(MultipleLocator(60.0))
     return drawn
@@ -141,7 +144,3 @@ def _map(
 def _levels(low: float, high: float) -> Floats:
     """Round levels that include a range."""
     return np.asarray(MaxNLocator(LEVELS).tick_values(low, max(high, low + 1e-3 * abs(low) + 1e-6)))
-
-
-def _short(value: float) -> str:
-    return f"{value:.3g}"

@@ -22,24 +22,19 @@ def move_plan_figure(plan: MovePlan) -> Figure:
         return np.array([*joints, data.oMf[model.getFrameId("flange")].translation])
 
     figure, axes = panels(1, 4.6, columns=2, share_x=False)
-    stands = line(plan.at)
     passed = [line(q) for jog in plan.jogs for q in jog.way[:-1]]
     rings = [line(jog.q) for jog in plan.jogs]
+    drawn = (
+        ("Passed on the way", passed, {"color": tint(INK, 0.3)}),
+        ("Rings here", rings, {"color": tint(OF_UNSHAPED.color, 0.5)}),
+        ("Stands now", [line(plan.at)], {"color": OF_SHAPED.color, "linewidth": 2.5}),
+    )
     for panel, across, what in ((axes[0], 2, "from the side"), (axes[1], 1, "from above")):
-        for number, points in enumerate(passed):
-            panel.plot(
-                points[:, 0],
-                points[:, across],
-                color=tint(INK, 0.3),
-                label="" if number else "Passed on the way",
-            )
+        for label, lines, how in drawn:
+            for number, points in enumerate(lines):
+                panel.plot(points[:, 0], points[:, across], label=None if number else label, **how)
         for number, points in enumerate(rings, 1):
-            tint_of = tint(OF_UNSHAPED.color, 0.5)
-            panel.plot(
-                points[:, 0], points[:, across], color=tint_of, label="" if number > 1 else "Rings here"
-            )
             note(panel, str(number), (points[-1, 0], points[-1, across]), (3, 3))
-        panel.plot(stands[:, 0], stands[:, across], color=OF_SHAPED.color, linewidth=2.5, label="Stands now")
         panel.set_aspect("equal")
         panel.margins(0.08)
         panel.set(xlabel="x (m)", ylabel="z (m)" if across == 2 else "y (m)")

@@ -1,131 +1,97 @@
-"""Style of the figures: series that differ to the colour-blind, few lines, units on every axis.
+"""What figures are drawn with: series that differ to the colour-blind, and words that explain every axis.
 
-Each colour has dashes and a marker of its own; for print they are exchanged for ones that differ in grey. Dashed lines
-are drawn over full ones, so that both are seen where they coincide, and nothing that stands for data is transparent.
+A figure is drawn within `with house_style():`, whose style sheet has its sizes and colours. Each colour has dashes and
+a marker of its own. Dashed lines are drawn over full ones, so that both are seen where they coincide, and nothing that
+stands for data is transparent.
 """
 
 from collections.abc import Mapping, Sequence
+from string import ascii_lowercase
 from typing import Any, NamedTuple
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.ticker import Formatter
 from numpy.typing import NDArray
 
-from tvist_lab.figures.own_style import own
+from tvist_lab.figures.sheets import headed, in_print
 
-UNSHAPED = "#D55E00"
-"""Vermilion (Okabe and Ito), of medium lightness."""
-SHAPED = "#0072B2"
-"""Blue (Okabe and Ito)."""
-THIRD = "#009E73"
-"""Bluish green (Okabe and Ito)."""
-IN_PRINT = {SHAPED: "#0B4A85", THIRD: "#5FBF9A"}
-"""Colours that a journal prints instead: a darker blue and a lighter green, which also differ in grey."""
+SHAPED, UNSHAPED, THIRD = "C0", "C1", "C2"
+"""Colours of what is shaped, of what is not, and of a third series: blue, vermilion and green in the style sheet."""
 INK = "#1F2933"
 """Colour of text and axes."""
 FAINT = "#8A8A8A"
 """Colour of limits and other auxiliary lines."""
 MUTED = "#5B6670"
 """Colour of less important text."""
-WIDTH = 183.0 / 25.4
-"""Width of every figure as it is drawn, two columns of a journal [inch]."""
-COLUMN = 89.0 / 25.4
-"""Width of one column [inch]."""
-DPI = 150
-"""Resolution of bitmaps unless a style file has another one [dots per inch]."""
 LIMIT = (0, (4, 3))
 """Dashes of limits and other auxiliary lines."""
 ALPHA = r"$|\alpha|$ (m/s²)"
 """Label of the axis of the tool's acceleration."""
 OF_ALPHA = {r"$|\alpha|$": "acceleration of the tool, without gravity"}
 """What its symbol means."""
-WIDTH_OF_LINES = 1.4
-"""Width of curves [pt]."""
+USUAL = {"lines.linewidth": 1.4, "lines.markersize": 4.0, "font.size": 8.0}
+"""Sizes of the usual style, to which those in this package are relative [pt]."""
 NEAR = 0.035
 """Points that are closer than this share of the axis share a name [-]."""
-
-
-HOUSE = {
-    "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": INK, "axes.labelcolor": INK,
-    "axes.axisbelow": True, "axes.titleweight": "bold", "axes.grid": True, "grid.color": "#E4E4E4",
-    "grid.linewidth": 0.6,
-    "xtick.color": INK, "ytick.color": INK, "xtick.major.size": 3.0, "ytick.major.size": 3.0,
-}  # fmt: skip
-"""Matplotlib's settings of these figures, without the sizes of text."""
 
 
 class Series(NamedTuple):
     """How one of several curves is drawn."""
 
-    color: str
+    cycled: str
+    """Its colour, as a place in the style sheet's."""
     dashes: Any
     """Line style of matplotlib."""
     marker: str
 
-    def line(self, width: float = WIDTH_OF_LINES, **more: Any) -> dict[str, Any]:
-        """Return the arguments of `plot` for a curve; dashed ones lie over full ones.
+    @property
+    def color(self) -> str:
+        """Its colour in the style sheet that is in use, as #rrggbb."""
+        return to_hex(self.cycled)
 
-        Args:
-            width: Width of the line [pt].
-            more: Further arguments of `plot`.
-        """
+    def line(self, width: float = USUAL["lines.linewidth"], **more: Any) -> dict[str, Any]:
+        """Return the arguments of `plot` for a curve of this width in the usual style [pt]; dashed ones lie on top."""
         above = 2.0 if self.dashes == "-" else 2.5
-        width *= float(own().get("lines.linewidth", WIDTH_OF_LINES)) / WIDTH_OF_LINES
-        return {"color": self.color, "linestyle": self.dashes, "linewidth": width, "zorder": above, **more}
+        wide = width * _scale("lines.linewidth")
+        return {"color": self.color, "linestyle": self.dashes, "linewidth": wide, "zorder": above, **more}
 
-    def points(self, size: float = 4.0, **more: Any) -> dict[str, Any]:
-        """Return the arguments of `plot` for points without a line.
-
-        Args:
-            size: Size of the markers [pt].
-            more: Further arguments of `plot`.
-        """
-        return {"color": self.color, "linestyle": "none", "marker": self.marker, "markersize": size, **more}
+    def points(self, size: float = USUAL["lines.markersize"], **more: Any) -> dict[str, Any]:
+        """Return the arguments of `plot` for points of this size in the usual style [pt], without a line."""
+        large = size * _scale("lines.markersize")
+        return {"color": self.color, "linestyle": "none", "marker": self.marker, "markersize": large, **more}
 
 
 SERIES = (
     Series(SHAPED, "-", "o"),
     Series(UNSHAPED, (0, (5, 1.5)), "s"),
     Series(THIRD, (0, (1, 1)), "^"),
-    Series(INK, (0, (6, 1.5, 1, 1.5)), "D"),
-    Series("#CC79A7", (0, (9, 2)), "v"),
-    Series("#E69F00", (0, (3, 1, 1, 1, 1, 1)), "P"),
-    Series("#56B4E9", (0, (2, 2)), "X"),
-    Series(FAINT, (0, (8, 2, 3, 2)), "*"),
+    Series("C3", (0, (6, 1.5, 1, 1.5)), "D"),
+    Series("C4", (0, (9, 2)), "v"),
+    Series("C5", (0, (3, 1, 1, 1, 1, 1)), "P"),
+    Series("C6", (0, (2, 2)), "X"),
+    Series("C7", (0, (8, 2, 3, 2)), "*"),
 )
 """Styles of curves, in the order in which they are used."""
 OF_SHAPED, OF_UNSHAPED, OF_THIRD = SERIES[:3]
 """Styles of what is shaped, of what is not, and of a third one."""
 
 
-def width() -> float:
-    """Return the width of every figure as it is written [inch]: that of a style file, or two columns of a journal."""
-    return float(own().get("figure.figsize", (WIDTH,))[0])
-
-
-def rules() -> dict[str, Any]:
-    """Return matplotlib's settings of these figures: the house's, unless a file of one's own has others."""
-    base = float(own().get("font.size", 8.0))
-    sizes = {"font.size": 1.0, "xtick.labelsize": 1.0, "ytick.labelsize": 1.0, "axes.labelsize": 9.0 / 8.0,
-             "axes.titlesize": 9.5 / 8.0, "legend.fontsize": 8.5 / 8.0}  # fmt: skip
-    return {**HOUSE, **{name: share * base for name, share in sizes.items()}, **own()}
+def _scale(name: str) -> float:
+    """How much larger a size of the style sheet is than in the usual one [-]."""
+    settings: Any = rcParams
+    return float(settings[name]) / USUAL[name]
 
 
 def tint(color: str, share: float = 0.2) -> str:
-    """Mix a colour with white, to fill areas without being transparent.
-
-    Args:
-        color: The colour, as #RRGGBB.
-        share: Share of the colour [-].
-    """
-    parts = (int(color[place : place + 2], 16) for place in (1, 3, 5))
-    return "#" + "".join(f"{round(share * part + (1.0 - share) * 255.0):02X}" for part in parts)
+    """Mix a colour with white, of which the colour has this share, to fill areas without being transparent."""
+    red, green, blue = (share * part + 1.0 - share for part in to_rgb(color))
+    return to_hex((red, green, blue))
 
 
 def panels(
@@ -137,11 +103,11 @@ def panels(
     share_y: bool = False,
     ratios: Sequence[float] | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Create a figure of panels in this style.
+    """Create a figure of panels, as wide as the style sheet says.
 
     Args:
         rows: Number of rows.
-        height: Height of the figure [inch].
+        height: Height of the figure in the usual style [inch]; larger type makes it higher.
         columns: Number of panels side by side.
         share_x: Whether all panels of a column share the lowest one's axis.
         share_y: Whether all panels of a row share the leftmost one's axis.
@@ -150,44 +116,22 @@ def panels(
     Returns:
         The figure, and its panels row by row.
     """
-    look: Any = rules()
-    with mpl.rc_context(look):
-        figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
-        grid: np.ndarray[Any, Any] = figure.subplots(
-            rows,
-            columns,
-            sharex="col" if share_x else False,
-            sharey="row" if share_y else False,
-            squeeze=False,
-            height_ratios=ratios,
-        )
+    size = rcParams["figure.figsize"][0], height * _scale("font.size") ** 0.5
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    shared: Any = {"sharex": "col" if share_x else False, "sharey": "row" if share_y else False}
+    grid: Any = figure.subplots(rows, columns, squeeze=False, height_ratios=ratios, **shared)
     axes = list(grid.ravel())
     for panel in axes:
-        _plain(panel, look)
+        for axis in (panel.xaxis, panel.yaxis):
+            axis.label.set_wrap(True)
     if share_x:
         figure.align_ylabels(axes)
     return figure, axes
 
 
-def _plain(panel: Axes, look: Mapping[str, Any]) -> None:
-    """Style grid and ticks of a panel, which matplotlib makes later: tick labels of one size on every scale."""
-    panel.grid(visible=look["axes.grid"], **({"color": look["grid.color"], "linewidth": look["grid.linewidth"]}
-                                             if look["axes.grid"] else {}))  # fmt: skip
-    for axis in ("x", "y"):
-        color, size, length = (look[f"{axis}tick.{name}"] for name in ("color", "labelsize", "major.size"))
-        panel.tick_params(axis, which="both", colors=color, labelsize=size, length=length)
-
-
 def decades(panel: Axes, *axes: str) -> None:
-    """Label an axis with a logarithmic scale in plain numbers of one size: 1, 2 and 5 of each decade.
-
-    If an axis is shorter than a decade, every digit is labelled.
-
-    Args:
-        panel: The panel, with its scale set.
-        axes: "x" and "y", which of its axes to label.
-    """
+    """Label logarithmic axes, "x" or "y", in plain numbers: 1, 2, 5 of each decade, or all digits of less than one."""
     for name in axes:
         axis = panel.xaxis if name == "x" else panel.yaxis
         axis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -204,10 +148,14 @@ class _Digits(Formatter):
 
 
 def title(panel: Axes, words: str) -> None:
-    """Write a heading at a panel's upper left."""
-    look = rules()
-    size, weight = look["axes.titlesize"], look["axes.titleweight"]
-    panel.set_title(words, loc="left", fontsize=size, color=INK, fontweight=weight)
+    """Write a heading at a panel's upper left; in print it is for the caption, and letters name several panels."""
+    if not in_print.get():
+        panel.set_title(words, wrap=True)
+        return
+    panel.set_label(words)
+    several = headed(panel.figure)
+    for letter, one in zip(ascii_lowercase, several if len(several) > 1 else (), strict=False):
+        one.set_title(letter)
 
 
 def legend(figure: Figure, panel: Axes, symbols: Mapping[str, str] | None = None) -> None:
@@ -219,55 +167,22 @@ def legend(figure: Figure, panel: Axes, symbols: Mapping[str, str] | None = None
         symbols: Symbols to explain below the panels, see `explain`.
     """
     handles, labels = panel.get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        loc="outside upper right",
-        ncols=len(labels),
-        fontsize=rules()["legend.fontsize"],
-        frameon=False,
-        labelcolor=INK,
-        handlelength=2.4,
-    )
+    for columns in range(len(labels), 0, -1):
+        box = figure.legend(handles, labels, loc="outside upper right", ncols=columns)
+        if columns == 1 or box.get_window_extent().width <= 0.98 * figure.bbox.width:
+            break
+        box.remove()
     if symbols:
         explain(figure, symbols)
 
 
-def legend_beside(panel: Axes, color: str | None = None) -> None:
-    """Draw a panel's legend on its right."""
-    panel.legend(
-        loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=rules()["font.size"], frameon=False, labelcolor=color,
-        handlelength=3.0,
-    )  # fmt: skip
-
-
-def color_bar(figure: Figure, drawn: Any, axes: Axes | Sequence[Axes], words: str, **how: Any) -> None:
-    """Draw the scale of a coloured area beside its panels."""
-    bar = figure.colorbar(drawn, ax=axes, **how)
-    look = rules()
-    bar.set_label(words, fontsize=look["axes.labelsize"], color=INK)
-    bar.ax.tick_params(labelsize=look["ytick.labelsize"], colors=INK)
-
-
 def explain(figure: Figure, symbols: Mapping[str, str]) -> None:
-    """Write what the symbols on the axes mean below the panels.
-
-    Args:
-        figure: The figure.
-        symbols: Symbol to its meaning.
-    """
-    figure.legend(
-        [Line2D([], [], linestyle="none") for _ in symbols],
-        [f"{symbol}: {meaning}" for symbol, meaning in symbols.items()],
-        loc="outside lower left",
-        ncols=len(symbols),
-        fontsize=rules()["font.size"],
-        frameon=False,
-        labelcolor=MUTED,
-        handlelength=0.0,
-        handletextpad=0.0,
-        columnspacing=1.6,
-    )
+    """Write below the panels what the symbols on the axes mean; in print, it is for the caption."""
+    said = [f"{symbol}: {meaning}" for symbol, meaning in symbols.items()]
+    if in_print.get():
+        figure.set_label(". ".join(said))
+    else:
+        figure.supxlabel("\u2003 ".join(said), x=0.01, ha="left", color=MUTED, wrap=True)
 
 
 def literal(words: str) -> str:
@@ -291,8 +206,6 @@ def note(
     words: str,
     at: tuple[float, float],
     offset: tuple[float, float] | None = None,
-    *,
-    color: str = INK,
     **how: Any,
 ) -> Text:
     """Write small text within a panel.
@@ -302,15 +215,12 @@ def note(
         words: The text.
         at: Point, in data coordinates unless `xycoords` names others.
         offset: Distance of the text from the point [pt].
-        color: Colour of the text.
         how: Further arguments of `annotate`.
     """
     backing = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
     if offset is not None:
         how |= {"xytext": offset, "textcoords": "offset points"}
-    return panel.annotate(
-        words, at, **{"color": color, "fontsize": rules()["font.size"], "bbox": backing, "zorder": 6.0, **how}
-    )
+    return panel.annotate(words, at, **{"bbox": backing, "zorder": 6.0, "wrap": True, **how})
 
 
 def remark(panel: Axes, words: str, at: tuple[float, float], **how: Any) -> Text:
@@ -339,4 +249,4 @@ def name_over(
     for group in groups:
         words = ", ".join(names[place] for place in group)
         at = float(x[group].mean()), float(highest[group].max())
-        note(panel, words, at, (0, 6), rotation=90, ha="center", va="bottom", bbox=None)
+        note(panel, words, at, (0, 6), rotation=90, ha="center", va="bottom", bbox=None, wrap=False)

@@ -1,6 +1,7 @@
 """What shapers leave of the vibration where the frequency is another one than theirs, and what it costs in time."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,13 +10,11 @@ from matplotlib.figure import Figure
 import tvist_shaping
 from tvist_lab.figures.style import (
     FAINT,
-    INK,
     OF_SHAPED,
     OF_UNSHAPED,
     SERIES,
     dashed,
     legend,
-    legend_beside,
     name_over,
     note,
     panels,
@@ -26,10 +25,8 @@ from tvist_lab.frequency_error import ALLOWED, residual_over_error, settling_tim
 from tvist_lab.recordings import Floats
 from tvist_shaping import Shaper, residual
 
-DESIGN = 10.5
-"""Middle of the frequency range over the workspace [Hz]."""
-SPAN = (6.0, 15.0)
-"""Range of the first mode's damped frequency over the UR5e's workspace with 5 kg [Hz]."""
+DESIGN, SPAN = 10.5, (6.0, 15.0)
+"""Frequency that the shapers of figure 4 are designed for, and the range of the UR5e's first mode with 5 kg [Hz]."""
 SHOWN_HZ = (5.5, 16.0)
 """Frequencies on the axis of figure 4 [Hz]."""
 ERRORS = (0.0, 0.1, 0.2)
@@ -50,17 +47,16 @@ WIDEST = 1.6
 
 def figure_4() -> Figure:
     """Residual vibration of ZV, ZVD and EI, undamped, over the true frequency."""
-    shapers = {"ZV": tvist_shaping.zv, "ZVD": tvist_shaping.zvd, "EI 5 %": tvist_shaping.ei}
     figure, (panel,) = panels(1, 3.4)
-    f = np.linspace(*SHOWN_HZ, 1051)
+    f, ends = np.linspace(*SHOWN_HZ, 1051), np.array(SPAN)
     worst = np.inf
     panel.axvspan(*SPAN, color=tint(FAINT, 0.15), linewidth=0.0, label="First mode over the workspace")
+    shapers = {"ZV": tvist_shaping.zv, "ZVD": tvist_shaping.zvd, "EI 5 %": tvist_shaping.ei}
     for (name, function), style in zip(shapers.items(), SERIES, strict=False):
         impulses = function(DESIGN, 0.0)
         panel.plot(f, 100.0 * residual(f, 0.0, impulses), **style.line(1.6, label=name))
-        worst = min(worst, 100.0 * float(np.max(residual(np.array(SPAN), 0.0, impulses))))
+        worst = min(worst, 100.0 * float(np.max(residual(ends, 0.0, impulses))))
     dashed(panel, worst)
-    # Every curve is near zero in the middle, where the shapers are designed.
     note(panel, f"{worst:.1f} %", (DESIGN, worst), (0, 4), ha="center")
     title(panel, f"{SPAN[0]:g} to {SPAN[1]:g} Hz: at least {worst:.1f} % remains")
     panel.set(xlim=SHOWN_HZ, ylim=(0.0, 72.0), xlabel="Frequency (Hz)", ylabel="Residual vibration (%)")
@@ -81,11 +77,8 @@ def sensitivity_figure(shapers: Sequence[Shaper], zeta: float, errors: Floats) -
     for place, shaper in enumerate(shapers):
         left = 100.0 * residual_over_error(shaper, zeta, errors)
         panel.plot(100.0 * errors, left, **SERIES[place % len(SERIES)].line(label=shaper.name))
-    panel.set(
-        xlim=(100.0 * errors[0], 100.0 * errors[-1]),
-        xlabel="Error of the assumed frequency (%)",
-        ylabel="Residual vibration (%)",
-    )
+    panel.set(xlim=(100.0 * errors[0], 100.0 * errors[-1]), xlabel="Error of the assumed frequency (%)")
+    panel.set_ylabel("Residual vibration (%)")
     panel.set_ylim(bottom=0.0)
     title(panel, f"Mode with a damping ratio of {zeta:g}")
     legend(figure, panel)
@@ -103,31 +96,21 @@ def settling_against_delay_figure(shapers: Iterable[Shaper], f_d: float, zeta: f
     shown = [shaper for shaper in shapers if zeta < shaper.zeta_max]
     delay = np.array([1e3 * shaper.impulses(f_d, zeta).duration for shaper in shown])
     times = np.array([[1e3 * settling_time(one, f_d, zeta, error) for one in shown] for error in ERRORS])
-    known = times[np.isfinite(times)]
-    top = 1.15 * float(known.max()) if known.size else 1.0
+    top = 1.15 * float(np.max(times, where=np.isfinite(times), initial=1.0 / 1.15))
     figure, (panel,) = panels(1, 4.2)
-    panel.plot(
-        [0.0, top], [0.0, top], color=FAINT, linewidth=0.9, zorder=1, label="Settled when the reference stops"
-    )
-    for error, row, style in zip(ERRORS, times, SERIES, strict=False):
-        ends = np.where(np.isfinite(row), row, top)
-        panel.plot(delay, ends, **style.points(4.5, label=f"Frequency wrong by {100.0 * error:g} %"))
+    straight: Any = {"color": FAINT, "linewidth": 0.9, "label": "Settled when the reference stops"}
+    panel.plot([0.0, top], [0.0, top], zorder=1, **straight)
+    drawn = np.where(np.isfinite(times), times, top)
+    for error, row, style in zip(ERRORS, drawn, SERIES, strict=False):
+        panel.plot(delay, row, **style.points(4.5, label=f"Frequency wrong by {100.0 * error:g} %"))
     if not np.isfinite(times).all():
         title(panel, "At the top: never, since nothing decays without damping")
-    name_over(panel, delay, np.where(np.isfinite(times), times, top).max(axis=0), [one.name for one in shown])
-    panel.set(
-        xlabel="Delay of the shaper (ms)",
-        ylabel="Settled after the unshaped stop (ms)",
-        ylim=(0.0, 1.75 * top),
-        xlim=(-0.04 * float(delay.max()), 1.06 * float(delay.max())),
-    )
-    legend(
-        figure,
-        panel,
-        {
-            "Settled": f"at {100.0 * ALLOWED:g} % of the unshaped vibration of a mode of {f_d:g} Hz, ζ = {zeta:g}"
-        },
-    )
+    name_over(panel, delay, drawn.max(axis=0), [one.name for one in shown])
+    longest = float(delay.max())
+    panel.set(ylim=(0.0, 1.75 * top), xlim=(-0.04 * longest, 1.06 * longest))
+    panel.set(xlabel="Delay of the shaper (ms)", ylabel="Settled after the unshaped stop (ms)")
+    mode = f"a mode of {f_d:g} Hz, ζ = {zeta:g}"
+    legend(figure, panel, {"Settled": f"at {100.0 * ALLOWED:g} % of the unshaped vibration of {mode}"})
     return figure
 
 
@@ -141,15 +124,18 @@ def catalogue_figure(shapers: Iterable[Shaper], zeta: float = 0.0) -> Figure:
     shown = {shaper.name: shaper for shaper in shapers if zeta < shaper.zeta_max and shaper.duration_periods}
     placed = {name for names in FAMILIES.values() for name in names}
     families = FAMILIES | {"Others": tuple(name for name in shown if name not in placed)}
-    groups = {
-        words: group
-        for words, names in families.items()
-        if (group := [shown[name] for name in names if name in shown])
-    }
+    found = {words: [shown[name] for name in names if name in shown] for words, names in families.items()}
+    groups = {words: group for words, group in found.items() if group}
     figure, axes = panels(len(groups) + 1, 1.0 + 2.1 * (len(groups) + 1), share_x=False)
+    f = np.linspace(*SHOWN_SHARE, 1301)
     for panel, (words, group) in zip(axes, groups.items(), strict=False):
         title(panel, words)
-        _curves(panel, group, zeta)
+        for place, shaper in enumerate(group):
+            left = 100.0 * residual(f, zeta, shaper.function(1.0, zeta))
+            panel.plot(f, left, **SERIES[place % len(SERIES)].line(label=shaper.name))
+        dashed(panel, 100.0 * ALLOWED)
+        panel.set(xlim=SHOWN_SHARE, ylim=(0.0, HIGHEST), ylabel="Residual vibration (%)")
+        panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     axes[len(groups) - 1].set_xlabel("True over assumed frequency (–)")
     title(axes[-1], "What insensitivity costs")
     _price(axes[-1], list(shown.values()), zeta)
@@ -157,37 +143,24 @@ def catalogue_figure(shapers: Iterable[Shaper], zeta: float = 0.0) -> Figure:
     return figure
 
 
-def _curves(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
-    f = np.linspace(*SHOWN_SHARE, 1301)
-    for place, shaper in enumerate(shapers):
-        left = 100.0 * residual(f, zeta, shaper.function(1.0, zeta))
-        panel.plot(f, left, **SERIES[place % len(SERIES)].line(label=shaper.name))
-    dashed(panel, 100.0 * ALLOWED)
-    panel.set(xlim=SHOWN_SHARE, ylim=(0.0, HIGHEST), ylabel="Residual vibration (%)")
-    legend_beside(panel, INK)
-
-
 def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
+    """Draw the width of each shaper's 5 % band against its duration; shapers at one place share a point."""
     points: dict[tuple[float, float], list[Shaper]] = {}
     for shaper in shapers:
         low, high = shaper.band(ALLOWED * (1.0 + 1e-4), zeta)  # count a hump of exactly 5 % as inside
-        width = min(high - low, WIDEST)
-        duration = shaper.function(1.0, zeta).duration
-        points.setdefault((round(duration, 2), round(width, 2)), []).append(shaper)
+        place = round(shaper.function(1.0, zeta).duration, 2), round(min(high - low, WIDEST), 2)
+        points.setdefault(place, []).append(shaper)
     for place, group in sorted(points.items()):
-        style = OF_SHAPED if group[0].peak == 1.0 else OF_UNSHAPED
-        panel.plot(*place, **style.points(4.5))
+        exceeds = group[0].peak > 1.0
+        panel.plot(*place, **(OF_UNSHAPED if exceeds else OF_SHAPED).points(4.5))
         words = ", ".join(shaper.name for shaper in group)
-        above, below = group[0].peak > 1.0, place[0] > 1.7
-        raised = 4 if words.endswith("_exact") and len(group) == 1 else 0
-        note(
-            panel,
-            words,
-            place,
-            (4, 4) if above else (4, -4) if below else (6, raised),
-            ha="right" if above or below else "left",
-            va="bottom" if above else "top" if below else "center",
-        )
+        # Names stand where there is room: above what exceeds limits, below what is long, else beside.
+        offset, ha, va = (6, 4 if words.endswith("_exact") and len(group) == 1 else 0), "left", "center"
+        if exceeds:
+            offset, ha, va = (4, 4), "right", "bottom"
+        elif place[0] > 1.7:
+            offset, ha, va = (4, -4), "right", "top"
+        note(panel, words, place, offset, ha=ha, va=va)
     panel.set(xlim=(0.0, 2.1), xlabel="Duration (damped periods)", ylabel="Width of the 5 % band (–)")
     panel.margins(y=0.12)
     panel.plot([], [], **OF_SHAPED.points(4.5, label="Keeps the reference's limits"))

@@ -188,12 +188,7 @@ class ProgramWatch(Sink):
         return self._controller.programs.present_line
 
     def end(self, reason: Reason, why: str | None) -> None:
-        """Note how the run has ended; what is noted first counts.
-
-        Args:
-            reason: How it has ended.
-            why: Why, for people; None if the program has ended by itself.
-        """
+        """Note how the run has ended; what is noted first counts."""
         if self.reason is None:
             self.reason, self.why, self._ended = reason, why, self.tick + 1
 

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tvist_lab.advice import Advice, command, verdict
-from tvist_lab.figures.advice import cost_figure, worst_stop_figure
+from tvist_lab.figures.advice import advice_figures
+from tvist_lab.figures.sheets import house_style
 from tvist_lab.metrics import Measured
 from tvist_lab.report.page import Page, PageTable, Section, picture
 
@@ -51,6 +52,7 @@ def option_rows(advice: Advice) -> list[tuple[str, ...]]:
     ]  # fmt: skip
 
 
+@house_style()
 def advice_page(advice: Advice, logs: Sequence[Measured], paths: Sequence[Path], typed: str) -> Page:
     """Build the page.
 
@@ -63,7 +65,7 @@ def advice_page(advice: Advice, logs: Sequence[Measured], paths: Sequence[Path],
     said, lines = verdict(advice, logs), command(advice, logs)
     sections = []
     if advice.best is not None:
-        drawn = [picture(worst_stop_figure(advice), WORST), picture(cost_figure(advice), COSTS)]
+        drawn = [picture(*both) for both in zip(advice_figures(advice), (WORST, COSTS), strict=True)]
         sections.append(Section("What convinces", pictures=drawn))
     if lines:
         sections.append(Section("How to use it", points=lines))

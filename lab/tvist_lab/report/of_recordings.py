@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tvist_lab.figures.after_stop import Shown, compared_figure
 from tvist_lab.figures.ring_down import ring_down_figure
+from tvist_lab.figures.sheets import house_style
 from tvist_lab.figures.style import SERIES, literal
 from tvist_lab.metrics import (
     COLUMNS,
@@ -59,6 +60,7 @@ class _File:
     pairs: Sequence[Pair]
 
 
+@house_style()
 def recordings_page(
     paths: Sequence[Path], command: str, recordings: Sequence[Recording] | None = None
 ) -> Page:

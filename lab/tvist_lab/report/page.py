@@ -11,9 +11,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
-from tvist_lab.figures.files import fit
-from tvist_lab.figures.style import WIDTH
-
 DPI = 138
 """Resolution of pictures [dpi]; a figure's 183 mm are the 994 pixels to which the page grows."""
 
@@ -69,7 +66,6 @@ class Page:
 
 def picture(figure: Figure, caption: str) -> Picture:
     """Put a figure into the page as PNG."""
-    fit(figure, WIDTH)
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
     return Picture("data:image/png;base64," + base64.b64encode(stream.getvalue()).decode(), caption)

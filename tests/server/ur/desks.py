@@ -1,6 +1,7 @@
 """A controller behind its interfaces, and clients at them, all in the test's own loop."""
 
 import asyncio
+from collections import deque
 
 from tests.controller.robots import Robot
 
@@ -15,29 +16,52 @@ PATIENCE = 60.0
 """After how long something is taken to hang [s]."""
 
 
-class Desk(Sink):
-    """A controller in the loop's own thread; `tick` lets time pass."""
+class ControllerThread(Sink):
+    """A controller, and what its thread does for clients: at once or, if `late`, when `answer` is called."""
 
-    def __init__(self):
+    def __init__(self, *, late=False):
         self.controller = Robot().controller
         self.controller.session.release()
-        self.host = Host(self.controller, self)
-        self.interfaces = None
-        self.writers = []
+        self.host, self.kinds = Host(self.controller, self), []
+        self._late, self._due = late, deque()
+
+    def post(self, job):
+        if self._late:
+            self._due.append(job)
+        else:
+            job()
+
+    def answer(self):
+        while self._due:
+            self._due.popleft()()
 
     def command(self, command, answer, origin=None):  # noqa: ARG002  as the desk has it
         self.last = command
-        answer(self.host.request(encode(command)))
+
+        def carry_out():
+            self.kinds.append(type(command).__name__)
+            answer(self.host.request(encode(command)))
+
+        self.post(carry_out)
 
     def client_seen(self, name, session=""):
         """Nobody asks."""
 
     def client_gone(self, name, session=""):
-        self.host.client_gone(name, session)
+        self.post(lambda: self.host.client_gone(name, session))
 
     def holder(self):
         lease = self.controller.session.lease
         return None if lease is None else lease.client
+
+
+class Desk(ControllerThread):
+    """A controller in the loop's own thread, and interfaces; `tick` lets time pass."""
+
+    def __init__(self):
+        super().__init__()
+        self.interfaces = None
+        self.writers = []
 
     def report(self, report):
         self.interfaces.report(report)

@@ -38,10 +38,7 @@ def test_of_several_robots_each_has_the_next_address():
 
 @pytest.mark.parametrize(
     ("values", "named"),
-    [
-        ({"ur_address": "robot"}, "ur_address is 'robot'"),
-        ({"ur_address": "127.0.0.300"}, "ur_address"),
-    ],
+    [({"ur_address": "robot"}, "ur_address is 'robot'"), ({"ur_address": "127.0.0.300"}, "ur_address")],
 )
 def test_an_address_that_is_none_is_named(values, named):
     with pytest.raises(StartError, match=named):

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay
+from tvist_protocol.programs import ProgramLoad, ProgramPlay
 from tvist_server.gateways.ur import program_request
 from tvist_server.gateways.ur.external_control import ALONE
 from tvist_server.gateways.ur.later import Later
@@ -13,7 +13,8 @@ from tvist_server.gateways.ur.programs import Programs
 from tvist_server.program_folder import ProgramFolder
 
 from .conftest import io
-from .hosts import external, hear, told
+from .decoders import message
+from .hosts import external, hear
 
 SENT = "# HEADER_BEGIN\nglobal a = 1\n# HEADER_END\nwhile a < 2:\n  sync()\nend\n# NODE_CONTROL_LOOP_ENDS\n"
 
@@ -49,23 +50,16 @@ def test_it_exists_without_a_file_and_gets_its_text_when_it_is_played(robot, con
     assert programs.state == "PLAYING"
 
 
-def test_a_machine_that_does_not_answer_starts_nothing(robot, control):
-    programs, _ = of(robot, answer=None)
+@pytest.mark.parametrize(("answer", "code"), [(None, None), (SENT, "script_error")])
+def test_a_machine_that_does_not_answer_or_sends_a_wrong_text_starts_nothing(robot, control, answer, code):
+    programs, _ = of(robot, answer=answer)
     hear(programs.load("external_control.urp", control), [])
+    if code is not None:
+        control.refuse(code, "syntax_error", "text:3:4")
     heard = []
     hear(programs.play(control), heard)
-    assert heard == [False]
-    assert control.of(ProgramPlay) == []
-
-
-def test_a_text_that_is_not_valid_is_an_exception_and_starts_nothing(robot, control):
-    programs, _ = of(robot)
-    hear(programs.load("external_control.urp", control), [])
-    control.refuse("script_error", "syntax_error", "text:3:4")
-    heard = []
-    hear(programs.play(control), heard)
-    assert heard == [False]
-    assert [message.kind for message in told(robot)] == [10]
+    assert (heard, control.of(ProgramPlay)) == ([False], [])
+    assert [message(data).kind for data in robot.told] == ([10] if code else [])
 
 
 @pytest.mark.parametrize("what", ["stop", "load", "play"])
@@ -94,16 +88,6 @@ def test_a_script_of_this_name_that_a_client_has_sent_is_played_as_it_is(robot, 
     hear(programs.play(control), [])
     assert not client.asked
     assert len(control.of(ProgramPlay)) == 1
-
-
-def test_a_paused_one_goes_on_as_it_is(robot, control):
-    programs, client = of(robot)
-    hear(programs.load("external_control.urp", control), [])
-    hear(programs.play(control), [])
-    hear(programs.pause(control), [])
-    hear(programs.play(control), [])
-    assert len(client.asked) == len(control.of(ProgramPause)) == 1
-    assert len(control.of(ProgramPlay)) == 2
 
 
 def test_a_file_of_this_name_comes_first_and_other_programs_are_left_alone(robot, control, tmp_path):

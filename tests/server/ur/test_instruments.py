@@ -10,10 +10,9 @@ from tests.controller.robots import UR5E, cut
 from tests.plant.arms import chain
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.instruments.variables import VARIABLES
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.setup import body, paper_payload
-from tvist_plant.model import FLANGE, rigid_model
+from tvist_plant.model import rigid_model
 from tvist_protocol import commands as c
 from tvist_protocol.values import Payload
 
@@ -51,20 +50,6 @@ def test_every_output_variable_is_there_and_finite_for_robots_of_any_size(ur5e, 
                 assert len(numbers) in {joints, length}, name
 
 
-@pytest.mark.parametrize("mode", ["IDLE", "POWER_OFF"])
-def test_every_output_variable_is_finite_in_other_modes_too(ur5e, mode):
-    snapshot = ur5e(mode=mode).tick(5)
-    for name in OUTPUT_TYPES:
-        value = getattr(snapshot, name)
-        assert all(map(math.isfinite, value if isinstance(value, list) else [value])), name
-
-
-def test_what_there_is_not_is_an_attribute_error(snapshot):
-    for name in ("input_int_register_48", "output_bit_register_128", "input_int_register_01", "actual_qdd"):
-        with pytest.raises(AttributeError, match=name):
-            getattr(snapshot, name)
-
-
 @pytest.mark.parametrize("slider", [1.0, 0.5, 0.2])
 def test_the_slider_and_the_scaling_together_are_the_speed(ur5e, slider):
     """Drivers multiply the two, and hold their trajectories while the product is 0."""
@@ -88,14 +73,6 @@ def test_registers_are_those_of_io(ur5e):
     assert snapshot.output_double_register_12 == 12 / 7
     assert (snapshot.input_bit_registers0_to_31, snapshot.input_bit_registers32_to_63) == (5, 1 << 31)
     assert [k for k in range(64, 128) if getattr(snapshot, f"input_bit_register_{k}")] == [66, 96]
-
-
-def test_what_the_state_carries_is_passed_on(ur5e):
-    snapshot = ur5e().tick(7)
-    for name in snapshot.state.__struct_fields__:
-        if name in VARIABLES and name != "timestamp":
-            assert getattr(snapshot, name) == getattr(snapshot.state, name), name
-    assert snapshot.timestamp == 40.0 + snapshot.state.timestamp
 
 
 class TestShaping:
@@ -149,16 +126,6 @@ class TestShaping:
         other = Instruments(UR5E).snapshot(msgspec.structs.replace(snapshot.state, **plain), snapshot.io)
         assert getattr(snapshot, name) == getattr(other, name)
 
-    def test_without_a_shaper_targets_are_those_of_the_state_to_the_last_bit(self, ur5e):
-        robot = ur5e(q=ELBOW_UP, shaper="none")
-        robot.send(c.MoveJ, q=FAR)
-        for _ in range(50):
-            snapshot = robot.tick(7)
-            for name in self.TARGETS:
-                assert getattr(snapshot, name) == getattr(snapshot.state, name)
-                if name in FOLLOWED:
-                    assert getattr(snapshot, name.replace("target", "shaped")) == getattr(snapshot, name)
-
 
 class TestElectricity:
     def test_currents_are_proportional_to_moments(self, snapshots):
@@ -185,22 +152,10 @@ class TestElectricity:
             assert snapshot.joint_mode == [255 if mode == "IDLE" else 239] * 6
             assert snapshot.robot_status_bits == (mode == "IDLE")
 
-    def test_the_robot_takes_more_current_as_it_speeds_up(self, snapshots):
-        rest, moving = snapshots[0], snapshots[-1]
-        assert moving.actual_robot_current > rest.actual_robot_current > 0.0
-
     def test_energy_is_the_integral_of_power(self, snapshots):
         steps = np.diff([snapshot.actual_robot_energy_consumed for snapshot in snapshots])
         power = [48.0 * snapshot.actual_robot_current for snapshot in snapshots]
         assert steps == pytest.approx(np.array(power[1:]) * PERIOD)
-
-    def test_braking_gives_energy_back(self, ur5e):
-        robot = ur5e()
-        robot.send(c.MoveJ, q=(1.5, -3.14, 0.0, -1.57, 0.0, 0.0), velocity=3.0, acceleration=10.0)
-        before = robot.tick(50).actual_robot_braking_energy_dissipated
-        assert before == 0.0
-        after = robot.tick(600).actual_robot_braking_energy_dissipated
-        assert after > 0.0
 
 
 class TestTemperatures:
@@ -212,29 +167,12 @@ class TestTemperatures:
             later = type(state)(**{**struct(state), "tick": round(time / PERIOD)})
             yield robot.instruments.snapshot(later, robot.io).joint_temperatures
 
-    def test_they_start_at_25_degrees(self, ur5e):
-        assert ur5e().tick().joint_temperatures == pytest.approx([25.0] * 6, abs=0.01)
-
     def test_they_rise_with_load_and_come_to_rest_without_turning_back(self, ur5e):
         curve = np.array(list(self.held(ur5e, 10 * 1200.0)))
         assert np.diff(curve, axis=0).min() >= 0.0
         assert np.abs(curve[-1] - curve[-2]).max() < 0.01
         base, shoulder, elbow = curve[-1][:3]
         assert 80.0 > shoulder > elbow > base > 25.0
-
-    def test_they_fall_without_power(self, ur5e):
-        robot = ur5e()
-        state = robot.tick().state
-        warm = robot.instruments.snapshot(type(state)(**{**struct(state), "tick": 500_000}), robot.io)
-        off = type(state)(**{**struct(state), "tick": 10_000_000, "robot_mode": 3})
-        cold = robot.instruments.snapshot(off, robot.io)
-        assert min(warm.joint_temperatures) > 27.0
-        assert cold.joint_temperatures == pytest.approx([25.0] * 6, abs=0.1)
-
-    def test_one_long_step_is_the_same_as_many_short_ones(self, ur5e):
-        (once,) = self.held(ur5e, 600.0, step=600.0)
-        *_, often = self.held(ur5e, 600.0, step=1.0)
-        assert once == pytest.approx(often, rel=1e-9)
 
     def test_a_tick_that_is_read_twice_counts_once(self, ur5e):
         robot = ur5e()
@@ -270,22 +208,14 @@ class TestMotion:
     def test_the_targets_speed_and_acceleration_are_differences_of_its_pose(self, ur5e):
         robot = ur5e(q=ELBOW_UP, shaper="none", io_changes={"tcp_offset": OFFSET})
         robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
-        robot.tick(100)
-        snapshots = [robot.tick() for _ in range(40)]
-        positions = np.array([s.target_TCP_pose[:3] for s in snapshots])
-        speeds = np.array([s.target_TCP_speed[:3] for s in snapshots])
-        accelerations = np.array([s.target_TCP_acceleration[:3] for s in snapshots])
-        assert (positions[2:] - positions[:-2]) / (2 * PERIOD) == pytest.approx(speeds[1:-1], abs=1e-4)
-        assert (speeds[2:] - speeds[:-2]) / (2 * PERIOD) == pytest.approx(accelerations[1:-1], abs=2e-2)
-
-    def test_the_targets_turning_is_the_difference_of_its_orientation(self, ur5e):
-        robot = ur5e(q=ELBOW_UP, shaper="none", io_changes={"tcp_offset": OFFSET})
-        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
-        before, middle, after = (robot.tick(n) for n in (200, 1, 1))
-        first, last = (pin.exp3(np.array(s.target_TCP_pose[3:])) for s in (before, after))
-        assert pin.log3(last @ first.T) / (2 * PERIOD) == pytest.approx(middle.target_TCP_speed[3:], abs=1e-4)
-        turned = np.array(after.target_TCP_speed[3:]) - np.array(before.target_TCP_speed[3:])
-        assert turned / (2 * PERIOD) == pytest.approx(middle.target_TCP_acceleration[3:], abs=2e-2)
+        for ticks in (100, 40, 40):
+            before, middle, after = (robot.tick(count) for count in (ticks, 1, 1))
+            poses = np.array([before.target_TCP_pose, after.target_TCP_pose])
+            turned = pin.log3(pin.exp3(poses[1, 3:]) @ pin.exp3(poses[0, 3:]).T)
+            speed = np.array([*(poses[1] - poses[0])[:3], *turned]) / (2 * PERIOD)
+            assert speed == pytest.approx(middle.target_TCP_speed, abs=1e-4)
+            faster = np.subtract(after.target_TCP_speed, before.target_TCP_speed) / (2 * PERIOD)
+            assert faster == pytest.approx(middle.target_TCP_acceleration, abs=2e-2)
 
     def test_the_offset_carries_the_flange_to_the_tool(self, ur5e):
         bare = ur5e(q=ELBOW_UP).tick()
@@ -296,18 +226,6 @@ class TestMotion:
             for pose in (bare.target_TCP_pose, tool.target_TCP_pose, OFFSET)
         )
         assert (flange * offset).isApprox(tcp, 1e-12)
-
-    def test_measured_acceleration_follows_the_targets(self, ur5e):
-        robot = ur5e(UR5E.clean(), q=ELBOW_UP)
-        assert np.abs(robot.tick().actual_TCP_acceleration).max() < 0.02
-        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
-        robot.tick(100)
-        both = [
-            (s.actual_TCP_acceleration[:3], s.target_TCP_acceleration[:3]) for s in map(robot.tick, [1] * 200)
-        ]
-        felt, wanted = np.array(both).transpose(1, 0, 2)
-        assert np.abs(wanted).max() > 0.5
-        assert np.abs(felt - wanted).mean() < 0.2 * np.abs(wanted).max()
 
     def test_the_elbow_is_where_the_upper_arm_ends(self, ur5e):
         robot = ur5e(q=ELBOW_UP)
@@ -327,12 +245,6 @@ class TestMotion:
 
 
 class TestForce:
-    def test_it_is_nothing_where_the_arm_carries_what_was_declared(self, ur5e):
-        for q in (ELBOW_UP, UR5E.poses["Q1"], UR5E.poses["Q3"]):
-            snapshot = ur5e(q=q).tick(5)
-            assert snapshot.tcp_force_scalar < 1.5
-            assert snapshot.collision_detection_ratio < 0.01
-
     @pytest.mark.parametrize("offset", [[0.0] * 6, OFFSET])
     def test_it_is_the_weight_of_a_mass_that_was_not_declared(self, ur5e, offset):
         extra = Payload(mass=1.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
@@ -365,24 +277,3 @@ class TestForce:
         assert snapshot.payload == 2.0
         assert snapshot.payload_cog == [0.01, 0.02, 0.03]
         assert snapshot.payload_inertia == [0.02, 0.03, 0.04, 0.001, 0.002, 0.003]
-
-    def test_another_payload_counts_at_once(self, ur5e):
-        robot = ur5e(q=ELBOW_UP)
-        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
-        robot.tick(200)
-        state = robot.tick().state
-        heavy = robot.instruments.snapshot(state, robot.io)
-        light = robot.instruments.snapshot(state, type(robot.io)(**{**struct(robot.io), "payload": NOTHING}))
-        assert light.actual_momentum < heavy.actual_momentum
-        assert heavy.actual_momentum == robot.instruments.snapshot(state, robot.io).actual_momentum
-
-
-def test_the_models_flange_is_the_tools(ur5e):
-    """With no offset the target's pose is plain kinematics."""
-    snapshot = ur5e(q=ELBOW_UP).tick()
-    model = rigid_model(UR5E, body(NOTHING))
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, np.array(snapshot.target_q))
-    placement = data.oMf[model.getFrameId(FLANGE)]
-    wanted = placement.translation.tolist() + pin.log3(placement.rotation).tolist()
-    assert snapshot.target_TCP_pose == pytest.approx(wanted, abs=1e-10)

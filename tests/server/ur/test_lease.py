@@ -1,48 +1,16 @@
 """Control for clients that know no lease: one for each host, taken with the first command, given back at the end."""
 
-from collections import deque
-
-from tests.controller.robots import Robot
-
 from tvist_protocol import commands as c
-from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.replies import Done
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 
+from .desks import ControllerThread
 from .hosts import hear
 
 
-class Desk:
-    """A controller whose replies come when `answer` is called; other clients reach it directly."""
-
-    def __init__(self):
-        self.controller = Robot().controller
-        self.controller.session.release()
-        self.kinds = []
-        self._due = deque()
-        self.present = set()
-
-    def command(self, command, answer, origin=None):  # noqa: ARG002  as the desk has it
-        self._due.append((command, answer))
-
-    def answer(self):
-        while self._due:
-            command, answer = self._due.popleft()
-            self.kinds.append(type(command).__name__)
-            answer(self.controller.receive(command))
-
-    def client_seen(self, name, _session=""):
-        self.present.add(name)
-
-    def client_gone(self, name, session=""):
-        self.present.discard(name)
-        self.controller.client_gone(name, session)
-
-    def holder(self):
-        lease = self.controller.session.lease
-        return None if lease is None else lease.client
-
-    def take(self, client):
-        return self.controller.receive(c.TakeControl(client=client))
+def take(desk, client):
+    """Control for a client that reaches the controller directly."""
+    return desk.controller.receive(c.TakeControl(client=client))
 
 
 def lease(desk, host="127.0.0.1"):
@@ -54,7 +22,7 @@ def slow(fraction):
 
 
 def test_control_is_taken_with_the_first_change_and_given_back_with_the_last_connection():
-    desk, replies = Desk(), []
+    desk, replies = ControllerThread(late=True), []
     host = lease(desk)
     first, second, watcher = (ConnectionControl(host) for _ in range(3))
     hear(watcher.ask(c.Stop()), replies)
@@ -76,7 +44,7 @@ def test_control_is_taken_with_the_first_change_and_given_back_with_the_last_con
 
 
 def test_commands_sent_while_control_is_being_taken_go_in_their_order():
-    desk, replies = Desk(), []
+    desk, replies = ControllerThread(late=True), []
     host = lease(desk)
     connection = ConnectionControl(host)
     for fraction in (0.1, 0.2, 0.3):
@@ -87,9 +55,9 @@ def test_commands_sent_while_control_is_being_taken_go_in_their_order():
 
 
 def test_where_somebody_else_has_control_the_refusal_comes_back_each_time():
-    desk, replies = Desk(), []
+    desk, replies = ControllerThread(late=True), []
     connection = ConnectionControl(lease(desk))
-    token = desk.take("anna").token
+    token = take(desk, "anna").token
     assert connection.held_by_other
     for _ in range(2):
         hear(connection.change(slow(0.5)), replies)
@@ -102,32 +70,8 @@ def test_where_somebody_else_has_control_the_refusal_comes_back_each_time():
     assert replies[-1] == Done()
 
 
-def test_who_was_refused_is_not_kept_in_mind():
-    desk, replies = Desk(), []
-    desk.take("anna")
-    for last in range(10):
-        connection = ConnectionControl(lease(desk, f"127.0.0.{last}"))
-        hear(connection.change(slow(0.5)), replies)
-        desk.answer()
-        connection.leave()
-    assert len(replies) == 10
-    assert not desk.present
-
-
-def test_another_host_is_somebody_else():
-    desk, replies = Desk(), []
-    here, there = (ConnectionControl(lease(desk, host)) for host in ("127.0.0.1", "10.0.0.2"))
-    hear(here.change(slow(0.5)), replies)
-    desk.answer()
-    hear(there.change(slow(0.5)), replies)
-    desk.answer()
-    assert replies[0] == Done()
-    assert isinstance(replies[1], Refused)
-    assert (there.held_by_other, here.held_by_other) == (True, False)
-
-
 def test_control_that_was_lost_is_taken_again():
-    desk, replies = Desk(), []
+    desk, replies = ControllerThread(late=True), []
     connection = ConnectionControl(lease(desk))
     hear(connection.change(slow(0.5)), replies)
     desk.answer()
@@ -139,18 +83,8 @@ def test_control_that_was_lost_is_taken_again():
     assert desk.controller.motion.motions.wanted_speed == 0.4
 
 
-def test_control_that_comes_when_everybody_has_gone_is_given_back():
-    desk = Desk()
-    connection = ConnectionControl(lease(desk))
-    connection.change(slow(0.5))
-    connection.leave()
-    desk.answer()
-    assert desk.holder() is None
-    assert isinstance(desk.take("anna"), Accepted)
-
-
 def test_a_lease_is_kept_alive_while_there_is_one():
-    desk = Desk()
+    desk = ControllerThread(late=True)
     host = lease(desk)
     host.keep_alive()
     ConnectionControl(host).change(slow(0.5))
@@ -161,8 +95,8 @@ def test_a_lease_is_kept_alive_while_there_is_one():
 
 
 def test_control_that_somebody_holds_for_a_host_is_shared_and_not_given_back_with_the_last_connection():
-    desk, replies = Desk(), []
-    token = desk.take("ur-127.0.0.1").token
+    desk, replies = ControllerThread(late=True), []
+    token = take(desk, "ur-127.0.0.1").token
     host = lease(desk)
     host.adopt(token, "the program")
     connection = ConnectionControl(host)

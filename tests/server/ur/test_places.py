@@ -1,12 +1,141 @@
-"""Places at the interfaces: how many, and for whom some are kept."""
+"""Who gets a place at the interfaces: those who say nothing keep nobody out, and some places are kept."""
 
+import asyncio
+import re
+import struct
 from dataclasses import dataclass
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_server.gateways.ur.connection import KEPT, MOST, ConnectionLimit, _is_loopback
+from tvist_server.gateways.ur.connection import KEPT, MOST, UNREAD_FOR, ConnectionLimit, _is_loopback
+
+from .desks import PATIENCE, connect, lines, until
+
+VERSION_2 = struct.pack(">HBH", 5, ord("V"), 2)
+START, PAUSE = (struct.pack(">HB", 3, ord(letter)) for letter in "SP")
+
+
+@pytest.fixture
+async def later(monkeypatch):
+    """Lets the loop's clock jump by so many seconds."""
+    loop = asyncio.get_running_loop()
+    real, jumped = loop.time, [0.0]
+    monkeypatch.setattr(loop, "time", lambda: real() + sum(jumped))
+    return jumped.append
+
+
+async def is_cut_off(reader):
+    """Whether there is an end to what a client reads; of a connection that stays there is none."""
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await reader.read()
+    except ConnectionError:
+        pass
+    return True
+
+
+async def package(reader):
+    """Kind of the next package of RTDE."""
+    head = await asyncio.wait_for(reader.readexactly(3), PATIENCE)
+    await reader.readexactly(struct.unpack(">H", head[:2])[0] - 3)
+    return head[2:]
+
+
+async def rtde(desk):
+    """A client of RTDE that is being served."""
+    reader, writer = await connect(desk, "rtde")
+    recipe = struct.pack(">HBd", 11 + len("timestamp"), ord("O"), 500.0) + b"timestamp"
+    writer.write(VERSION_2 + recipe + START)
+    assert [await package(reader) for _ in range(3)] == [b"V", b"O", b"S"]
+    return reader, writer
+
+
+async def dashboard(desk):
+    """A client of the dashboard that has said something."""
+    reader, writer = await connect(desk, "dashboard")
+    assert (await reader.readline()).startswith(b"Connected")
+    assert await lines(reader, writer, "robotmode") == ["Robotmode: RUNNING"]
+    return reader, writer
+
+
+async def readers(desk, count, interface="realtime"):
+    """So many clients that only read."""
+    before = len(desk.interfaces._connections)
+    found = [(await connect(desk, interface))[0] for _ in range(count)]
+    await until(lambda: len(desk.interfaces._connections) == before + count)
+    return found
+
+
+async def silent(desk, count=MOST, interface="dashboard"):
+    """So many clients that say nothing; they have come in, and some have had to go again."""
+    found = [(await connect(desk, interface))[0] for _ in range(count)]
+    await until(lambda: all(connection.session for connection in desk.interfaces._connections))
+    return found
+
+
+@pytest.mark.parametrize("interface", ["dashboard", "rtde"])
+async def test_clients_that_say_nothing_lock_nobody_out(interface, desk):
+    await silent(desk, interface=interface)
+    await dashboard(desk)
+    await rtde(desk)
+    reader, _ = await connect(desk, "primary")
+    assert len(await asyncio.wait_for(reader.readexactly(5), PATIENCE)) == 5
+
+
+async def test_a_client_of_rtde_that_does_not_read_is_disconnected_after_ten_seconds_and_no_other(
+    later, desk, caplog
+):
+    reading, (_, sleeping) = (await rtde(desk))[0], await rtde(desk)
+    port = sleeping.get_extra_info("sockname")[1]
+    (stuck,) = [one for one in desk.interfaces._connections if f":{port} " in one.peer]
+    await desk.tick()
+    sleeping.transport.pause_reading()
+    stuck._transport.write(bytes(20_000_000))  # more than the system holds for it
+    later(UNREAD_FOR - 1.0)
+    await desk.tick(3)
+    assert len(desk.interfaces._connections) == 2
+    later(2.0)
+    await desk.tick()
+    await until(lambda: len(desk.interfaces._connections) == 1)
+    assert f":{port} of port" in caplog.text
+    assert "has not read for 10 s" in caplog.text
+    assert [await package(reading) for _ in range(5)] == [b"U"] * 5
+
+
+async def test_for_a_newcomer_the_one_that_has_been_silent_for_longest_goes(later, desk, caplog):
+    old, _ = await dashboard(desk)
+    served, _ = await rtde(desk)
+    later(60.0)
+    recent, writer = await dashboard(desk)
+    later(10.0)
+    await readers(desk, 228)
+    await connect(desk, "realtime")  # of 256 places 231 are taken
+    assert await is_cut_off(old)
+    # Seventy seconds that it jumped, and what the 231 connections took.
+    assert re.search(r"silent for 7\d s, was closed to make room for the client 127.0.0.1", caplog.text)
+    await desk.tick()
+    assert await package(served) == b"U"
+    assert await lines(recent, writer, "robotmode") == ["Robotmode: RUNNING"]
+
+
+async def test_who_is_being_served_goes_for_nobody_and_the_last_newcomer_is_turned_away(later, desk, caplog):
+    served, writer = await rtde(desk)
+    later(86_400.0)
+    others = await readers(desk, MOST - 1)
+    assert await is_cut_off((await connect(desk, "primary"))[0])
+    assert "was refused: 256 of 256 connections are in use" in caplog.text
+    await desk.tick()
+    assert await package(served) == b"U"
+    writer.write(PAUSE)
+    assert await package(served) == b"P"
+    reader, _ = await connect(desk, "primary")
+    assert len(await reader.readexactly(5)) == 5
+    assert await is_cut_off(served)  # paused, it is like any other that says nothing
+    await desk.tick()
+    for other in others:
+        assert len(await other.readexactly(1220)) == 1220
 
 
 @dataclass(eq=False)

@@ -1,7 +1,6 @@
 """The primary interface: robot state, robot messages, and the ear for commands."""
 
 import struct
-import tracemalloc
 from types import SimpleNamespace
 
 import pytest
@@ -12,7 +11,6 @@ from tests.controller.robots import UR5E, cut
 from tvist_plant.description import load
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramRun, ProgramStop
-from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur import messages, version
@@ -20,8 +18,7 @@ from tvist_server.gateways.ur.primary.packages import robot_state, robot_type
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake
 from tvist_server.gateways.ur.primary.session import PrimarySession
 
-from .conftest import FakeControl
-from .decoders import Cursor, message, parts, split
+from .decoders import message, parts, split
 from .hosts import host, told
 
 RECORDED = {0: 47, 1: 251, 4: 101, 5: 225, 9: 53, 3: 75, 2: 37, 6: 445, 7: 61, 8: 9, 10: 43, 11: 26, 12: 8}
@@ -51,17 +48,11 @@ def test_parts_lengths_and_order_are_those_of_the_recording(snapshot):
 
 
 def test_robot_mode(snapshot):
-    c = Cursor(state_of(snapshot)[0][0])
-    assert c.take("Q") == round(snapshot.timestamp * 1e6)
-    connected, enabled, power, emergency, protective, running, paused = c.many("?", 7)
-    assert (connected, enabled, power) == (True, True, True)
-    assert (emergency, protective) == (False, False)
-    assert (running, paused) == (True, False)  # it moves
-    assert c.take("B") == 7
-    assert c.take("B") == 0
-    assert c.many("d", 3) == [snapshot.target_speed_fraction, snapshot.speed_scaling, 1.0]
-    c.take("B")
-    assert c.done
+    numbers = struct.unpack(">Q7?2B3dB", state_of(snapshot)[0][0])
+    assert numbers[0] == round(snapshot.timestamp * 1e6)
+    assert numbers[1:8] == (True, True, True, False, False, True, False)  # it has power, and moves
+    assert numbers[8:10] == (7, 0)
+    assert numbers[10:13] == (snapshot.target_speed_fraction, snapshot.speed_scaling, 1.0)
 
 
 def flags(part):
@@ -76,33 +67,19 @@ def test_a_robot_without_power_in_a_protective_stop_or_with_a_paused_program_say
     stopped.send(SimulationInject, fault="protective_stop")
     part = state_of(stopped.tick(50))[0][0]
     assert flags(part)[4:] == (True, False, False)
-    for program, told_as in (
-        ("STOPPED", (False, False)),
-        ("PLAYING", (True, False)),
-        ("PAUSED", (False, True)),
-    ):
+    for program, told_as in {"STOPPED": (0, 0), "PLAYING": (1, 0), "PAUSED": (0, 1)}.items():
         resting = ur5e(io_changes={"program": "f", "program_state": program})
         assert flags(state_of(resting.tick())[0][0])[5:] == told_as
 
 
 def test_joints_have_the_snapshots_values(snapshot):
-    c = Cursor(state_of(snapshot)[0][1])
-    for joint in range(6):
-        assert c.many("d", 3) == [
-            snapshot.actual_q[joint],
-            snapshot.target_q[joint],
-            snapshot.actual_qd[joint],
-        ]
-        assert c.many("f", 3) == pytest.approx(
-            [
-                snapshot.actual_current[joint],
-                snapshot.actual_joint_voltage[joint],
-                snapshot.joint_temperatures[joint],
-            ]
-        )
-        c.take("f")
-        assert c.take("B") == 253
-    assert c.done
+    columns = list(zip(*struct.iter_unpack(">3d4fB", state_of(snapshot)[0][1]), strict=True))
+    for column, name in zip(columns[:3], ("actual_q", "target_q", "actual_qd"), strict=True):
+        assert list(column) == getattr(snapshot, name)
+    singles = ("actual_current", "actual_joint_voltage", "joint_temperatures")
+    for column, name in zip(columns[3:6], singles, strict=True):
+        assert column == pytest.approx(getattr(snapshot, name))
+    assert set(columns[7]) == {253}
 
 
 def test_cartesian_and_force(snapshot):
@@ -112,25 +89,20 @@ def test_cartesian_and_force(snapshot):
 
 
 def test_kinematics_and_configuration_are_the_descriptions(snapshot):
-    found = state_of(snapshot)[0]
-    c = Cursor(found[5])
-    assert set(c.many("I", 6)) == {2**32 - 1}
-    theta, a, d, alpha = (c.many("d", 6) for _ in range(4))
-    kinematics = UR5E.kinematics
-    assert (theta, a, d, alpha) == ([0.0] * 6, [*kinematics.a], [*kinematics.d], [*kinematics.alpha])
-    assert c.take("I") == 0
-    c = Cursor(found[6])
-    limits = UR5E.limits
-    assert [c.many("d", 2) for _ in range(6)] == [[-most, most] for most in limits.position]
-    assert [tuple(c.many("d", 2)) for _ in range(6)] == list(
-        zip(limits.velocity, limits.acceleration, strict=True)
-    )
-    assert all(value > 0 for value in c.many("d", 5))
-    assert [c.many("d", 6) for _ in range(4)] == [a, d, alpha, theta]
-    board, box, robot_type, subtype = c.many("i", 4)
-    assert (robot_type, subtype) == (1, 3)
-    assert board
-    assert box
+    found, limits, arm = state_of(snapshot)[0], UR5E.limits, UR5E.kinematics
+    table, nothing = (*arm.a, *arm.d, *arm.alpha), (0.0,) * 6
+    assert struct.unpack(">6I24dI", found[5]) == (*[2**32 - 1] * 6, *nothing, *table, 0)
+    numbers = struct.unpack(">53d4i", found[6])
+    assert numbers[:12] == tuple(side * most for most in limits.position for side in (-1, 1))
+    assert list(batched(numbers[12:24])) == list(zip(limits.velocity, limits.acceleration, strict=True))
+    assert min(numbers[24:29]) > 0
+    assert numbers[29:53] == (*table, *nothing)
+    assert all(numbers[53:55])  # the masterboard and the controller's box
+    assert numbers[55:] == (1, 3)
+
+
+def batched(numbers):
+    return zip(numbers[::2], numbers[1::2], strict=True)
 
 
 def test_terminals(ur5e):
@@ -143,27 +115,15 @@ def test_terminals(ur5e):
         "tool_analog_input": [1.25, 0.5],
     }
     found = state_of(ur5e(io_changes=changes).tick())[0]
-    c = Cursor(found[3])
-    assert c.many("I", 2) == [0x20081, 0x10203]
-    assert (c.many("b", 2), c.many("d", 2)) == ([0, 1], [0.005, 7.5])
-    assert (c.many("b", 2), c.many("d", 2)) == ([1, 0], [2.5, 0.012])
-    temperature, voltage, current, io_current = c.many("f", 4)
+    board = struct.unpack(">2I2b2d2b2d4f3BI3B", found[3])
+    assert board[:10] == (0x20081, 0x10203, 0, 1, 0.005, 7.5, 1, 0, 2.5, 0.012)
+    temperature, voltage, current, io_current = board[10:14]
     assert 0 < temperature < 80
-    assert voltage == 48.0
+    assert (voltage, io_current) == (48.0, 0.0)
     assert current > 0
-    assert io_current == 0.0
-    assert (c.take("B"), c.take("B"), c.take("B")) == (1, 0, 0)
-    c.take("I")
-    assert c.many("B", 3) == [1, 1, 1]
-    assert c.done
-    c = Cursor(found[2])
-    c.many("b", 2)
-    assert c.many("d", 2) == [1.25, 0.5]
-    assert c.take("f") == 48.0
-    c.take("B")
-    c.many("f", 2)
-    assert c.take("B") == 253
-    assert c.done
+    assert (board[14:17], board[18:]) == ((1, 0, 0), (1, 1, 1))
+    tool = struct.unpack(">2b2dfB2fB", found[2])
+    assert (tool[2:5], tool[8]) == ((1.25, 0.5, 48.0), 253)
 
 
 @pytest.mark.parametrize("joints", [1, 3, 5])
@@ -177,18 +137,10 @@ def test_an_arm_with_fewer_joints_fills_the_same_package(ur5e, joints):
 # ---------------------------------------------------------------------- the session's stream
 
 
-class Ticks:
-    """Snapshots with numbers of ticks that one can choose."""
+class At:
+    """A snapshot with another number of its tick, and other values."""
 
-    def __init__(self, snapshot):
-        self.snapshot = snapshot
-
-    def at(self, tick, **changes):
-        return Changed(self.snapshot, tick, changes)
-
-
-class Changed:
-    def __init__(self, snapshot, tick, changes):
+    def __init__(self, snapshot, tick, **changes):
         self._snapshot, self._changes = snapshot, changes
         self.state, self.shared = SimpleNamespace(tick=tick), {}
 
@@ -205,57 +157,40 @@ def test_the_version_comes_first_and_the_first_state_at_once(robot, control, sen
     assert hello.values["name"] == "URControl"
     assert hello.values["numbers"] == [version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD]
     assert hello.values["date"] == version.DATE
-    assert interface.sample(Ticks(snapshot).at(1234)) == b""
+    assert interface.sample(At(snapshot, 1234)) == b""
     assert [kind for kind, _ in split(b"".join(sent[1:]))] == [16]
 
 
 def test_states_come_at_10_hz_even_where_ticks_were_left_out(robot, control, sent, snapshot):
     interface = session(robot, control, sent.append)
-    ticks = Ticks(snapshot)
-    interface.sample(ticks.at(1))
+    interface.sample(At(snapshot, 1))
     assert len(sent) == 1
-    assert [tick for tick in range(2, 501) if interface.sample(ticks.at(tick))] == list(range(50, 501, 50))
-    assert interface.sample(ticks.at(561))
-    assert not interface.sample(ticks.at(599))
-    assert interface.sample(ticks.at(600))
+    assert [tick for tick in range(2, 501) if interface.sample(At(snapshot, tick))] == list(
+        range(50, 501, 50)
+    )
+    assert interface.sample(At(snapshot, 561))
+    assert not interface.sample(At(snapshot, 599))
+    assert interface.sample(At(snapshot, 600))
     assert len(sent) == 1
 
 
-def test_it_is_packed_once_for_all_clients(robot, control, snapshot):
-    states = []
-    one, other = session(robot, control, states.append), session(robot, control, states.append)
-    tick = Ticks(snapshot).at(50)
-    one.sample(tick)
-    other.sample(tick)
-    assert states[0] is states[1]
-
-
-def test_the_safety_mode_is_told_when_it_changes_and_not_before(robot, control, sent, snapshot):
+@pytest.mark.parametrize(("modes", "told"), [((1, 1, 3, 3, 1), [3, 1]), ((3, 3, 1), [1])])
+def test_the_safety_mode_is_told_when_it_changes_and_not_before(robot, control, sent, snapshot, modes, told):
     interface = session(robot, control, sent.append)
-    ticks = Ticks(snapshot)
-    interface.opened()
-    for tick, mode in enumerate((1, 1, 3, 3, 1), start=1):
-        interface.sample(ticks.at(tick, safety_mode=mode))
-    changes = [message(data) for data in sent if data[4] == 20][1:]
-    assert [(one.kind, one.values["mode"]) for one in changes] == [(5, 3), (5, 1)]
-
-
-def test_a_client_that_comes_in_a_protective_stop_is_told_of_its_end_alone(robot, control, sent, snapshot):
-    interface = session(robot, control, sent.append)
-    ticks = Ticks(snapshot)
-    interface.sample(ticks.at(1, safety_mode=3))
-    interface.sample(ticks.at(2, safety_mode=1))
-    assert [message(data).values["mode"] for data in sent if data[4] == 20] == [1]
+    for tick, mode in enumerate(modes, start=1):
+        interface.sample(At(snapshot, tick, safety_mode=mode))
+    changes = [message(data) for data in sent if data[4] == 20]
+    assert [(one.kind, one.values["mode"]) for one in changes] == [(5, mode) for mode in told]
 
 
 def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning_after_the_state(
     robot, control, sent, snapshot
 ):
-    interface, ticks = session(robot, control, sent.append), Ticks(snapshot)
-    interface.sample(ticks.at(6))
+    interface = session(robot, control, sent.append)
+    interface.sample(At(snapshot, 6))
     sent.clear()
     interface.event(Event(tick=7, kind="protective_stop", code="limit_torque", why="too much"))
-    interface.sample(ticks.at(7, safety_mode=3))
+    interface.sample(At(snapshot, 7, safety_mode=3))
     assert [data[4] for data in sent] == [20, 16, 20]
     error = message(sent[-1])
     assert error.kind == 6
@@ -264,11 +199,11 @@ def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning_after_the_sta
 
 
 def test_clients_of_the_secondary_interface_get_the_state_and_no_messages(robot, control, sent, snapshot):
-    interface, ticks = session(robot, control, sent.append, informed=False), Ticks(snapshot)
-    interface.sample(ticks.at(6))
+    interface = session(robot, control, sent.append, informed=False)
+    interface.sample(At(snapshot, 6))
     interface.event(Event(tick=7, kind="protective_stop", code="limit_torque", why="too much"))
     interface.event(Event(tick=7, kind="warning", why="mind the gap"))
-    assert interface.sample(ticks.at(7, safety_mode=3)) == b""
+    assert interface.sample(At(snapshot, 7, safety_mode=3)) == b""
     assert [data[4] for data in sent] == [16, 16]
 
 
@@ -354,47 +289,6 @@ def test_a_stream_is_cut_into_the_same_units_wherever_it_is_split(sample, ending
         assert intake.feed(stream[:at]) + intake.feed(stream[at:]) == whole
 
 
-def test_a_text_that_ends_in_the_middle_of_a_program_waits():
-    intake = Intake()
-    assert not intake.feed(b"def f():\n  stop program\n  if x:\n  end\n")
-    assert not intake.feed(b"en")
-    (unit,) = intake.feed(b"d\n")
-    assert unit.name == "f"
-    assert intake.feed(b"power on") == []
-
-
-def test_a_unit_says_where_its_code_begins():
-    comments, indented = Intake().feed(b"# one\n\n  # two\n   def f():\nend\n  movej(q)\n")
-    assert (comments.line, comments.column, comments.name) == (4, 4, "f")
-    assert (indented.line, indented.column, indented.name) == (1, 3, None)
-
-
-def test_a_unit_that_is_too_long_is_answered_once_and_forgotten():
-    intake = Intake()
-    units = intake.feed(b"def f():\n")
-    for _ in range(300):
-        units += intake.feed(b"  x = 1 # " + b"y" * 10_000 + b"\n")
-        assert intake.held <= LONGEST
-    assert [unit.too_long for unit in units] == [True]
-    assert units[0].text.startswith("def f():")
-    units = intake.feed(b"end\nstop program\n")
-    assert [unit.words for unit in units] == ["stop program"]
-
-
-def test_a_unit_of_short_lines_takes_little_more_memory_than_it_has_bytes():
-    intake = Intake()
-    tracemalloc.start()
-    try:
-        intake.feed(b"def f():\n")
-        for _ in range(100):
-            intake.feed(b"ab\n" * 3000)
-        held = tracemalloc.get_traced_memory()[0]
-    finally:
-        tracemalloc.stop()
-    assert intake.held > 900_000
-    assert held < 2 * intake.held
-
-
 def test_a_line_that_is_too_long_does_not_swallow_the_next():
     for line in (b"a" * (3 * LONGEST), b" " * (3 * LONGEST), b"#" + b"a" * (3 * LONGEST)):
         intake = Intake()
@@ -405,19 +299,6 @@ def test_a_line_that_is_too_long_does_not_swallow_the_next():
         units += intake.feed(b"\nstop program\n")
         assert [unit.words for unit in units if not unit.too_long] == ["stop program"]
         assert sum(unit.too_long for unit in units) == 1
-
-
-@given(
-    st.lists(st.binary(max_size=40) | st.sampled_from([b"def f():\n", b"end\n", b"if x:\n", b"\r\n", b'"\n']))
-)
-def test_nothing_that_comes_raises(pieces):
-    intake = Intake()
-    for piece in pieces:
-        for unit in intake.feed(piece):
-            assert unit.line >= 1
-            assert unit.column >= 1
-            assert isinstance(unit.words, str)
-            assert unit.name is None or unit.name.isidentifier() or unit.name[0].isdecimal()
 
 
 # ---------------------------------------------------------------------- the ear: orders
@@ -466,16 +347,6 @@ def test_units_are_carried_out_in_their_order_each_when_the_one_before_was_answe
     assert interface.waiting == 0
 
 
-def test_what_is_complete_is_carried_out_even_if_the_connection_ends(robot, control, sent):
-    interface = session(robot, control, sent.append)
-    control.wait()
-    interface.receive(b"set robotmode run\nmovej(q)\n")
-    interface.closed()
-    control.answer()
-    assert [type(command) for command in control.commands] == [c.PowerOn, ProgramRun]
-    assert control.left == 1  # what lasted longer than the connection; the program's own lasts
-
-
 REPORTS = {
     b"power on\n": 'the script "power on" of {} was run',
     b"stop program\n": 'the script "stop program" of {} was run',
@@ -512,68 +383,44 @@ def test_a_text_that_is_not_valid_is_told_to_everybody_and_on_the_console(robot,
 @pytest.mark.parametrize("text", ["movej(q)", "set robotmode run"])
 def test_what_cannot_be_done_now_is_a_line_of_the_log_for_who_sent_it(robot, control, sent, text):
     control.refuse("wrong_mode", why="the arm has no power")
-    robot.latest = Ticks(robot.latest).at(1, robot_mode=3)
+    robot.latest = At(robot.latest, 1, robot_mode=3)
     session(robot, control, sent.append).receive(text.encode() + b"\n")
     (line,) = [message(data) for data in sent]
     assert (line.kind, line.values["text"]) == (0, f"{text} was refused: the arm has no power")
     assert not robot.told
 
 
-def test_a_refusal_is_told_on_the_console_with_its_reason(robot, control, sent):
+@pytest.mark.parametrize("read_only", [True, False])
+def test_without_control_or_at_a_read_only_port_commands_are_answered_with_210(
+    robot, control, sent, read_only
+):
     control.refuse("no_control")
-    session(robot, control, sent.append).receive(b"power off\n")
-    (line,) = robot.reported
-    assert line.endswith("was refused: another client has control: 'a'")
-    session(robot, control, sent.append, read_only=True).receive(b"power off\n")
-    assert robot.reported[1].endswith("was refused: this port is read-only")
-
-
-@pytest.mark.parametrize("text", [b"power on\n", b"movej(q)\n"])
-def test_who_does_not_have_control_is_told_that_the_interface_is_read_only(robot, control, sent, text):
-    control.refuse("no_control")
-    session(robot, control, sent.append).receive(text)
-    (error,) = [message(data) for data in sent]
-    assert (error.kind, error.values["code"]) == (6, 210)
-    assert not robot.told
-
-
-@pytest.mark.parametrize("text", [b"power on\n", b"set robotmode run\n", b"set unlock protective stop\n"])
-def test_what_is_so_already_is_no_failure(robot, control, sent, text):
-    control.refuse("wrong_mode")
-    session(robot, control, sent.append).receive(text)
-    assert not sent
-
-
-def test_a_protective_stop_that_cannot_be_left_yet_is_a_refusal(robot, control, sent):
-    control.reply = Refused(code="wrong_mode", where="", why="it is stopping")
-    robot.latest = Ticks(robot.latest).at(1, safety_mode=3)
-    session(robot, control, sent.append).receive(b"set unlock protective stop\n")
-    assert message(sent[0]).kind == 0
-
-
-def test_the_read_only_ports_answer_commands_with_210_and_do_nothing(robot, control, sent):
-    interface = session(robot, control, sent.append, read_only=True)
-    interface.receive(b"power off\ndef f():\n  x=1\nend\nstop program\n")
+    interface = session(robot, control, sent.append, read_only=read_only)
+    interface.receive(b"power off\ndef f():\n  x=1\nend\n" + (b"stop program\n" if read_only else b""))
     errors = [message(data) for data in sent]
-    assert [error.values["code"] for error in errors] == [210] * 3
-    assert not control.commands
+    assert [(error.kind, error.values["code"]) for error in errors] == [(6, 210)] * (2 + read_only)
+    assert (control.commands == []) is read_only
     assert not robot.told
+    why = "this port is read-only" if read_only else "another client has control: 'a'"
+    assert robot.reported[0].endswith(f"was refused: {why}")
 
 
-@given(data=st.binary(max_size=300))
-def test_no_bytes_break_a_session(data):
-    reported = []
-    said = {"tell": message, "report": reported.append, "report_refusal": reported.append}
-    robot = host(SimpleNamespace(description=UR5E, latest=None, **said))
-    control = FakeControl()
-    control.held_by_other = True
-    control.refuse()
-    interface = PrimarySession(robot, control, message)
-    interface.opened()
-    interface.receive(data)
-    interface.receive(b"\npower on\nstop program\n")
-    interface.closed()
-    assert all(line.isprintable() and len(line) < 300 for line in reported)
+@pytest.mark.parametrize(
+    ("text", "safety", "kinds"),
+    [
+        (b"power on\n", 1, []),
+        (b"set robotmode run\n", 1, []),
+        (b"set unlock protective stop\n", 1, []),
+        (b"set unlock protective stop\n", 3, [0]),
+    ],
+)
+def test_what_is_so_already_is_no_failure_and_a_stop_that_cannot_be_left_yet_is_one(
+    robot, control, sent, text, safety, kinds
+):
+    control.refuse("wrong_mode", why="it is stopping")
+    robot.latest = At(robot.latest, 1, safety_mode=safety)
+    session(robot, control, sent.append).receive(text)
+    assert [message(data).kind for data in sent] == kinds
 
 
 @pytest.mark.parametrize(

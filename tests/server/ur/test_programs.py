@@ -5,13 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tvist_protocol.programs import (
-    ProgramClosePopup,
     ProgramLabel,
-    ProgramLoad,
-    ProgramPause,
-    ProgramPlay,
     ProgramRun,
-    ProgramStop,
 )
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.stream import Event
@@ -43,18 +38,6 @@ def titles(robot):
     return [(one.kind, one.values.get("title")) for one in told(robot)]
 
 
-def test_what_is_asked_for_reaches_the_controller_as_a_command(programs, control, answers):
-    assert load(programs, "/ursim/programs/paper.urp", control)
-    hear(programs.play(control), answers)
-    hear(programs.pause(control), answers)
-    hear(programs.play(control), answers)
-    hear(programs.stop(control), answers)
-    kinds = [type(command) for command in control.commands]
-    assert kinds == [ProgramLoad, ProgramPlay, ProgramPause, ProgramPlay, ProgramStop]
-    assert control.of(ProgramLoad)[0].name == "paper.urp"
-    assert answers == [True] * 4
-
-
 def started(name, **fields):
     return Event(tick=5, kind="program_started", program=name, **fields)
 
@@ -73,25 +56,6 @@ def test_clients_are_told_that_a_program_has_started_and_that_it_has_stopped(pro
     assert [one.values["text"] for one in told(robot)[1::2]] == names
 
 
-def test_the_state_is_the_controllers(programs, control, answers):
-    load(programs, "paper.urp", control)
-    hear(programs.play(control), answers)
-    assert programs.playing
-    hear(programs.pause(control), answers)
-    assert programs.state == "PAUSED"
-    programs.io(io(program="paper.urp", program_state="PLAYING", program_line=1))
-    assert programs.playing
-    programs.io(io(program="paper.urp"))
-    assert programs.state == "STOPPED"
-
-
-def test_what_other_clients_load_and_play_is_told_too(programs, robot):
-    programs.io(io(program="Q2.urp", program_state="PLAYING", program_line=1))
-    assert (programs.path, programs.playing, programs.saved) == ("/programs/Q2.urp", True, True)
-    programs.io(io(program="rtde_control", program_state="PLAYING", program_line=1))
-    assert (programs.path, programs.playing, programs.saved) == ("rtde_control", True, False)
-
-
 def test_a_label_is_told_once_when_the_program_comes_to_it(programs, robot):
     for number, name in ((1, "Robot Program"), (1, "Robot Program"), (2, "Waypoint_1")):
         programs.io(
@@ -102,34 +66,6 @@ def test_a_label_is_told_once_when_the_program_comes_to_it(programs, robot):
         (1, {"number": 1, "text": "Robot Program"}),
         (1, {"number": 2, "text": "Waypoint_1"}),
     ]
-
-
-def test_a_secondary_program_sends_no_key_messages(programs, robot):
-    programs.event(started("aside", secondary=True))
-    programs.event(stopped("aside", secondary=True))
-    assert not robot.told
-
-
-def test_folders_do_not_matter(programs, control):
-    assert load(programs, "/ursim/programs/wait_program.urp", control)
-    assert (programs.path, programs.name) == ("/ursim/programs/wait_program.urp", "wait_program.urp")
-    programs.io(io(program="wait_program.urp"))
-    assert programs.path == "/ursim/programs/wait_program.urp"
-    assert load(programs, "Q1.urp", control)
-    assert programs.path == "/programs/Q1.urp"
-    assert not load(programs, "", control)
-    assert not load(programs, "/programs/nothing.urp", control)
-    assert programs.name == "Q1.urp"
-
-
-def test_a_file_that_is_not_there_and_a_load_that_is_refused_are_told_apart(robot, control):
-    from tvist_server.gateways.ur.dashboard import DashboardSession
-
-    said = []
-    dashboard = DashboardSession(host(robot), control, said.append)
-    control.refuse("busy")
-    dashboard.receive(b"load nothing.urp\nload Q1.urp\n")
-    assert said == [b"File not found: nothing.urp\n", b"Error while loading program: Q1.urp\n"]
 
 
 def test_a_line_that_cannot_be_carried_out_is_a_runtime_exception(programs, robot):
@@ -204,35 +140,6 @@ def test_a_script_that_is_refused_for_another_reason_gives_control_back(programs
     assert refused.code == code
     assert control.left == 1
     assert not robot.told
-
-
-def test_a_popup_can_be_closed_by_anybody(programs, control, answers):
-    hear(programs.close_popup(control), answers)
-    assert control.commands == [ProgramClosePopup()]
-    assert answers == [True]
-
-
-def test_without_control_nothing_is_asked_for_but_a_stop(programs, control, answers):
-    load(programs, "wait_program.urp", control)
-    control.held_by_other = True
-    hear(programs.play(control), answers)
-    hear(programs.pause(control), answers)
-    hear(programs.stop(control), answers)
-    assert answers == [False, False, True]
-    assert [type(command) for command in control.commands] == [ProgramLoad, ProgramStop]
-
-
-def test_what_the_controller_refuses_has_failed(programs, robot, control, answers):
-    load(programs, "wait_program.urp", control)
-    control.refuse("wrong_mode")
-    hear(programs.play(control), answers)
-    hear(programs.pause(control), answers)
-    hear(programs.stop(control), answers)
-    assert not load(programs, "Q1.urp", control)
-    assert answers == [False] * 3
-    assert (programs.name, programs.state) == ("wait_program.urp", "STOPPED")
-    assert not robot.told
-    assert control.left == 1
 
 
 def test_control_is_held_as_long_as_the_program_plays(programs, control, answers):

@@ -5,10 +5,9 @@ import struct
 import pytest
 from tests.controller.robots import cut
 
-from tvist_protocol import commands as c
 from tvist_server.gateways.ur.realtime import RealtimeSession, package
 
-from .hosts import host, told
+from .hosts import host
 
 # Zero-based numbers of doubles, from the description of the interface; counts behind.
 PLACES = {
@@ -72,20 +71,9 @@ def test_every_value_stands_where_the_description_has_it_to_the_last_bit(snapsho
         assert {values[number] for number in reserved} == {0.0}
 
 
-def test_a_client_of_software_5_1_finds_its_shorter_package_at_the_beginning(snapshot):
-    assert doubles(package(snapshot))[138] == snapshot.safety_status
-    assert 4 + 139 * 8 == 1116
-
-
 def test_the_tool_accelerometer_feels_gravity(ur5e):
     x, y, z = doubles(package(ur5e().tick()))[108:111]
     assert (x * x + y * y + z * z) ** 0.5 == pytest.approx(9.81, abs=0.3)
-
-
-def test_it_is_packed_once_for_all_clients_of_a_robot(robot, control, snapshots):
-    one, other = session(robot, control), session(robot, control)
-    assert one.sample(snapshots[3]) is other.sample(snapshots[3])
-    assert one.sample(snapshots[4]) != one.sample(snapshots[3])
 
 
 @pytest.mark.parametrize("joints", [1, 4])
@@ -96,26 +84,8 @@ def test_joints_that_are_not_there_are_zero(ur5e, joints):
     assert values[31 + joints : 37] == (0.0,) * (6 - joints)
 
 
-def test_what_is_sent_to_it_is_taken_for_a_script(robot, control):
-    interface = session(robot, control)
-    for piece in (b"def f():\n  movej([0,", b"0,0,0,0,0])\nen", b"d\n"):
-        interface.receive(piece)
-    (run,) = control.commands
-    assert run.text == "def f():\n  movej([0,0,0,0,0,0])\nend\n"
-    interface.receive(b"power off\n")
-    assert control.of(c.PowerOff)
-
-
 def test_the_read_only_port_hears_nothing(robot, control):
     interface = session(robot, control, read_only=True)
     interface.receive(b"power off\ndef f():\nend\n" + bytes(range(256)))
     assert not control.commands
     assert not robot.told
-
-
-def test_a_program_sent_without_end_is_bounded(robot, control):
-    interface = session(robot, control)
-    for _ in range(40):
-        interface.receive(b"def f():\n" + b"  x = 1\n" * 10_000)
-    assert interface._intake.held <= 1 << 20
-    assert [one.values["text"].split(":")[0] for one in told(robot)] == ["program_too_long"]

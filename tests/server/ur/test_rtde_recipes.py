@@ -2,8 +2,6 @@
 
 import math
 import struct
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -22,7 +20,6 @@ from . import rtde_client as client
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "rtde-variables.md"
 names_of_outputs = st.lists(st.sampled_from(sorted(client.OUTPUT_TYPES)), min_size=1, max_size=60)
-names_of_inputs = st.lists(st.sampled_from(sorted(client.INPUT_TYPES)), min_size=1, max_size=60)
 NUMBERS = {
     "BOOL": st.booleans(),
     "UINT8": st.integers(0, 255),
@@ -94,15 +91,6 @@ def test_the_longest_list_of_names_there_is_fits(snapshot):
     assert all(math.isfinite(value) for value in found.values() if not isinstance(value, list))
 
 
-def test_equal_recipes_share_one_package(snapshots):
-    board, recipes = Board(), [OutputRecipe(("timestamp", "actual_q")) for _ in range(2)]
-    for number, recipe in enumerate(recipes):
-        board.begin(number, recipe)
-    first, second = (board.package(recipe, snapshots[3], b"\x01") for recipe in recipes)
-    assert first is second
-    assert board.package(recipes[0], snapshots[4], b"\x01") != first
-
-
 @given(st.lists(st.tuples(st.integers(0, 3), st.none() | names_of_outputs), min_size=1, max_size=12))
 def test_who_else_reads_what_changes_nothing(snapshots, changes):
     board, recipes = Board(), {}
@@ -146,23 +134,6 @@ def test_what_is_read_only_when_io_changes_depends_on_nothing_else(snapshots):
         assert not part.of_io or part.read(early) == part.read(late), name
 
 
-def test_what_nobody_reads_is_not_computed(ur5e, monkeypatch):
-    robot = ur5e()
-    computed = []
-    monkeypatch.setattr(type(robot.instruments._rigid), "momentum", lambda *_: computed.append(1) or 0.0)
-    board, few, more = Board(), OutputRecipe(("actual_q",)), OutputRecipe(("actual_momentum",))
-    board.begin("one", few)
-    board.package(few, robot.tick(), b"")
-    assert not computed
-    board.begin("other", more)
-    for recipe in (few, more, few):
-        board.package(recipe, robot.tick(), b"")
-    assert len(computed) == 3
-    board.end("other")
-    board.package(few, robot.tick(), b"")
-    assert len(computed) == 3
-
-
 @given(st.lists(st.dictionaries(st.sampled_from(sorted(BANKS)), st.integers(0, 47)), max_size=6), st.data())
 def test_registers_are_those_of_the_tick_however_they_change(ur5e_at_rest, changes, data):
     robot, registers = ur5e_at_rest, [name for name in client.OUTPUT_TYPES if "_register" in name]
@@ -188,15 +159,6 @@ def test_vectors_have_six_entries_however_few_the_arm_has(ur5e, joints):
     assert found["actual_q"] == (snapshot.actual_q + [0.0] * 6)[:6]
     assert found["joint_mode"] == ([253] * joints + [0] * 6)[:6]
     assert (found["elbow_position"], found["timestamp"]) == (snapshot.elbow_position, snapshot.timestamp)
-
-
-@pytest.mark.parametrize("names", [(), ("",), ("nonsense",), ("actual_q", "actual_qdd"), ("actual_Q",)])
-def test_what_is_not_there_is_not_found(names):
-    recipe = OutputRecipe(names)
-    assert not recipe.valid
-    assert [word == "NOT_FOUND" for word in recipe.words] == [
-        name not in client.OUTPUT_TYPES for name in names
-    ]
 
 
 def test_a_recipe_beyond_the_largest_package_is_not_valid():
@@ -234,26 +196,7 @@ def test_names_are_split_at_commas_with_or_without_one_at_the_end(names):
         assert split(text + b",") == split(text)
 
 
-@given(st.binary(max_size=300))
-def test_any_bytes_are_names_of_some_kind(data):
-    assert all(isinstance(name, str) for name in split(data))
-
-
 def test_the_page_of_variables_is_up_to_date():
     assert PAGE.read_text(encoding="utf-8") == page(), (
         f"run `python -m tvist_server.gateways.ur.rtde.table > {PAGE.relative_to(PAGE.parents[2])}`"
     )
-
-
-def test_the_page_names_every_variable():
-    text = page()
-    for name in (*client.OUTPUT_TYPES, *client.INPUT_TYPES):
-        if "_register" not in name:
-            assert f"| `{name}` |" in text
-
-
-def test_the_page_prints_itself():
-    printed = subprocess.run(
-        [sys.executable, "-m", "tvist_server.gateways.ur.rtde.table"], capture_output=True, check=True
-    ).stdout
-    assert printed.decode() == page()

@@ -5,14 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, Save, write
 from tvist_cli.log_comparison import compare
 from tvist_cli.log_facts import show_facts
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, progress, say, table
 
 if TYPE_CHECKING:
-    from tvist_lab.figures import FigureFiles
     from tvist_lab.metrics import MotionRows
     from tvist_lab.recordings import Recording
 
@@ -90,7 +89,8 @@ def _motions(
             results.append(measure(recording, motion))
             bar(1, None)
     if figures is not None:
-        _draw(recording, found, look.into(figures))
+        with look.into(figures) as save:
+            _draw(recording, found, save)
     changed = changes(Measured(recording, found, results))
     if json:
         return {"motions": [result.as_dict() for result in results], "changes": changed}
@@ -126,17 +126,17 @@ def _sensor_alone(recording: "Recording", *, json: bool) -> dict[str, Any]:
     return {}
 
 
-def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles") -> None:
+def _draw(recording: "Recording", found: "list[MotionRows]", save: Save) -> None:
     """Write the figures of each motion; what a log does not contain has none."""
-    from tvist_lab.figures import observed_figure, ring_down_figure
+    from tvist_lab.figures import motion_figure, ring_down_figure
     from tvist_lab.metrics import NotMeasurableError
 
-    kinds = {"ring_down": ring_down_figure}
+    kinds: dict[str, Any] = {"ring_down": ring_down_figure}
     if not recording.foreign:
-        kinds = {"motion": observed_figure, **kinds}
+        kinds = {"motion": motion_figure, **kinds}
     for index, motion in enumerate(found, 1):
         for kind, figure_of in kinds.items():
             try:
-                write(files, {f"{kind}_{index}": figure_of(f"motion {index}", (recording, motion))})
+                write(save, {f"{kind}_{index}": figure_of(f"motion {index}", (recording, motion))})
             except NotMeasurableError as error:
                 say(f"motion {index}: no figure {kind}: {error}")

@@ -1,0 +1,66 @@
+"""What a shell offers as the value of an option: names that come with the package, and files of its kind.
+
+A command annotates such an option with one of these, `Annotated[str, ROBOTS]`; the shell asks the program at TAB.
+"""
+
+from collections.abc import Iterable
+from glob import escape, glob
+from typing import TYPE_CHECKING, get_args
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from cyclopts.completion import CompletionContext
+
+
+def _names(kind: str) -> Iterable[str]:
+    """Names of a kind; what they need is imported only when something is completed, so that help stays quick."""
+    found: Iterable[str]
+    match kind:
+        case "robot":
+            from tvist_plant.description import robots
+
+            found = robots()
+        case "pose":
+            from tvist_plant.description import load
+
+            found = sorted({name for robot in _names("robot") for name in load(robot).poses})
+        case "shaper":
+            from tvist_shaping import BUILT_IN
+
+            found = BUILT_IN.names()
+        case "compared":
+            from tvist_lab.study.menus import rows
+
+            found = [row.name for row in rows()]
+        case "plant":
+            from tvist_controller.sources.own_plants import named_plants
+
+            found = named_plants()
+        case "world":
+            from tvist_plant.world.scene_file import scenes
+
+            found = scenes()
+        case _:
+            from tvist_server.profiles import ProfileName
+
+            found = get_args(ProfileName)
+    return found
+
+
+def _offered(kind: str, ending: str | None = None) -> Parameter:
+    def complete(context: "CompletionContext") -> list[str]:
+        typed, ends = escape(context.incomplete), () if ending is None else (ending, "/")
+        return [*_names(kind), *(file for end in ends for file in glob(f"{typed}*{end}"))]  # noqa: PTH207  a text
+
+    return Parameter(completer=complete)
+
+
+ROBOTS = _offered("robot", ".toml")
+SHAPERS = _offered("shaper", ".py")
+COMPARED = _offered("compared", ".py")
+"""Shapers and baselines that studies compare."""
+PLANTS = _offered("plant", ".py")
+WORLDS = _offered("world", ".xml")
+PROFILES = _offered("profile")
+POSES = _offered("pose")

@@ -1,0 +1,170 @@
+"""The arm of the paper's Figure 2, one flexible joint whose inertia changes as it folds: in closed form, and simulated.
+
+A joint's own rotation does not change the inertia about it, so the angle that does is the elbow's. Both axes are
+vertical; then the arm's weight loads no joint. With the parallel-axis theorem for each body and the law of cosines
+for the distance of the forearm's centre of mass from the shoulder,
+
+    I(q) = J_1 + J_2 + m_2 (l² + 2 l c_2 cos q)
+
+where J_1 is the inertia of the upper arm about the shoulder, J_2 and m_2 c_2 are inertia and first moment of the
+forearm with its payload about the elbow, l is the length of the upper arm, and q = 0 is the stretched arm. Whether that
+is so shows a pluck of the simulated arm, which rings.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tvist_controller.api.line import body, paper_payload
+from tvist_lab.metrics import RingDown, fit_ring_down
+from tvist_plant.description import Payload, RobotDescription, load
+from tvist_plant.drives import DriveCommand
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.plant import PERIOD
+from tvist_shaping import FlexibleJoint, flexible_joint
+
+MASSES = (0.0, 1.0)
+"""Payloads of the figure [kg]."""
+ANGLES = tuple(np.radians(np.arange(0.0, 151.0, 10.0)).tolist())
+"""Elbow angles at which the arm is plucked [rad]."""
+TORQUE = 2.0
+"""Torque that twists the shoulder before it is let go [N m]."""
+HELD, LISTENED = 1.0, 1.0
+"""Time for which it acts, until the arm rests again, and time that is recorded after that [s]."""
+GRAVITY = (0.0, 0.0, 9.81)
+"""What the accelerometer of an arm with vertical axes feels at rest [m/s²]."""
+
+
+@dataclass(frozen=True)
+class FlexibleShoulder:
+    """What the closed form is made of."""
+
+    middle: float
+    """I(90°) = J_1 + J_2 + m_2 l² [kg m²]."""
+    change: float
+    """2 l m_2 c_2, the inertia by which the stretched arm differs from that [kg m²]."""
+    stiffness: float
+    """K of the shoulder [N m/rad]."""
+    damping: float
+    """D of the damper beside it [N m s/rad]."""
+
+    @classmethod
+    def of(cls, description: RobotDescription, payload: Payload) -> "FlexibleShoulder":
+        """Take it from a robot file.
+
+        The drives are taken as rigid. A drive of gain K_d yields, which adds about √(K I)/(2 K_d) to ζ and lowers f_d
+        by a share of about K K_p/(2 K_d ω²).
+
+        Args:
+            description: An arm with two joints.
+            payload: What it carries.
+
+        Raises:
+            ValueError: The arm has not two vertical axes with the masses in line with its links.
+        """
+        kinematics, links = description.kinematics, description.links
+        aside = [com[1] for com in links.com] + [payload.com[1]]
+        if len(kinematics.a) != 2 or any(kinematics.alpha) or any(aside):
+            raise ValueError(
+                f"robot {description.robot.name}: the closed form is for two vertical axes with masses in line"
+            )
+        length, forearm = kinematics.a
+        J_1 = links.inertia[0][5] + links.mass[0] * (length + links.com[0][0]) ** 2
+        c, c_payload = forearm + links.com[1][0], forearm + payload.com[0]
+        mass, moment = links.mass[1] + payload.mass, links.mass[1] * c + payload.mass * c_payload
+        J_2 = links.inertia[1][5] + links.mass[1] * c**2 + payload.inertia[5] + payload.mass * c_payload**2
+        return cls(
+            middle=J_1 + J_2 + mass * length**2,
+            change=2.0 * length * moment,
+            stiffness=description.drives.gear_stiffness[0],
+            damping=description.drives.gear_damping[0],
+        )
+
+    def inertia(self, elbow: float) -> float:
+        """I(q) about the shoulder [kg m²] at an angle of the elbow [rad], 0 where the arm is stretched."""
+        return self.middle + self.change * float(np.cos(elbow))
+
+    def mode(self, elbow: float) -> tuple[float, float]:
+        """Return f_d [Hz] and ζ [-] at an angle of the elbow [rad]; see `tvist_shaping.flexible_joint`."""
+        return flexible_joint(self.inertia(elbow), self.stiffness, self.damping)
+
+    def estimator(self) -> FlexibleJoint:
+        """Return the closed form as an estimator for a filter, which takes the angles of shoulder and elbow."""
+        ends = (self.middle - abs(self.change), self.middle + abs(self.change))
+        return FlexibleJoint(lambda q: self.inertia(float(q[1])), ends, self.stiffness, self.damping)
+
+
+class Plucked(NamedTuple):
+    """The mode at one angle of the elbow, by the formula and fitted to the accelerometer after a pluck."""
+
+    mass: float
+    """Of the payload [kg]."""
+    elbow: float
+    """[rad]."""
+    inertia: float
+    """About the shoulder [kg m²]."""
+    f_d: float
+    """[Hz]."""
+    zeta: float
+    """[-]."""
+    simulated_f_d: float
+    simulated_zeta: float
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The modes of the one-joint arm over the angle of its elbow."""
+
+    description: RobotDescription
+    curve: tuple[Plucked, ...]
+    """Over `ANGLES`, with each of `MASSES`."""
+    poses: tuple[Plucked, ...]
+    """At Q1 to Q3 of the robot file, which are the angles of the paper's figure, with its payload."""
+
+    @property
+    def worst_f_d(self) -> float:
+        """Largest deviation of the simulated f_d from the formula [%]."""
+        return max(100.0 * abs(one.simulated_f_d / one.f_d - 1.0) for one in self.curve)
+
+    @property
+    def worst_zeta(self) -> float:
+        """Largest deviation of the simulated ζ from the formula [%]."""
+        return max(100.0 * abs(one.simulated_zeta / one.zeta - 1.0) for one in self.curve)
+
+
+def pluck_all() -> Modes:
+    """Pluck the arm all over its range."""
+    description = load("one-joint")
+    curve = [_plucked(description, mass, elbow) for mass in MASSES for elbow in ANGLES]
+    elbows = [description.poses[name][1] for name in ("Q1", "Q2", "Q3")]
+    poses = [_plucked(description, description.payload.mass, elbow) for elbow in elbows]
+    return Modes(description, tuple(curve), tuple(poses))
+
+
+def _plucked(description: RobotDescription, mass: float, elbow: float) -> Plucked:
+    payload = body(paper_payload(description, mass))
+    formula = FlexibleShoulder.of(description, payload)
+    ring = pluck(description, payload, elbow)
+    return Plucked(mass, elbow, formula.inertia(elbow), *formula.mode(elbow), ring.f_d, ring.zeta)
+
+
+def pluck(description: RobotDescription, payload: Payload, elbow: float) -> RingDown:
+    """Twist the shoulder, let it go, and fit a damped sine to what the accelerometer feels.
+
+    The fit knows nothing of the arm: neither masses nor spring.
+
+    Args:
+        description: An arm with a shoulder and an elbow, about vertical axes.
+        payload: What it carries.
+        elbow: Angle of the elbow [rad].
+    """
+    plant = FlexibleArm(description, payload)
+    still = DriveCommand(np.array([0.0, elbow]), np.zeros(2), np.zeros(2))
+    plant.reset(still, seed=0)
+    plant.push(np.array([TORQUE, 0.0]))
+    for _ in range(round(HELD / PERIOD)):
+        plant.step(still)
+    plant.push(np.zeros(2))
+    felt = np.array([plant.step(still).accelerometer for _ in range(round(LISTENED / PERIOD))])
+    return fit_ring_down(felt - GRAVITY, PERIOD)

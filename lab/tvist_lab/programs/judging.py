@@ -1,0 +1,234 @@
+"""What runs are judged by: limits, what they are to leave behind, and an earlier run in lockstep."""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pinocchio as pin
+
+from tvist_lab.programs.results import Shortcoming, seconds
+from tvist_lab.programs.watch import Fastest, ProgramWatch
+from tvist_plant.model import Floats
+from tvist_plant.plant import PERIOD, Plant, Shape
+from tvist_plant.user_file import UserFileError, read_text
+
+UNITS = {"max_shake": "m/s²", "max_seconds": "s", "max_joint_speed": "rad/s", "max_tool_speed": "m/s",
+         "max_force": "N"}  # fmt: skip
+"""Units of the limits."""
+_EXPECTED = re.compile(r"\s*(?P<body>.+?) in (?P<area>.+)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What a run must keep and leave behind; None where there is no limit."""
+
+    max_shake: float | None = None
+    """Fail if the tool's acceleration after a stop exceeds this, in m/s², without gravity and from 10 ms until 0.3 s
+    after the stop."""
+    max_seconds: float | None = None
+    """Fail if a program runs for longer than this, in s as the robot counts it; --timeout would end it."""
+    max_joint_speed: float | None = None
+    """Fail if a joint turns faster than this, in rad/s."""
+    max_tool_speed: float | None = None
+    """Fail if the tool centre point moves faster than this, in m/s."""
+    max_force: float | None = None
+    """Fail if the world of --world touches the arm with a larger force than this, in N."""
+    expect: list[str] | None = None
+    """BODY in AREA, repeatable: fail if this body of --world does not end in this area, which is a site of its file."""
+
+    def check(self) -> None:
+        """Refuse limits that nothing can keep.
+
+        Raises:
+            ValueError: One is not finite and more than 0, or what is expected is not BODY in AREA.
+        """
+        for name, unit in UNITS.items():
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < math.inf:
+                option = name.replace("_", "-")
+                raise ValueError(f"{option} is {value:g} {unit}: must be finite and more than 0")
+        for text in self.expect or ():
+            if _EXPECTED.fullmatch(text) is None:
+                raise ValueError(f"expect is {text!r}: must be BODY in AREA, such as 'box 1 in pallet'")
+
+    def broken(self, watch: ProgramWatch) -> Iterator[Shortcoming]:
+        """Say of each limit that a run broke where and when, and of the shake after each stop that broke it."""
+        if self.max_seconds is not None and watch.seconds > self.max_seconds:
+            yield self._more("max_seconds", f"it ran for {watch.seconds:.3f} s", None)
+        if self.max_shake is not None:
+            yield from self._shaken(watch, self.max_shake)
+        joint, tool, hardest = watch.fastest_joint, watch.fastest_tool, watch.hardest
+        yield from self._fast("max_joint_speed", joint, f"joint {joint.joint} turned with")
+        yield from self._fast("max_tool_speed", tool, "the tool moved with")
+        yield from self._fast("max_force", hardest, "the arm was touched with")
+
+    def missed(self, plant: Plant) -> list[Shortcoming]:
+        """Say which bodies are not where they are expected."""
+        said = (_missed(text, plant) for text in self.expect or ())
+        return [Shortcoming("expect", f"{text} (--expect)") for text in said if text is not None]
+
+    def _shaken(self, watch: ProgramWatch, most: float) -> Iterator[Shortcoming]:
+        for number, move in enumerate(watch.moves, 1):
+            if move.ended is None:
+                continue
+            line = move.line or None
+            stop = f"after move {number}, which stopped at {seconds(move.rests or move.ended):.3f} s"
+            if move.peak is not None and move.peak > most:
+                yield self._more("max_shake", f"{stop}, the tool shook with {move.peak:.3g} m/s²", line)
+            elif move.peak is None and (move.rests is not None or move.stopped is None):
+                why = f"{stop}, it is not known how much the tool shook: this arm does not tell (--max-shake)"
+                yield Shortcoming("max_shake", why, line)
+
+    def _fast(self, name: str, fastest: Fastest, what: str) -> Iterator[Shortcoming]:
+        most = getattr(self, name)
+        if most is not None and fastest.speed > most:
+            text = f"{what} {fastest.speed:.3g} {UNITS[name]} at {seconds(fastest.tick):.3f} s"
+            yield self._more(name, text, fastest.line or None)
+
+    def _more(self, name: str, what: str, line: int | None) -> Shortcoming:
+        text = f"{what}, more than {getattr(self, name):g} (--{name.replace('_', '-')})"
+        return Shortcoming(name, text, line)
+
+
+def _missed(text: str, plant: Plant) -> str | None:
+    """Say why a body is not in an area; None if it is."""
+    expected = _EXPECTED.fullmatch(text)
+    assert expected is not None
+    body, name = expected["body"].strip(), expected["area"].strip()
+    things, places = plant.things(), plant.places()
+    if things is None:
+        return f"{body} cannot be in {name}: the arm stands in no world (--world)"
+    for kind, one, known in (("body", body, things.bodies), ("area", name, tuple(things.areas))):
+        if one not in known:
+            return f"the world {things.name} has no {kind} {one!r}: it has {', '.join(known) or 'none'}"
+    at, area = places[things.bodies.index(body), :3], things.areas[name]
+    if is_inside(area, _frame(area, places).actInv(at)):
+        return None
+    return f"{body} is at ({', '.join(f'{value:.3f}' for value in at)}) m, which is not in {name}"
+
+
+def _frame(area: Shape, places: Floats) -> pin.SE3:
+    own = _se3(area.pose)
+    return own if area.body is None else _se3(places[area.body]) * own
+
+
+def _se3(pose: Sequence[float] | Floats) -> pin.SE3:
+    return pin.SE3(pin.exp3(np.array(pose[3:])), np.array(pose[:3]))
+
+
+def is_inside(area: Shape, at: Floats) -> bool:
+    """Whether a point in the frame of an area is in it."""
+    size = np.array(area.size)
+    match area.kind:
+        case "box":
+            return bool((np.abs(at) <= size).all())
+        case "sphere":
+            return bool(np.linalg.norm(at) <= size[0])
+        case "ellipsoid":
+            return bool(np.linalg.norm(at / size) <= 1.0)
+        case "cylinder":
+            return bool(np.hypot(*at[:2]) <= size[0] and abs(at[2]) <= size[1])
+    nearest = np.array([0.0, 0.0, np.clip(at[2], -size[1], size[1])])  # a capsule
+    return bool(np.linalg.norm(at - nearest) <= size[0])
+
+
+# ---------------------------------------------------------------------- an earlier run
+
+Run = Mapping[str, Any]
+"""What --json prints of a program."""
+ROUNDING = {"_s": 0.5 * PERIOD, "seconds": 0.5 * PERIOD}
+"""Differences of times that count as none, by the end of the key [s]."""
+SHARES = {"_m_s2": 1e-3, "_rad_s": 1e-4, "_m_s": 1e-4}
+"""The same of accelerations and speeds, as shares of one more than the earlier value: what another processor may make
+different in the same run."""
+OF_MOVES = ("seconds", "stopped", "rested_s", "peak_after_stop_m_s2")
+"""Keys of a move that are compared."""
+
+
+class BaselineError(ValueError):
+    """A file is no baseline of these programs; the message says why."""
+
+
+def read_baseline(path: Path, files: Sequence[str]) -> Mapping[str, Run]:
+    """Read what `tvist run --lockstep --json` printed of exactly these programs, by their names.
+
+    Raises:
+        BaselineError: It has something else, or other programs.
+        OSError: It cannot be read.
+    """
+    try:
+        content = msgspec.json.decode(read_text(path, "baseline"))
+        runs = {run["file"]: run for run in content.get("programs", [content])}
+        in_real_time = [file for file, run in runs.items() if not run.get("lockstep", True)]
+        for run in runs.values():
+            for name, value in _points(run).items():  # whether they can be compared
+                _differ(name, value, value)
+            _warned(run)
+    except (
+        msgspec.DecodeError, UserFileError, AttributeError, KeyError, TypeError, OverflowError, RecursionError,
+    ) as error:  # fmt: skip
+        raise BaselineError(f"baseline {path} is not what tvist run --lockstep --json prints") from error
+    if in_real_time:
+        raise BaselineError(f"baseline {path} is of a run in real time: make it with --lockstep")
+    if set(runs) != set(files):
+        was = ", ".join(map(str, runs)) or "nothing"
+        raise BaselineError(
+            f"baseline {path} is of {was}, and this run is of {', '.join(files)}: give the same"
+        )
+    return runs
+
+
+def changes(before: Run, now: Run) -> Iterator[Shortcoming]:
+    """Say what is different from a program's run in the baseline beyond rounding."""
+    old, new = _points(before), _points(now)
+    lines = {f"move {number}": move["line"] for number, move in enumerate(now.get("moves", ()), 1)}
+    for name in old:
+        if name in new and _differ(name, old[name], new[name]):
+            text = f"{name} is {_shown(new[name])}, before {_shown(old[name])}"
+            yield Shortcoming("baseline", text, lines.get(name.partition(":")[0]))
+    if "compile_error" in {before["exit_reason"], now["exit_reason"]}:
+        return
+    was, warned = _warned(before), _warned(now)
+    for what, texts in (("new warning", warned - was), ("no longer warned", was - warned)):
+        for text in texts.elements():
+            yield Shortcoming("baseline", f"{what}: {text}")
+
+
+def _points(run: Run) -> dict[str, Any]:
+    """What is compared of a run; of one that did not compile, just that."""
+    points: dict[str, Any] = {"exit_reason": run["exit_reason"]}
+    if run["exit_reason"] == "compile_error":
+        return points
+    points |= {
+        "seconds": run["seconds"],
+        "the number of moves": len(run["moves"]),
+        "largest joint speed_rad_s": run["largest_joint_speed"]["speed_rad_s"],
+        "largest tool speed_m_s": run["largest_tool_speed"]["speed_m_s"],
+    }
+    for number, move in enumerate(run["moves"], 1):
+        points |= {f"move {number}: {key}": move[key] for key in OF_MOVES}
+    return points
+
+
+def _warned(run: Run) -> Counter[str]:
+    return Counter(one["text"] for one in run.get("warnings", ()))
+
+
+def _differ(name: str, before: Any, now: Any) -> bool:
+    if before is None or now is None or isinstance(before, str) or isinstance(now, str):
+        return bool(before != now)
+    before, now = float(before), float(now)
+    share = next((share for end, share in SHARES.items() if name.endswith(end)), None)
+    if share is not None:
+        return bool(abs(now - before) > share * (1.0 + abs(before)))
+    return bool(abs(now - before) > next((most for end, most in ROUNDING.items() if name.endswith(end)), 0.0))
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else "nothing" if value is None else f"{value}"

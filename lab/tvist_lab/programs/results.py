@@ -1,0 +1,170 @@
+"""What is known of a run when it is over: a sentence for people, plain values for programs, XML for CI systems."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from tvist_lab.programs.watch import Fastest, Move, ProgramWatch, Said
+from tvist_lab.words import counted
+from tvist_plant.plant import PERIOD
+from tvist_protocol.errors import harmless
+
+MEASURES = ("seconds", "largest_peak_after_stop_m_s2")
+"""Keys of --json that become properties of a program in JUnit's XML under their own names."""
+
+
+@dataclass(frozen=True)
+class Shortcoming:
+    """Something for which a run counts as failed."""
+
+    kind: str
+    """How the run ended, the limit that it broke such as `max_shake`, `expect`, `baseline`, or `recording`."""
+    text: str
+    """A sentence."""
+    line: int | None = None
+    """Line of the program that it belongs to; None if it belongs to none."""
+
+
+def largest_peak(watch: ProgramWatch) -> float | None:
+    """Largest acceleration of the tool after a stop [m/s²]; None if it never stopped, or the arm cannot tell."""
+    return max((move.peak for move in watch.moves if move.peak is not None), default=None)
+
+
+def summary(watch: ProgramWatch) -> str:
+    """Say in a sentence how long a program ran, how often it moved, and how much the tool shook."""
+    said = f"{watch.name} ran for {watch.seconds:.3f} s of robot time"
+    if watch.moves:
+        said += f" and made {counted(len(watch.moves), 'move')}"
+    peak = largest_peak(watch)
+    return said if peak is None else f"{said}; after a stop the tool shook with at most {peak:.3g} m/s²"
+
+
+def as_dict(watch: ProgramWatch) -> dict[str, Any]:
+    """Return everything that is known of a run, as plain values."""
+    error = watch.error
+    return {
+        "program": watch.name,
+        "ok": watch.reason == "finished",
+        "exit_reason": watch.reason,
+        "why": watch.why,
+        "error": None if error is None else {"line": error.line, "column": error.column, "text": error.text},
+        "seconds": round(watch.seconds, 6),
+        "messages": [_message(said) for said in watch.said if said.kind != "warning"],
+        "warnings": [
+            {"timestamp": seconds(said.tick), "line": said.line or None, "text": said.text}
+            for said in watch.said
+            if said.kind == "warning"
+        ],
+        "moves": [_move(move) for move in watch.moves],
+        "largest_peak_after_stop_m_s2": largest_peak(watch),
+        "largest_joint_speed": {"joint": watch.fastest_joint.joint, **_fastest(watch.fastest_joint, "rad_s")},
+        "largest_tool_speed": _fastest(watch.fastest_tool, "m_s"),
+        **_in_world(watch),
+    }
+
+
+def _in_world(watch: ProgramWatch) -> dict[str, Any]:
+    """The largest force of contact, and where the bodies of the arm's world are; nothing without one."""
+    things = watch.plant.things()
+    if things is None:
+        return {}
+    hardest = watch.hardest
+    force = {
+        "force_n": hardest.speed, "timestamp": seconds(hardest.tick), "line": hardest.line or None,
+    }  # fmt: skip
+    poses = zip(things.bodies, watch.plant.places().tolist(), strict=True)
+    return {"largest_contact_force": force, "bodies": dict(poses)}
+
+
+def seconds(ticks: int) -> float:
+    """Time of a tick, as `timestamp` in `state` gives it, or of a number of ticks [s]."""
+    return round(ticks * PERIOD, 6)  # 0.002 is no binary number
+
+
+def _message(said: Said) -> dict[str, Any]:
+    message: dict[str, Any] = {"timestamp": seconds(said.tick), "kind": said.kind, "text": said.text}
+    return message | ({"title": said.title, "level": said.level} if said.kind == "popup" else {})
+
+
+def _move(move: Move) -> dict[str, Any]:
+    ended, rests, followed = move.ended, move.rests, move.followed
+    return {
+        "id": move.id,
+        "line": move.line or None,
+        "timestamp": seconds(move.started),
+        "seconds": None if ended is None else seconds(ended - move.started),
+        "stopped": move.stopped,
+        "rested_s": None if followed is None else seconds(followed - (followed if rests is None else rests)),
+        "peak_after_stop_m_s2": move.peak,
+    }
+
+
+def _fastest(fastest: Fastest, unit: str) -> dict[str, Any]:
+    return {
+        f"speed_{unit}": fastest.speed,
+        "timestamp": seconds(fastest.tick),
+        "line": fastest.line or None,
+    }
+
+
+def junit(results: Sequence[Mapping[str, Any]]) -> bytes:
+    """Return what --json prints of programs as JUnit's XML: a test suite with a case for each.
+
+    A case's time is the robot's. Its properties are what was measured, its failure has a sentence for each thing that
+    failed, `system-out` has the program's messages and `system-err` the warnings.
+    """
+    failed = sum(not result["ok"] for result in results)
+    counts = {
+        "tests": str(len(results)),
+        "failures": str(failed),
+        "errors": "0",
+        "skipped": "0",
+        "time": f"{sum(result.get('seconds', 0.0) for result in results):.3f}",
+    }
+    suites = ET.Element("testsuites", {"name": "tvist run", **counts})
+    suite = ET.SubElement(suites, "testsuite", {"name": "tvist run", **counts})
+    for result in results:
+        _add(suite, result)
+    ET.indent(suites)
+    text: bytes = ET.tostring(suites, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def _add(suite: ET.Element, result: Mapping[str, Any]) -> None:
+    file = _readable(result["file"])
+    time = f"{result.get('seconds', 0.0):.3f}"
+    case = ET.SubElement(
+        suite, "testcase", {"classname": "tvist run", "name": file, "file": file, "time": time}
+    )
+    if measures := _measures(result):
+        properties = ET.SubElement(case, "properties")
+        for name, value in measures.items():
+            ET.SubElement(properties, "property", {"name": name, "value": value})
+    if result["failures"]:
+        texts = [_placed(file, failure["line"], failure["text"]) for failure in result["failures"]]
+        about = {"message": "; ".join(_readable(one["text"]) for one in result["failures"])}
+        kind = result["failures"][0]["kind"]
+        ET.SubElement(case, "failure", {**about, "type": kind}).text = "\n".join(texts)
+    for tag, key in (("system-out", "messages"), ("system-err", "warnings")):
+        if said := [_placed(file, one.get("line"), one["text"]) for one in result.get(key, ())]:
+            ET.SubElement(case, tag).text = "\n".join(said)
+
+
+def _measures(result: Mapping[str, Any]) -> dict[str, str]:
+    found = {name: result[name] for name in MEASURES if result.get(name) is not None}
+    if "moves" in result:
+        found["moves"] = len(result["moves"])
+        found["largest_joint_speed_rad_s"] = result["largest_joint_speed"]["speed_rad_s"]
+        found["largest_tool_speed_m_s"] = result["largest_tool_speed"]["speed_m_s"]
+    return {name: f"{value:.6g}" for name, value in found.items()}
+
+
+def _placed(file: str, line: int | None, text: str) -> str:
+    """A text in the form that editors and CI systems make a link of."""
+    return _readable(f"{file}:{line}: {text}" if line else text)
+
+
+def _readable(text: str) -> str:
+    """Replace characters that XML 1.0 does not permit, which programs may print."""
+    return harmless(text).translate(dict.fromkeys((0xFFFE, 0xFFFF), 0xFFFD))

@@ -1,0 +1,54 @@
+"""The paper's figures, drawn from our runs, from the robot file and from the shaping library."""
+
+from matplotlib.figure import Figure
+
+from tvist_lab.figures import (
+    Recorded,
+    after_stop_figure,
+    figure_1,
+    figure_2,
+    figure_3,
+    figure_4,
+    figure_7,
+    figure_8,
+    figure_15,
+    figure_16,
+    motion_figure,
+    ring_down_figure,
+)
+from tvist_lab.metrics import motions
+from tvist_lab.one_joint import pluck_all
+from tvist_lab.studies.paper.experiment import Experiment
+from tvist_lab.studies.paper.published import MOTIONS
+
+NUMBERS = {"Q1-Q2": 12, "Q1-Q3": 13, "Q3-Q1": 14}
+DEFINED_ON = "Q1-Q2"
+"""Motion on which figure 15 shows delay, stabilisation time, cycle time and overshoot, and the spectrogram is made."""
+
+
+def draw(done: Experiment, *, all_figures: bool) -> dict[str, Figure]:
+    """Draw figures 12 to 16, and on request also 1 to 4, 7, 8 and the spectrogram of a ring-down.
+
+    Returns:
+        Name of the file, without its suffix, to the figure.
+    """
+    pairs = {motion: _pair(done, motion) for motion in MOTIONS}
+    figures = {f"figure_{NUMBERS[name]}": motion_figure(name, *pair) for name, pair in pairs.items()}
+    figures |= {"figure_15": figure_15(DEFINED_ON, *pairs[DEFINED_ON]), "figure_16": figure_16(pairs)}
+    if all_figures:
+        figures |= {"figure_02": figure_2(pluck_all())}
+        makers = {1: figure_1, 3: figure_3, 4: figure_4, 7: figure_7, 8: figure_8}
+        figures |= {f"figure_{number:02}": make() for number, make in makers.items()}
+        figures |= {"ring_down": ring_down_figure(DEFINED_ON, pairs[DEFINED_ON][0])}
+    return dict(sorted(figures.items()))
+
+
+def overview(done: Experiment, motion: str) -> Figure:
+    """Draw the tool's acceleration after one motion, without and with shaping."""
+    return after_stop_figure(*_pair(done, motion), motion)
+
+
+def _pair(done: Experiment, motion: str) -> tuple[Recorded, Recorded]:
+    """The first recording of a motion without and with shaping."""
+    unshaped, shaped = (done.first[motion, kind] for kind in ("unshaped", "shaped"))
+    return (unshaped, motions(unshaped)[0]), (shaped, motions(shaped)[0])
