@@ -103,7 +103,7 @@ MISUSE = [
     (("study", "bench", "--moves", "0"), ["moves is 0", "1 to 100000"]),
     (("study", "moves", "--modes", "9"), ["modes is 9", "1 to 6"]),
     (("study", "moves", "--payload", "heavy"), ["payload", "'heavy'", "a number"]),
-    (("study",), ["study is missing"]),
+    (("study",), ["STUDY is missing"]),
     (("study", "sweep"), ["there is no study sweep", "moves, bench, robustness, match"]),
     (("study", "x.toml", "--seed", "1"), ["--seed is for moves, bench", "x.toml says itself"]),
     (("study", "bench", "--streams"), ["--streams is not for bench"]),

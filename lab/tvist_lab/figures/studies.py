@@ -109,7 +109,10 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
         _dots(
             panel,
             names,
-            [(one, [[found[one, name][key] for key in keys] for name in names]) for one in shapers],
+            [
+                (one, [[found.get((one, name), {}).get(key) for key in keys] for name in names])
+                for one in shapers
+            ],
         )
         title(panel, words)
     axes[0].axvline(0.0, color=FAINT, linewidth=0.8)
