@@ -7,7 +7,7 @@ import asyncio
 import io
 import shutil
 import tempfile
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -60,15 +60,7 @@ class FilmError(RuntimeError):
 
 
 class Film:
-    """Pictures of runs.
-
-    Args:
-        tracks: The runs; their times are those of one clock.
-        factor: Magnification of the bending.
-        result: What the comparison of two runs says, as `playback.said` makes it; None: nothing.
-        theme: Whether it is light or dark.
-        size: Width and height [px].
-    """
+    """Pictures of runs, whose times are those of one clock, with what their comparison says, if anything."""
 
     def __init__(
         self,
@@ -112,14 +104,8 @@ class Film:
     def _slow(self, time: float) -> bool:
         return any(at - BRAKES_S <= time < at + SLOW_S for at in self._stops[0])
 
-    async def pictures(
-        self, times: Sequence[float], progress: Callable[[], None] = lambda: None
-    ) -> list[Image.Image]:
-        """Draw the pictures at simulation times [s].
-
-        Raises:
-            FilmError: There is no browser, or it draws nothing.
-        """
+    async def pictures(self, times: Sequence[float]) -> list[Image.Image]:
+        """Draw the pictures at simulation times [s]; a FilmError says that no browser draws them."""
         tabs: asyncio.Queue[Tab] = asyncio.Queue()
         drawn = asyncio.Event()
 
@@ -135,32 +121,19 @@ class Film:
                 ended.cancel()
                 tab = await asyncio.wait_for(first, 0)
                 told = aiter(tab)
-                for time in times:
-                    content = {"time": time - self.start, "slow": SLOW if self._slow(time) else 1}
-                    await tab.send("draw", content)
-                    picture = await asyncio.wait_for(anext(told), NEXT_S if found else FIRST_S)
-                    assert isinstance(picture, bytes)  # as our page sends it
-                    found.append(Image.open(io.BytesIO(picture)).convert("RGB"))
-                    progress()
+                with progress(len(times), "pictures") as advance:
+                    for time in times:
+                        content = {"time": time - self.start, "slow": SLOW if self._slow(time) else 1}
+                        await tab.send("draw", content)
+                        picture = await asyncio.wait_for(anext(told), NEXT_S if found else FIRST_S)
+                        assert isinstance(picture, bytes)  # as our page sends it
+                        found.append(Image.open(io.BytesIO(picture)).convert("RGB"))
+                        advance(1, None)
             except (TimeoutError, StopAsyncIteration, ConnectionClosed):
                 raise FilmError("the browser does not draw: try it with another Chromium") from None
             finally:
                 drawn.set()
             return found
-
-    def write(self, file: Path, progress: Callable[[], None] = lambda: None) -> None:
-        """Write all pictures as an animated WebP.
-
-        Raises:
-            FilmError: See `pictures`.
-            OSError: The file cannot be written.
-        """
-        first, *later = asyncio.run(self.pictures(self.times(), progress))
-        durations = [round(1000 / RATE)] * len(later) + [round(1000 * HOLD_S)]
-        first.save(
-            file, save_all=True, append_images=later, duration=durations, loop=0, quality=QUALITY, method=4,
-            minimize_size=True,
-        )  # fmt: skip
 
 
 def browser() -> str | None:
@@ -188,12 +161,16 @@ async def _browser(url: str) -> AsyncIterator[asyncio.subprocess.Process]:
 
 
 def main() -> None:
-    """Simulate both arms, and write the film."""
+    """Simulate both arms, and write the film as animated WebP."""
     shows = compared(SHAPERS, "ur5e")
     for theme in ("light", "dark"):
         film = Film(shows.tracks, MAGNIFY, shows.result, theme)
-        with progress(len(film.times()), "pictures") as advance:
-            film.write(IMAGES / f"without-and-with-{theme}.webp", lambda: advance(1, None))
+        first, *later = asyncio.run(film.pictures(film.times()))
+        durations = [round(1000 / RATE)] * len(later) + [round(1000 * HOLD_S)]
+        first.save(
+            IMAGES / f"without-and-with-{theme}.webp", save_all=True, append_images=later, duration=durations,
+            loop=0, quality=QUALITY, method=4, minimize_size=True,
+        )  # fmt: skip
 
 
 if __name__ == "__main__":

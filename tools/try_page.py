@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_lab.compared import run_beside
+from tvist_lab.in_process import run_beside
 from tvist_lab.one_joint import FlexibleShoulder
 from tvist_lab.study.line import PAPER
 from tvist_plant.description import load

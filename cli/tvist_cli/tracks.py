@@ -109,7 +109,7 @@ def repeated(file: Path) -> Shows:
 def compared(shapers: Sequence[str], robot: str) -> Shows:
     """The same motion with each shaper, simulated now."""
     from tvist_controller.refusal import RefusalError
-    from tvist_lab.compared import run_beside
+    from tvist_lab.in_process import run_beside
     from tvist_plant.description import DescriptionError, load
     from tvist_server.option_values import StartError
     from tvist_view.beside import Run

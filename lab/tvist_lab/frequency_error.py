@@ -1,21 +1,18 @@
-"""What a shaper that assumes a wrong frequency leaves of the vibration, and how long that takes to decay."""
+"""What a shaper that assumes a wrong frequency leaves of the vibration, and the one that leaves least over a range."""
 
 import numpy as np
 
 from tvist_lab.recordings import Floats
-from tvist_shaping import Shaper, residual
+from tvist_shaping import Shaper, residual, shaper
 
 ALLOWED = 0.05
-"""Residual vibration at which the mode counts as settled, as a share of the unshaped one [-]."""
+"""Residual vibration at which a mode counts as settled, and that a robust shaper may leave [-]."""
 
 
 def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
-    """Residual vibration of a shaper designed for a wrong frequency, as a share of the unshaped vibration [-].
+    """Residual vibration of a shaper, as a share of the unshaped one, over shares by which its frequency is too high.
 
-    Args:
-        shaper: The shaper.
-        zeta: Damping ratio, both assumed and true [-].
-        errors: Shares by which the assumed frequency is too high [-], > -1, shape (E,).
+    The damping ratio is both the assumed and the true one.
     """
     return np.asarray(residual(1.0 / (1.0 + errors), zeta, shaper.impulses(1.0, zeta)))
 
@@ -23,13 +20,8 @@ def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
 def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> float:
     """Time from the unshaped stop until the mode is at 5 % of its unshaped vibration for good [s].
 
-    It is the shaper's delay, and after it the time in which what is left decays; infinite where nothing decays.
-
-    Args:
-        shaper: The shaper.
-        f_d: True damped frequency [Hz].
-        zeta: Damping ratio, both assumed and true [-].
-        error: Size of the error of the assumed frequency, of which the worse sign counts [-].
+    It is the shaper's delay, and after it the time in which what is left decays; infinite where nothing decays. Of an
+    error of the assumed frequency, the worse sign counts.
     """
     times = []
     for side in (-error, error):
@@ -39,3 +31,28 @@ def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> floa
         sigma = 2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2)
         times.append(delay + (0.0 if over == 0.0 else over / sigma if sigma else np.inf))
     return float(max(times))
+
+
+def robust_over(name: str, f_d: tuple[float, float], zeta: tuple[float, float]) -> tuple[float, float]:
+    """Return frequency [Hz] and damping ratio of a fixed shaper for a whole workspace, given its ranges of both.
+
+    It is the shortest one that leaves at most 5 % anywhere; if none does, the one with the smallest worst case. The
+    damping ratio is assumed to fall linearly from its highest value at the lowest frequency to its lowest value at
+    the highest frequency.
+    """
+    frequencies = np.linspace(*f_d, 60)
+    damping = _damping(frequencies, f_d, zeta)
+    designs = np.linspace(*f_d, 90)
+    worst = np.empty_like(designs)
+    for number, design in enumerate(designs):
+        impulses = shaper(name).function(float(design), float(_damping(design, f_d, zeta)))
+        worst[number] = max(
+            float(residual(f, z, impulses)) for f, z in zip(frequencies, damping, strict=True)
+        )
+    good = np.flatnonzero(worst <= ALLOWED)
+    best = designs[good[-1] if good.size else np.argmin(worst)]
+    return float(best), float(_damping(best, f_d, zeta))
+
+
+def _damping(f: Floats | float, f_d: tuple[float, float], zeta: tuple[float, float]) -> Floats:
+    return np.asarray(np.interp(f, f_d, zeta[::-1]))

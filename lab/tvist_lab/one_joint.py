@@ -1,4 +1,6 @@
-"""The arm of the paper's Figure 2, one flexible joint whose inertia changes as it folds: in closed form, and simulated.
+"""The arm of the paper's Figure 2, one flexible joint whose inertia changes as it folds.
+
+Its inertia, frequency and damping are given in closed form; a pluck of the simulated arm shows that they are right.
 
 A joint's own rotation does not change the inertia about it, so the angle that does is the elbow's. Both axes are
 vertical; then the arm's weight loads no joint. With the parallel-axis theorem for each body and the law of cosines
@@ -7,8 +9,7 @@ for the distance of the forearm's centre of mass from the shoulder,
     I(q) = J_1 + J_2 + m_2 (l² + 2 l c_2 cos q)
 
 where J_1 is the inertia of the upper arm about the shoulder, J_2 and m_2 c_2 are inertia and first moment of the
-forearm with its payload about the elbow, l is the length of the upper arm, and q = 0 is the stretched arm. Whether that
-is so shows a pluck of the simulated arm, which rings.
+forearm with its payload about the elbow, l is the length of the upper arm, and q = 0 is the stretched arm.
 """
 
 from dataclasses import dataclass
@@ -153,11 +154,6 @@ def pluck(description: RobotDescription, payload: Payload, elbow: float) -> Ring
     """Twist the shoulder, let it go, and fit a damped sine to what the accelerometer feels.
 
     The fit knows nothing of the arm: neither masses nor spring.
-
-    Args:
-        description: An arm with a shoulder and an elbow, about vertical axes.
-        payload: What it carries.
-        elbow: Angle of the elbow [rad].
     """
     plant = FlexibleArm(description, payload)
     still = DriveCommand(np.array([0.0, elbow]), np.zeros(2), np.zeros(2))

@@ -62,7 +62,7 @@ def test_references_last_as_long_as_the_generators_analysis_says(done, motion):
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("method", ["unshaped", "shaped"])
 def test_the_shaped_reference_keeps_near_the_acceleration_limit(done, motion, method):
-    assert max(judged.acceleration for judged in done.judged[motion, method]) <= 2.1
+    assert max(judged.result.peak_acceleration_rad_s2 for judged in done.judged[motion, method]) <= 2.1
 
 
 def test_the_shaper_follows_the_arm_from_one_end_of_a_motion_to_the_other(done):

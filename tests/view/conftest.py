@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from tvist_lab.compared import run_beside
+from tvist_lab.in_process import run_beside
 from tvist_plant.description import load
 from tvist_view.look import Look
 from tvist_view.track import Shown, Track

@@ -22,7 +22,7 @@ PORT = 8080
 FOLDER = Path("tvist-demo")
 """Folder for recording and figures."""
 ANSWERED = "Q1-Q3"
-"""Motion of which the overview is drawn: on its way the arm's frequency doubles, and its vibration is seen to ring."""
+"""Motion of the overview: on its way the arm's frequency doubles, and its vibration is seen to ring."""
 
 
 def demo(
@@ -38,7 +38,7 @@ def demo(
     look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
-    """Run the paper's three motions, unshaped and shaped: once over Zenoh in real time, and say what happened.
+    """Run the paper's motions, unshaped and shaped: once over Zenoh in real time, and say what happened.
 
     With --runs, instead simulate them as fast as possible, and print the paper's tables beside ours.
 
@@ -87,7 +87,7 @@ def demo(
         ]
     first, *others = map(as_dict, arms)
     if output is not None:
-        from tvist_lab.studies.paper.drawing import draw
+        from tvist_lab.figures.paper import draw
 
         with told(OSError), look.into(output) as save:
             write(save, draw(arms[0], all_figures=True))
@@ -125,8 +125,8 @@ def _in_real_time(
 
 
 def _figures(result: "Served", folder: Path, look: FigureOptions) -> Path:
-    """Draw the paper's figures and, last, one of a motion that shows the answer at a glance, whose path is returned."""
-    from tvist_lab.studies.paper.drawing import draw, overview
+    """Draw the paper's figures and an overview that shows the answer at a glance; return the latter's path."""
+    from tvist_lab.figures.paper import draw, overview
 
     with look.into(folder) as save:
         for name, figure in draw(result.done, all_figures=False).items():

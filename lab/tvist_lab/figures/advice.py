@@ -40,7 +40,7 @@ OTHERS = np.linspace(0.01, 1.0, 30)
 
 
 def advice_figures(advice: Advice) -> tuple[Figure, Figure]:
-    """Return the figures of an advice that recommends a shaper: its worst stop, and what each shaper costs."""
+    """Return both figures of an advice that recommends a shaper: its worst stop, and what shapers cost."""
     with rc_context({"font.size": LARGE * rcParams["font.size"]}):
         return _worst_stop(advice), _costs(advice)
 
@@ -54,7 +54,7 @@ def _worst_stop(advice: Advice) -> Figure:
         amplitude(alpha)
         for alpha in (stop.alpha, stop.after(np.asarray(impulses.A), np.asarray(impulses.tau)))
     )
-    figure, (panel,) = panels(1, 4.4)
+    figure, (panel,) = panels(1, 3.4)
     ms = 1e3 * stop.time
     panel.plot(ms, recorded, **OF_UNSHAPED.line(1.8, label="recorded"))
     panel.plot(ms, shaped, **OF_SHAPED.line(2.2, label=f"predicted with {advice.best.shaper}"))
@@ -69,7 +69,7 @@ def _worst_stop(advice: Advice) -> Figure:
 
 def _costs(advice: Advice) -> Figure:
     """What each shaper leaves against the time that it adds, medians over the stops that ring."""
-    figure, (panel,) = panels(1, 4.8)
+    figure, (panel,) = panels(1, 3.7)
     fair = [one for one in advice.options if one.keeps_limits]
     longest = max(one.added_s for one in fair)
     times = longest * OTHERS

@@ -50,14 +50,9 @@ BEFORE, AFTER = 100.0, 600.0
 
 
 def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure:
-    """|α| of the tool around the end of one motion, without and with shaping, on one clock.
+    """|α| of the tool around the end of one motion without and with shaping, on one clock.
 
     Time is zero where the reference without shaping ends.
-
-    Args:
-        unshaped: The motion without shaping.
-        shaped: The same motion with shaping.
-        what: The motion in words, for the heading.
 
     Raises:
         RecordingError: The true acceleration was not recorded.
@@ -131,9 +126,8 @@ class Shown(NamedTuple):
 def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> Figure:
     """|α| of several motions, a panel for each, all to one scale; each on a clock that begins with the motion.
 
-    Args:
-        motions: The motions; those that cannot be drawn are left out, and of more than eight names of curves the rest.
-        unshaped: Names of the curves that are drawn in the colour of what is not shaped.
+    Motions that cannot be drawn are left out, and of more than eight names of curves the rest. Curves with the names
+    `unshaped` are drawn in the colour of what is not shaped.
 
     Raises:
         NotMeasurableError: None of them has an accelerometer, or enough rest.

@@ -45,16 +45,7 @@ def identified_figure(
     true_f_d: Floats | None,
     true_zeta: Floats | None,
 ) -> Figure:
-    """Estimated against measured (f_d, ζ), one point per configuration, and against the truth if it is known.
-
-    Args:
-        calibration: Calibration with polynomials.
-        q: Configurations, shape (N, n) [rad].
-        f_d: Measured damped frequencies, shape (N,) [Hz].
-        zeta: Measured damping ratios, shape (N,) [-].
-        true_f_d: Damped frequency of the lowest true mode, shape (N,) [Hz].
-        true_zeta: Damping ratio of the lowest true mode, shape (N,) [-].
-    """
+    """Estimated against measured f_d [Hz] and ζ, one point per configuration, and against the truth if it is known."""
     estimator = estimator_of(calibration)
     estimated = np.array([np.concatenate(estimator.estimate(row)) for row in q]).T
     figure, axes = panels(2, 7.6, share_x=False)
@@ -74,15 +65,10 @@ def identified_figure(
 
 
 def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
-    """Draw one quantity as identified, as it truly is, and the error.
+    """Draw one quantity, "f_d_hz" or "zeta", as identified, as it truly is, and the error; `words` say of what.
 
-    The three maps are side by side, and in a narrow figure one below the other. White areas are left out, because the
-    arm would touch itself or the floor there.
-
-    Args:
-        found: The maps.
-        key: "f_d_hz" or "zeta".
-        words: What they are of, for the heading.
+    The three maps are side by side, and in a narrow figure one below the other. White areas are left out: the arm
+    would touch itself or the floor there.
     """
     symbol, meaning, unit = LABELS[key]
     if beside := rcParams["figure.figsize"][0] > NARROW:

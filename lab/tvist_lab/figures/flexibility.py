@@ -70,7 +70,7 @@ class _Arm:
         return float(np.linalg.norm(self.line(springs)[-1] - self.line(0.0 * springs)[-1]))
 
     def largest_deflection(self, description: RobotDescription) -> Floats:
-        """Stop the shoulder, unshaped, and return the springs' angles at the deflection farthest from rest."""
+        """Stop the shoulder, unshaped, and return the springs' angles where the flange is farthest from rest."""
         start = self.q + RAISED * np.eye(len(self.q))[1]
         unshaped = choose_filter("none", Fixed([10.0], [0.1]), description.joints)
         cycle = ControlCycle(

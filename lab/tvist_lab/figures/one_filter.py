@@ -35,7 +35,7 @@ BUFFERED = 22
 
 
 def figure_3() -> Figure:
-    """Draw ZV: its impulses, the response of a mode to each and to both, and a reference before and after it."""
+    """Draw ZV: its impulses, a mode's response to each and to both, and a reference before and after it."""
     f_d, zeta = 10.0, 0.1
     impulses = tvist_shaping.zv(f_d, zeta)
     time = np.linspace(0.0, 0.4, 801)

@@ -32,9 +32,6 @@ def figure_2(modes: Modes) -> Figure:
 
     Top: the arm from above, with its inertia about the shoulder. Below: f_d and ζ by the formula, as lines, and as the
     simulated arm's accelerometer shows them after a pluck, as points.
-
-    Args:
-        modes: What was computed and measured.
     """
     figure, (arms, frequencies, dampings) = panels(3, 7.2, share_x=False, ratios=(1.35, 1.25, 0.8))
     title(arms, f"The arm from above, with {modes.description.payload.mass:g} kg")

@@ -30,7 +30,7 @@ from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_lab.recordings import Floats
 
 BEFORE, AFTER = 60.0, 150.0
-"""Time shown in figure 15 before the stop of the unshaped reference and after the last of the marked times [ms]."""
+"""Time shown in figure 15 before the unshaped reference's stop and after the last mark [ms]."""
 STOPS = {"$t_b$, $t_b^*$": "stop of the reference and of the shaped one"}
 """What two symbols mean."""
 SYMBOLS = {
@@ -58,14 +58,9 @@ BOTH = {"Unshaped": (OF_UNSHAPED, "$t_b$"), "Shaped": (OF_SHAPED, "$t_b^*$")}
 
 
 def figure_15(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
-    """Draw E of one motion around its stop, unshaped and shaped, with the times and the overshoot of the unshaped one.
+    """Draw E of one motion around its stop, unshaped and shaped, with the times and the overshoot of the former.
 
     Where E never settles, its curves are drawn without these marks.
-
-    Args:
-        name: Name of the motion, used as the heading.
-        unshaped: The motion without shaping.
-        shaped: The same motion with shaping.
 
     Raises:
         NotMeasurableError: The attained position cannot be determined, because too little rest was recorded.
@@ -124,9 +119,6 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
 
     Time is zero when the reference starts.
 
-    Args:
-        motions: Name to the recording and motion without and with shaping.
-
     Raises:
         NotMeasurableError: Less than 0.3 s were recorded after a stop.
     """
@@ -155,7 +147,7 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
 
 
 def _draw(panel: Axes, recorded: Recorded, style: Series, label: str) -> tuple[Residual, str]:
-    """Draw one recording; return its residual vibration, and how it was found where not from a decay that is drawn."""
+    """Draw one recording; return its residual vibration, and how it was found if not from a drawn decay."""
     recording, motion = recorded
     start, rv = recording.time[motion.start], residual(recording, motion)
     alpha = amplitude(tool_acceleration(recording))

@@ -43,13 +43,9 @@ Recorded = tuple[Recording, MotionRows]
 
 
 def motion_figure(name: str, *recorded: Recorded) -> Figure:
-    """Draw accelerations of the reference, E, |α|, and the mode that the shaper uses unless it is constant, over time.
+    """Draw over time: accelerations of the reference, E, |α|, and the shaper's mode unless it is constant.
 
-    Time is zero when the reference starts.
-
-    Args:
-        name: Name of the motion, used as the heading.
-        recorded: The motion; or the same one without and with shaping.
+    It is of one recorded motion, or of the same one without and with shaping. Time is zero when the reference starts.
 
     Raises:
         NotMeasurableError: The attained position cannot be determined, because too little rest was recorded.

@@ -41,11 +41,7 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
     """Draw the tool's acceleration after a stop, the mode fitted to it, its spectrum and its spectrogram.
 
     Top: the acceleration along the axis in which the tool vibrates most, with the envelope of the fit. Middle: the
-    spectrum of all three axes together after the stop. Bottom: levels of all axes relative to the largest, over time.
-
-    Args:
-        name: Name of the motion, used as the heading.
-        recorded: The motion, from a recording or a log that shows its ring-down.
+    spectrum of all three axes together after the stop. Bottom: levels of all axes relative to the largest.
 
     Raises:
         NotMeasurableError: The accelerometer was not recorded, or less rest than a fit needs.

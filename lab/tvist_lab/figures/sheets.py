@@ -17,7 +17,7 @@ from matplotlib.figure import Figure, SubFigure
 FORMATS = ("png", "pdf", "svg")
 """Formats of figures: one bitmap, two of lines."""
 STYLES = ("paper", "slides")
-"""Style sheets besides the usual one: headings and explanations in a text beside the figure, and larger type."""
+"""Style sheets besides the usual one: words in a text beside the figure, and larger type."""
 SUFFIX = ".mplstyle"
 """End of the name of a style sheet."""
 RANGES = {"figure.figsize": (2.0, 40.0), "savefig.dpi": (30.0, 2400.0)}
@@ -47,11 +47,10 @@ def house_style(*styles: str) -> Iterator[None]:
     """Draw and save figures in this style.
 
     Args:
-        styles: Any of `STYLES`, and paths of style sheets of one's own, of which the later ones take precedence.
+        styles: Any of `STYLES`, and paths of style sheets of one's own; later ones take precedence.
 
     Raises:
-        StyleError: One of them is neither, cannot be read, or has a setting that matplotlib does not know or a wrong
-            value.
+        StyleError: One of them is neither, cannot be read, or has an unknown setting or a wrong value.
     """
     settings: Any = house_settings(*styles)
     before = in_print.set("paper" in styles)
@@ -63,7 +62,7 @@ def house_style(*styles: str) -> Iterator[None]:
 
 
 def house_settings(*styles: str) -> dict[str, Any]:
-    """Return matplotlib's settings of `house_style`, for a notebook that has one style from beginning to end."""
+    """Return matplotlib's settings of `house_style`, for a notebook that has one style throughout."""
     settings, own = _shipped("house"), dict[str, Any]()
     for style in styles:
         if style in STYLES:
@@ -75,7 +74,7 @@ def house_settings(*styles: str) -> dict[str, Any]:
                 f"style is {style!r}: must be {', '.join(STYLES)} or a file that ends in {SUFFIX}"
             )
     settings |= own
-    # Text remains readable in a narrow figure; a sheet of one's own says how large text is, whatever the width.
+    # Text remains readable in a narrow figure; one's own sheet may say how large it is, whatever the width.
     narrow = np.interp(settings["figure.figsize"][0], (COLUMN, WIDTH), (SMALLER, 1.0))
     for name in SIZES:
         settings[name] *= 1.0 if "font.size" in own else float(narrow)
@@ -134,12 +133,12 @@ def save(figure: Figure, path: str | Path) -> Path:
 
 
 def headed(figure: Figure | SubFigure) -> list[Axes]:
-    """Return the panels with a heading that is left out, which is their label; that of a scale of colours has a "<"."""
+    """Return the panels whose heading is left out: it is their label. That of a colour bar begins with "<"."""
     return [panel for panel in figure.axes if not str(panel.get_label() or "<").startswith("<")]
 
 
 def caption(figure: Figure) -> str:
-    """Return what the headings and explanations of a figure say; letters name the panels if several have headings."""
+    """Return what headings and explanations of a figure say; letters name panels if several have headings."""
     headings = [str(panel.get_label()) for panel in headed(figure)]
     if len(headings) > 1:
         headings = [f"{letter}: {words}" for letter, words in zip(ascii_lowercase, headings, strict=False)]

@@ -1,8 +1,8 @@
 """What figures are drawn with: series that differ to the colour-blind, and words that explain every axis.
 
-A figure is drawn within `with house_style():`, whose style sheet has its sizes and colours. Each colour has dashes and
-a marker of its own. Dashed lines are drawn over full ones, so that both are seen where they coincide, and nothing that
-stands for data is transparent.
+A figure is drawn within `with house_style():`, whose style sheet has its sizes and colours. Each colour has
+dashes and a marker of its own. Dashed lines are drawn over full ones, so that both are seen where they coincide,
+and nothing that stands for data is transparent.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from tvist_lab.figures.sheets import headed, in_print
 
 SHAPED, UNSHAPED, THIRD = "C0", "C1", "C2"
-"""Colours of what is shaped, of what is not, and of a third series: blue, vermilion and green in the style sheet."""
+"""Colours of what is shaped, of what is not, and of a third series, as places in the style sheet's cycle."""
 INK = "#1F2933"
 """Colour of text and axes."""
 FAINT = "#8A8A8A"
@@ -56,7 +56,7 @@ class Series(NamedTuple):
         return to_hex(self.cycled)
 
     def line(self, width: float = USUAL["lines.linewidth"], **more: Any) -> dict[str, Any]:
-        """Return the arguments of `plot` for a curve of this width in the usual style [pt]; dashed ones lie on top."""
+        """Return the arguments of `plot` for a curve of this width in the usual style [pt]."""
         above = 2.0 if self.dashes == "-" else 2.5
         wide = width * _scale("lines.linewidth")
         return {"color": self.color, "linestyle": self.dashes, "linewidth": wide, "zorder": above, **more}
@@ -89,7 +89,7 @@ def _scale(name: str) -> float:
 
 
 def tint(color: str, share: float = 0.2) -> str:
-    """Mix a colour with white, of which the colour has this share, to fill areas without being transparent."""
+    """Mix a share of a colour with white, to fill areas without being transparent."""
     red, green, blue = (share * part + 1.0 - share for part in to_rgb(color))
     return to_hex((red, green, blue))
 
@@ -131,7 +131,7 @@ def panels(
 
 
 def decades(panel: Axes, *axes: str) -> None:
-    """Label logarithmic axes, "x" or "y", in plain numbers: 1, 2, 5 of each decade, or all digits of less than one."""
+    """Label logarithmic axes, "x" or "y", in plain numbers: 1, 2, 5 of a decade, or all digits of a part."""
     for name in axes:
         axis = panel.xaxis if name == "x" else panel.yaxis
         axis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -148,7 +148,7 @@ class _Digits(Formatter):
 
 
 def title(panel: Axes, words: str) -> None:
-    """Write a heading at a panel's upper left; in print it is for the caption, and letters name several panels."""
+    """Write a panel's heading; in print, it is for the caption, and letters name several panels."""
     if not in_print.get():
         panel.set_title(words, wrap=True)
         return

@@ -26,7 +26,7 @@ from tvist_lab.recordings import Floats
 from tvist_shaping import Shaper, residual
 
 DESIGN, SPAN = 10.5, (6.0, 15.0)
-"""Frequency that the shapers of figure 4 are designed for, and the range of the UR5e's first mode with 5 kg [Hz]."""
+"""Design frequency of the shapers of figure 4, and range of the UR5e's first mode with 5 kg [Hz]."""
 SHOWN_HZ = (5.5, 16.0)
 """Frequencies on the axis of figure 4 [Hz]."""
 ERRORS = (0.0, 0.1, 0.2)
@@ -65,13 +65,7 @@ def figure_4() -> Figure:
 
 
 def sensitivity_figure(shapers: Sequence[Shaper], zeta: float, errors: Floats) -> Figure:
-    """Draw the residual vibration of shapers over the error of the frequency.
-
-    Args:
-        shapers: The shapers.
-        zeta: Damping ratio, both assumed and true [-].
-        errors: Shares by which the assumed frequency is too high [-], shape (E,).
-    """
+    """Draw the residual vibration of shapers over the share by which the assumed frequency is too high."""
     figure, (panel,) = panels(1, 3.6)
     dashed(panel, 100.0 * ALLOWED, label=f"{100.0 * ALLOWED:g} %")
     for place, shaper in enumerate(shapers):
@@ -86,12 +80,9 @@ def sensitivity_figure(shapers: Sequence[Shaper], zeta: float, errors: Floats) -
 
 
 def settling_against_delay_figure(shapers: Iterable[Shaper], f_d: float, zeta: float) -> Figure:
-    """Draw how soon a mode settles with each shaper against the shaper's delay, for errors of the frequency.
+    """Draw how soon a mode settles with each shaper against its delay, for errors of the frequency.
 
-    Args:
-        shapers: The shapers; those that do not support this damping are left out.
-        f_d: True damped frequency [Hz].
-        zeta: Damping ratio, both assumed and true [-].
+    Shapers that do not support this damping are left out.
     """
     shown = [shaper for shaper in shapers if zeta < shaper.zeta_max]
     delay = np.array([1e3 * shaper.impulses(f_d, zeta).duration for shaper in shown])
@@ -115,11 +106,9 @@ def settling_against_delay_figure(shapers: Iterable[Shaper], f_d: float, zeta: f
 
 
 def catalogue_figure(shapers: Iterable[Shaper], zeta: float = 0.0) -> Figure:
-    """Residual vibration of each shaper against the true frequency, and the width of its band against its duration.
+    """Residual vibration of each shaper against the true frequency; the width of its band against its duration.
 
-    Args:
-        shapers: The shapers; those that do not support this damping, or do not shape, are left out.
-        zeta: Damping ratio, assumed and true [-].
+    Shapers that do not support this damping, or do not shape, are left out.
     """
     shown = {shaper.name: shaper for shaper in shapers if zeta < shaper.zeta_max and shaper.duration_periods}
     placed = {name for names in FAMILIES.values() for name in names}

@@ -18,8 +18,8 @@ from tvist_controller.api.line import (
     paper_payload,
     wanted_modes,
 )
+from tvist_lab.frequency_error import robust_over
 from tvist_lab.recordings import Floats
-from tvist_lab.robust import robust_over
 from tvist_lab.study.line import samples_of
 from tvist_lab.study.moves import Move
 from tvist_lab.workspace import ranges, workspace

@@ -10,12 +10,7 @@ POSES = {"Q1": "stretched out", "Q2": "stretched out to the side", "Q3": "folded
 
 
 def answer(report: dict[str, Any], motion: str) -> list[str]:
-    """What shaping did to one motion, and in short to the others, a sentence or two a line.
-
-    Args:
-        report: Report of the demonstration.
-        motion: Name of the motion to speak of.
-    """
+    """What shaping did to one motion, and in short to the others, a sentence or two a line."""
     start, end = motion.split("-")
     change, longer = _change(report, motion), report["baselines"][motion]["shaped"]["delay_ms"]
     before, after = map(_number, (change.before, change.after))
@@ -46,12 +41,7 @@ def terms(report: dict[str, Any], motion: str) -> dict[str, str]:
 
 
 def checks(report: dict[str, Any], difference: str | None) -> dict[str, str]:
-    """How far the figures can be trusted: words to sentences.
-
-    Args:
-        report: Report of the demonstration.
-        difference: Where the replay differs first; None if it does not.
-    """
+    """How far the figures can be trusted, words to sentences; `difference` is the first of the replay, if any."""
     ticks, missed, lost = (
         report[name] for name in ("replayed_ticks", "missed_ticks", "states_lost_on_the_way")
     )

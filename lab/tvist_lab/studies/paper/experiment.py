@@ -13,18 +13,10 @@ from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_controller.api.line import Setup
 from tvist_lab.collect import collect
+from tvist_lab.frequency_error import robust_over
 from tvist_lab.in_process import robot_in_process
-from tvist_lab.metrics import (
-    MotionResult,
-    Runs,
-    measure,
-    motions,
-    peak_acceleration,
-    peak_after_stop,
-    still_after,
-)
+from tvist_lab.metrics import MotionResult, Runs, measure, motions, peak_after_stop
 from tvist_lab.recordings import Recording
-from tvist_lab.robust import robust_over
 from tvist_lab.studies.paper.published import MOTIONS, pose
 from tvist_protocol.info import Info
 
@@ -97,15 +89,8 @@ class JudgedRun:
     """One run of one motion."""
 
     result: MotionResult
-    """The paper's metrics."""
     peak: float | None
-    """Largest true |α| later than 10 ms after the reference stops [m/s²]; None if the robot does not publish the
-    truth.
-    """
-    still_after: float | None
-    """Time until still, from the start of the unshaped reference [s]; None if never still."""
-    acceleration: float
-    """Largest |q̈*| [rad/s²]."""
+    """Largest true |α| later than 10 ms after the reference stops [m/s²]; None without the truth."""
 
 
 @dataclass
@@ -126,11 +111,9 @@ class Experiment:
 
     def of_table_2(self) -> dict[str, Runs]:
         """Return the unshaped and shaped runs of each motion, for Table 2."""
+        kinds = ("unshaped", "shaped")
         return {
-            motion: Runs(
-                [judged.result for judged in self.judged[motion, "unshaped"]],
-                [judged.result for judged in self.judged[motion, "shaped"]],
-            )
+            motion: Runs(*([one.result for one in self.judged[motion, kind]] for kind in kinds))
             for motion in MOTIONS
         }
 
@@ -143,13 +126,8 @@ def judge(recording: Recording) -> JudgedRun:
     """Measure the one motion of a recording."""
     motion = motions(recording)[0]
     has_truth = "truth_tool_acceleration" in recording
-    result = measure(recording, motion)
-    return JudgedRun(
-        result=result,
-        peak=peak_after_stop(recording, motion) if has_truth else None,
-        still_after=still_after(recording, motion) if result.still_after_ms is not None else None,
-        acceleration=peak_acceleration(recording, motion),
-    )
+    peak = peak_after_stop(recording, motion) if has_truth else None
+    return JudgedRun(measure(recording, motion), peak)
 
 
 async def table_1(robot: Robot, arm: Arm) -> dict[str, dict[str, float]]:
@@ -188,16 +166,7 @@ async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) ->
 async def experiment(
     robot: Robot, arm: Arm, *, runs: int, seed: int, baselines: bool, progress: Progress
 ) -> Experiment:
-    """Run every motion with every method.
-
-    Args:
-        robot: The robot.
-        arm: Control of the robot.
-        runs: Number of repetitions, each with its own noise and gear errors.
-        seed: Seed of the first repetition.
-        baselines: Whether to run the baselines, too.
-        progress: Called after each run.
-    """
+    """Run every motion with every method, and repeat it, each time with other noise and gear errors."""
     done = Experiment(info=await robot.info(), seed=seed, runs=runs, table_1=await table_1(robot, arm))
     for motion in MOTIONS:
         for method in (UNSHAPED, SHAPED):

@@ -1,4 +1,4 @@
-"""The experiment's results as values and as rows of tables, beside the paper's, with the origin of each figure."""
+"""The experiment's results as values and rows of tables, beside the paper's; the origin of each figure."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -83,7 +83,6 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
     residual = _mean([one.result.residual_vibration_m_s2 for one in judged])
     before = _mean([one.result.residual_vibration_m_s2 for one in unshaped])
     peak, peak_before = _mean([one.peak for one in judged]), _mean([one.peak for one in unshaped])
-    still = _mean([one.still_after for one in judged])
     # The unshaped references of a motion start alike, so the later stop of the shaped one is its delay.
     started = [one.result.stop_s - one.result.start_s for one in judged]
     started_before = [one.result.stop_s - one.result.start_s for one in unshaped]
@@ -93,8 +92,9 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
         "residual_vibration_reduction_percent": _reduction(residual, before),
         "peak_m_s2": peak,
         "peak_reduction_percent": _reduction(peak, peak_before),
-        "still_after_ms": None if still is None else 1e3 * still,
-        "peak_acceleration_ratio": max(one.acceleration for one in judged) / ACCELERATION,
+        "still_after_ms": _mean([one.result.still_after_ms for one in judged]),
+        "peak_acceleration_ratio": max(one.result.peak_acceleration_rad_s2 or 0.0 for one in judged)
+        / ACCELERATION,
     }
 
 
@@ -111,12 +111,7 @@ def _reduction(after: float | None, before: float | None) -> float | None:
 
 
 def origins(robot: str, result: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Return an entry for each figure: its name, the paper's value, that of an arm, and the origin of the latter.
-
-    Args:
-        robot: Model of the arm.
-        result: Table 1, the span of f_d and Table 2 of the arm, see `as_dict`.
-    """
+    """Return an entry for each figure of an arm: its name, the paper's value, the arm's, and the latter's origin."""
     theirs, adjusted, entries = published(), ADJUSTED.get(robot, {}), []
 
     def compare(
@@ -154,9 +149,7 @@ def origins(robot: str, result: Mapping[str, Any]) -> list[dict[str, str]]:
 def table_2(table: dict[str, Any], digits: int) -> list[tuple[str, ...]]:
     """Return the rows of Table 2: the motion, what is shown and whose it is, and the figures.
 
-    Args:
-        table: Table 2 of `as_dict`.
-        digits: Decimals of the residual vibration.
+    The residual vibration has this number of decimals.
     """
     forms = {
         "delay_ms": ".1f", "stabilisation_ms": ".1f", "cycle_ms": ".1f", "overshoot_m": ".1e",
@@ -176,13 +169,7 @@ def table_2(table: dict[str, Any], digits: int) -> list[tuple[str, ...]]:
 
 
 def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, ...]]:
-    """Return the rows of a table of methods.
-
-    Args:
-        result: Result of `as_dict`.
-        motion: The motion.
-        first: How the method that is still first is written, such as "**{}**".
-    """
+    """Return the rows of a motion's table of methods; `first` writes the one that is still first, as "**{}**"."""
     rows = result["baselines"][motion]
     known = [row["still_after_ms"] for row in rows.values() if row["still_after_ms"] is not None]
     soonest = min(known, default=None)
@@ -195,11 +182,7 @@ def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, 
 
 
 def beside(arms: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
-    """Return heading and rows of the table of the origins, with the paper's figures and those of each arm.
-
-    Args:
-        arms: Result of `as_dict` for each arm.
-    """
+    """Return heading and rows of the table of the origins, with the paper's figures and those of each arm."""
     heading = ("figure", "paper", *(title for one in arms for title in (one["robot"], "origin")))
     rows = zip(*(one["origins"] for one in arms), strict=True)
     return [heading, *(

@@ -1,4 +1,4 @@
-"""The experiment on a served robot: over the network, in real time, measured by the robot's recording, and replayed."""
+"""The experiment on a served robot: in real time, measured by the robot's recording, and replayed."""
 
 import asyncio
 from dataclasses import dataclass
@@ -33,15 +33,10 @@ class Served:
 
 
 def serve(path: Path, seed: int, progress: Progress) -> Served:
-    """Serve a robot, run the experiment once, and replay the recording.
+    """Serve a robot, run the experiment once, and replay the recording, which replaces an earlier one.
 
     The figures come from the server's own recording, which is complete however busy the machine is. The figures from
     the messages that this client received are compared with them.
-
-    Args:
-        path: The recording; an earlier one is replaced.
-        seed: Seed of noise and gear errors.
-        progress: Called after each motion.
 
     Raises:
         RuntimeError: The robot did not start or disconnected.
