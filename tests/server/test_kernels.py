@@ -9,7 +9,10 @@ from tvist_server import kernels
 
 LISTED = "; print(*sorted(kernel.name for kernel in KERNELS))"
 ALONE = "from tvist_server.kernels import KERNELS" + LISTED
-AFTER_ALL = "import tvist_lab.demo, tvist_lab.studies.moves, tvist_view.live, tvist_server.workers;" + ALONE
+AFTER_ALL = (
+    "import tvist_lab.studies.paper.served, tvist_lab.studies.moves, tvist_view.live, tvist_server.workers;"
+    + ALONE
+)
 TICKING = """
 import sys
 from pathlib import Path
