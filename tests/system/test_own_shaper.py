@@ -89,7 +89,8 @@ def later(f_d, zeta):
     return zv(f_d, zeta) if len(calls) < 700 else None
 """
     (folder / "mine.py").write_text(MINE + later, encoding="utf-8")
-    ended = tvist("study", "moves", "--moves", 1, "--shapers", "mine.py:later", cwd=folder)
+    same = ("--moves", 1, "--json")
+    ended = tvist("study", "moves", "--shapers", "mine.py:later", *same, cwd=folder)
     said = "the shaper returns NoneType instead of Impulses(A, tau) of tvist_shaping for f_d = "
     ended.assert_failed(1, "1 of 2 rows failed, the first with later at move 1", said)
 
