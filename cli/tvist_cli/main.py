@@ -10,11 +10,9 @@ import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tvist_cli.study_names import STUDY
 from tvist_server.ending import end_like_interrupted, ending_signals
 
 if TYPE_CHECKING:
@@ -46,9 +44,7 @@ GROUPS = {
         "log": f"Recordings, and other robots' logs: {', '.join(LOG)}.",
     },
     "Studies": {
-        "evaluate": "Compare the vibration of any moves unshaped and shaped.",
-        "shaperbench": "Rank shapers, your own included, on fifteen simulated arms.",
-        "study": f"Run a study, one's own from a file or one of {', '.join(STUDY)}.",
+        "study": "Compare shapers in simulation: on any moves, two of them, all of them, or by a study of your own.",
     },
     "Make and manage": {
         "demo": "Run the paper's experiment, in real time or simulated, and print its tables beside ours.",
@@ -63,7 +59,7 @@ GROUPS = {
     },
 }
 """The commands with their one-line help, in groups, in the order in which a new user meets them."""
-OF_GROUPS = {"log": LOG, "study": STUDY}
+OF_GROUPS = {"log": LOG}
 """Commands that have commands of their own."""
 COMMANDS = {name: what for group in GROUPS.values() for name, what in group.items()}
 
@@ -125,9 +121,6 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
         )
         app.command(group)
         _add(group, f"tvist_cli.commands.{name}", commands, called[1:2] if called[:1] == [name] else ())
-        if name == "study" and (name in called or not called):
-            # The parser takes no path for what a group does without a command of its own.
-            group.default(import_module("tvist_cli.commands.study.file").file)
     return app
 
 

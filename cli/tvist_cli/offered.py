@@ -30,9 +30,9 @@ def _names(kind: str) -> Iterable[str]:
 
             found = BUILT_IN.names()
         case "compared":
-            from tvist_lab.study.menus import UNSHAPED, names
+            from tvist_lab.study.menus import rows
 
-            found = (UNSHAPED, *names("bench"))
+            found = [row.name for row in rows()]
         case "plant":
             from tvist_controller.sources.own_plants import named_plants
 
@@ -58,8 +58,8 @@ def _offered(kind: str, ending: str | None = None) -> Parameter:
 
 ROBOTS = _offered("robot", ".toml")
 SHAPERS = _offered("shaper", ".py")
-COMPARED = _offered("compared")
-"""Shapers and baselines that ShaperBench compares."""
+COMPARED = _offered("compared", ".py")
+"""Shapers and baselines that studies compare."""
 PLANTS = _offered("plant", ".py")
 WORLDS = _offered("world", ".xml")
 PROFILES = _offered("profile")

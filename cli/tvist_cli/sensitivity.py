@@ -23,15 +23,7 @@ POINTS = 401
 def print_sensitivity(
     shapers: Sequence[str], zeta: float, errors: tuple[float, float], places: Places, *, json: bool
 ) -> None:
-    """Compute and print the residual vibration of shapers for a mode whose frequency they assume wrongly.
-
-    Args:
-        shapers: Names of the shapers, or FILE.py:NAME; if empty, those of the paper.
-        zeta: Damping ratio of the mode, both assumed and true.
-        errors: Lowest and highest percentage by which the assumed frequency is too high.
-        places: Where to write the curves, and a figure of them.
-        json: Whether to print one JSON object.
-    """
+    """Compute and print the residual vibration of shapers for a mode whose frequency they assume wrongly."""
     import numpy as np
 
     from tvist_lab.frequency_error import residual_over_error

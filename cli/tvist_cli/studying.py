@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import print_json, progress, table, write_json, write_report
+from tvist_cli.output import print_json, table, write_json, write_report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tvist_lab.report import Page
-    from tvist_lab.study.tables import Entry, Shown
+    from tvist_lab.study.columns import Column, Entry
 
 One = TypeVar("One")
 
@@ -33,49 +33,6 @@ def check_seed(seed: int, bits: int = 62) -> None:
     """Refuse a seed that is negative or has more bits."""
     if not 0 <= seed < 2**bits:
         raise Failure(f"seed is {seed}: must be at least 0 and less than 2^{bits}", code=2)
-
-
-def command(name: str, **options: object) -> str:
-    """Return the command that gives the same figures.
-
-    Args:
-        name: Its words before the options.
-        options: Options in the order in which they stand; those that are None or False are left out.
-    """
-    words = ["tvist", name]
-    for option, value in options.items():
-        if value is None or value is False:
-            continue
-        values = value if isinstance(value, list | tuple) else [] if value is True else [value]
-        words += [f"--{option}", *(f"{one:g}" if isinstance(one, float) else str(one) for one in values)]
-    return " ".join(words)
-
-
-def gathered(
-    results: Iterable[One],
-    total: int,
-    what: str,
-    *errors: type[Exception],
-    weigh: Callable[[One], int] = lambda _: 1,
-) -> list[One]:
-    """Return results, which a bar counts as they come.
-
-    Args:
-        results: The results.
-        total: Number of steps.
-        what: Name of the steps, in the plural.
-        errors: Errors of the work that are failures to tell.
-        weigh: Number of steps that a result stands for.
-
-    Raises:
-        Failure: One of the errors occurred, or Control+C was pressed.
-    """
-    found = []
-    with told(*errors), progress(total, what) as bar:
-        for one in results:
-            found.append(one)
-            bar(weigh(one), None)
-    return found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,16 +59,7 @@ class Places:
         draw: Callable[[], Figures] | None = None,
         web_page: "Callable[[Figures], Page] | None" = None,
     ) -> None:
-        """Write a result to all places.
-
-        Args:
-            result: What --json prints.
-            draw: Draws the figures, in the style that is set when it is called.
-            web_page: Makes the web page around the figures.
-
-        Raises:
-            Failure: A file cannot be written.
-        """
+        """Write a result to all places; figures are drawn in the style that is set then."""
         with told(OSError):
             if self.output is not None:
                 write_json(self.output, result)
@@ -135,8 +83,8 @@ def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, js
         say_it(result)
 
 
-def show(title: str, entries: "Iterable[Entry]", columns: "Sequence[Shown]") -> None:
+def show(title: str, entries: "Iterable[Entry]", columns: "Sequence[Column]") -> None:
     """Print a table of nested results."""
-    from tvist_lab.study.tables import cells, titles
+    from tvist_lab.study.columns import cells, titles
 
     table(title, titles(columns), cells(entries, columns))

@@ -171,7 +171,7 @@ def check_command(words):
     match program.removeprefix(".venv/bin/"):
         case "tvist" | "marimo" | "dask" as name:
             verbs = list(itertools.takewhile(lambda word: re.fullmatch(r"[a-z][\w-]*,?", word), arguments))
-            words = None if name == "marimo" else 1 + (verbs[:1] in (["log"], ["study"]))
+            words = None if name == "marimo" else 1 + (verbs[:1] == ["log"])
             verbs = [word.rstrip(",") for word in verbs][:words]
             unknown = {word for word in arguments if word.startswith("--")} - options(name, *verbs)
             assert not unknown, f"{name} {' '.join(verbs)} does not know {unknown}"

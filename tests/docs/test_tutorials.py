@@ -22,7 +22,6 @@ pytestmark = pytest.mark.realtime
 EXAMPLES = examples()
 COMPARED = (DOCS / "how-to" / "change-a-shaper.md").read_text("utf-8")
 WAVE = ROOT / "clients" / "examples" / "wave.script"
-SWEEP = 'shapers = ["zv"]\npayloads = [2.5]\nmoves = 2\n'
 SERVED = ("check", "move", "watch", "log record", "stop", "unlock", "forget", "view")
 """Commands whose examples are about the robot of `serve`'s example."""
 
@@ -116,7 +115,6 @@ def test_every_command_has_an_example():
 def place(tmp_path_factory):
     """A folder with what examples read."""
     folder = with_files(tmp_path_factory.mktemp("examples"), "")
-    (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8")
     # Recorded here, since the last bits of another processor's may differ.
     for shaped, name in (("--shaper", "none", "--payload", "2"), "day.mcap"), ((), "first.mcap"):
         run = ("run", "wave.script", "--lockstep", *shaped, "--record", name)

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import time
 from pathlib import Path
 
 
@@ -11,12 +10,6 @@ class OddError(Exception):
 
     def __init__(self, first, second):
         super().__init__(f"{first} {second}")
-
-
-def square_late(number):
-    """The first ones come last."""
-    time.sleep(0.1 if number < 3 else 0.0)
-    return number * number
 
 
 def square_or_raise(number):

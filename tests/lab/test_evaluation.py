@@ -10,9 +10,10 @@ from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.sources import calibrations
-from tvist_lab.studies.evaluate import jobs, report
+from tvist_lab.studies.moves import study
+from tvist_lab.study.asked import Asked
 from tvist_lab.study.case import Case
-from tvist_lab.study.catalogue import baselines
+from tvist_lab.study.catalogue import baselines, some
 from tvist_lab.study.held_out import interval
 from tvist_lab.study.line import (
     PAPER,
@@ -21,9 +22,9 @@ from tvist_lab.study.line import (
     round_a_corner,
 )
 from tvist_lab.study.measures import WORTH
-from tvist_lab.study.method import Named, Task
+from tvist_lab.study.method import Task
 from tvist_lab.study.moves import Move, MovesError, draw_moves, is_free, read_moves, write_moves
-from tvist_lab.study.recipes import Mistaken, Recipe, RecipeError
+from tvist_lab.study.recipes import FrequencyError, Recipe, RecipeError
 from tvist_lab.study.shaping import shape
 from tvist_lab.study.work import measure
 from tvist_plant.plant import PERIOD
@@ -165,7 +166,7 @@ class TestLine:
 
 class TestRecipes:
     def test_a_wrong_frequency_is_wrong_by_the_share(self):
-        wrong = Mistaken(Fixed([10.0, 20.0], [0.1, 0.2]), -0.2)
+        wrong = FrequencyError(Fixed([10.0, 20.0], [0.1, 0.2]), -0.2)
         f_d, zeta = wrong.estimate(np.zeros(6))
         np.testing.assert_allclose(f_d, [8.0, 16.0])
         np.testing.assert_allclose(zeta, [0.1, 0.2])
@@ -180,40 +181,47 @@ class TestRecipes:
             Recipe("zz", paper).make(ur5e, 5.0)
 
 
-def judged(unshaped, shaped):
-    """Rows of a move by a shaper and by waiting, by the peaks that they leave."""
-    counts = unshaped >= WORTH
-    row = {
-        "shaper": "zv", "payload_kg": 5.0, "unshaped_peak_m_s2": unshaped, "shaped_peak_m_s2": shaped,
-        "reduction_percent": 100.0 * (1.0 - shaped / unshaped) if counts else None,
-        "less_than_waiting_percent": 0.0 if counts else None, "delay_ms": 100.0, "unshaped_still_after_ms": 1200.0,
-        "shaped_still_after_ms": None, "still_after_unshaped_stop_ms": None, "quiet_after_unshaped_stop_ms": None,
-        "peak_acceleration_ratio": 1.01, "peak_velocity_ratio": 1.0,
-    }  # fmt: skip
-    return row, row | {"shaper": "waiting"}
+@pytest.fixture
+def report(ur5e, paper):
+    """What is said of moves by the peaks that they leave unshaped and shaped."""
+    drawn = draw_moves(ur5e, 1, 0, (0.0, 5.0)).moves
+    made = study(Asked(description=ur5e, moves=drawn, methods=some(["zv"], ur5e, paper), named=1))
+
+    def of(*peaks):
+        rows = [
+            {
+                "shaper": shaper, "arm": "calibrated", "status": "measured", "move": place, "payload_kg": 5.0,
+                "unshaped_peak_m_s2": unshaped, "shaped_peak_m_s2": shaped, "delay_ms": 100.0,
+                "reduction_percent": 100.0 * (1.0 - shaped / unshaped) if unshaped >= WORTH else None,
+                "unshaped_still_after_ms": 1200.0, "peak_acceleration_ratio": 1.01,
+            }
+            for place, (unshaped, shaped) in enumerate(peaks, 1)
+            for shaper in ("zv", "waiting")
+        ]  # fmt: skip
+        return made.result(made.frame(rows), {})
+
+    return of
 
 
 class TestReport:
-    def test_percentages_leave_out_what_did_not_vibrate_and_list_it(self):
-        peaks = [(1.0, 0.1), (2.0, 0.5), (0.5 * WORTH, 0.1 * WORTH)]
-        told = report([judged(*pair) for pair in peaks])
-        assert [row["reduction_percent"] for row in told["moves"]] == [
-            pytest.approx(90.0),
-            pytest.approx(75.0),
-            None,
-        ]
-        assert told["left_out"] == [3]
-        assert told["counted"] == 2
-        assert told["reduction_percent"] == pytest.approx({"median": 82.5, "p5": 75.75, "min": 75.0})
-        assert told["delay_ms"] == pytest.approx({"median": 100.0, "max": 100.0})
-        assert told["moves"][0]["still_after_ms"] == {"unshaped": 1200.0, "shaped": None}
-        assert told["never_still"] == 3
-        assert told["peak_m_s2"] == pytest.approx({"median": 0.3, "p95": 0.48, "max": 0.5})
+    def test_percentages_leave_out_what_did_not_vibrate_and_say_so(self, report):
+        result = report((1.0, 0.1), (2.0, 0.5), (0.5 * WORTH, 0.1 * WORTH))
+        told = result.values["summary"][0]
+        moves = result.study.tables_of(result)[0].entries
+        assert [row["reduction_percent"] for row in moves] == [pytest.approx(90.0), pytest.approx(75.0), None]
+        assert (told["counted"], told["rows"], told["never_still"]) == (2, 3, 3)
+        less = [told[f"reduction_percent_{name}"] for name in ("median", "p5", "min")]
+        assert less == pytest.approx([82.5, 75.75, 75.0])
+        assert (told["delay_ms_median"], told["delay_ms_max"]) == (100.0, 100.0)
+        peaks = [told[f"shaped_peak_m_s2_{name}"] for name in ("median", "p95")]
+        assert peaks == pytest.approx([0.3, 0.48])
+        assert any("1 of 3 moves have an unshaped peak below 0.2" in note for note in result.values["notes"])
 
-    def test_nothing_but_moves_without_vibration_is_no_percentage(self):
-        told = report([judged(0.1, 0.05)])
-        assert told["reduction_percent"] == {"median": None, "p5": None, "min": None}
-        assert told["reduction_percent_interval"] == {"median": None, "p5": None}
+    def test_nothing_but_moves_without_vibration_is_no_percentage(self, report):
+        values = report((0.1, 0.05)).values
+        for name in ("median", "p5", "min", "median_interval", "p5_interval"):
+            assert values["summary"][0][f"reduction_percent_{name}"] is None
+        assert values["verdict"] == ["No move vibrates enough unshaped to show what zv does."]
 
     def test_an_interval_covers_the_percentile_of_a_known_distribution(self):
         random = np.random.default_rng(5)
@@ -225,8 +233,8 @@ class TestReport:
 
 class TestMoves:
     def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
-        recipe = Recipe("zv", paper)
-        (job,) = jobs(ur5e, [move], 0, Named(recipe, "zv"), baselines(recipe, ur5e, (5.0, 5.0)))
+        methods = (*some(["zv"], ur5e, paper), *baselines(paper, ur5e, (5.0, 5.0)))
+        (job,) = study(Asked(description=ur5e, moves=[move], methods=methods, named=1)).jobs
         shaped, waiting, longer, *others = measure(job)
         assert shaped["reduction_percent"] > 80.0
         assert 28.0 <= shaped["delay_ms"] <= 38.0  # half a period at Q3, where the mode is at 15 Hz
@@ -239,7 +247,7 @@ class TestMoves:
         assert longer["peak_acceleration_ratio"] <= 1.0 + 1e-9
 
     def test_baselines_for_frequencies_far_too_low_are_long_and_no_error(self, ur5e, paper, move):
-        recipe, reference = Recipe("zv", paper, frequency_error=-0.9), Case(ur5e, move).point_to_point()
+        reference = Case(ur5e, move).point_to_point()
         task = Task(ur5e, move, reference, as_served=True, ticks=len(reference) + 20)
-        for baseline in baselines(recipe, ur5e, (5.0, 5.0)):
+        for baseline in baselines(paper, ur5e, (5.0, 5.0), -0.9):
             np.testing.assert_allclose(baseline.shaped(task).q[-1], move.target, atol=1e-9)

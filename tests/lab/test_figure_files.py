@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tvist_lab.identification.workspace_map import WorkspaceMap
+from tvist_lab.studies.robustness import ERRORS, cells
 from tvist_shaping import SHAPERS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -48,14 +49,11 @@ def make(figures, recorded, found):
         ]
 
     def entries():
-        reduction = {"median": 90.0, "p5": 80.0}
-        return [
-            {"shaper": name, "reduction_percent": reduction, "delay_ms": {"median": 50.0}}
-            for name in ("zv", "auto")
-        ] * 2
+        figures = {"reduction_percent_median": 90.0, "reduction_percent_p5": 80.0, "delay_ms_median": 50.0}
+        return [{"shaper": name, **figures} for name in ("zv", "auto")] * 2
 
-    def leaderboard(name):
-        return json.loads((DOCS / "reference" / f"{name}.json").read_text(encoding="utf-8"))["shapers"]
+    def published(name):
+        return json.loads((DOCS / "reference" / f"{name}.json").read_text(encoding="utf-8"))
 
     modes = np.array([np.linspace(7.0, 9.0, 5), np.linspace(0.2, 0.3, 5)])
     known = SHAPERS.values()
@@ -74,9 +72,9 @@ def make(figures, recorded, found):
         "catalogue": lambda: figures.catalogue_figure(known),
         "sensitivity": lambda: figures.sensitivity_figure([SHAPERS["zv"]], 0.0, np.linspace(-0.4, 0.6, 51)),
         "settling_against_delay": lambda: figures.settling_against_delay_figure(known, 10.0, 0.1),
-        "pareto": lambda: figures.pareto_figure(leaderboard("leaderboard")),
-        "settling": lambda: figures.settling_figure(leaderboard("leaderboard")),
-        "robustness": lambda: figures.robustness_figure(leaderboard("robustness")),
+        "pareto": lambda: figures.pareto_figure(published("leaderboard")["summary"]),
+        "settling": lambda: figures.settling_figure(published("leaderboard")["summary"]),
+        "robustness": lambda: figures.robustness_figure(cells(published("robustness")), ERRORS),
         "moves": lambda: figures.residual_by_move_figure(judged(4)),
         "one_move": lambda: figures.vibration_figure(recorded[0][0], recorded[1][0], 3),
         "identified": lambda: figures.identified_figure("mine", modes, 1.02 * modes),
@@ -263,14 +261,14 @@ def test_a_style_file_that_is_none_is_refused_in_a_sentence(figures, tmp_path, c
         pass
 
 
-@pytest.mark.parametrize("shares", [("median", "p5", "p95"), ("least", "most")])
+@pytest.mark.parametrize("shares", [("median", "p5", "p95"), ("min", "max")])
 def test_a_study_draws_lines_over_numbers_and_dots_with_bars_over_names(figures, shares):
     summary = [
-        {"shaper": "zv", "kg": kg, "way": f"way {kg:g}", "delay_ms": dict.fromkeys(shares, 50.0)}
+        {"shaper": "zv", "kg": kg, "way": f"way {kg:g}", **{f"delay_ms_{share}": 50.0 for share in shares}}
         for kg in (1.0, 5.0)
     ]
     for axis, dashes in (("kg", "-"), ("way", "None")):
-        (panel,) = figures.study_figure(summary, [axis], ["delay_ms"]).axes
+        (panel,) = figures.study_figure(summary, [axis], ["delay_ms"], few="min" in shares).axes
         lines = panel.get_lines()
         assert {line.get_linestyle() for line in lines} == {dashes}
         assert len(lines) == (1 if "median" in shares else 2)
@@ -292,12 +290,12 @@ def test_a_figure_of_no_counted_move_has_no_empty_panel(make):
 
 def test_a_triangle_is_one_that_exceeds_a_limit_by_more_than_a_percent(figures):
     row = {
-        "ranked": True, "pareto": False, "residual_m_s2": {"median": 0.1}, "time_until_still_ms": {"median": 50.0},
-        "peak_velocity_ratio": {"max": 1.0}, "keeps_limits": False,
+        "pareto": False, "residual_m_s2_median": 0.1, "time_until_still_ms_median": 50.0,
+        "reference_velocity_ratio_max": 1.0,
     }  # fmt: skip
     rows = [
-        row | {"name": "near", "peak_acceleration_ratio": {"max": 1.003}},
-        row | {"name": "far", "peak_acceleration_ratio": {"max": 2.5}, "residual_m_s2": {"median": 0.2}},
+        row | {"shaper": "near", "reference_acceleration_ratio_max": 1.003},
+        row | {"shaper": "far", "reference_acceleration_ratio_max": 2.5, "residual_m_s2_median": 0.2},
     ]
     (panel,) = figures.pareto_figure(rows).axes
     markers = [line.get_marker() for line in panel.get_lines() if len(line.get_xdata()) == 1]

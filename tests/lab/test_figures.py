@@ -8,7 +8,7 @@ import pytest
 
 from tvist_lab.metrics import motions
 from tvist_lab.metrics.residual import residual as measured
-from tvist_lab.studies.evaluate import example
+from tvist_lab.studies.moves import example
 from tvist_shaping import SHAPERS, custom, residual
 
 TICKS = 1500

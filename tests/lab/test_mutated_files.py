@@ -352,7 +352,7 @@ def _read_state(path):
 
 
 def _read_sweep(path):
-    from tvist_lab.studies.sweep.spec import read_spec
+    from tvist_lab.studies.sweep import read_spec
     from tvist_plant.user_file import UserFileError
 
     return read_spec, UserFileError

@@ -1,22 +1,22 @@
 """Every executor gives each task its result or its failure, whatever happens to the others."""
 
-import itertools
 import threading
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from distributed import Client, LocalCluster
-from tests.lab.runner_work import die, die_once, function_of, square_late, square_or_raise
+from polars.testing import assert_frame_equal
+from tests.lab.runner_work import die, die_once, function_of, square_or_raise
 
 from tvist_controller.sources.calibrations import load as load_calibration
-from tvist_lab.runners import Failed, TaskError, in_order, outcomes, processes
+from tvist_lab.runners import Failed, Here, TaskError, outcomes, processes
 from tvist_lab.study.case import Case
-from tvist_lab.study.engine import made
-from tvist_lab.study.method import Named
+from tvist_lab.study.catalogue import some
+from tvist_lab.study.engine import run
 from tvist_lab.study.moves import draw_moves
-from tvist_lab.study.recipes import Recipe
-from tvist_lab.study.work import Job, measure
+from tvist_lab.study.study import Study
+from tvist_lab.study.work import measure
 
 ROOT = str(Path(__file__).parents[2])
 
@@ -31,7 +31,7 @@ def cluster():
         yield client.get_executor(pure=False)
 
 
-EXECUTORS = {"processes": lambda: processes(2), "dask": cluster}
+EXECUTORS = {"processes": lambda: processes(2), "dask": cluster, "here": Here}
 
 
 @pytest.fixture(autouse=True)
@@ -40,24 +40,15 @@ def importable(monkeypatch):
     monkeypatch.syspath_prepend(ROOT)
 
 
-class TestOrder:
-    def test_results_are_in_the_order_of_the_tasks_whatever_ends_first(self):
-        assert list(in_order(square_late, range(10), few=2)) == [n * n for n in range(10)]
-
-    def test_the_first_failure_is_raised_after_the_results_before_it(self):
-        for few in (2, 99):
-            results = in_order(square_or_raise, range(20), few)
-            assert list(itertools.islice(results, 7)) == [n * n for n in range(7)]
-            with pytest.raises(KeyError, match="task 7"):
-                next(results)
-
-    def test_evaluations_do_not_depend_on_what_runs_them(self, ur5e):
-        moves = draw_moves(ur5e, 17, 1, (0.0, 5.0)).moves  # enough for other processes
-        zv = (Named(Recipe("zv", load_calibration("ur5e_5kg")), "zv"),)
-        jobs = [Job(Case(ur5e, move, seed), zv) for seed, move in enumerate(moves)]
-        here = [measure(job) for job in jobs]
-        assert list(made(jobs)) == here
-        assert list(made(jobs[:2])) == here[:2]
+def test_rows_do_not_depend_on_what_runs_them(ur5e):
+    methods = some(["zv"], ur5e, load_calibration("ur5e_5kg"))
+    moves = draw_moves(ur5e, 5, 1, (0.0, 5.0)).moves
+    study = Study(
+        title="", cases=[Case(ur5e, move, seed) for seed, move in enumerate(moves)], methods=methods
+    )
+    here = [{"case": place, **row} for place, job in enumerate(study.jobs) for row in measure(job)]
+    assert_frame_equal(run(study).rows, study.frame(here))
+    assert_frame_equal(run(study, executor=lambda: processes(2)).rows, study.frame(here))
 
 
 @pytest.mark.parametrize("executor", EXECUTORS.values(), ids=EXECUTORS)
@@ -86,8 +77,8 @@ class TestExecutors:
 
 class TestDeath:
     def test_a_process_that_dies_ends_the_run_in_a_sentence(self):
-        with pytest.raises(ChildProcessError, match="a process died"):
-            list(in_order(die, range(20)))
+        with pytest.raises(ChildProcessError, match="a process died"), processes(2) as pool:
+            list(outcomes(pool, die, range(20)))
 
     def test_a_worker_that_dies_costs_nothing_if_its_task_can_be_done_again(self, tmp_path):
         tasks = [(number, str(tmp_path / "mark")) for number in range(30)]

@@ -9,30 +9,22 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+import polars as pl
 import pytest
 from tools.tables.pages import page_of
 
 from tvist_lab.metrics import best_tool_acceleration
-from tvist_lab.studies.leaderboard import leaderboard
-from tvist_lab.studies.shaperbench import (
-    STICKING,
-    STICKS,
-    WANTED,
-    bends,
-    check_causal,
-    draw,
-    inspect,
-    jobs,
-    path_error,
-)
+from tvist_lab.studies.bench import STICKING, STICKS, bend, path_error, study
+from tvist_lab.studies.causality import check_causal, inspect
 from tvist_lab.study.arms import ARMS
+from tvist_lab.study.asked import Asked
 from tvist_lab.study.case import Case
-from tvist_lab.study.catalogue import bench
+from tvist_lab.study.catalogue import some
 from tvist_lab.study.foreign import CandidateError, FromFile, load_shaper
 from tvist_lab.study.line import PAPER, ControlLine, point_to_point
 from tvist_lab.study.menus import ROWS, names
 from tvist_lab.study.method import Named, Stepping, Task
-from tvist_lab.study.moves import Move
+from tvist_lab.study.moves import Move, draw_moves
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.shaping import ShaperFaultError
 from tvist_lab.study.work import Job, measure, measure_each
@@ -59,6 +51,11 @@ HONEST = """
             self.past = [q_ref, *self.past[:20]]
             return np.mean(self.past, axis=0)
 """
+
+
+def bench(ur5e, modal, *wanted):
+    """Waiting, and methods of the bench."""
+    return some(["none", *(wanted or names("bench"))], ur5e, modal)
 
 
 @pytest.fixture(scope="module")
@@ -255,12 +252,12 @@ class TestDishonesty:
             own(text).shaped(task)
 
     def test_our_own_are_honest(self, ur5e, modal, task):
-        for candidate in bench(ur5e, modal, None, None):
+        for candidate in bench(ur5e, modal):
             assert inspect(candidate, ur5e, [task.move]) is None, candidate.name
             candidate.shaped(task)
 
     def test_who_is_told_the_target_is_said_and_may_know_nothing_else(self, ur5e, modal, task):
-        told = {one.name for one in bench(ur5e, modal, None, None) if one.told_target}
+        told = {one.name for one in bench(ur5e, modal) if one.told_target}
         frozen = {"zv_frozen_at_end", "zv_3_modes_frozen_at_end"}
         assert told == {"auto-target", *frozen, "double_s_as_zv", "double_s_as_auto"}
 
@@ -281,8 +278,8 @@ class TestElastic:
         def made(kind, *arms):
             case = Case(ur5e, task.move, arms=tuple(ARMS[place] for place in arms))
             method = kind(Recipe("elastic", modal), "elastic", "")
-            rows = measure(Job(case, (method,), WANTED, as_served=False))
-            return [row | {"cost_us": None} for row in rows]
+            rows = measure(Job(case, (method,), ("declared_delay_ms", "residual_m_s2"), as_served=False))
+            return list(rows)
 
         whole = made(Named, 0, 7)
         for ours, theirs in zip(whole, made(Bare, 0, 7), strict=True):
@@ -302,8 +299,8 @@ class TestOwn:
             assert stepper.delay == there.delay
 
     def test_the_held_product_keeps_the_limits_and_its_mean_delay(self, ur5e, modal):
-        (product,) = (one for one in bench(ur5e, modal, None, None) if one.name == "product")
-        for move in draw(ur5e, 3, 5):
+        (product,) = some(["product"], ur5e, modal)
+        for move in draw_moves(ur5e, 3, 5, (0.0, 5.0)).moves:
             reference = point_to_point(np.array(move.start), np.array(move.target))
             # With a tenth more declared than is rated: the most that the bench does.
             shaped = product.shaped(Task(ur5e, replace(move, mass=1.1 * ur5e.limits.payload), reference))
@@ -424,44 +421,45 @@ class TestScores:
         assert path_error(path, np.array([[0.5, 0.02], [0.2, -0.01]])) == pytest.approx(0.02)
 
     def test_a_leaderboard_ranks_and_says_why_it_does_not(self, ur5e, modal, own):
-        candidate = own("def step(q_ref, info):\n    return q_ref[:5]")
-        standing = [*bench(ur5e, modal, None, ["zv", "double_s_as_zv"]), candidate]
-        moves = draw(ur5e, 1, 0)
-        todo = [
-            replace(job, case=replace(job.case, arms=ARMS[:1]))
-            for job in jobs(ur5e, standing, moves, 0, quick=True)
-        ]
-        done = [row for job in todo for row in measure_each(job)]
-        board = leaderboard(standing, [None] * len(standing), done, [])
-        found = {row["name"]: row for row in board["shapers"]}
-        assert [row["ranked"] for row in board["shapers"]] == [True, True, True, False]
-        assert "tick 0" in found["file"]["fault"]
-        assert found["none"]["reduction_percent"]["median"] in {None, 0.0}
-        assert found["zv"]["residual_m_s2"]["median"] < found["none"]["residual_m_s2"]["median"]
-        assert [row["place"] for row in board["shapers"][:3]] == [1, 2, 3]
-        assert any(row["pareto"] for row in board["shapers"][:3])
-        about = {
-            "date": "2026-11-23",
-            "moves": 1,
-            "seed": 0,
-            "robot": "UR5e",
-            "calibration": "",
-            "arms": {ARMS[0].name: ARMS[0].label},
-        }
-        written = page_of("shaperbench", about | board)
-        assert all(row["name"] in written for row in board["shapers"])
+        """One is found out before it moves, and one when it does."""
+        early = replace(own("def step(q_ref, info):\n    return q_ref[:5]"), name="early")
+        standing = [*bench(ur5e, modal, "zv", "double_s_as_zv"), early]
+        moves = draw_moves(ur5e, 1, 0, (0.0, 5.0)).moves
+        facts = {"moves_made": 1, "seed": 0, "robot": "UR5e", "calibration": "", "command": ""}
+        asked = Asked(description=ur5e, moves=moves, methods=standing, quick=True, facts=facts)
+        made = study(asked)
+        made = replace(made, cases=[replace(case, arms=ARMS[:1]) for case in made.cases])
+        done = made.frame([row for job in made.jobs for row in measure_each(job)])
+        spoilt = done.with_columns(
+            error=pl.when(pl.col("shaper") == "double_s_as_zv").then(pl.lit("the shaper gives NaN at tick 7"))
+        )
+        board = made.result(done, {"date": "2026-11-23"}).values
+        assert [row["shaper"] for row in board["summary"] if not row["ranked"]] == ["early"]
+        found = {row["shaper"]: row for row in board["summary"]}
+        assert "tick 0" in found["early"]["fault"]
+        assert found["none"]["less_percent_median"] in {None, 0.0}
+        assert found["zv"]["residual_m_s2_median"] < found["none"]["residual_m_s2_median"]
+        assert [row["place"] for row in board["summary"][:3]] == [1, 2, 3]
+        assert any(row["pareto"] for row in board["summary"][:3])
+        assert found["double_s_as_zv"]["path_error_mrad"] is None
+        written = page_of("shaperbench", board)
+        assert all(row["shaper"] in written for row in board["summary"])
         assert "Measured on 2026-11-23" in written
+        lost = {row["shaper"]: row for row in made.result(spoilt, {}).values["summary"] if not row["ranked"]}
+        assert lost["double_s_as_zv"]["fault"] == "gives NaN at tick 7 (payload error +0 %)"
 
     def test_the_published_page_says_when_it_was_made_and_what_it_lacks(self, ur5e, modal):
         reference = Path(__file__).parents[2] / "docs" / "reference"
         published = json.loads((reference / "leaderboard.json").read_text(encoding="utf-8"))
         _, first, *_ = (reference / "shaperbench.md").read_text(encoding="utf-8").split("\n\n")
-        now = [one.name for one in bench(ur5e, modal, None, None)] + [arm.name for arm in (*ARMS, *STICKING)]
-        there = [row["name"] for row in published["shapers"]] + list(published["arms"])
+        now = [one.name for one in bench(ur5e, modal)] + [arm.name for arm in (*ARMS, *STICKING)]
+        there = [row["shaper"] for row in published["summary"]] + list(published["arms"])
         assert first.startswith("Measured on 20")
         assert set(re.findall(r"`(\w+(?:-\w+)*)`", first)) == set(now) - set(there)
 
     def test_curved_paths_are_run_by_all_that_shape_references(self, ur5e, modal):
-        standing = bench(ur5e, modal, None, ["zv", "double_s_as_zv"])
-        moves = draw(ur5e, 2, 0)
-        assert {job.method.name for job in bends(ur5e, standing, moves)} == {"none", "zv"}
+        none, zv, planned = bench(ur5e, modal, "zv", "double_s_as_zv")
+        moves = draw_moves(ur5e, 2, 0, (0.0, 5.0)).moves
+        assert bend(none, ur5e, moves) == pytest.approx(0.0, abs=1e-3)
+        assert 0.5 < bend(zv, ur5e, moves) < 10.0
+        assert bend(planned, ur5e, moves) is None

@@ -3,23 +3,24 @@
 import json
 import re
 import threading
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import polars as pl
 import pytest
 from polars.testing import assert_frame_equal
 
 from tvist_controller.sources import calibrations
-from tvist_lab.figures import study_figure
-from tvist_lab.runners import Failed, TaskError, outcomes, processes
-from tvist_lab.studies.sweep.spec import Spec, SpecError, read_spec
-from tvist_lab.studies.sweep.sweep import COLUMNS, SCHEMA, Axes, SweptRobot, setting_name, summary
+from tvist_lab.report import study_figures
+from tvist_lab.runners import Failed, TaskError, processes
+from tvist_lab.studies import sweep
+from tvist_lab.studies.sweep import Spec, SpecError, SweptRobot, read_spec, setting_name
 from tvist_lab.study.arms import scattered
 from tvist_lab.study.case import Case, arm_seed
-from tvist_lab.study.columns import frame
-from tvist_lab.study.engine import Done, Effort
-from tvist_lab.study.engine import run as run_plan
+from tvist_lab.study.engine import run as run_study
+from tvist_lab.study.measures import MEASURES
 from tvist_lab.study.method import Named
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
@@ -43,7 +44,7 @@ def tasks_of(folder, text=SPEC):
     path.write_text(text, encoding="utf-8")
     spec, ur5e = read_spec(path), load("ur5e")
     known = calibrations.load("ur5e_5kg")
-    return Axes(spec, [SweptRobot("ur5e", ur5e, tuple(Recipe(name, known) for name in spec.shapers))])
+    return sweep.study(spec, [SweptRobot("ur5e", ur5e, tuple(Recipe(name, known) for name in spec.shapers))])
 
 
 class Quick:
@@ -58,7 +59,7 @@ class Quick:
     def __init__(self, order=sorted, stop=10**9, fail=()):
         self.order, self.stop, self.fail, self.asked = order, stop, fail, []
 
-    def __call__(self, _work, tasks):
+    def __call__(self, _executor, _work, tasks):
         for count, place in enumerate(self.order(range(len(tasks)))):
             if count == self.stop:
                 raise KeyboardInterrupt
@@ -70,20 +71,16 @@ class Quick:
                 rows = failed(tasks[place], "measured", "")
                 for number, row in enumerate(rows, position * len(rows)):
                     row |= {"error": None, "delay_ms": 0.1 * number, "reduction_percent": 50.0}
-                yield place, Done(rows, "a", 0.0, 1.0)
+                yield place, rows
 
 
-def in_processes(work, tasks):
-    with processes(2) as pool:
-        yield from outcomes(pool, work, tasks)
+def run(study, folder, runner):
+    with patch("tvist_lab.study.engine.outcomes", runner):
+        return run_study(study, folder, nullcontext)
 
 
-def run(axes, *others):
-    return run_plan(axes.plan(), *others)
-
-
-def quietly(_):
-    return lambda _: None
+def in_processes(study, folder):
+    return run_study(study, folder, lambda: processes(2))
 
 
 @pytest.fixture
@@ -94,7 +91,7 @@ def tasks(tmp_path):
 @pytest.fixture
 def whole(tmp_path, tasks):
     """The rows of a run that nothing interrupted."""
-    return run(tasks, tmp_path / "whole", Quick(), quietly).rows
+    return run(tasks, tmp_path / "whole", Quick()).rows
 
 
 class TestSpec:
@@ -125,15 +122,15 @@ class TestSpec:
         assert str(error.value).startswith(f"sweep {tmp_path / 'spec.toml'}")
         assert all(word in str(error.value) for word in words), error.value
 
-    def test_a_key_that_is_left_out_has_the_default_of_evaluate(self, tmp_path):
-        spec = tasks_of(tmp_path, "shapers = ['zv']\nmoves = 1\npayloads = [5]").spec
+    def test_a_key_that_is_left_out_has_a_default(self, tmp_path):
+        spec = tasks_of(tmp_path, "shapers = ['zv']\nmoves = 1\npayloads = [5]").cases.spec
         assert (spec.robots, spec.seed, spec.modes, spec.limits) == (("ur5e",), 0, 1, "gentle")
         assert (spec.stroke, spec.wrists, spec.streams) == ((0.3, 1.0), False, False)
 
 
 class TestTasks:
-    def test_rows_are_to_the_bit_what_evaluate_measures(self, tasks):
-        task = tasks[11]
+    def test_rows_are_to_the_bit_what_any_study_measures(self, tasks):
+        task = tasks.jobs[11]
         ur5e = load("ur5e")
         move = draw_moves(ur5e, 3, 4, (0.0, ur5e.limits.payload)).moves[2]
         said = [task.case.axes[name] for name in ("payload", "stiffness_error_percent", "move")]
@@ -141,22 +138,22 @@ class TestTasks:
         none, zv = measure_each(task)
         recipe = Recipe("zv", calibrations.load("ur5e_5kg"), frequency_error=-0.05)
         case = Case(ur5e, move, arm_seed(4, 2), (scattered(0.15),), payload_error=0.2)
-        (one,) = measure(Job(case, (Named(recipe, "zv"),)))
+        (one,) = measure(Job(case, (Named(recipe, "zv"),), task.measures))
         assert {name: zv[name] for name in one} == one
         assert zv["unshaped_peak_m_s2"] == none["shaped_peak_m_s2"]
 
     def test_a_position_has_the_same_bits_whatever_was_done_before(self, tmp_path, tasks):
         again = tasks_of(tmp_path)
-        later = [measure_each(again[place]) for place in (5, 2)]
-        assert [measure_each(tasks[place]) for place in (2, 5)] == later[::-1]
+        later = [measure_each(again.jobs[place]) for place in (5, 2)]
+        assert [measure_each(tasks.jobs[place]) for place in (2, 5)] == later[::-1]
 
     def test_moves_and_arms_are_the_same_for_all_payloads_and_errors(self, tasks):
-        same = [tasks[place] for place in range(1, len(tasks), 3)]
+        same = [tasks.jobs[place] for place in range(1, len(tasks.jobs), 3)]
         assert len({(one.case.move.start, one.case.move.target, one.case.seed) for one in same}) == 1
         assert [one.case.axes["payload"] for one in same] == ["1.5", "1.5", "uniform", "uniform"]
 
     def test_a_shaper_that_fails_costs_its_own_row(self, tasks):
-        task = tasks[0]
+        task = tasks.jobs[0]
         broken = Recipe("zv", None)
         none, zv = measure_each(replace(task, methods=(task.methods[0], Named(broken, "zv"))))
         assert (none["status"], none.get("error")) == ("measured", None)
@@ -165,7 +162,7 @@ class TestTasks:
 
     def test_a_move_for_which_the_drives_are_too_weak_says_so(self, tmp_path):
         text = SPEC.replace("1.5", "60").replace("moves = 3", "moves = 1") + "limits = 'industrial'"
-        rows = measure_each(tasks_of(tmp_path, text)[0])
+        rows = measure_each(tasks_of(tmp_path, text).jobs[0])
         assert {row["status"] for row in rows} == {"too weak"}
         assert all("of a drive's torque" in row["error"] for row in rows)
 
@@ -177,36 +174,36 @@ class TestResuming:
     ):
         first, second = Quick(order=lambda places: list(places)[::-1], stop=stop), Quick()
         with pytest.raises(KeyboardInterrupt):
-            run(tasks, tmp_path / "x", first, quietly)
-        study = run(tasks, tmp_path / "x", second, quietly)
+            run(tasks, tmp_path / "x", first)
+        study = run(tasks, tmp_path / "x", second)
         assert len(first.asked) == study.resumed == stop
         assert sorted(first.asked + second.asked) == list(range(12))
         assert_frame_equal(study.rows, whole)
-        assert_frame_equal(pl.read_parquet(tmp_path / "x" / "sweep.parquet"), whole)
+        assert_frame_equal(pl.read_parquet(tmp_path / "x" / "rows.parquet"), whole)
 
     def test_a_part_at_each_so_many_tasks_survives_a_kill(self, tmp_path, tasks, whole, monkeypatch):
         monkeypatch.setattr("tvist_lab.study.engine.PART", 2)
         with pytest.raises(KeyboardInterrupt):
-            run(tasks, tmp_path / "x", Quick(stop=7), quietly)
+            run(tasks, tmp_path / "x", Quick(stop=7))
         (tmp_path / "x" / "parts" / "000004.parquet").unlink()  # written because it was no kill
         second = Quick()
-        assert_frame_equal(run(tasks, tmp_path / "x", second, quietly).rows, whole)
+        assert_frame_equal(run(tasks, tmp_path / "x", second).rows, whole)
         assert second.asked == list(range(6, 12))
 
     def test_a_run_that_ended_has_nothing_left(self, tmp_path, tasks, whole):
         again = Quick()
-        study = run(tasks, tmp_path / "whole", again, quietly)
+        study = run(tasks, tmp_path / "whole", again)
         assert (again.asked, study.resumed) == ([], 12)
         assert_frame_equal(study.rows, whole)
 
     def test_what_failed_is_named_and_tried_again(self, tmp_path, tasks, whole):
-        rows = run(tasks, tmp_path / "x", Quick(fail={3}), quietly).rows
+        rows = run(tasks, tmp_path / "x", Quick(fail={3})).rows
         bad = rows.filter(pl.col("status") == "failed")
         assert bad["move"].to_list() == [1, 1]
         assert set(bad["error"]) == {"it cannot be pickled: a lock"}
-        assert_frame_equal(rows.filter(pl.col("status") != "failed"), whole.filter(pl.col("row") // 2 != 3))
+        assert_frame_equal(rows.filter(pl.col("status") != "failed"), whole.filter(pl.col("case") != 3))
         again = Quick()
-        assert_frame_equal(run(tasks, tmp_path / "x", again, quietly).rows, whole)
+        assert_frame_equal(run(tasks, tmp_path / "x", again).rows, whole)
         assert again.asked == [3]
 
     @pytest.mark.parametrize(
@@ -219,14 +216,14 @@ class TestResuming:
         with pytest.raises(
             StoreError, match=rf"whole holds a study with other {what}.*: give another --output"
         ):
-            run(other, tmp_path / "whole", Quick(), quietly)
+            run(other, tmp_path / "whole", Quick())
 
     @pytest.mark.usefixtures("whole")
     def test_a_changed_robot_does_not_continue(self, tmp_path, tasks):
-        robot = tasks.robots[0]
+        robot = tasks.cases.robots[0]
         other = SweptRobot(robot.name, robot.description.clean(), robot.recipes)
         with pytest.raises(StoreError, match="other contents of robots"):
-            run(Axes(tasks.spec, [other]), tmp_path / "whole", Quick(), quietly)
+            run(sweep.study(tasks.cases.spec, [other]), tmp_path / "whole", Quick())
 
 
 class TestFolder:
@@ -234,22 +231,23 @@ class TestFolder:
         (tmp_path / "x").mkdir()
         (tmp_path / "x" / "thesis.tex").touch()
         with pytest.raises(StoreError, match="x exists already and holds no study"):
-            run(tasks, tmp_path / "x", Quick(), quietly)
+            run(tasks, tmp_path / "x", Quick())
         assert [file.name for file in (tmp_path / "x").iterdir()] == ["thesis.tex"]
 
-    def test_two_sweeps_cannot_write_one_folder(self, tmp_path):
+    def test_two_studies_cannot_write_one_folder(self, tmp_path, tasks):
+        schema = tasks.schema
         with (
-            Store(tmp_path / "x", {}, SCHEMA),
+            Store(tmp_path / "x", {}, schema),
             pytest.raises(StoreError, match=r"another study is writing .*x"),
         ):
-            Store(tmp_path / "x", {}, SCHEMA)
-        with Store(tmp_path / "x", {}, SCHEMA) as store:
+            Store(tmp_path / "x", {}, schema)
+        with Store(tmp_path / "x", {}, schema) as store:
             assert store.rows().is_empty()
 
-    def test_a_sweep_that_kept_nothing_does_not_reserve_its_folder(self, tmp_path):
-        with Store(tmp_path / "x", {"moves": 1}, SCHEMA):
+    def test_a_study_that_kept_nothing_does_not_reserve_its_folder(self, tmp_path, tasks):
+        with Store(tmp_path / "x", {"moves": 1}, tasks.schema):
             pass
-        with Store(tmp_path / "x", {"moves": 2}, SCHEMA) as store:
+        with Store(tmp_path / "x", {"moves": 2}, tasks.schema) as store:
             assert store.rows().is_empty()
 
     def test_a_full_disk_is_a_sentence_and_leaves_whole_files(self, tmp_path, tasks, whole, monkeypatch):
@@ -263,15 +261,15 @@ class TestFolder:
         with monkeypatch.context() as patch:
             patch.setattr("os.fsync", fsync)
             with pytest.raises(StoreError, match=r"x cannot be written: No space left on device; what was"):
-                run(tasks, tmp_path / "x", Quick(), quietly)
+                run(tasks, tmp_path / "x", Quick())
         files = sorted((tmp_path / "x" / "parts").iterdir())
         assert [file.name for file in files] == [f"{n:06d}.parquet" for n in (1, 2, 3)]
         assert len(pl.read_parquet(tmp_path / "x" / "parts" / "*.parquet")) == 12
-        assert_frame_equal(run(tasks, tmp_path / "x", Quick(), quietly).rows, whole)
+        assert_frame_equal(run(tasks, tmp_path / "x", Quick()).rows, whole)
 
     def test_a_damaged_part_is_named(self, tmp_path, tasks):
-        with Store(tmp_path / "x", {}, SCHEMA) as store:
-            store.keep(frame(failed(tasks[0], "failed", "x"), SCHEMA))
+        with Store(tmp_path / "x", {}, tasks.schema) as store:
+            store.keep(tasks.frame(failed(tasks.jobs[0], "failed", "x")))
             (tmp_path / "x" / "parts" / "000001.parquet").write_bytes(b"PAR1")
             with pytest.raises(
                 StoreError, match=r"000001\.parquet cannot be read as rows of a study: remove it"
@@ -280,35 +278,30 @@ class TestFolder:
 
 
 class TestFigures:
-    def test_the_overhead_is_what_workers_wait_between_their_tasks(self):
-        effort = Effort()
-        for worker, began, ended in (("a", 1.0, 2.0), ("b", 50.0, 53.0), ("a", 2.5, 3.5)):
-            effort.add(Done((), worker, began, ended))
-        assert (effort.tasks, effort.workers, effort.task_s) == (3, 2, 5.0)
-        assert effort.overhead_percent == pytest.approx(10.0)
-
-    def test_the_summary_has_an_entry_for_each_setting_and_shaper(self, whole):
-        entries = summary(whole)
+    def test_the_summary_has_an_entry_for_each_setting_and_shaper(self, tasks, whole):
+        entries = tasks.summary(whole)
         assert len(entries) == 8
-        assert [entry["moves"] for entry in entries] == [3] * 8
-        assert {entry["reduction_percent"]["median"] for entry in entries} == {50.0}
-        assert entries[0]["delay_ms"] == pytest.approx({"median": 0.2, "max": 0.4})
+        assert [entry["rows"] for entry in entries] == [3] * 8
+        assert {entry["reduction_percent_median"] for entry in entries} == {50.0}
+        assert [entries[0][f"delay_ms_{name}"] for name in ("median", "max")] == pytest.approx([0.2, 0.4])
         names = list(dict.fromkeys(map(setting_name, entries)))
         assert names[0] == "ur5e, 1.5 kg"
         assert names[3] == "ur5e, uniform, payload +20 %, stiffness ±15 %, frequency -5 %"
 
     def test_rows_that_measure_nothing_have_empty_cells(self, tasks):
-        found = frame(failed(tasks[0], "failed", "why"), SCHEMA)
-        assert found.schema == pl.Schema(SCHEMA)
+        found = tasks.frame(failed(tasks.jobs[0], "failed", "why"))
+        assert found.schema == pl.Schema(tasks.schema)
         assert found["shaped_peak_m_s2"].to_list() == [None, None]
-        (entry, _) = summary(found)
-        assert (entry["failed"], entry["measured"], entry["delay_ms"]["median"]) == (1, 0, None)
+        (entry, _) = tasks.summary(found)
+        assert (entry["failed"], entry["measured"], entry["delay_ms_median"]) == (1, 0, None)
         json.dumps(entry)
 
-    def test_the_page_explains_every_column_with_its_unit(self):
+    def test_the_page_explains_every_column_with_its_unit(self, tasks):
         _, _, text = HOW_TO.read_text(encoding="utf-8").partition("## Read the rows")
         told = re.findall(r"^\| `(\w+)` \| (.*?) \| (.*) \|$", text, re.MULTILINE)
-        assert told == [(column.name, column.unit, column.meaning) for column in COLUMNS]
+        assert [name for name, *_ in told] == list(tasks.schema)
+        known = [(MEASURES[name].unit, MEASURES[name].meaning) for name in tasks.measured]
+        assert [words for name, *words in told if name in MEASURES] == list(map(list, known))
 
 
 def test_the_page_has_an_example_and_names_every_key(tmp_path):
@@ -330,25 +323,31 @@ def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
     text = of_the_page()
     (tmp_path / "speeds.py").write_text(text.replace("20, seed", "1, seed"), encoding="utf-8")
     study = read_study(tmp_path / "speeds.py")
-    ran = run_plan(study.plan(), tmp_path / "x", in_processes, quietly)
-    assert run_plan(study.plan(), tmp_path / "x", Quick(), quietly).resumed == 3
+    ran = in_processes(study, tmp_path / "x")
+    assert run(study, tmp_path / "x", Quick()).resumed == 3
     entries = study.summary(ran.rows)
     assert [(one["speed"], one["shaper"]) for one in entries] == [
         (speed, name) for speed in (0.5, 1.0, 1.5) for name in ("zv", "auto")
     ]
     assert list(ran.rows["speed"]) == [0.5, 0.5, 1.0, 1.0, 1.5, 1.5]
-    unshaped = [one["unshaped_peak_m_s2"]["median"] for one in entries[::2]]
+    unshaped = [one["unshaped_peak_m_s2_median"] for one in entries[::2]]
     assert unshaped == sorted(unshaped)
     for one in entries:
-        assert one["shaped_peak_m_s2"]["median"] < one["unshaped_peak_m_s2"]["median"]
-    assert len(study_figure(entries, study.by, study.show).axes) == 2
+        assert one["shaped_peak_m_s2_median"] < one["unshaped_peak_m_s2_median"]
+    result = study.result(ran.rows, {})
+    assert len(study_figures(result)["study"][0].axes) == 2
+    (table,) = study.tables_of(result)
+    assert [column.title for column in table.columns[2:]][:2] == [
+        "unshaped_peak_m_s2\nleast",
+        "unshaped_peak_m_s2\nmost",
+    ]
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         (("STUDY =", "study ="), "contains no STUDY"),
-        (('by=("speed",)', 'by=("pace",)'), "'pace' is no axis: there are speed, move"),
+        (('by=("speed",)', 'by=("pace",)'), "'pace' is no axis: there are speed, move, arm, shaper"),
         (('"shaped_peak_m_s2")', '"peak")'), "'peak' is no measure"),
         (('"zv", "auto"', '"zvv"'), "there is no method 'zvv', did you mean 'zv'"),
         (("0.5, 1.0", "1, 'fast'"), "TypeError"),
@@ -373,25 +372,26 @@ def test_what_is_wrong_with_a_study_is_a_sentence(tmp_path, change, words):
         read_study(tmp_path / "speeds.py")
 
 
-class Locked(Axes):
-    """Tasks of which one cannot be pickled, and one fails."""
+class Locked(sweep.Axes):
+    """Cases of which one cannot be pickled, and one fails."""
 
     def __getitem__(self, position):
-        task = super().__getitem__(position)
+        case = super().__getitem__(position)
         if position == 1:
-            return replace(task, as_served=threading.Lock())
-        short = replace(task.case, move=replace(task.case.move, start=()))
-        return replace(task, case=short) if position == 2 else task
+            return replace(case, stream=threading.Lock())
+        return replace(case, move=replace(case.move, start=())) if position == 2 else case
 
 
 def test_a_task_that_cannot_be_pickled_and_one_that_fails_name_their_moves_and_the_others_go_on(tmp_path):
     tasks = tasks_of(tmp_path, "shapers = ['none']\nmoves = 4\npayloads = [5]")
-    bad = run(Locked(tasks.spec, tasks.robots), tmp_path / "x", in_processes, quietly).rows
+    bad = in_processes(
+        replace(tasks, cases=Locked(tasks.cases.spec, tasks.cases.robots)), tmp_path / "x"
+    ).rows
     assert bad["status"].to_list() == ["measured", "failed", "failed", "measured"]
     assert bad["move"].to_list() == [1, 2, 3, 4]
     assert "cannot be pickled" in bad["error"][1]
     assert bad["error"][2].startswith(("ValueError", "IndexError"))
-    good = run(tasks, tmp_path / "x", in_processes, quietly)
+    good = in_processes(tasks, tmp_path / "x")
     assert good.resumed == 2
-    rows = [{"row": place} | row for place, task in enumerate(tasks) for row in measure_each(task)]
-    assert_frame_equal(good.rows, frame(rows, SCHEMA))
+    rows = [{"case": place} | row for place, job in enumerate(tasks.jobs) for row in measure_each(job)]
+    assert_frame_equal(good.rows, tasks.frame(rows))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_lab.study.recipes import Mistaken
+from tvist_lab.study.recipes import FrequencyError
 from tvist_shaping import Fade, Fixed, Polynomial, TvistFilter, shaper
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
@@ -36,7 +36,7 @@ def modal(modes):
 
 
 def mistaken(modes):
-    return Mistaken(modal(modes), 0.1)
+    return FrequencyError(modal(modes), 0.1)
 
 
 ESTIMATORS = {"fixed": fixed, "polynomial": polynomial, "modal": modal, "mistaken": mistaken}

@@ -28,7 +28,7 @@ CASES = {
     "tvist serve --robot a": {"arm.toml"},
     "tvist serve --profile u": {"ursim"},
     "tvist move Q": {"Q1", "Q2", "Q3"},
-    "tvist shaperbench --against zvd": {"zvd"},
+    "tvist study moves --shapers zvd": {"zvd", "zvdd", "zvddd"},
     "tvist move Q1 --shaper el": {"elastic", "elastic-auto", "elastic-position"},
 }
 """Typed lines with what completes their last word."""

@@ -17,7 +17,7 @@ from tvist_cli.main import main
 from tvist_server.ending import ending_signals
 
 STUDIES = {
-    "evaluate": ["evaluate", "--random", "400"],
+    "moves": ["study", "moves", "--moves", "400"],
     "sweep": ["study", "spec.toml", "--output", "out"],
 }
 """Each takes much longer than it is waited for; all end by the same runner."""
@@ -83,8 +83,8 @@ def begun(study, folder):
 @pytest.mark.parametrize(
     ("study", "number", "to"),
     [
-        ("evaluate", signal.SIGTERM, os.kill),
-        ("evaluate", signal.SIGHUP, os.killpg),  # as a terminal does that is closed
+        ("moves", signal.SIGTERM, os.kill),
+        ("moves", signal.SIGHUP, os.killpg),  # as a terminal does that is closed
         ("sweep", signal.SIGHUP, os.killpg),
         ("sweep", signal.SIGTERM, os.killpg),  # as a supervisor does
     ],

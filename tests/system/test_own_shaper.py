@@ -50,10 +50,10 @@ def test_one_that_cannot_be_loaded_does_not_start_a_server(folder, place, monkey
     assert (code, WRONG[place] in said) == (2, True), said
 
 
-@pytest.mark.parametrize("command", [("shapers",), ("evaluate", "--random", 1), ("shaperbench", "--quick")])
+@pytest.mark.parametrize("command", [("shapers", "--shaper"), ("study", "moves", "--moves", 1, "--shapers")])
 @pytest.mark.parametrize("place", ["mine.py:nobody", "mine.py:unequal"])
 def test_every_command_refuses_it_alike(folder, command, place):
-    tvist(*command, "--shaper", place, cwd=folder).assert_failed(2, WRONG[place])
+    tvist(*command, place, cwd=folder).assert_failed(2, WRONG[place])
 
 
 def test_a_replay_takes_a_file_alone(folder):
@@ -72,10 +72,12 @@ def test_it_stands_in_the_table_and_the_json_of_shapers(folder):
 
 def test_processes_that_share_the_work_load_it_again(folder):
     """Ten motions and more are shared among processes; the shaper travels there as its file."""
-    same = ("--random", 10, "--no-baselines", "--clean", "--json")
-    mine = tvist("evaluate", "--shaper", "mine.py:mine", *same, cwd=folder).assert_done().json
-    assert mine["shaper"] == "mine"
-    assert mine["moves"] == tvist("evaluate", "--shaper", "zv", *same).assert_done().json["moves"]
+    same = ("--moves", 10, "--clean", "--json")
+    mine = tvist("study", "moves", "--shapers", "mine.py:mine", *same, cwd=folder).assert_done().json
+    assert [one["name"] for one in mine["methods"]] == ["mine", "waiting"]
+    theirs = tvist("study", "moves", "--shapers", "zv", *same).assert_done().json
+    for one, other in zip(mine["moves"], theirs["moves"], strict=True):
+        assert one | {"shaper": ""} == other | {"shaper": ""}
 
 
 def test_an_evaluation_never_counts_old_weights(folder):
@@ -87,10 +89,10 @@ def later(f_d, zeta):
     return zv(f_d, zeta) if len(calls) < 700 else None
 """
     (folder / "mine.py").write_text(MINE + later, encoding="utf-8")
-    ended = tvist("evaluate", "--random", 1, "--no-baselines", "--shaper", "mine.py:later", cwd=folder)
-    ended.assert_failed(
-        1, "shaper later returns NoneType instead of Impulses(A, tau) of tvist_shaping for f_d = "
-    )
+    same = ("--moves", 1, "--json")
+    ended = tvist("study", "moves", "--shapers", "mine.py:later", *same, cwd=folder)
+    said = "the shaper returns NoneType instead of Impulses(A, tau) of tvist_shaping for f_d = "
+    ended.assert_failed(1, "1 of 2 rows failed, the first with later at move 1", said)
 
 
 class TestServed:

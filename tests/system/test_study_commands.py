@@ -4,11 +4,10 @@ import json
 import re
 
 import numpy as np
+import polars as pl
 import pytest
 from tests.system.test_command_line import tvist
 
-from tvist_cli.simulated_arm import plants_of
-from tvist_plant.description import load
 from tvist_shaping import SHAPERS, residual
 from tvist_shaping.impulse_train import Impulses
 
@@ -32,12 +31,12 @@ class Memory:
 
 def made_again(told, folder):
     """Random moves are kept, and can be made again."""
-    again = ["--disturbances", "none", "--shaper", "auto", "--no-baselines", "--json"]
-    made = tvist("evaluate", "--moves", folder / "drawn.json", *again).assert_done().json
+    again = ["--disturbances", "none", "--shapers", "auto", "--json"]
+    made = tvist("study", "moves", "--moves", folder / "drawn.json", *again).assert_done().json
     assert told["moves"] == made["moves"]
-    assert told["baselines"] == {}
     for one in (told, made):
-        assert (one["plant"], one["disturbances"]) == ("clean", [])
+        assert [entry["shaper"] for entry in one["summary"]] == ["auto", "waiting"]
+        assert (one["arm"], one["disturbances"]) == ("clean", [])
     assert 0.0 < told["free_of_collision"] <= 1.0
     web_page = re.sub(r'"data:[^"]*"', "", (folder / "report.html").read_text(encoding="utf-8"))
     assert "(2 moves)" in web_page
@@ -74,33 +73,41 @@ def with_bands(told, _):
     assert curves["zv"]["residual_percent"][200] == pytest.approx(0.0, abs=1e-9)
 
 
-def with_each_error(told, _):
-    """Each shaper has its reductions with each error."""
-    (zv,) = told["shapers"]
-    assert (zv["name"], told["moves"], told["calibration"]) == ("zv", 1, "ur5e_modal")
-    assert zv["stiffness"].keys() > zv["payload"].keys() > {"+0 %", "+20 %", "-20 %"}
+def with_each_error(told, folder):
+    """Each shaper has its reductions with each error, and the rows are kept."""
+    (zv,) = told["summary"]
+    assert (zv["shaper"], told["moves_made"], told["calibration"]) == ("zv", 1, "ur5e_modal")
+    springs = {one["arm"] for one in told["cells"]}
+    assert springs > {"calibrated", "springs_+30_percent", "springs_-5_percent", "combined"}
+    assert {one["payload_error"] for one in told["cells"]} == {-0.2, -0.1, 0.0, 0.1, 0.2}
+    kept = pl.read_parquet(folder / "kept" / "rows.parquet")
+    assert len(kept) == told["rows"]
+    again = tvist(*RUNS["robustness"][0].split(), "--json").assert_done().json
+    assert (again["tasks"], again["tasks_done_before"]) == (0, 5)
+    assert again["cells"] == told["cells"]
 
 
 def pair_by_pair(told, _):
     """Each plant has the medians of both, and a verdict; the seed is said to be for tuning."""
-    assert (told["shapers"], told["moves"], told["payload_kg"]) == (["zv", "ei"], 20, [0.0, 3.0])
-    assert [one["name"] for one in told["plants"]] == ["calibrated", "hidden-3"]
-    for one in told["plants"]:
-        assert one["first"]["delay_ms"] < one["second"]["delay_ms"]
-        assert one["verdict"] in {"first", "second", "no difference shown", "too few moves vibrate"}
+    assert [one["name"] for one in told["methods"]] == ["zv", "ei"]
+    assert (told["moves_made"], told["payload_kg"]) == (20, [0.0, 3.0])
+    assert [one["arm"] for one in told["summary"]] == ["calibrated", "hidden-3"]
+    for one in told["summary"]:
+        assert one["first_delay_ms_median"] < one["second_delay_ms_median"]
+        assert one["verdict"] in {"zv better", "ei better", "no difference shown", "too few moves vibrate"}
     assert "not held out" in told["held_out"]
 
 
-RANDOM = "evaluate --random 2 --seed 5 --payload uniform --clean --shaper auto --no-baselines --save-moves drawn.json"
+RANDOM = "study moves --moves 2 --seed 5 --clean --shapers auto --save-moves drawn.json"
 RUNS = {
-    "evaluate": (f"{RANDOM} --figures . --report report.html", {"moves.png", "one_move.png"}, made_again),
+    "moves": (f"{RANDOM} --figures . --report report.html", {"moves.png", "one_move.png"}, made_again),
     "robustness": (
-        "study robustness --moves 1 --against zv --output out.json --figures .",
+        "study robustness --moves 1 --shapers zv --output kept --figures .",
         {"robustness.png"},
         with_each_error,
     ),
     "match": (
-        "study match zv ei --moves 20 --plants calibrated --hidden 3 --payload 0 3 --clean --output out.json",
+        "study match --shapers zv ei --moves 20 --plants calibrated --hidden 3 --payload 0 3 --clean",
         set(),
         pair_by_pair,
     ),
@@ -137,7 +144,7 @@ def test_a_result_is_right_and_what_is_written_is_what_is_printed(here, name):
     check(told, here)
     assert {path.name for path in here.iterdir() if path.suffix in {".png", ".svg", ".pdf"}} == figures
     assert all((here / figure).stat().st_size > 5000 for figure in figures)
-    if "--output" in words:
+    if "--output out.json" in words:
         assert json.loads((here / "out.json").read_text(encoding="utf-8")) == told
     if "--report" in words:
         assert (here / "report.html").read_text(encoding="utf-8").count("<img") == len(figures)
@@ -153,79 +160,63 @@ def test_words_are_for_people(words):
 
 
 @pytest.mark.usefixtures("here")
-class TestEvaluate:
-    def test_moves_of_a_file_have_the_keys_that_are_promised(self):
-        told = tvist("evaluate", "--moves", "moves.json", "--payload", 5, "--json").assert_done().json
-        assert list(told["baselines"]) == [
-            "waiting", "equal_duration_double_s", "double_s_of_one_period", "zv_frozen_at_end",
+class TestMoves:
+    def test_moves_of_a_file_are_made_by_every_baseline(self):
+        told = tvist("study", "moves", "--moves", "moves.json", "--payload", 5, "--json").assert_done().json
+        assert [one["shaper"] for one in told["summary"]] == [
+            "zv", "waiting", "equal_duration_double_s", "double_s_of_one_period", "zv_frozen_at_end",
             "mzv_for_payload", "ei_for_payload", "ei3_for_payload", "fixed_mzv", "fixed_ei2", "fixed_ei3",
         ]  # fmt: skip
         assert told["disturbances"] == ["friction", "gear", "noise"]
-        assert len(told["moves"]) == 2
-        for move in told["moves"]:
-            assert {
-                "unshaped_peak_m_s2", "shaped_peak_m_s2", "reduction_percent", "delay_ms", "still_after_ms",
-                "peak_acceleration_ratio", "peak_velocity_ratio",
-            } <= set(move)  # fmt: skip
-            assert set(move["still_after_ms"]) == {"unshaped", "shaped"}
+        mine = [move for move in told["moves"] if move["shaper"] == "zv"]
+        for move in mine:
             assert 0.0 <= move["shaped_peak_m_s2"] < move["unshaped_peak_m_s2"]
-        assert [move["payload_kg"] for move in told["moves"]] == [5.0, 1.5]
-        assert set(told["reduction_percent"]) == {"median", "p5", "min"}
-        assert set(told["delay_ms"]) == {"median", "max"}
-        assert set(told["peak_acceleration_ratio"]) == {"median", "p90", "max"}
+        assert [move["payload_kg"] for move in mine] == [5.0, 1.5]
 
     def test_words_are_for_people_with_what_they_should_know(self, here):
         (here / "moves.json").write_text(json.dumps(MOVES[1:]), encoding="utf-8")
-        said = tvist("evaluate", "--moves", "moves.json", "--payload", 5).assert_done()
-        assert "unshaped m/s²" in said.out
+        said = tvist("study", "moves", "--moves", "moves.json", "--payload", 5).assert_done()
+        assert "unshaped" in said.out
         assert "fixed_ei3" in said.out
         assert "carry something else" in said.err
 
     def test_disturbances_act_one_by_one_and_the_targets_knower_is_a_shaper_like_any(self):
         told = {
             name: tvist(
-                "evaluate", "--moves", "moves.json", "--shaper", "auto-target", "--disturbances", name,
-                "--no-baselines", "--json",
+                "study", "moves", "--moves", "moves.json", "--shapers", "auto-target", "--disturbances", name, "--json",
             ).assert_done().json
             for name in ("none", "noise", "friction,gear")
         }  # fmt: skip
-        assert [one["plant"] for one in told.values()] == [
-            "clean", "with noise alone", "with friction and gear alone"
-        ]  # fmt: skip
+        assert [one["arm"] for one in told.values()] == [
+            "clean",
+            "with noise alone",
+            "with friction and gear alone",
+        ]
         assert told["noise"]["moves"] == told["none"]["moves"]  # the truth has no noise
-        assert told["friction,gear"]["peak_m_s2"]["median"] > told["none"]["peak_m_s2"]["median"]
-        assert told["none"]["reduction_percent"]["min"] > 95.0
+        peaks = {name: one["summary"][0]["shaped_peak_m_s2_median"] for name, one in told.items()}
+        assert peaks["friction,gear"] > peaks["none"]
+        assert told["none"]["summary"][0]["reduction_percent_min"] > 95.0
 
     def test_a_move_beyond_a_limit_is_named(self, here):
         far = [MOVES[0], {**MOVES[0], "target": [0, 0, 7, 0, 0, 0]}]
         (here / "moves.json").write_text(json.dumps(far), encoding="utf-8")
-        tvist("evaluate", "--moves", "moves.json").assert_failed(2, "move 2", "joint 3", "elbow", "6.28319")
+        ended = tvist("study", "moves", "--moves", "moves.json")
+        ended.assert_failed(2, "move 2", "joint 3", "elbow", "6.28319")
 
 
-def test_shaperbench_names_a_cheat_and_does_not_rank_it(here):
+def test_the_bench_names_a_cheat_and_does_not_rank_it(here):
     (here / "peeks.py").write_text(PEEKS, encoding="utf-8")
-    given = [
-        "--quick",
-        "--moves",
-        "1",
-        "--against",
-        "zv",
-        "--shaper",
-        "peeks.py",
-        "--output",
-        "board.json",
-        "--json",
-    ]
-    ended = tvist("shaperbench", *given).assert_failed(1, "not ranked", "peeks at the future")
-    rows = {row["name"]: row for row in ended.json["shapers"]}
+    given = "study bench --quick --moves 1 --shapers zv peeks.py --json"
+    ended = tvist(*given.split()).assert_failed(1, "not ranked", "peeks at the future")
+    rows = {row["shaper"]: row for row in ended.json["summary"]}
     assert [rows[name]["ranked"] for name in ("none", "zv", "peeks")] == [True, True, False]
     assert "peeks at the future" in rows["peeks"]["fault"]
-    assert json.loads((here / "board.json").read_text(encoding="utf-8")) == ended.json
-    assert set(rows["zv"]["by_arm"]) == set(ended.json["arms"])
-    assert len(ended.json["arms"]) == 15
-    assert list(ended.json["arms"])[-2:] == ["stiction", "more_stiction"]
+    arms = list(ended.json["arms"])
+    assert {one["arm"] for one in ended.json["by_arm"] if one["shaper"] == "zv"} == set(arms)
+    assert (len(arms), arms[-2:]) == (15, ["stiction", "more_stiction"])
 
 
+@pytest.mark.usefixtures("here")
 def test_a_plant_that_is_named_twice_counts_once():
-    names = [one.name for one in plants_of(["stribeck", "Stribeck", "hidden-5"], [5, 6, 5], load("ur5e"))]
-    assert names == ["stribeck", "hidden-5", "hidden-6"]
+    given = "study moves --moves 1 --shapers zv --plants stribeck Stribeck hidden-5 --hidden 5 6 5 --json"
+    assert list(tvist(*given.split()).assert_done().json["arms"]) == ["stribeck", "hidden-5", "hidden-6"]

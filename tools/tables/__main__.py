@@ -25,6 +25,8 @@ def main() -> None:
         _, *words = f"{page.command} {page.files} --json".split()
         ran = [sys.executable, "-m", "tvist_cli", *words]
         text = subprocess.run(ran, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+    if page.result and len(sys.argv) == 2:
+        (ROOT / page.result).write_text(json.dumps(json.loads(text), indent=1, ensure_ascii=False) + "\n")
     (ROOT / page.path).write_text(page_of(name, json.loads(text)), encoding="utf-8")
 
 

@@ -6,24 +6,24 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from tools.tables.markdown import best_in_bold, in_markdown, markdown_table
-from tvist_lab.studies import leaderboard, robustness
+from tools.tables.markdown import in_markdown, markdown_table
+from tvist_lab.studies import bench, robustness
 from tvist_lab.studies.arms.about import REDUCED, SIZE, frequencies
 from tvist_lab.studies.paper.report import FIGURES, MEANINGS, METHODS, beside, methods, table_2
+from tvist_lab.study.columns import Column, across
 from tvist_lab.study.held_out import said
-from tvist_lab.study.tables import Shown
 
 ARMS = (
-    Shown("name", lambda one: f"`{one['name']}`"), *SIZE,
-    Shown("largest torques N m", lambda one: ", ".join(f"{torque:g}" for torque in one["torque_n_m"])),
-    Shown("calibrations", lambda one: ", ".join(one["calibrations"])),
+    Column("name", lambda one: f"`{one['name']}`"), *SIZE,
+    Column("largest torques N m", lambda one: ", ".join(f"{torque:g}" for torque in one["torque_n_m"])),
+    Column("calibrations", lambda one: ", ".join(one["calibrations"])),
 )  # fmt: skip
 """Columns of the table of arms."""
 MEASUREMENTS = (
-    Shown("arm", lambda one: f"`{one['name']}`"),
-    Shown("springs", lambda one: f"{100.0 * (one['stiffness'] - 1.0):+.0f} %"), Shown("calibration", "calibration"),
-    frequencies("f_d off by %"), Shown("moves", "counted"), Shown("too weak", "too_weak"), *REDUCED,
-    Shown("sag off by %", "sag_error_percent", 2),
+    Column("arm", lambda one: f"`{one['name']}`"),
+    Column("springs", lambda one: f"{100.0 * (one['stiffness'] - 1.0):+.0f} %"), Column("calibration", "calibration"),
+    frequencies("f_d off by %"), Column("moves", "counted"), Column("too weak", "too_weak"), *REDUCED,
+    Column("sag off by %", "sag_error_percent", 2),
 )  # fmt: skip
 """Columns of the table of measurements."""
 
@@ -51,31 +51,37 @@ def _paper(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _stiction(result: dict[str, Any]) -> dict[str, Any]:
-    rows: dict[str, dict[str, str]] = {}
-    for one in result["summary"]:
-        less = one["reduction_percent"]
-        rows.setdefault(one["controller"], {})[one["shaper"]] = f"{less['median']:.1f} / {less['p5']:.1f}"
-    heading = ("known friction", *next(iter(rows.values())))
-    return {"table": markdown_table(heading, [(name, *cells.values()) for name, cells in rows.items()])}
+    found = across(result["summary"], "controller", "shaper", robustness.BOTH)
+    columns = (Column("known friction", "controller"), *found.columns[1:])
+    return {"table": in_markdown(found.entries, columns, left=len(columns))}
 
 
 def _robustness(result: dict[str, Any]) -> dict[str, Any]:
-    columns = robustness.columns(result["hidden"])
-    tables = {
-        f"{'Plants by name' if kind == robustness.PLANT else f'Wrong {kind}'}: {share}": [
-            *robustness.FIRST, *(Shown(one, f"{kind}.{one}.reduction_percent.{share}", 1) for one in those),
-        ]
-        for kind, those in columns.items()
-        for share in ("median", "p5")
+    shown = (robustness.LESS, robustness.WORST)
+    tables = [table for kind in robustness.errors() for table in robustness.tables(result, kind, shown)]
+    named = dict.fromkeys(one["error"] for one in robustness.cells(result)[robustness.PLANT])
+    return {"tables": tables, "plants": [(name, result["arms"][name]) for name in named]}
+
+
+def _bench(result: dict[str, Any]) -> dict[str, Any]:
+    ranked = bench.ranked(result)
+    name = Column("shaper", lambda one: f"**{one['shaper']}**" if one["pareto"] else one["shaper"])
+    order = [one["shaper"] for one in ranked]
+    apart = {"arm": result["by_arm"], "error": [
+        one | {"error": f"{100.0 * one['payload_error']:+.0f} %"} for one in result["by_payload_error"]
+    ]}  # fmt: skip
+
+    def best(key: str, cell: Column) -> str:
+        those = sorted(
+            (one for one in apart[key] if one["shaper"] in order), key=lambda one: order.index(one["shaper"])
+        )
+        found = across(those, "shaper", key, cell, best=True)
+        return in_markdown(found.entries, found.columns)
+
+    return {
+        "ranked": ranked, "columns": (name, *bench.COLUMNS),
+        "tables": {one.title: [best(key, one) for key in apart] for one in (bench.STILL, bench.RING)},
     }  # fmt: skip
-    plants = [(one.name, one.label) for one, _ in columns[robustness.PLANT].values()]
-    return {"tables": tables, "plants": plants}
-
-
-def _shaperbench(result: dict[str, Any]) -> dict[str, Any]:
-    name = Shown("shaper", lambda row: f"**{row['name']}**" if row["pareto"] else row["name"])
-    columns = (name, *leaderboard.ON_TERMINAL[1:])
-    return {"ranked": leaderboard.ranked(result), "columns": columns, "best_in_bold": best_in_bold}
 
 
 @dataclass(frozen=True)
@@ -90,6 +96,8 @@ class Page:
     """Returns what its template needs besides the result."""
     files: str = ""
     """Options for the other files that belong to the page."""
+    result: str = ""
+    """Where the result is kept; empty if it is not."""
 
 
 PAGES = {
@@ -103,16 +111,18 @@ PAGES = {
     ),
     "robustness": Page(
         "docs/reference/robustness.md",
-        "tvist study robustness --against zv auto auto-target smoothing elastic elastic-16 elastic-auto "
-        "zv_3_modes_frozen_at_end --moves 60 --seed 20261123",
+        "tvist study robustness --shapers zv auto auto-target smoothing elastic elastic-16 elastic-auto "
+        "zv_3_modes_frozen_at_end --seed 20261123",
         _robustness,
-        "--output docs/reference/robustness.json --figures docs/images",
+        "--output build/robustness --figures docs/images",
+        "docs/reference/robustness.json",
     ),
     "shaperbench": Page(
         "docs/reference/shaperbench.md",
-        "tvist shaperbench --moves 100 --seed 0",
-        _shaperbench,
-        "--output docs/reference/leaderboard.json --figures docs/images",
+        "tvist study bench --moves 100",
+        _bench,
+        "--output build/bench --figures docs/images",
+        "docs/reference/leaderboard.json",
     ),
 }
 """The pages by name, which is also that of their template."""

@@ -87,7 +87,7 @@ def demo(
         ]
     first, *others = map(as_dict, arms)
     if output is not None:
-        from tvist_lab.figures.paper import draw
+        from tvist_lab.studies.paper.figures import draw
 
         with told(OSError), look.into(output) as save:
             write(save, draw(arms[0], all_figures=True))
@@ -126,7 +126,7 @@ def _in_real_time(
 
 def _figures(result: "Served", folder: Path, look: FigureOptions) -> Path:
     """Draw the paper's figures and an overview that shows the answer at a glance; return the latter's path."""
-    from tvist_lab.figures.paper import draw, overview
+    from tvist_lab.studies.paper.figures import draw, overview
 
     with look.into(folder) as save:
         for name, figure in draw(result.done, all_figures=False).items():

@@ -28,15 +28,11 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     """Draw each ranked shaper as a point, with medians over arms, moves and payload errors, and the front as a line.
 
     A triangle exceeds a limit of the motion by more than 1 %; beside it is the largest peak over its limit.
-
-    Args:
-        rows: Rows of the leaderboard.
     """
     figure, (panel,) = panels(1, 4.6)
     panel.set_yscale("log")
-    ranked = [row for row in rows if row["ranked"]]
     placed: list[tuple[float, float, bool]] = []
-    for place, row in enumerate(sorted(ranked, key=_point)):
+    for place, row in enumerate(sorted(rows, key=_point)):
         y, x = _point(row)
         excess = _excess(row)
         exceeds = excess > NOTICEABLE
@@ -50,7 +46,7 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
             markersize=5.5,
             markerfacecolor=filled if best or exceeds else "white",
         )
-        right = _beside(place, (x, y), [_point(other)[::-1] for other in ranked])
+        right = _beside(place, (x, y), [_point(other)[::-1] for other in rows])
         raised = any(
             abs(x - near) < 2.0 and abs(math.log(y / level)) < 0.1 and side == right
             for near, level, side in placed
@@ -60,9 +56,9 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
             "xytext": (6 if right else -6, 9 if raised else 0),
             "ha": "left" if right else "right",
         }
-        words = f"{row['name']} ({excess:.1f}×)" if exceeds else row["name"]
+        words = f"{row['shaper']} ({excess:.1f}×)" if exceeds else row["shaper"]
         note(panel, words, (x, y), textcoords="offset points", va="center", **where)
-    front = sorted(_point(row)[::-1] for row in ranked if row["pareto"])
+    front = sorted(_point(row)[::-1] for row in rows if row["pareto"])
     if front:
         panel.plot(*zip(*front, strict=True), color=FAINT, linewidth=1.0, zorder=0)
     panel.plot([], [], "o", color=OF_SHAPED.color, label="Keeps the limits within 1 %, and is on the front")
@@ -80,19 +76,15 @@ def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     """Draw the time until the arm is still against the shaper's delay, median and 90th percentile of each shaper.
 
     On the line, an arm is still as soon as its shaped reference stops.
-
-    Args:
-        rows: Rows of the leaderboard.
     """
     figure, (panel,) = panels(1, 4.2)
-    known = [row for row in rows if row["ranked"] and row["time_until_still_ms"]["median"] is not None]
-    for place, row in enumerate(sorted(known, key=lambda row: float(row["delay_ms"]["median"]))):
-        x, still = row["delay_ms"]["median"], row["time_until_still_ms"]
-        high = _slowest(still)
-        panel.plot([x, x], [still["median"], high], color=FAINT, linewidth=1.0, zorder=1)
-        panel.plot([x], [still["median"]], **OF_SHAPED.points(4.5, label="Median" if place == 0 else None))
+    known = [row for row in rows if row["time_until_still_ms_median"] is not None]
+    for place, row in enumerate(sorted(known, key=lambda row: float(row["declared_delay_ms_median"]))):
+        x, still, high = row["declared_delay_ms_median"], row["time_until_still_ms_median"], _slowest(row)
+        panel.plot([x, x], [still, high], color=FAINT, linewidth=1.0, zorder=1)
+        panel.plot([x], [still], **OF_SHAPED.points(4.5, label="Median" if place == 0 else None))
         panel.plot([x], [high], **OF_UNSHAPED.points(3.0, label="90th percentile" if place == 0 else None))
-    longest = max((float(row["delay_ms"]["median"]) for row in known), default=1.0)
+    longest = max((float(row["declared_delay_ms_median"]) for row in known), default=1.0)
     panel.plot(
         [0.0, longest],
         [0.0, longest],
@@ -103,28 +95,29 @@ def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     )
     panel.set(xlabel="Delay of the shaper (ms)", ylabel="Still after the unshaped stop (ms)")
     if known:
-        ends = [(row["delay_ms"]["median"], _slowest(row["time_until_still_ms"])) for row in known]
+        ends = [(row["declared_delay_ms_median"], _slowest(row)) for row in known]
         delays, highest = np.array(ends, dtype=np.float64).T
-        name_over(panel, delays, highest, [row["name"] for row in known])
+        name_over(panel, delays, highest, [row["shaper"] for row in known])
         panel.set_ylim(0.0, 1.9 * float(highest.max()))
     panel.margins(x=0.06)
     legend(figure, panel)
     return figure
 
 
-def _slowest(still: dict[str, Any]) -> float:
+def _slowest(row: dict[str, Any]) -> float:
     """90th percentile of the time until still, or the median where more than a tenth never are [ms]."""
-    return float(still["median"] if still["p90"] is None else still["p90"])
+    slow = row["time_until_still_ms_p90"]
+    return float(row["time_until_still_ms_median"] if slow is None else slow)
 
 
 def _excess(row: dict[str, Any]) -> float:
     """Largest peak of acceleration or velocity over its limit [-]."""
-    return max(float(row[f"peak_{kind}_ratio"]["max"]) for kind in ("acceleration", "velocity"))
+    return max(float(row[f"reference_{kind}_ratio_max"]) for kind in ("acceleration", "velocity"))
 
 
 def _point(row: dict[str, Any]) -> tuple[float, float]:
     """Residual vibration [m/s²] and time until still [ms]."""
-    return row["residual_m_s2"]["median"], row["time_until_still_ms"]["median"]
+    return row["residual_m_s2_median"], row["time_until_still_ms_median"]
 
 
 def _beside(place: int, point: tuple[float, float], points: Sequence[tuple[float, float]]) -> bool:

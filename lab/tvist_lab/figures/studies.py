@@ -1,9 +1,11 @@
 """What studies show: medians over their axes, shapers beside each other, and every move as a point."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tvist_lab.figures.style import (
@@ -18,7 +20,6 @@ from tvist_lab.figures.style import (
     tint,
     title,
 )
-from tvist_lab.studies.robustness import ERRORS
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.work import Row
 from tvist_lab.words import MANY
@@ -31,124 +32,126 @@ FLOOR = 1e-4
 """Smaller peaks are drawn at this value [m/s²]."""
 
 
-def study_figure(summary: Sequence[dict[str, Any]], by: Sequence[str], show: Sequence[str]) -> Figure:
+def study_figure(
+    summary: Sequence[dict[str, Any]], by: Sequence[str], show: Sequence[str], *, few: bool
+) -> Figure:
     """Draw medians, with a band from the 5th to the 95th percentile; of few rows, from the least to the most.
 
-    They are lines with bands if the first axis is numeric, otherwise dots with bars.
-
-    Args:
-        summary: Entries of `tvist_lab.study.study.Study.summary`.
-        by: Axes that they distinguish; the first is drawn to the right, the others are named with the method.
-        show: Measures to draw.
+    They are lines with bands if the first axis is numeric, otherwise dots with bars. The other axes are named with the
+    method.
     """
-    figure, axes = panels(len(show), 2.6 * len(show))
-    places = list(dict.fromkeys(_place(entry, by) for entry in summary))
+    places = list(dict.fromkeys(entry[by[0]] if by else "" for entry in summary))
+    lines: dict[str, list[dict[str, Any]]] = {}
+    for entry in summary:
+        more = [f"{name} {entry[name]}" for name in (*by[1:], "arm") if name in entry]
+        lines.setdefault(", ".join([entry["shaper"], *more]), []).append(entry)
     numbers = bool(by) and all(isinstance(place, int | float) for place in places)
-    lines = list(dict.fromkeys(_line(entry, by) for entry in summary))
+    shares = ("min", "min", "max") if few else ("p5", "median", "p95")
+    figure, axes = panels(len(show), 2.6 * len(show))
     for panel, name in zip(axes, show, strict=True):
-        for number, line in enumerate(lines):
-            style = SERIES[number % len(SERIES)]
-            mine = [entry for entry in summary if _line(entry, by) == line]
-            aside = 0.6 * ((number + 0.5) / len(lines) - 0.5)
-            x = [_place(entry, by) if numbers else places.index(_place(entry, by)) + aside for entry in mine]
-            few = "least" in mine[0][name]
-            shares = ("least", "most", "least") if few else ("p5", "p95", "median")
-            low, high, middle = (
-                np.array([entry[name][share] for entry in mine], dtype=float) for share in shares
-            )
-            if numbers:
-                panel.fill_between(x, low, high, color=tint(style.color), linewidth=0, zorder=1.0)
-                panel.plot(x, middle, **style.line(1.4, marker=style.marker, markersize=3.0, label=line))
-                if few:
-                    panel.plot(x, high, **style.line(1.4, marker=style.marker, markersize=3.0))
-            else:
-                panel.vlines(x, low, high, color=style.color, linewidth=1.2)
-                panel.plot(x, middle, **style.points(label=line))
-                if few:
-                    panel.plot(x, high, **style.points())
+        keys = [f"{name}_{share}" for share in shares]
         title(panel, name)
-    if not numbers:
-        axes[-1].set_xticks(range(len(places)), [str(place) for place in places] if by else [""])
-    axes[-1].set(xlabel=by[0] if by else "")
+        if not numbers:
+            found = {
+                line: {one[by[0]] if by else "": [one[key] for key in keys] for one in mine}
+                for line, mine in lines.items()
+            }
+            _dots(panel, list(map(str, places)), [(line, [one.get(each, [None] * 3) for each in places])
+                                                  for line, one in found.items()], both=few)  # fmt: skip
+            continue
+        for (line, mine), style in zip(lines.items(), cycle(SERIES), strict=False):
+            low, middle, high = np.array([[one[key] for key in keys] for one in mine], dtype=float).T
+            x = [one[by[0]] for one in mine]
+            panel.fill_between(x, low, high, color=tint(style.color), linewidth=0, zorder=1.0)
+            for y, label in ((middle, line), (high, None)) if few else ((middle, line),):
+                panel.plot(x, y, **style.line(1.4, marker=style.marker, markersize=3.0, label=label))
+    if numbers:
+        axes[-1].set(xlabel=by[0])
     legend(figure, axes[0])
     return figure
 
 
-def _place(entry: dict[str, Any], by: Sequence[str]) -> Any:
-    return entry[by[0]] if by else 0
-
-
-def _line(entry: dict[str, Any], by: Sequence[str]) -> str:
-    more = [f"{name} {entry[name]}" for name in (*by[1:], "arm") if name in entry]
-    return ", ".join([entry["shaper"], *more])
+def _dots(
+    panel: Axes,
+    names: Sequence[str],
+    series: Sequence[tuple[str, Sequence[Sequence[float | None]]]],
+    *,
+    both: bool = False,
+) -> None:
+    """Draw values with bars, a line of the panel for each name: low, middle and high of each name, by series."""
+    for number, (label, values) in enumerate(series):
+        style = SERIES[number % len(SERIES)]
+        y = np.arange(len(names)) + 0.65 * ((number + 0.5) / len(series) - 0.5)
+        low, middle, high = np.array(values, dtype=float).T
+        panel.hlines(y, low, high, color=style.color, linewidth=1.0)
+        panel.plot(middle, y, **style.points(3.5, label=label))
+        if both:
+            panel.plot(high, y, **style.points(3.5))
+    panel.set_yticks(range(len(names)), names, fontsize=8)
+    panel.set_ylim(len(names) - 0.5, -0.5)
 
 
 def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> Figure:
-    """Draw the median of the reduction with a line down to its 5th percentile, and the median of the delay.
-
-    Args:
-        entries: Entries of `tvist_lab.studies.sweep.sweep.summary`.
-        settings: Name of the setting of each entry.
-    """
+    """Draw the median of the reduction with a bar to its 5th percentile, and the median of the delay, by setting."""
     names = list(dict.fromkeys(settings))
     shapers = list(dict.fromkeys(entry["shaper"] for entry in entries))
     height = 1.9 + EACH * (1.0 + 0.3 * len(shapers)) * len(names)
-    figure, (less, late) = panels(2, 2.0 * height, share_x=False)
-    for place, shaper in enumerate(shapers):
-        style = SERIES[place % len(SERIES)]
-        offset = 0.6 * ((place + 0.5) / len(shapers) - 0.5)
-        mine = [(one, name) for one, name in zip(entries, settings, strict=True) if one["shaper"] == shaper]
-        y = np.array([names.index(name) + offset for _, name in mine])
-        median, p5, delay = (
-            np.array([np.nan if one[key][share] is None else one[key][share] for one, _ in mine], dtype=float)
-            for key, share in (
-                ("reduction_percent", "median"),
-                ("reduction_percent", "p5"),
-                ("delay_ms", "median"),
-            )
-        )
-        less.hlines(y, p5, median, color=style.color, linewidth=1.0)
-        less.plot(p5, y, "|", color=style.color, markersize=5)
-        less.plot(median, y, **style.points(), label=shaper)
-        late.plot(delay, y, **style.points(), clip_on=False)
-    less.axvline(0.0, color=FAINT, linewidth=0.8)
-    for panel, words in (
-        (less, "Reduction: median, line to 5th percentile"),
-        (late, "Delay: median"),
+    figure, axes = panels(2, 2.0 * height, share_x=False)
+    found = {(one["shaper"], name): one for one, name in zip(entries, settings, strict=True)}
+    for panel, words, keys in (
+        (
+            axes[0],
+            "Reduction: median, bar to 5th percentile",
+            ("reduction_percent_p5", *["reduction_percent_median"] * 2),
+        ),
+        (axes[1], "Delay: median", ("delay_ms_median",) * 3),
     ):
-        panel.set_yticks(range(len(names)), names, fontsize=8)
-        panel.set_ylim(len(names) - 0.5, -0.5)
+        _dots(
+            panel,
+            names,
+            [
+                (one, [[found.get((one, name), {}).get(key) for key in keys] for name in names])
+                for one in shapers
+            ],
+        )
         title(panel, words)
-    less.set(xlabel="Reduction (%)")
-    late.set(xlabel="Delay (ms)")
-    late.set_xlim(left=0.0)
-    legend(figure, less)
+    axes[0].axvline(0.0, color=FAINT, linewidth=0.8)
+    axes[0].set(xlabel="Reduction (%)")
+    axes[1].set(xlabel="Delay (ms)")
+    axes[1].set_xlim(left=0.0)
+    legend(figure, axes[0])
     return figure
 
 
-def robustness_figure(rows: Sequence[dict[str, Any]]) -> Figure:
+def robustness_figure(
+    cells: Mapping[str, Sequence[dict[str, Any]]], errors: Mapping[str, Sequence[float]]
+) -> Figure:
     """Draw the median of the reduction with a bar to its 5th percentile, each the worse of ± an error, by shaper.
 
-    Args:
-        rows: Rows of `robustness_report`, ordered by delay.
+    `cells` are those of `tvist_lab.studies.robustness`: entries of each kind of error, by shaper, ordered by delay.
     """
-    sizes = {kind: sorted({abs(error) for error in errors}) for kind, errors in ERRORS.items()}
-    most = max(map(len, sizes.values()))
-    figure, axes = panels(1, 1.6 + (0.1 + 0.1 * most) * len(rows), columns=2, share_y=True)
-    for panel, (kind, errors) in zip(axes, ERRORS.items(), strict=True):
-        for place, (size, style) in enumerate(zip(sizes[kind], SERIES, strict=False)):
-            names = [f"{100.0 * error:+.0f} %" for error in errors if abs(error) == size]
-            y = np.arange(len(rows)) + 0.7 * ((place + 0.5) / most - 0.5)
-            median, p5 = (
-                [min(_known(row[kind][error]["reduction_percent"][share]) for error in names) for row in rows]
-                for share in ("median", "p5")
-            )
-            panel.hlines(y, p5, median, color=style.color, linewidth=1.0)
-            panel.plot(median, y, **style.points(3.5, label=f"±{100.0 * size:.0f} %"))
-        panel.set(xlabel="Reduction (%)", ylim=(len(rows) - 0.5, -0.5))
-        panel.set_yticks(
-            range(len(rows)), [f"{_label(row['name'])}, {row['delay_ms']:.0f} ms" for row in rows]
-        )
+    sizes = {kind: sorted({abs(error) for error in those}) for kind, those in errors.items()}
+    every = {(kind, one["shaper"], one["error"]): one for kind, those in cells.items() for one in those}
+    delays = {one["shaper"]: one["delay_ms_median"] for those in cells.values() for one in those}
+    names = [f"{_label(name)}, {delay:.0f} ms" for name, delay in delays.items()]
+    figure, axes = panels(
+        1, 1.6 + (0.1 + 0.1 * max(map(len, sizes.values()))) * len(delays), columns=2, share_y=True
+    )
+
+    def worse(kind: str, shaper: str, size: float, share: str) -> float | None:
+        found = [
+            every[kind, shaper, f"{100.0 * sign * size + 0.0:+.0f} %"][f"reduction_percent_{share}"]
+            for sign in (1, -1)
+        ]
+        return None if None in found else min(found)
+
+    for panel, kind in zip(axes, errors, strict=True):
+        _dots(panel, names, [
+            (f"±{100.0 * size:.0f} %",
+             [[worse(kind, one, size, share) for share in ("p5", "median", "median")] for one in delays])
+            for size in sizes[kind]
+        ])  # fmt: skip
+        panel.set(xlabel="Reduction (%)")
         title(panel, f"Wrong {kind}")
     legend(figure, max(axes, key=lambda panel: len(panel.get_legend_handles_labels()[1])),
            {"dot": "median, the worse of ±", "bar": "to the 5th percentile"})  # fmt: skip
@@ -160,10 +163,6 @@ def _label(name: str) -> str:
     words = name.split("_")
     half = (len(words) + 1) // 2
     return name if len(name) < LONG else "_".join(words[:half]) + "_\n" + "_".join(words[half:])
-
-
-def _known(value: float | None) -> float:
-    return float("nan") if value is None else value
 
 
 def residual_by_move_figure(rows: Sequence[Row]) -> Figure:

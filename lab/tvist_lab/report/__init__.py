@@ -2,7 +2,7 @@
 
 from tvist_lab.report.of_advice import advice_page
 from tvist_lab.report.of_recordings import recordings_page
-from tvist_lab.report.of_studies import evaluation_page, shaperbench_page, study_page
+from tvist_lab.report.of_studies import study_figures, study_page
 from tvist_lab.report.page import Page, PageTable, Picture, Section, render
 
 __all__ = [
@@ -11,9 +11,8 @@ __all__ = [
     "Picture",
     "Section",
     "advice_page",
-    "evaluation_page",
     "recordings_page",
     "render",
-    "shaperbench_page",
+    "study_figures",
     "study_page",
 ]

@@ -1,1 +1,1 @@
-"""The studies, each a preset of `tvist_lab.study`."""
+"""The studies that come with the package, each a preset of `tvist study`."""

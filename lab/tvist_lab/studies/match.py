@@ -1,4 +1,4 @@
-"""Two methods on the same moves and plants: the differences of their reductions, and whether they show anything.
+"""`tvist study match`: two shapers on the same moves and plants, and whether their differences show anything.
 
 Each move is made by both on each plant, so its difference does not depend on how hard the move is. The interval of the
 median difference is exact for any distribution: its ends are the differences between which a sign test at 5 % rejects
@@ -7,144 +7,115 @@ moves in the tail: it is shown, and no verdict hangs on it.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+import polars as pl
 from scipy.stats import binom
 
-from tvist_controller.api.line import MotionLimits
 from tvist_lab.recordings import Floats
-from tvist_lab.study.case import Case, arm_seed
-from tvist_lab.study.held_out import LEAST, bootstrap, median_and_p5
-from tvist_lab.study.method import Method
-from tvist_lab.study.moves import Move
-from tvist_lab.study.tables import Entry, Shown
-from tvist_lab.study.work import Job, Row
-from tvist_plant.description import RobotDescription
-from tvist_plant.variants import Variant
+from tvist_lab.study.arms import JUDGED
+from tvist_lab.study.asked import Asked, Preset
+from tvist_lab.study.columns import Column, of_group, share
+from tvist_lab.study.held_out import LEAST, bootstrap
+from tvist_lab.study.study import Study, StudyError
+from tvist_plant.variants import variant
 
-WANTED = ("reduction_percent", "delay_ms")
-"""Measures of each motion."""
-FIRST, SECOND, NEITHER, TOO_FEW = "first", "second", "no difference shown", "too few moves vibrate"
-"""Verdicts: which method is better."""
+NEITHER, TOO_FEW = "no difference shown", "too few moves vibrate"
+FIRST, SECOND = (pl.col(f"{place}_percent") for place in ("first", "second"))
+DIFFERENCE = (FIRST - SECOND).alias("difference")
+BOOTSTRAP = "Of the 5th percentiles, first minus second in points, with its 95 % interval, a bootstrap."
+EXACT = "Of the medians, first minus second in points, with its 95 % interval, which is exact."
 
 
-def jobs(
-    description: RobotDescription,
-    pair: tuple[Method, Method],
-    plants: Sequence[Variant],
-    moves: Sequence[Move],
-    seed: int,
-    limits: MotionLimits,
-) -> list[Job]:
-    """Return a job for each move: by both methods on all plants, as a robot makes it.
-
-    Raises:
-        ValueError: There are fewer than `LEAST` moves.
-    """
+def study(asked: Asked) -> Study:
+    """Return the study of two shapers, side by side."""
+    if len(asked.methods) != 2:
+        raise StudyError(f"shapers are {len(asked.methods)} different ones: give two as --shapers")
+    moves, names = asked.feasible(), [one.name for one in asked.methods]
     if len(moves) < LEAST:
-        raise ValueError(
-            f"there are {len(moves)} moves: must be at least {LEAST}, since fewer show hardly any difference"
+        raise StudyError(
+            f"only {len(moves)} of {len(asked.moves)} moves are within the drives' torque at these limits; at least "
+            f"{LEAST} are needed"
         )
-    arms = tuple({one.name: one for one in plants}.values())
-    return [
-        Job(Case(description, move, arm_seed(seed, place), arms, limits, axes={"move": place}), pair, WANTED)
-        for place, move in enumerate(moves)
-    ]
+    weak = len(asked.moves) - len(moves)
+    both = [(name, word) for name, word in zip(names, ("first", "second"), strict=True)]
+    return Study(
+        title=f"Reduction by {' and '.join(names)}",
+        cases=asked.cases(moves, asked.arms or [variant(name) for name in JUDGED]),
+        methods=asked.methods,
+        by=("arm",),
+        pooled=("shaper",),
+        measures=("reduction_percent", "delay_ms"),
+        prepare=lambda rows: _paired(rows, names),
+        columns=(
+            Column("moves", DIFFERENCE.count().alias("moves"), 0, meaning="Those that vibrate enough."),
+            *(column for name, word in both for column in _columns(name, word)),
+            Column("difference\nmedian", DIFFERENCE.median().alias("difference_median"), 1, meaning=EXACT),
+            Column("95 %\nexact", of_group(_exact, [DIFFERENCE], pl.List(pl.Float64), "difference_median_interval"), 1),
+            Column("difference\np5", of_group(_between, [FIRST, SECOND], pl.Float64, "difference_p5"), 1),
+            Column("95 %\nbootstrap", of_group(_of_p5, [FIRST, SECOND], pl.List(pl.Float64), "difference_p5_interval"),
+                   1, meaning=BOOTSTRAP),
+            Column("verdict", of_group(lambda found: verdict(found, *names), [DIFFERENCE], pl.String, "verdict"),
+                   meaning="The interval of the median is on one side of zero, for each plant by itself."),
+        ),
+        draw=lambda _: {},
+        facts=asked.facts,
+        notes=f"{weak} further moves were left out: the drives are too weak" if weak else "",
+    )  # fmt: skip
 
 
-def report(
-    pair: tuple[Method, Method], plants: Sequence[Variant], rows: Sequence[Row]
-) -> list[dict[str, Any]]:
-    """Return an entry for each plant; moves without vibration do not count."""
-    by_plant: dict[str, dict[str, dict[int, Row]]] = {}
-    for row in rows:
-        by_plant.setdefault(row["arm"], {}).setdefault(row["shaper"], {})[row["move"]] = row
-    return [
-        {"name": one.name, "label": one.label, **_entry(*(by_plant[one.name][each.name] for each in pair))}
-        for one in {one.name: one for one in plants}.values()
-    ]
-
-
-def _entry(first: dict[int, Row], second: dict[int, Row]) -> dict[str, Any]:
-    counted = [move for move, row in first.items() if row["reduction_percent"] is not None]
-    both = np.array([[one[move]["reduction_percent"] for one in (first, second)] for move in counted])
-    both = both.reshape(-1, 2)
-    differences = both[:, 0] - both[:, 1]
-    enough = len(counted) >= LEAST
-    middle = exact_interval(differences) if enough else None
-    shares = [median_and_p5(column) for column in both.T]
-    p5 = [one["p5"] for one in shares]
-    return {
-        "moves": len(counted),
-        **{
-            name: {
-                "reduction_percent": share,
-                "delay_ms": round(float(np.median([row["delay_ms"] for row in made.values()])), 6),
-            }
-            for name, share, made in zip((FIRST, SECOND), shares, (first, second), strict=True)
-        },
-        "difference": {
-            "median": float(np.median(differences)) if counted else None,
-            "median_interval": middle,
-            "p5": None if p5[0] is None or p5[1] is None else p5[0] - p5[1],
-            "p5_interval": bootstrap(both, _between_p5) if enough else None,
-        },
-        "verdict": TOO_FEW if middle is None else verdict(middle),
+def _paired(rows: pl.DataFrame, names: Sequence[str]) -> pl.DataFrame:
+    """Put what both made of a move side by side, in the row of the first."""
+    columns = {
+        f"{word}_{short}": pl.col(measure).filter(pl.col("shaper") == name).first().over("arm", "move")
+        for name, word in zip(names, ("first", "second"), strict=True)
+        for measure, short in (("reduction_percent", "percent"), ("delay_ms", "delay_ms"))
     }
+    return rows.with_columns(**columns).filter(pl.col("shaper") == names[0])
+
+
+def _columns(name: str, word: str) -> list[Column]:
+    counts = DIFFERENCE.is_not_null()
+    return [
+        Column(f"{name}\nmedian %", share(f"{word}_percent", 0.5, "median", among=counts), 1),
+        Column(f"{name}\np5 %", share(f"{word}_percent", 0.05, "p5", LEAST, among=counts), 1),
+        Column(f"{name}\ndelay ms", share(f"{word}_delay_ms", 0.5, "median"), 0),
+    ]
+
+
+def _exact(differences: Floats) -> list[float] | None:
+    return exact_interval(differences) if len(differences) >= LEAST else None
 
 
 def exact_interval(differences: Floats) -> list[float]:
-    """Interval that contains the median of a distribution with at least 95 % probability, whatever that is like.
-
-    Args:
-        differences: Independent values, at least 6, shape (n,).
-    """
+    """Interval that contains the median of a distribution with at least 95 % probability, whatever that is like."""
     ordered = np.sort(differences)
     outside = int(binom.ppf(0.025, len(ordered), 0.5))  # P(fewer lie below the median) is less than 2.5 %
     return [float(ordered[outside - 1]), float(ordered[len(ordered) - outside])]
 
 
-def verdict(interval: Sequence[float]) -> str:
-    """Return what an interval of the median difference, first minus second, shows."""
-    low, high = interval
-    return FIRST if low > 0.0 else SECOND if high < 0.0 else NEITHER
+def verdict(differences: Floats, first: str, second: str) -> str:
+    """Return what the exact interval of the median difference, first minus second, shows."""
+    found = _exact(differences)
+    if found is None:
+        return TOO_FEW
+    return f"{first} better" if found[0] > 0.0 else f"{second} better" if found[1] < 0.0 else NEITHER
 
 
-def _between_p5(drawn: Floats) -> Floats:
-    p5 = np.percentile(drawn, 5.0, axis=1)
-    return np.asarray(p5[:, 0] - p5[:, 1])
+def _between(first: Floats, second: Floats) -> float | None:
+    return float(np.percentile(first, 5.0) - np.percentile(second, 5.0)) if len(first) >= LEAST else None
 
 
-def table(first: str, second: str) -> list[Shown]:
-    """Columns of the table.
+def _of_p5(first: Floats, second: Floats) -> list[float] | None:
+    def between(drawn: Floats) -> Floats:
+        p5 = np.percentile(drawn, 5.0, axis=1)
+        return np.asarray(p5[:, 0] - p5[:, 1])
 
-    Args:
-        first: Name of the first method.
-        second: Name of the second method.
-    """
+    return bootstrap(np.column_stack([first, second]), between) if len(first) >= LEAST else None
 
-    def said(entry: Entry) -> str:
-        found = entry["verdict"]
-        return f"{ {FIRST: first, SECOND: second}[found] } better" if found in {FIRST, SECOND} else found
 
-    def sure(name: str) -> Shown:
-        def text(entry: Entry) -> str | None:
-            value, ends = entry["difference"][name], entry["difference"][f"{name}_interval"]
-            if value is None:
-                return None
-            return f"{value:+.1f}" + ("" if ends is None else f" [{ends[0]:+.1f}, {ends[1]:+.1f}]")
-
-        return Shown(f"difference {name}", text)
-
-    def of(key: str, name: str) -> list[Shown]:
-        return [
-            Shown(f"{name} median", f"{key}.reduction_percent.median", 1),
-            Shown("p5", f"{key}.reduction_percent.p5", 1),
-            Shown("delay ms", f"{key}.delay_ms", 0),
-        ]
-
-    return [
-        Shown("plant", "name"), Shown("moves", "moves", 0), *of(FIRST, first), *of(SECOND, second), sure("median"),
-        sure("p5"), Shown("verdict", said),
-    ]  # fmt: skip
+PRESET = Preset(
+    study,
+    options=frozenset(("plants", "limits", "modes")),
+    least=LEAST,
+)  # fmt: skip

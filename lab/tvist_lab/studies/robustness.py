@@ -1,146 +1,123 @@
-"""Reduction of vibration by each method on arms other than calibrated, or that carry more or less than declared."""
+"""`tvist study robustness`: shapers on arms other than calibrated, or that carry more or less than declared."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
+import polars as pl
 
 from tvist_lab.study.arms import AS_DESCRIBED, PERTURBED, with_springs
+from tvist_lab.study.asked import Asked, Preset
 from tvist_lab.study.case import Case
-from tvist_lab.study.held_out import intervals, median_and_p5
-from tvist_lab.study.measures import QUIET, WORTH
-from tvist_lab.study.method import Method
-from tvist_lab.study.moves import Move
-from tvist_lab.study.tables import Shown
-from tvist_lab.study.work import Job, Row
-from tvist_plant.description import RobotDescription
-from tvist_plant.variants import Variant, hidden_variant, variant
+from tvist_lab.study.columns import Column, Table, across, median, p5
+from tvist_lab.study.held_out import LEAST, sure
+from tvist_lab.study.measures import QUIET
+from tvist_lab.study.study import Figures, Result, Study
+from tvist_plant.variants import Variant, variant
 
 ERRORS: dict[str, tuple[float, ...]] = {
-    "stiffness": (0.0, 0.05, -0.05, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3),
-    "payload": (0.0, 0.1, -0.1, 0.2, -0.2),
+    "stiffness": (-0.3, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.3),
+    "payload": (-0.2, -0.1, 0.0, 0.1, 0.2),
 }
 """Relative errors [-]: by which all springs of the arm are stiffer than calibrated, and by which the declared mass
 exceeds the carried one.
 """
 PLANT = "plant"
 """Kind of what is wrong with a plant that has a name."""
-WANTED = ("unshaped_peak_m_s2", "shaped_peak_m_s2", "waited_peak_m_s2", "delay_ms")
-"""Measures of each motion."""
-FIRST = (Shown("shaper", "name"), Shown("delay ms", "delay_ms", 0))
-"""First columns of all tables."""
+LESS = Column("median", median("reduction_percent"), 1)
+WORST = Column("p5", p5("reduction_percent", LEAST), 1)
+BOTH = Column("median / p5", lambda one: f"{LESS.text(one)} / {WORST.text(one)}")
+DELAY = Column("delay ms", median("delay_ms"), 0)
+BEYOND = 100.0 * (1.0 - pl.col("shaped_peak_m_s2") / pl.col("waited_peak_m_s2"))
+"""Reduction beyond what waiting alone is enough for."""
+WAITED = pl.col("reduction_percent").is_not_null() & (pl.col("waited_peak_m_s2") >= QUIET)
 
 
-Columns = Mapping[str, Mapping[str, tuple[Variant, float]]]
-"""The columns of each kind of table by their titles: the arm, and the error of the declared mass [-]."""
+def study(asked: Asked) -> Study:
+    """Return the study: errors of the payload by moves, each by all shapers on all arms with that error."""
+    wrong = errors(asked.arms)
+    arms: dict[float, dict[str, Variant]] = {}
+    for kind in wrong.values():
+        for arm, error in kind.values():
+            arms.setdefault(error, {})[arm.name] = arm
+    cases = [
+        Case(
+            asked.description, move, asked.seed + number, tuple(those.values()), payload_error=error,
+            axes={"payload_error": error, "move": number + 1},
+        )
+        for error, those in sorted(arms.items(), key=lambda one: abs(one[0]))
+        for number, move in enumerate(asked.moves)
+    ]  # fmt: skip
+    return Study(
+        title="Reduction on arms that are not as calibrated",
+        cases=cases,
+        methods=asked.methods,
+        pooled=("arm",),
+        splits={"cells": ("arm", "payload_error")},
+        columns=(LESS, WORST, DELAY),
+        more=(
+            pl.col("reduction_percent").count().alias("counted"),
+            sure("reduction_percent", 50.0, "median"), sure("reduction_percent", 5.0, "p5", LEAST),
+            BEYOND.filter(WAITED).median().alias("beyond_waiting_percent_median"),
+            pl.when(WAITED.sum() >= LEAST).then(BEYOND.filter(WAITED).quantile(0.05, "linear"))
+            .alias("beyond_waiting_percent_p5"),
+        ),
+        measures=(),
+        as_served=False,
+        finish=lambda result: result.values["summary"].sort(key=lambda one: (one["delay_ms_median"], one["shaper"])),
+        tables=lambda result: [
+            table for kind in cells(result.values) for table in tables(result.values, kind, [BOTH])
+        ],
+        draw=_draw,
+        facts=asked.facts,
+    )  # fmt: skip
 
 
-def columns(hidden: Sequence[int] = ()) -> Columns:
-    """Return the columns of all tables, each in the order of the errors.
-
-    Args:
-        hidden: Seeds of hidden robots that are plants, too.
-    """
-
-    def titled(kind: str) -> dict[str, float]:
-        return {f"{100.0 * error:+.0f} %": error for error in sorted(ERRORS[kind])}
-
-    plants = [*map(variant, PERTURBED), *map(hidden_variant, hidden)]
+def errors(named: Sequence[Variant] = ()) -> dict[str, dict[str, tuple[Variant, float]]]:
+    """Return the columns of each kind of table by their titles: the arm, and the error of the declared mass [-]."""
+    plants = [*map(variant, PERTURBED), *named]
     return {
-        "stiffness": {
-            title: (with_springs(1.0 + error), 0.0) for title, error in titled("stiffness").items()
-        },
-        "payload": {title: (AS_DESCRIBED, error) for title, error in titled("payload").items()},
+        "stiffness": {f"{100.0 * one:+.0f} %": (with_springs(1.0 + one), 0.0) for one in ERRORS["stiffness"]},
+        "payload": {f"{100.0 * one:+.0f} %": (AS_DESCRIBED, one) for one in ERRORS["payload"]},
         PLANT: {one.name: (one, 0.0) for one in plants},
     }
 
 
-def jobs(
-    description: RobotDescription,
-    methods: Sequence[Method],
-    moves: Sequence[Move],
-    seed: int,
-    hidden: Sequence[int] = (),
-) -> list[Job]:
-    """Return all jobs: error of the payload by move, each by all methods on all arms with that error."""
-    arms: dict[float, dict[str, Variant]] = {}
-    for kind in columns(hidden).values():
-        for arm, error in kind.values():
-            arms.setdefault(error, {})[arm.name] = arm
-    return [
-        Job(
-            Case(
-                description,
-                move,
-                seed + number,
-                tuple(those.values()),
-                payload_error=error,
-                axes={"payload_error": error},
-            ),
-            tuple(methods),
-            WANTED,
-            as_served=False,
+def cells(values: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
+    """Return the entries of each kind of table, by shaper in the order of the summary, with the title of the column."""
+    found = {(one["shaper"], one["arm"], one["payload_error"]): one for one in values["cells"]}
+    delays = {one["shaper"]: one["delay_ms_median"] for one in values["summary"]}
+    known = {arm for one in errors().values() for arm, _ in one.values()}
+    hidden = [
+        Variant(name, label)
+        for name, label in values["arms"].items()
+        if name not in {arm.name for arm in known}
+    ]
+    return {
+        kind: [
+            {**found[name, arm.name, error], "error": title, "delay_ms_median": delay}
+            for name, delay in delays.items()
+            for title, (arm, error) in those.items()
+        ]
+        for kind, those in errors(hidden).items()
+    }
+
+
+def tables(values: Mapping[str, Any], kind: str, shown: Sequence[Column]) -> list[Table]:
+    """Return tables of one kind with a column for each error."""
+    title = "Plants by name" if kind == PLANT else f"Wrong {kind}"
+    found = [across(cells(values)[kind], "shaper", "error", one, [DELAY]) for one in shown]
+    return [Table(f"{title}: {one.title}", one.entries, one.columns) for one in found]
+
+
+def _draw(result: Result) -> Figures:
+    from tvist_lab.figures import robustness_figure
+
+    return {
+        "robustness": (
+            robustness_figure(cells(result.values), ERRORS),
+            "Reduction against delay, for each error.",
         )
-        for error, those in arms.items()
-        for number, move in enumerate(moves)
-    ]
-
-
-def report(
-    methods: Sequence[Method], rows: Sequence[Row], hidden: Sequence[int] = ()
-) -> list[dict[str, Any]]:
-    """Return one entry for each method, ordered by delay; moves without vibration do not count."""
-    every = columns(hidden)
-    entries = [
-        _entry(method, [row for row in rows if row["shaper"] == method.name], every) for method in methods
-    ]
-    return sorted(entries, key=lambda entry: (entry["delay_ms"], entry["name"]))
-
-
-def _entry(method: Method, rows: Sequence[Row], every: Columns) -> dict[str, Any]:
-    cells: dict[tuple[str, float], list[Row]] = {}
-    for row in rows:
-        if row["unshaped_peak_m_s2"] >= WORTH:
-            cells.setdefault((row["arm"], row["payload_error"]), []).append(row)
-    return {
-        "name": method.name,
-        "label": method.label,
-        "told_target": method.told_target,
-        "delay_ms": round(float(np.median([row["delay_ms"] for row in rows])), 6),
-        **{
-            kind: {
-                title: _reductions(cells.get((arm.name, error), [])) for title, (arm, error) in those.items()
-            }
-            for kind, those in every.items()
-        },
     }
 
 
-def _reductions(rows: Sequence[Row]) -> dict[str, Any]:
-    # Where waiting alone is enough, there is nothing to gain beyond it.
-    waited = [row for row in rows if row["waited_peak_m_s2"] >= QUIET]
-    less = np.array([_less(row["shaped_peak_m_s2"], row["unshaped_peak_m_s2"]) for row in rows])
-    return {
-        "moves": len(rows),
-        "reduction_percent": median_and_p5(less),
-        "reduction_percent_interval": intervals(less),
-        "beyond_waiting_percent": median_and_p5(
-            [_less(row["shaped_peak_m_s2"], row["waited_peak_m_s2"]) for row in waited]
-        ),
-    }
-
-
-def _less(peak: float, before: float) -> float:
-    return 100.0 * (1.0 - peak / before)
-
-
-def on_terminal(hidden: Sequence[int] = ()) -> dict[str, list[Shown]]:
-    """Columns of the tables of a terminal, by their titles, each with median and 5th percentile."""
-
-    def both(kind: str, title: str) -> Shown:
-        one, other = (Shown("", f"{kind}.{title}.reduction_percent.{share}", 1) for share in ("median", "p5"))
-        return Shown(title, lambda entry: f"{one.text(entry)} / {other.text(entry)}")
-
-    return {
-        kind: [*FIRST, *(both(kind, title) for title in those)] for kind, those in columns(hidden).items()
-    }
+PRESET = Preset(study, menu="robustness")

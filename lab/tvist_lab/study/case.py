@@ -10,6 +10,7 @@ from tvist_controller.api.line import InverseDynamics, MotionLimits, body, centr
 from tvist_lab.recordings import Floats
 from tvist_lab.study.arms import AS_DESCRIBED
 from tvist_lab.study.line import PAPER, point_to_point
+from tvist_lab.study.method import Method
 from tvist_lab.study.moves import Move, stopped_stream
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -42,6 +43,8 @@ class Case:
     """Error of the declared mass, relative to the carried one [-]."""
     stream: bool = False
     """Whether to follow a stream from the move's start that is stopped somewhere, instead of making the move."""
+    methods: tuple[Method, ...] = ()
+    """What makes it; empty for the methods of its study."""
     axes: Mapping[str, Any] = field(default_factory=dict)
     """What distinguishes it from the other cases of its study: cells of its rows, by the names of their columns."""
 

@@ -1,96 +1,165 @@
-"""The columns of a study's rows: names, types, units and meanings; and rows in short."""
+"""The columns of tables, on a terminal, on a page and in Markdown alike; and what studies compute for them."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import polars as pl
 
-from tvist_lab.study.measures import MEASURES
-from tvist_lab.study.work import FAILED, MEASURED, TOO_WEAK, Row
+from tvist_lab.recordings import Floats
+
+Entry = Mapping[str, Any]
+"""Values by name: a line of a table, before it is written."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column."""
+    """A column of a table."""
 
-    name: str
-    kind: Any
-    """Its type in polars."""
-    unit: str
-    """Its unit; empty for text and counts."""
-    meaning: str
+    title: str
+    """Its heading; a second line is small on a web page."""
+    of: str | pl.Expr | Callable[[Entry], Any]
+    """Where its value is in an entry, such as "delay_ms" or "less.p5"; what finds it there; or what
+    computes it of a group of rows, under the name by which it is in the entry then. """
+    digits: int | None = None
+    """Number of decimals; None for text."""
+    unit: str = ""
+    """What follows the number."""
+    meaning: str = ""
+    """What the first line of the heading means."""
 
-
-ROW = Column("row", pl.Int64, "", "position of the row, from 0 on")
-STATUS = Column(
-    "status", pl.String, "", "`measured`; `too weak` if the drives cannot make the move; or `failed`"
-)
-ERROR = Column("error", pl.String, "", "why a row that is not `measured` is not; null otherwise")
-_KINDS: Mapping[type, Any] = {bool: pl.Boolean, int: pl.Int64, float: pl.Float64, str: pl.String}
-
-Schema = Mapping[str, Any]
-"""Types of the columns by name, in their order."""
-Shares = Mapping[str, float]
-"""Percentiles by name, as shares [-]."""
-OF_STATUS = {status: pl.col("status") == status for status in (MEASURED, TOO_WEAK, FAILED)}
-"""Whether a row has a status."""
-
-
-def columns_of(axes: Sequence[Column], measures: Iterable[str]) -> tuple[Column, ...]:
-    """Return the columns of rows with these axes and measures."""
-    figures = (MEASURES[name] for name in measures)
-    return (
-        ROW, *axes, STATUS,
-        *(Column(one.name, pl.Float64, one.unit, one.meaning) for one in figures), ERROR,
-    )  # fmt: skip
+    def text(self, entry: Entry) -> str:
+        """Return a cell; a dash stands for what was not measurable."""
+        value: Any = entry
+        if isinstance(self.of, pl.Expr):
+            value = entry[self.of.meta.output_name()]
+        elif isinstance(self.of, str):
+            for key in self.of.split("."):
+                value = value[key]
+        else:
+            value = self.of(entry)
+        if isinstance(value, list):
+            return " to ".join(replace(self, of="x").text({"x": one}) for one in value)
+        if value is None:
+            return "–"
+        return str(value) if self.digits is None else f"{value:.{self.digits}f}{self.unit}"
 
 
-def column_of(name: str, values: Iterable[object]) -> Column:
-    """Return the column of an axis by its values, whole numbers and others among them as the others.
+@dataclass(frozen=True)
+class Table:
+    """Entries, and the columns to show of them."""
 
-    Raises:
-        ValueError: Its values have different types.
-    """
-    kinds = {type(value) for value in values}
-    if kinds == {int, float}:
-        kinds = {float}
-    if len(kinds) > 1:
-        raise ValueError(
-            f"axis {name!r} has values of the types {', '.join(sorted(kind.__name__ for kind in kinds))}"
-        )
-    return Column(name, _KINDS.get(kinds.pop(), pl.String), "", "")
+    title: str
+    entries: Sequence[Entry]
+    columns: Sequence[Column]
+    listing: bool = False
+    """Whether it lists single motions, of which there may be too many to show."""
 
 
-def schema_of(columns: Iterable[Column]) -> Schema:
-    """Return the types of columns."""
-    return {column.name: column.kind for column in columns}
+def titles(columns: Iterable[Column]) -> tuple[str, ...]:
+    """Return the headings of columns."""
+    return tuple(column.title for column in columns)
 
 
-def frame(rows: Sequence[Row], schema: Schema) -> pl.DataFrame:
-    """Return rows as a table with all columns; what a row lacks is null."""
-    return pl.DataFrame([{name: row.get(name) for name in schema} for row in rows], schema=dict(schema))
+def cells(entries: Iterable[Entry], columns: Sequence[Column]) -> list[tuple[str, ...]]:
+    """Return the cells of a table, a row for each entry."""
+    return [tuple(column.text(entry) for column in columns) for entry in entries]
 
 
-def summarized(
-    rows: pl.DataFrame, keys: Sequence[str], counted: Mapping[str, pl.Expr], figures: Mapping[str, Shares]
-) -> list[dict[str, Any]]:
-    """Return an entry for each combination of keys, in the order of the rows.
+def meanings(columns: Iterable[Column]) -> dict[str, str]:
+    """Return what the words of headings mean."""
+    return {column.title.partition("\n")[0]: column.meaning for column in columns if column.meaning}
+
+
+def across(
+    entries: Iterable[Entry],
+    line: str,
+    key: str,
+    cell: Column,
+    first: Sequence[Column] = (),
+    best: bool = False,
+) -> Table:
+    """Return a table with a line for each value of one name, and a column for each value of another."""
+    lines: dict[Any, dict[str, Entry]] = {}
+    for entry in entries:
+        lines.setdefault(entry[line], {})[str(entry[key])] = entry
+    names = list(dict.fromkeys(name for one in lines.values() for name in one))
+    value = cell.of.meta.output_name() if isinstance(cell.of, pl.Expr) else str(cell.of)
+
+    def of(name: str) -> Column:
+        found = [one[name][value] for one in lines.values() if best and one[name][value] is not None]
+
+        def text(one: Entry) -> str:
+            here = one["of"].get(name)
+            said = "–" if here is None else cell.text(here)
+            return f"**{said}**" if found and here is not None and here[value] == min(found) else said
+
+        return Column(name, text)
+
+    shown = [{**next(iter(one.values())), "of": one} for one in lines.values()]
+    return Table(cell.title, shown, [Column(line, line), *first, *map(of, names)])
+
+
+def share(
+    name: str,
+    of: float,
+    called: str,
+    least: int = 0,
+    how: Literal["linear", "higher"] = "linear",
+    among: pl.Expr | None = None,
+) -> pl.Expr:
+    """Return what computes a percentile of a measure, over the rows that have it.
 
     Args:
-        rows: Rows of a study.
-        keys: Columns that together distinguish what is summarized.
-        counted: Numbers of an entry by name.
-        figures: Percentiles of an entry by measure, over the rows that were measured and have it.
+        name: The measure.
+        of: The percentile, as a share [-].
+        called: Its name, which is put behind that of the measure.
+        least: Number of rows below which there is none.
+        how: What lies between two values.
+        among: Which rows count; None for all.
     """
-    asked = {
-        f"{name}.{share}": pl.col(name).filter(OF_STATUS[MEASURED]).quantile(value, "linear")
-        for name, shares in figures.items()
-        for share, value in shares.items()
-    }
-    grouped = rows.group_by(keys, maintain_order=True).agg(**counted, **asked)
-    return [
-        {name: row[name] for name in (*keys, *counted)}
-        | {name: {share: row[f"{name}.{share}"] for share in shares} for name, shares in figures.items()}
-        for row in grouped.iter_rows(named=True)
-    ]
+    column = pl.col(name) if among is None else pl.col(name).filter(among)
+    return pl.when(column.count() >= least).then(column.quantile(of, how)).alias(f"{name}_{called}")
+
+
+def median(name: str) -> pl.Expr:
+    """Return what computes a median."""
+    return share(name, 0.5, "median")
+
+
+def p5(name: str, least: int = 0) -> pl.Expr:
+    """Return what computes a 5th percentile of so many rows at least."""
+    return share(name, 0.05, "p5", least)
+
+
+def p90(name: str) -> pl.Expr:
+    """Return what computes a 90th percentile."""
+    return share(name, 0.9, "p90")
+
+
+def lowest(name: str) -> pl.Expr:
+    """Return what computes the smallest value."""
+    return pl.col(name).min().alias(f"{name}_min")
+
+
+def highest(name: str) -> pl.Expr:
+    """Return what computes the largest value."""
+    return pl.col(name).max().alias(f"{name}_max")
+
+
+def of_group(function: Callable[..., Any], columns: Sequence[pl.Expr], kind: Any, called: str) -> pl.Expr:
+    """Return what calls a function with the values of columns in a group of rows, without those that are null.
+
+    Args:
+        function: Returns a value, or None, from an array for each column, of equal length.
+        columns: The columns.
+        kind: Type of the value.
+        called: Name of the value.
+    """
+
+    def call(series: Sequence[pl.Series]) -> pl.Series:
+        whole = pl.DataFrame({str(place): one for place, one in enumerate(series)}).drop_nulls()
+        arrays: list[Floats] = [one.to_numpy() for one in whole.iter_columns()]
+        return pl.Series([function(*arrays)], dtype=kind)
+
+    return pl.map_groups(list(columns), call, return_dtype=kind, returns_scalar=True).alias(called)

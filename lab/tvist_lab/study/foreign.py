@@ -83,18 +83,7 @@ class FromFile(Stepping):
 
 
 class Foreign:
-    """A user's shaper in operation.
-
-    Args:
-        made: The shaper; it has `step`, and may have `reset` and `delay`.
-        info: The information that it gets, without the modes.
-        estimator: Estimator of these modes.
-        start: Joint angles at which the reference rests, shape (n,) [rad].
-        reach: Largest angle of each joint in either direction, shape (n,) [rad].
-
-    Raises:
-        ShaperFaultError: Its `reset` raises an exception.
-    """
+    """A user's shaper in operation."""
 
     def __init__(self, made: Any, info: TickInfo, estimator: Estimator, start: Floats, reach: Floats) -> None:
         self._made, self._info, self._estimator, self._reach = made, info, estimator, reach
@@ -115,11 +104,7 @@ class Foreign:
         return float(declared) if isinstance(declared, int | float | np.floating) else None
 
     def step(self, q: Floats) -> Floats:
-        """Shape one sample.
-
-        Raises:
-            ShaperFaultError: It raises an exception, or its output is not a position.
-        """
+        """Shape one sample."""
         f_d, zeta = self._estimator.estimate(self._q_star)
         info = replace(self._info, f_d=f_d.copy(), zeta=zeta.copy())
         where = f"at tick {self._tick}"
@@ -164,13 +149,7 @@ def load_shaper(path: Path) -> Callable[[], Any]:
 
 
 def run_file(path: Path, kind: str, wrong: type[ValueError]) -> ModuleType:
-    """Run a Python file of the user's, and return its module.
-
-    Args:
-        path: The file.
-        kind: What it should contain: a shaper or a study.
-        wrong: The error if it cannot be run; its message names the file.
-    """
+    """Run a Python file of the user's, and return its module."""
     name = f"tvist_{kind}_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path.resolve())
     if spec is None or spec.loader is None:

@@ -1,11 +1,13 @@
-"""Which moves a shaper is tuned on and which it is judged on, how many a figure needs, and how sure it is."""
+"""Seeds that are reserved for evaluation, how many moves a figure needs, and bootstrap intervals."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from types import MappingProxyType
 
 import numpy as np
+import polars as pl
 
 from tvist_lab.recordings import Floats
+from tvist_lab.study.columns import of_group
 
 TUNING = range(100)
 """Seeds of moves and arms that a shaper may be tuned on; no published table uses one. On which of them the shapers were
@@ -36,25 +38,6 @@ def said(seed: int) -> str:
     return f"Nothing is tuned on seed {seed}: shapers may be tuned on {tuned}."
 
 
-def percentiles(values: Sequence[float] | Floats, **shares: float) -> dict[str, float | None]:
-    """Return percentiles by name; None without values."""
-    return {
-        name: float(np.percentile(values, share)) if len(values) else None for name, share in shares.items()
-    }
-
-
-def median_and_p5(values: Sequence[float] | Floats) -> dict[str, float | None]:
-    """Return both percentiles; None without values, and no p5 of fewer than `LEAST`."""
-    found = percentiles(values, median=50.0, p5=5.0)
-    return found if len(values) >= LEAST else found | {"p5": None}
-
-
-def intervals(values: Floats) -> dict[str, list[float] | None]:
-    """95 % bootstrap intervals of both, None where `median_and_p5` has none."""
-    enough = len(values) >= LEAST
-    return {"median": interval(values, 50.0), "p5": interval(values, 5.0) if enough else None}
-
-
 def interval(values: Floats, percentile: float) -> list[float] | None:
     """95 % bootstrap interval of a percentile; None if there are no values."""
     return bootstrap(values, lambda drawn: np.percentile(drawn, percentile, axis=1))
@@ -73,3 +56,12 @@ def bootstrap(values: Floats, statistic: Callable[[Floats], Floats]) -> list[flo
     drawn = values[random.integers(0, len(values), (RESAMPLED, len(values)))]
     low, high = np.percentile(statistic(drawn), [2.5, 97.5])
     return [float(low), float(high)]
+
+
+def sure(name: str, percentile: float, called: str, least: int = 0) -> pl.Expr:
+    """Return what computes the 95 % bootstrap interval of a percentile of a measure, of so many rows at least."""
+
+    def of(values: Floats) -> list[float] | None:
+        return interval(values, percentile) if len(values) >= least else None
+
+    return of_group(of, [pl.col(name)], pl.List(pl.Float64), f"{name}_{called}_interval")

@@ -37,15 +37,7 @@ QUIET = 0.02
 
 
 class Motion:
-    """A motion that an arm made, beside the same one unshaped.
-
-    Args:
-        case: The case.
-        shaped: The shaped reference.
-        recording: What the arm made of it.
-        unshaped: Returns the recording of the unshaped motion; called only if a measure needs it.
-        like: The same motion by another arm, so that what its reference tells is known; None if there is none.
-    """
+    """A motion that an arm made, beside the same one unshaped."""
 
     def __init__(
         self,

@@ -94,12 +94,7 @@ def rows(menu: Menu | None = None) -> list[Row]:
 
 
 def row(name: str) -> Row:
-    """Return a method's row; a filter whose name has a parameter, as `elastic-20`, needs none of its own.
-
-    Raises:
-        UnknownShaperError: There is no method of that name.
-        DesignError: The name has a parameter that no filter has.
-    """
+    """Return a method's row; a filter whose name has a parameter, as `elastic-20`, needs none of its own."""
     known = next((one for one in rows() if one.name == name), None)
     if known is None:
         BUILT_IN.check(name)

@@ -63,11 +63,7 @@ class Method(ABC):
 
     @abstractmethod
     def shaped(self, task: Task) -> Shaped:
-        """Return the whole motion.
-
-        Raises:
-            ShaperFaultError: The output is not a position; or it is watched, and does not come to rest or moves on.
-        """
+        """Return the whole motion."""
 
 
 class Waiting(Method):
@@ -174,7 +170,7 @@ class Constant(Stepping):
 
 
 @dataclass(frozen=True)
-class Held(Stepping):
+class ConstantMeanDelay(Stepping):
     """The modes' zero-vibration shapers in series, delayed to a constant mean delay."""
 
     recipe: Recipe

@@ -65,18 +65,7 @@ Entries = Annotated[tuple[_Entry, ...], Meta(min_length=1)]
 
 
 def read_moves(path: Path, description: RobotDescription, masses: Callable[[], float]) -> list[Move]:
-    """Read and check a file of moves.
-
-    Args:
-        path: JSON file with a list of maps with `start` and `target`, one angle per joint [rad], and optionally
-            `payload` [kg].
-        description: The robot.
-        masses: Returns the payload of the next move that does not specify one [kg].
-
-    Raises:
-        MovesError: The file cannot be read, or a move exceeds a limit or goes nowhere.
-        UserFileError: The file is not text, too large or nested too deeply.
-    """
+    """Read and check a file of moves; `masses` gives the payload of the next move that has none [kg]."""
     try:
         entries = checked(parse_json(read_bytes(path, "moves")), Entries)
     except OSError as error:
@@ -162,17 +151,7 @@ def draw_moves(
 def stopped_stream(
     description: RobotDescription, start: Floats, seed: int, limits: MotionLimits = PAPER
 ) -> Floats:
-    """Draw a stream that uses its limits fully, and is brought to rest within them before it reaches its last target.
-
-    Args:
-        description: The robot, whose workspace the targets are drawn from.
-        start: Joint angles at which it begins at rest, shape (n,) [rad].
-        seed: Seed of targets and times.
-        limits: Limits of every joint.
-
-    Returns:
-        One sample a tick, until the arm rests, shape (T, n) [rad].
-    """
+    """Draw a stream that uses its limits fully, and is brought to rest before its last target, shape (T, n) [rad]."""
     joints, random = len(start), np.random.default_rng([seed, 71])
     region = workspace(ranges(description))
     used = min(len(region.low), joints)

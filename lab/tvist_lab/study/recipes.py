@@ -45,13 +45,8 @@ class RecipeError(ValueError):
     """There is no such filter for this arm; the message says why."""
 
 
-class Mistaken(Estimator):
-    """Another estimator's modes with wrong frequencies.
-
-    Args:
-        right: The other estimator.
-        error: Share by which every frequency is too high [-], > -1.
-    """
+class FrequencyError(Estimator):
+    """Another estimator's modes with wrong frequencies."""
 
     def __init__(self, right: Estimator, error: float) -> None:
         self._right, self._factor = right, 1.0 + error
@@ -93,16 +88,7 @@ class Recipe:
     """Shapers from files, available by name beside those that come with the package."""
 
     def make(self, description: RobotDescription, mass: float) -> Filter:
-        """Create the filter for a declared payload that is the paper's disc with another mass.
-
-        Args:
-            description: The robot.
-            mass: Mass of the declared payload [kg].
-
-        Raises:
-            RecipeError: The calibration belongs to another arm, or has fewer modes than the filter needs.
-            RefusalError: There is no such filter, or its parts do not fit together.
-        """
+        """Create the filter for a declared payload that is the paper's disc with another mass."""
         known = Registry(own.shaper for own in self.own)
         modes = wanted_modes(self.shaper, self.modes, "shaper", known)
         if self.shaper == "none":
@@ -111,15 +97,7 @@ class Recipe:
         return choose_filter(self.shaper, estimator, description.joints, known=known)
 
     def elastic(self, description: RobotDescription, tvist: Filter) -> ElasticFeedForward | None:
-        """Create the elastic feed-forward that the filter needs; None if it does without.
-
-        Args:
-            description: The robot.
-            tvist: The filter.
-
-        Raises:
-            RecipeError: The calibration has no springs, or belongs to another arm.
-        """
+        """Create the elastic feed-forward that the filter needs; None if it does without."""
         if self.calibration is None:
             return None
         try:
@@ -128,27 +106,14 @@ class Recipe:
             raise RecipeError(f"shaper {self.shaper}: {error}") from error
 
     def friction(self, description: RobotDescription, tvist: Filter | None = None) -> Floats | None:
-        """Return the friction that the drives are fed forward with a filter or unshaped, see `known_friction`.
-
-        Raises:
-            RecipeError: The calibration has it for some joints only, or more than the drives have torque.
-        """
+        """Return the friction that the drives are fed forward with a filter or unshaped, see `known_friction`."""
         try:
             return known_friction(tvist, description, self.calibration)
         except EstimatorError as error:
             raise RecipeError(f"shaper {self.shaper}: {error}") from error
 
     def estimator(self, description: RobotDescription, mass: float, modes: int) -> Estimator:
-        """Create the estimator that provides the filter's modes.
-
-        Args:
-            description: The robot.
-            mass: Mass of the declared payload [kg].
-            modes: Number of modes.
-
-        Raises:
-            RecipeError: The calibration belongs to another arm, or has fewer modes.
-        """
+        """Create the estimator that provides the filter's modes."""
         known = self.calibration
         if known is None:
             raise RecipeError(f"shaper {self.shaper} needs a calibration")
@@ -163,17 +128,13 @@ class Recipe:
                 + (": make one with tvist identify" if known.modal is None else "")
             )
         right = source.estimator(modes, paper_payload(description, mass))
-        return Mistaken(right, self.frequency_error) if self.frequency_error else right
+        return FrequencyError(right, self.frequency_error) if self.frequency_error else right
 
 
 def own_move(
     recipe: Recipe, description: RobotDescription, move: Move, limits: MotionLimits
 ) -> tuple[Filter, Floats]:
-    """Return the filter before a move, and the move's reference within limits, shape (T, n) [rad].
-
-    Raises:
-        RecipeError: The calibration belongs to another arm, or has fewer modes than the filter needs.
-    """
+    """Return the filter before a move, and the move's reference within limits, shape (T, n) [rad]."""
     start, target = np.array(move.start), np.array(move.target)
     tvist = recipe.make(description, move.mass)
     tvist.reset(start)
@@ -197,14 +158,7 @@ def workspace_range(recipe: Recipe, description: RobotDescription, masses: Range
 
 
 def longest_mean_delay(recipe: Recipe, description: RobotDescription, masses: Range, modes: int) -> float:
-    """Return the longest mean delay of the product of the modes' ZV shapers, over workspace and payloads [s].
-
-    Args:
-        recipe: Source of the estimates.
-        description: The robot.
-        masses: Smallest and largest payload [kg].
-        modes: Number of modes.
-    """
+    """Return the longest mean delay of the product of the modes' ZV shapers, over workspace and payloads [s]."""
     return max(
         mean_delay(f_d, zeta) for f_d, zeta in _over_workspace(recipe, description, masses, modes, SEARCHED)
     )

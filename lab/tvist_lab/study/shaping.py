@@ -67,11 +67,7 @@ class InOneGo(Protocol):
 
 
 class Running:
-    """A filter in operation, which fails when its shaper's function does, so that no figure is based on old weights.
-
-    Args:
-        tvist: The filter, at rest at the first sample.
-    """
+    """A filter in operation, which fails when its shaper's function does, so that no figure has old weights."""
 
     def __init__(self, tvist: Filter) -> None:
         self._tvist = tvist
@@ -82,19 +78,11 @@ class Running:
         return self._tvist.delay
 
     def step(self, q: Floats) -> Floats:
-        """Return the next shaped sample, shape (n,) [rad].
-
-        Raises:
-            ShaperFaultError: The shaper's function fails.
-        """
+        """Return the next shaped sample, shape (n,) [rad]."""
         return self._checked(self._tvist.filter(q))
 
     def all(self, q: Floats) -> Floats:
-        """Return the next shaped samples, shape (T, n) [rad].
-
-        Raises:
-            ShaperFaultError: The shaper's function fails at the last of them.
-        """
+        """Return the next shaped samples, shape (T, n) [rad]."""
         return self._checked(self._tvist.filter_all(q))
 
     def _checked(self, shaped: Floats) -> Floats:
@@ -104,17 +92,9 @@ class Running:
 
 
 def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped:
-    """Apply a shaper to a reference until it rests at the target.
+    """Apply a shaper to a reference until it rests at the target; both are at rest at its first and last sample.
 
-    Args:
-        stepper: The shaper, at rest at the first sample.
-        reference: Reference, at rest at its last sample, shape (T, n) [rad].
-        watched: Whether the shaper has to end, keep its word about its delay, and then hide no tail. Its processor time
-            is measured as well.
-
-    Raises:
-        ShaperFaultError: The shaper's function fails; or it is watched, and does not end at the target, or moves after
-            its end or its declared delay.
+    If it is watched, it has to end, keep its word about its delay, and hide no tail; its processor time is measured.
     """
     target, stop = reference[-1], len(reference) - 1
     q, cost = _through(stepper, reference, timed=watched)

@@ -1,4 +1,4 @@
-"""The folder of a sweep: what it is a sweep of, the parts done so far, and at the end all rows in one file.
+"""The folder of a study: what determines its rows, the parts done so far, and at the end all rows in one file.
 
 Each file is written under another name, and renamed when it is complete, so that every file of the folder can be read
 at any time, whatever ended the program.
@@ -15,36 +15,26 @@ from typing import Any, Self
 import msgspec
 import polars as pl
 
-from tvist_lab.study.columns import Schema
 from tvist_lab.study.work import FAILED
 from tvist_lab.whole_file import UNFINISHED, whole_file
 
-MANIFEST = "sweep.json"
-"""What the folder is a sweep of."""
+MANIFEST = "study.json"
+"""What determines the rows."""
 PARTS = "parts"
-"""Folder of the parts of a sweep that has not ended."""
-ROWS = "sweep.parquet"
-"""All rows of a sweep that has ended."""
+"""Folder of the parts of a study that has not ended."""
+ROWS = "rows.parquet"
+"""All rows of a study that has ended."""
 
 
 class StoreError(OSError):
-    """A folder cannot hold this sweep; the message names the folder or the file."""
+    """A folder cannot hold this study; the message names the folder or the file."""
 
 
 class Store:
-    """An open folder; no other process can open it meanwhile.
+    """An open folder; no other process can open it meanwhile."""
 
-    Args:
-        folder: The folder, which is created if it does not exist.
-        identity: What determines the rows, by name; the folder has to hold a sweep of the same, or nothing.
-        schema: Types of the columns.
-
-    Raises:
-        StoreError: The folder holds another sweep or something else, is in use, or cannot be written.
-    """
-
-    def __init__(self, folder: Path, identity: dict[str, Any], schema: Schema) -> None:
-        self.folder, self._schema = folder, dict(schema)
+    def __init__(self, folder: Path, identity: dict[str, Any], schema: dict[str, Any]) -> None:
+        self.folder, self._schema = folder, schema
         self._parts = folder / PARTS
         manifest = folder / MANIFEST
         if not manifest.exists() and folder.is_dir() and any(folder.iterdir()):
@@ -89,13 +79,10 @@ class Store:
         os.close(self._lock)
 
     def rows(self) -> pl.DataFrame:
-        """Return all rows that there are, each once, in the order of their positions.
-
-        Raises:
-            StoreError: A file cannot be read.
-        """
+        """Return all rows that there are, each once, in the order of their cases."""
         found = pl.concat([pl.DataFrame(schema=self._schema), *map(self._read, self._files())])
-        return found.unique("row", keep="last", maintain_order=True).sort("row")
+        found = found.unique(["case", "shaper", "arm"], keep="last", maintain_order=True)
+        return found.sort("case", maintain_order=True)
 
     def _read(self, file: Path) -> pl.DataFrame:
         try:
@@ -105,31 +92,18 @@ class Store:
                 f"{file} cannot be read as rows of a study: remove it to run them again"
             ) from error
 
-    def done(self, rows: int) -> set[int]:
-        """Return the positions of the tasks that are done: all rows are there, and none failed.
-
-        Args:
-            rows: Number of rows of a task.
-        """
-        tasks = self.rows().select(task=pl.col("row") // rows, well=pl.col("status") != FAILED)
-        counted = tasks.group_by("task").agg(pl.col("well").sum())
-        return set(counted.filter(pl.col("well") == rows)["task"].to_list())
+    def done(self) -> set[int]:
+        """Return the cases that are done: their rows are there, and none failed."""
+        found = self.rows().group_by("case").agg(well=(pl.col("status") != FAILED).all())
+        return set(found.filter("well")["case"].to_list())
 
     def keep(self, rows: pl.DataFrame) -> None:
-        """Write rows as a part.
-
-        Raises:
-            StoreError: The part cannot be written; the parts before it remain.
-        """
+        """Write rows as a part."""
         _write_frame(self._parts / f"{self._next:06d}.parquet", rows, self.folder)
         self._next += 1
 
     def finish(self) -> pl.DataFrame:
-        """Write all rows to one file, remove the parts, and return the rows.
-
-        Raises:
-            StoreError: The file cannot be written; the parts remain.
-        """
+        """Write all rows to one file, remove the parts, and return the rows."""
         found, parts = self.rows(), list(self._parts.glob("*.parquet"))
         if parts:
             _write_frame(self.folder / ROWS, found, self.folder)

@@ -1,6 +1,6 @@
-"""A study of one's own: cases by methods, and what its tables, its page and its figure show."""
+"""A study: cases by methods, what is computed of their rows, and what tables, page and figures show."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from importlib.metadata import version
@@ -8,70 +8,155 @@ from pathlib import Path
 from typing import Any
 
 import polars as pl
+from matplotlib.figure import Figure
 
 from tvist_lab.study.case import Case
-from tvist_lab.study.columns import OF_STATUS, Column, Shares, column_of, columns_of, schema_of, summarized
-from tvist_lab.study.engine import Plan
+from tvist_lab.study.columns import Column, Table, highest, lowest, p5, share
 from tvist_lab.study.foreign import run_file
 from tvist_lab.study.measures import MEASURES, OF_PEAKS
 from tvist_lab.study.method import Method
-from tvist_lab.study.tables import Shown
-from tvist_lab.study.work import FAILED, MEASURED, Job
-from tvist_lab.words import counted
+from tvist_lab.study.work import FAILED, MEASURED, TOO_WEAK, Job, Row
+from tvist_lab.words import MANY
 
-SHARES = {"median": 0.5, "p5": 0.05, "p95": 0.95}
-ENDS = {"least": 0.0, "most": 1.0}
-"""Percentiles of each measure that are summarized."""
+KINDS: Mapping[type, Any] = {
+    bool: pl.Boolean,
+    int: pl.Int64,
+    float: pl.Float64,
+    str: pl.String,
+    list: pl.List(pl.Float64),
+}
+"""Types of columns by those of the values of an axis."""
+COUNTS = {
+    "rows": pl.len(),
+    **{
+        status.replace(" ", "_"): (pl.col("status") == status).sum()
+        for status in (MEASURED, TOO_WEAK, FAILED)
+    },
+}
+"""What is counted in each group of rows."""
 DIGITS = 3
-"""Decimals of the figures in tables."""
+"""Decimals of the measures that a study shows."""
+
+Figures = Mapping[str, tuple[Figure, str]]
+"""Figures and their captions, by the names of their files without suffix."""
 
 
 class StudyError(ValueError):
-    """A file contains no study that can be made; the message says why."""
+    """A study cannot be made; the message says why."""
+
+
+def of_measures(*names: str) -> tuple[Column, ...]:
+    """Return columns of the medians of measures, and of their 95th percentiles."""
+    return tuple(
+        Column(f"{name}\n{called}", share(name, of, called), DIGITS, meaning=_meaning(name))
+        for name in names
+        for called, of in (("median", 0.5), ("p95", 0.95))
+    )
+
+
+def ends_of(*names: str) -> tuple[Column, ...]:
+    """Return columns of the least and the largest values of measures."""
+    return tuple(
+        Column(f"{name}\n{called}", of(name), DIGITS, meaning=_meaning(name))
+        for name in names
+        for called, of in (("least", lowest), ("most", highest))
+    )
+
+
+def _meaning(name: str) -> str:
+    if name not in MEASURES:
+        raise StudyError(f"{name!r} is no measure: there are {', '.join(MEASURES)}")
+    return f"{MEASURES[name].meaning}{f' [{MEASURES[name].unit}]' if MEASURES[name].unit else ''}"
 
 
 @dataclass(frozen=True)
+class Result:
+    """A study that was run."""
+
+    study: "Study"
+    rows: pl.DataFrame
+    """All rows."""
+    values: dict[str, Any]
+    """What --json prints."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Study:
     """Every method makes every case."""
 
     title: str
     cases: Sequence[Case]
-    """The cases, each with the same axes."""
-    methods: Sequence[Method]
+    """The cases, each with the same axes; a case may have methods of its own."""
+    methods: Sequence[Method] = ()
     by: tuple[str, ...] = ()
-    """Axes that the tables distinguish; the figure is drawn over the first. The other axes, such as the number of the
-    move, are summarized.
-    """
+    """Axes that the tables distinguish, besides several arms and methods; the figure is drawn over the
+    first. The other axes, such as the number of the move, are summarized. """
+    pooled: tuple[str, ...] = ()
+    """What the tables do not distinguish though it differs: "arm" or "shaper"."""
+    splits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Further axes that further summaries distinguish, by the names that these have in --json."""
     show: tuple[str, ...] = ("reduction_percent", "delay_ms")
-    """Measures in tables and in the figure."""
+    """Measures in the table and in the figure, unless there are columns."""
+    columns: tuple[Column, ...] = ()
+    """Columns of the table."""
+    few: tuple[Column, ...] = ()
+    """Its columns where so few rows count that a median says nothing."""
+    more: tuple[pl.Expr, ...] = ()
+    """What is computed of each group of rows besides, for --json."""
     measures: tuple[str, ...] = OF_PEAKS
-    """What else is measured and kept in the rows."""
+    """What is measured and kept in the rows besides what the columns need."""
+    prepare: Callable[[pl.DataFrame], pl.DataFrame] = lambda rows: rows
+    """What is computed of all rows together before they are grouped."""
+    finish: Callable[[Result], None] = lambda _: None
+    """Adds to a result what no column can compute."""
+    tables: Callable[[Result], Sequence[Table]] | None = None
+    """The tables; None for one with the summary."""
+    draw: Callable[[Result], Figures] | None = None
+    """Draws the figures; None for the measures over the first axis."""
     as_served: bool = True
-    """Whether moves are planned for the shaper as a robot plans them, instead of giving it the same reference."""
+    """Whether moves are planned for the shaper as a robot plans them, instead of giving it the same
+    reference."""
     notes: str = ""
-    """What a reader should know, in Markdown."""
-    file: bytes = field(default=b"", repr=False)
-    """Content of the file that defines it."""
+    """What a reader should know."""
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    """What determines the cases, for --json."""
+    identity: Mapping[str, Any] = field(default_factory=dict)
+    """What determines the rows, besides title, facts and the version of tvist: rows of another one are not
+    continued."""
+
+    @property
+    def shown(self) -> tuple[Column, ...]:
+        """The columns of its table, without what distinguishes the lines."""
+        return self.columns or of_measures(*self.show)
+
+    @property
+    def jobs(self) -> Sequence[Job]:
+        """What workers do, each made when it is asked for."""
+        return _Jobs(self)
 
     @property
     def measured(self) -> tuple[str, ...]:
         """All that is measured."""
-        return tuple(dict.fromkeys((*self.measures, *self.show)))
+        asked = [name for one in self._computed().values() for name in one.meta.root_names()]
+        return tuple(dict.fromkeys((*self.measures, *(name for name in asked if name in MEASURES))))
 
     @property
-    def columns(self) -> tuple[Column, ...]:
-        """The columns of its rows."""
-        axes = [column_of(name, [case.axes[name] for case in self.cases]) for name in self.cases[0].axes]
-        names = (Column("shaper", pl.String, "", "the method"), Column("arm", pl.String, "", "the arm"))
-        return columns_of((*axes, *names), self.measured)
+    def schema(self) -> dict[str, Any]:
+        """Types of the columns of its rows."""
+        axes = {name: _kind_of(name, self.cases) for name in self.cases[0].axes}
+        figures = dict.fromkeys(self.measured, pl.Float64)
+        texts = dict.fromkeys(("shaper", "arm", "status"), pl.String)
+        return {"case": pl.Int64, **axes, **texts, **figures, "error": pl.String}
+
+    @property
+    def keys(self) -> list[str]:
+        """What the tables distinguish."""
+        several = ["arm"] if len(self.cases[0].arms) > 1 else []
+        return [name for name in dict.fromkeys((*self.by, *several, "shaper")) if name not in self.pooled]
 
     def check(self) -> None:
-        """Check that it can be made.
-
-        Raises:
-            StudyError: It has no cases or methods, the cases have different axes, or a name is unknown or not alone.
-        """
-        if not self.cases or not self.methods:
+        """Check that it can be made."""
+        if not self.cases or not (self.methods or self.cases[0].methods):
             raise StudyError("it needs a case and a method at least")
         for place, case in enumerate(self.cases):
             self._check_case(f"cases[{place}]", case)
@@ -80,16 +165,15 @@ class Study:
                 raise StudyError(f"{what} is {names!r}: must be a tuple of names, ({names!r},)")
         if not self.show:
             raise StudyError("show is empty: must name a measure at least")
-        taken = {"row", "shaper", "arm", "status", "error", *self.measured}.intersection(self.cases[0].axes)
+        taken = {"case", "shaper", "arm", "status", "error", *self.measured}.intersection(self.cases[0].axes)
         if taken:
             raise StudyError(f"axis {min(taken)!r} has the name of another column: give it another one")
-        _check_known(self.measured, MEASURES, "measure")
-        _check_known(self.by, self.cases[0].axes, "axis")
+        axes = (*self.cases[0].axes, "arm", "shaper")
+        for name in self.by:
+            if name not in axes:
+                raise StudyError(f"{name!r} is no axis: there are {', '.join(axes)}")
         _check_alone([method.name for method in self.methods], "methods")
-        try:
-            _ = self.columns
-        except ValueError as error:
-            raise StudyError(str(error)) from error
+        _ = self.schema
 
     def _check_case(self, place: str, case: Case) -> None:
         first = self.cases[0]
@@ -98,43 +182,82 @@ class Study:
         for limit, value in vars(case.limits).items():
             if not (isinstance(value, int | float) and value > 0.0):
                 raise StudyError(f"{place} has the {limit} limit {value!r}: must be a positive number")
-        if len(case.arms) != len(first.arms):
-            raise StudyError(f"{place} has {counted(len(case.arms), 'arm')}: all need as many")
         _check_alone([arm.name for arm in case.arms], f"arms of {place}")
 
-    def plan(self) -> Plan:
-        """Return what the engine runs."""
-        methods = tuple(self.methods)
-        jobs = [Job(case, methods, self.measured, self.as_served) for case in self.cases]
-        identity = {
-            "title": self.title,
-            "contents of its file": sha256(self.file).hexdigest(),
-            "version of tvist": version("tvist"),
-        }
-        return Plan(jobs, schema_of(self.columns), identity)
+    def determined_by(self) -> dict[str, Any]:
+        """Return what determines the rows, by names that a message can give."""
+        return {"title": self.title, **self.facts, **self.identity, "version of tvist": version("tvist")}
 
-    def summary(self, rows: pl.DataFrame, shares: Shares = SHARES) -> list[dict[str, Any]]:
-        """Return an entry for each setting, arm and method, over all other axes; `ENDS` is for few rows."""
-        keys = [*self.by, *(["arm"] if len(self.cases[0].arms) > 1 else []), "shaper"]
-        numbers = {"rows": pl.len(), **{name: OF_STATUS[name].sum() for name in (MEASURED, FAILED)}}
-        return summarized(rows, keys, numbers, dict.fromkeys(self.measured, shares))
+    def frame(self, rows: Sequence[Row]) -> pl.DataFrame:
+        """Return rows as a table with all columns; what a row lacks is null."""
+        schema = self.schema
+        return pl.DataFrame([{name: row.get(name) for name in schema} for row in rows], schema=schema)
 
-    def shown(self, entries: Sequence[dict[str, Any]]) -> list[Shown]:
-        """Return the columns of its table."""
-        keys = [name for name in entries[0] if name not in {"rows", "failed", *self.measured}]
-        figures = [
-            Shown(f"{name}{'' if share == 'median' else f' {share}'}", f"{name}.{share}", DIGITS)
-            for name in self.show
-            for share in ("median", "p95", *ENDS)
-            if share in entries[0][name]
-        ]
-        return [*(Shown(name, name) for name in keys), *figures]
+    def summary(self, rows: pl.DataFrame, *more: str) -> list[dict[str, Any]]:
+        """Return an entry for each group of rows, which differ in no key and in none of some more axes."""
+        grouped = self.prepare(rows).group_by([*self.keys, *more], maintain_order=True)
+        return grouped.agg(**COUNTS, **self._computed()).to_dicts()
+
+    def _computed(self) -> dict[str, pl.Expr]:
+        every = dict.fromkeys((*self.show, *(() if self.columns else self.measures)))
+        drawn = (*of_measures(*every), *ends_of(*every)) if self.draw is None else ()
+        columns = (one.of for one in (*self.shown, *self.few, *drawn))
+        worst = map(p5, every) if self.draw is None else ()
+        computed = (*(one for one in columns if isinstance(one, pl.Expr)), *worst, *self.more)
+        return {one.meta.output_name(): one for one in computed}
+
+    def result(self, rows: pl.DataFrame, about: Mapping[str, Any]) -> Result:
+        """Return what was found."""
+        methods = {one.name: one for one in (*self.cases[0].methods, *self.methods)}
+        values = {
+            "title": self.title, **self.facts, **about,
+            "methods": [
+                {"name": one.name, "label": one.label, "told_target": one.told_target} for one in methods.values()
+            ],
+            "arms": {arm.name: arm.label for arm in self.cases[0].arms},
+            "summary": self.summary(rows),
+            **{name: self.summary(rows, *axes) for name, axes in self.splits.items()},
+            "notes": [self.notes] if self.notes else [],
+        }  # fmt: skip
+        found = Result(self, rows, values)
+        self.finish(found)
+        return found
+
+    def tables_of(self, result: Result) -> Sequence[Table]:
+        """Return the tables that show a result."""
+        if self.tables is not None:
+            return self.tables(result)
+        return [self.table_of(result.values["summary"])]
+
+    def table_of(self, entries: Sequence[dict[str, Any]], title: str = "") -> Table:
+        """Return the table of a summary: of few rows, with their ends instead of medians."""
+        many = all(entry.get("counted", entry["rows"]) >= MANY for entry in entries)
+        columns = self.shown if many else self.few or (self.columns or ends_of(*self.show))
+        return Table(title, entries, [*(Column(name, name) for name in self.keys), *columns])
 
 
-def _check_known(names: Iterable[str], known: Iterable[str], what: str) -> None:
-    for name in names:
-        if name not in known:
-            raise StudyError(f"{name!r} is no {what}: there are {', '.join(known)}")
+class _Jobs(Sequence[Job]):
+    def __init__(self, study: Study) -> None:
+        self._study, self._measures = study, study.measured
+
+    def __len__(self) -> int:
+        return len(self._study.cases)
+
+    def __getitem__(self, place: Any) -> Any:
+        case, study = self._study.cases[place], self._study
+        return Job(case, case.methods or tuple(study.methods), self._measures, study.as_served)
+
+
+def _kind_of(name: str, cases: Iterable[Case]) -> Any:
+    """Return the type of the column of an axis; whole numbers and others among them are as the others."""
+    kinds = {type(case.axes[name]) for case in cases}
+    if kinds == {int, float}:
+        kinds = {float}
+    if len(kinds) > 1:
+        raise StudyError(
+            f"axis {name!r} has values of the types {', '.join(sorted(kind.__name__ for kind in kinds))}"
+        )
+    return KINDS.get(kinds.pop(), pl.String)
 
 
 def _check_alone(names: Sequence[str], what: str) -> None:
@@ -143,12 +266,7 @@ def _check_alone(names: Sequence[str], what: str) -> None:
 
 
 def read_study(path: Path) -> Study:
-    """Run a Python file, and return its `STUDY`.
-
-    Raises:
-        StudyError: The file cannot be run, or has no study that can be made.
-        OSError: The file cannot be read.
-    """
+    """Run a Python file, and return its `STUDY`."""
     content = path.read_bytes()
     module = run_file(path, "study", StudyError)
     found = getattr(module, "STUDY", None)
@@ -158,4 +276,4 @@ def read_study(path: Path) -> Study:
         found.check()
     except StudyError as error:
         raise StudyError(f"study {path}: {error}") from error
-    return replace(found, file=content)
+    return replace(found, identity={"contents of its file": sha256(content).hexdigest()})

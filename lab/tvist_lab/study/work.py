@@ -48,11 +48,7 @@ class Job:
 
 
 class Bench:
-    """The arms and the line of a job, on which its motions are made.
-
-    Args:
-        job: The job.
-    """
+    """The arms and the line of a job, on which its motions are made."""
 
     def __init__(self, job: Job) -> None:
         self.job, case = job, job.case
@@ -68,6 +64,8 @@ class Bench:
             case.description, np.array(case.move.start), self._body(case.declared.mass), law
         )
         self._plain: dict[str, Motion] = {}
+        self.ticks: int | None = None
+        """Duration of the first motion, which others are as long as; None before it is measured."""
 
     @cached_property
     def _arms(self) -> dict[str, SimulatedArm]:
@@ -78,20 +76,12 @@ class Bench:
     def _body(self, mass: float) -> Payload:
         return body(paper_payload(self.job.case.description, mass))
 
-    def make(self, method: Method, ticks: int | None = None) -> Iterator[tuple[str, Motion]]:
-        """Yield the motion of each arm, with the arm's name.
-
-        Args:
-            method: The method.
-            ticks: Duration of the motion that it is compared with; None if there is none.
-
-        Raises:
-            ShaperFaultError: The method gives no shaped reference.
-        """
+    def make(self, method: Method) -> Iterator[tuple[str, Motion]]:
+        """Yield the motion of each arm, with the arm's name."""
         if isinstance(method, Waiting):
             yield from ((arm.name, self.unshaped(arm.name)) for arm in self.job.case.arms)
             return
-        shaped = method.shaped(replace(self.task, ticks=ticks))
+        shaped = method.shaped(replace(self.task, ticks=self.ticks))
         follow, first = self._following(shaped), None
         for arm in self.job.case.arms:
             unshaped = partial(self.unshaped, arm.name)
@@ -114,21 +104,9 @@ class Bench:
 
 
 def measure(job: Job) -> tuple[Row, ...]:
-    """Make a case by every method, on every arm; methods after the first are compared with it.
-
-    Raises:
-        ShaperFaultError: A method gives no shaped reference.
-        RecipeError: There is no such filter for this arm.
-    """
+    """Make a case by every method, on every arm; methods after the first are compared with it."""
     bench = Bench(job)
-    found: list[Row] = []
-    ticks = None
-    for method in job.methods:
-        for arm, motion in bench.make(method, ticks):
-            found.append(_row(job, method.name, arm, motion))
-            if ticks is None:
-                ticks = round(motion.duration / PERIOD)
-    return tuple(found)
+    return tuple(row for method in job.methods for row in _rows(bench, method))
 
 
 def measure_each(job: Job) -> tuple[Row, ...]:
@@ -146,12 +124,22 @@ def measure_each(job: Job) -> tuple[Row, ...]:
     found: list[Row] = []
     for method in job.methods:
         try:
-            found += [_row(job, method.name, arm, motion) for arm, motion in bench.make(method)]
+            found += _rows(bench, method)
         except ShaperFaultError as fault:
             found += _lost(job, method.name, FAILED, f"the shaper {fault}")
         except Exception as error:  # noqa: BLE001  it costs these rows alone
             found += _lost(job, method.name, FAILED, why(error))
     return tuple(found)
+
+
+def _rows(bench: Bench, method: Method) -> list[Row]:
+    """Make the motions of a method, and measure them."""
+    job = bench.job
+    found: list[Row] = []
+    for arm, motion in bench.make(method):
+        found.append(job.head(method.name, arm) | {"status": MEASURED, **measured(motion, job.measures)})
+        bench.ticks = bench.ticks or round(motion.duration / PERIOD)
+    return found
 
 
 def record(job: Job) -> tuple[Recording, Recording]:
@@ -173,7 +161,3 @@ def why(error: Exception) -> str:
 
 def _lost(job: Job, method: str, status: str, error: str) -> list[Row]:
     return [job.head(method, arm.name) | {"status": status, "error": error} for arm in job.case.arms]
-
-
-def _row(job: Job, method: str, arm: str, motion: Motion) -> Row:
-    return job.head(method, arm) | {"status": MEASURED, **measured(motion, job.measures)}

@@ -3,19 +3,19 @@
 from typing import Any
 
 from tvist_controller.api.line import calibrations, load_calibration
-from tvist_lab.study.tables import Entry, Shown
+from tvist_lab.study.columns import Column, Entry
 from tvist_plant.description import RobotDescription
 from tvist_plant.robot_tables import ORIGINS
 from tvist_plant.similar import stretched
 
 SIZE = (
-    Shown("model", "model"), Shown("joints", lambda one: len(one["joints"])), Shown("length m", "length_m", 2),
-    Shown("payload kg", lambda one: f"{one['payload_kg']:g}"),
+    Column("model", "model"), Column("joints", lambda one: len(one["joints"])), Column("length m", "length_m", 2),
+    Column("payload kg", lambda one: f"{one['payload_kg']:g}"),
 )  # fmt: skip
 """Columns about what an arm is."""
 REDUCED = (
-    Shown("less % median", "reduction_percent.median", 1), Shown("p5", "reduction_percent.p5", 1),
-    Shown("delay ms", "delay_ms", 0),
+    Column("less % median", "reduction_percent.median", 1), Column("p5", "reduction_percent.p5", 1),
+    Column("delay ms", "delay_ms", 0),
 )  # fmt: skip
 """Columns about the effect of auto."""
 
@@ -24,19 +24,20 @@ def _origin_of_drives(one: Entry) -> str:
     return next((kind for kind, told in one["origins"].items() if "drives" in told), "not told")
 
 
-def frequencies(title: str) -> Shown:
+def frequencies(title: str) -> Column:
     """Return the column of the errors of a calibration's frequencies."""
-    return Shown(title, lambda one: ", ".join(f"{value:.1f}" for value in one["f_d_error_percent"]))
+    return Column(title, lambda one: ", ".join(f"{value:.1f}" for value in one["f_d_error_percent"]))
 
 
 LISTED = (
-    Shown("name", "name"), *SIZE,
-    Shown("springs and drives", _origin_of_drives),
-    Shown("calibrations", lambda one: ", ".join(one["calibrations"]) or "–"),
+    Column("name", "name"), *SIZE,
+    Column("springs and drives", _origin_of_drives),
+    Column("calibrations", lambda one: ", ".join(one["calibrations"]) or "–"),
 )  # fmt: skip
 RESULTS = (
-    Shown("name", "name"), Shown("springs", lambda one: f"× {one['stiffness']:g}"), Shown("calibration", "calibration"),
-    frequencies("f_d off % 1, 2, 3"), Shown("moves", "counted"), *REDUCED, Shown("sag off %", "sag_error_percent", 2),
+    Column("name", "name"), Column("springs", lambda one: f"× {one['stiffness']:g}"),
+    Column("calibration", "calibration"),
+    frequencies("f_d off % 1, 2, 3"), Column("moves", "counted"), *REDUCED, Column("sag off %", "sag_error_percent", 2),
 )  # fmt: skip
 
 

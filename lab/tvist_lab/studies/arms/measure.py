@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,12 @@ from tvist_lab.identification.calibrate import calibrate, true_errors
 from tvist_lab.identification.design import free_configurations
 from tvist_lab.identification.jogs import make_jogs, plan_jogs
 from tvist_lab.in_process import robot_in_process
-from tvist_lab.studies.evaluate import feasible, jobs, report
+from tvist_lab.studies.moves import study
 from tvist_lab.study.arms import stiffer
-from tvist_lab.study.engine import made
-from tvist_lab.study.method import Named
+from tvist_lab.study.asked import Asked
+from tvist_lab.study.catalogue import some
+from tvist_lab.study.engine import run
 from tvist_lab.study.moves import draw_moves
-from tvist_lab.study.recipes import Recipe
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
@@ -62,22 +63,21 @@ def measure(
     known = asyncio.run(_identified(arm, seed)) if calibration is None else calibration
     mass = arm.payload.mass
     drawn = draw_moves(arm, moves, seed, (mass, mass)).moves
-    able = feasible(drawn, arm)
-    judged = []
-    for rows in made(jobs(arm, able, seed, Named(Recipe("auto", known), "auto"))):
-        judged.append(rows)
-        progress(1)
-    progress(len(drawn) - len(able))
-    summary = report(judged)
+    asked = Asked(description=arm, moves=drawn, methods=some(["auto"], arm, known), named=1, seed=seed)
+    wanted = study(asked)
+    weak = len(drawn) - len(wanted.cases)
+    progress(weak)
+    ran = run(wanted, progress=lambda _: nullcontext(progress))
+    summary = wanted.summary(ran.rows)[0]
     return {
         "stiffness": stiffness,
         "calibration": "identified" if calibration is None else known.name,
         "f_d_error_percent": [one.f_d.median for one in true_errors(arm, known, (paper_payload(arm),), seed)],
-        "moves": len(able),
-        "too_weak": len(drawn) - len(able),
+        "moves": len(wanted.cases),
+        "too_weak": weak,
         "counted": summary["counted"],
-        "reduction_percent": {key: summary["reduction_percent"][key] for key in ("median", "p5", "min")},
-        "delay_ms": summary["delay_ms"]["median"],
+        "reduction_percent": {key: summary[f"reduction_percent_{key}"] for key in ("median", "p5", "min")},
+        "delay_ms": summary["delay_ms_median"],
         "sag_error_percent": sag_error(arm, seed),
     }
 

@@ -9,7 +9,7 @@ from tvist_lab.metrics import table_2 as table_2_of
 from tvist_lab.metrics import table_notes
 from tvist_lab.studies.paper.experiment import ACCELERATION, Experiment, JudgedRun
 from tvist_lab.studies.paper.published import MOTIONS, published
-from tvist_lab.study.tables import Shown, cells
+from tvist_lab.study.columns import Column, cells
 
 FITTED = "fitted"
 TUNED = "tuned"
@@ -46,9 +46,9 @@ FIGURES = ("delay ms", "stabilisation ms", "cycle ms", "overshoot m", "RV m/s²"
 IMPACTS = ("stabilisation", "cycle", "overshoot", "residual_vibration")
 """What shaping changes, in the order of these figures."""
 METHODS = (
-    Shown("method", "label"), Shown("delay ms", "delay_ms", 0), Shown("RV m/s²", "residual_vibration_m_s2", 3),
-    Shown("peak m/s²", "peak_m_s2", 3), Shown("less peak %", "peak_reduction_percent", 1),
-    Shown("still after ms", "still_after_ms", 0), Shown("peak q̈ / limit", "peak_acceleration_ratio", 3),
+    Column("method", "label"), Column("delay ms", "delay_ms", 0), Column("RV m/s²", "residual_vibration_m_s2", 3),
+    Column("peak m/s²", "peak_m_s2", 3), Column("less peak %", "peak_reduction_percent", 1),
+    Column("still after ms", "still_after_ms", 0), Column("peak q̈ / limit", "peak_acceleration_ratio", 3),
 )  # fmt: skip
 """Columns of a table of methods."""
 

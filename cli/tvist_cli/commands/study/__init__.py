@@ -1,1 +1,0 @@
-"""The commands of `tvist study`, one module each."""

@@ -1,0 +1,85 @@
+"""What a study that comes with the package is made of: a robot, moves and shapers, as they were asked for."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from tvist_controller.api.line import MotionLimits
+from tvist_lab.study.case import Case, arm_seed
+from tvist_lab.study.line import PAPER
+from tvist_lab.study.menus import Menu
+from tvist_lab.study.method import Method
+from tvist_lab.study.moves import Move
+from tvist_lab.study.study import Study, StudyError
+from tvist_plant.description import RobotDescription
+from tvist_plant.variants import Variant
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """A robot, moves and shapers, all checked."""
+
+    description: RobotDescription
+    """The arm, and the controller's model of it."""
+    moves: Sequence[Move]
+    methods: Sequence[Method]
+    """Those that the study always has, the shapers that were named, the baselines."""
+    named: int = 0
+    """Number of the former."""
+    arms: Sequence[Variant] = ()
+    """The plants that were named."""
+    seed: int = 0
+    """Seed of gear errors and deviations."""
+    limits: MotionLimits = PAPER
+    payload_error: float = 0.0
+    """Error of the declared mass, relative to the carried one [-]."""
+    streams: bool = False
+    """Whether to follow streams from the start of each move."""
+    quick: bool = False
+    """Whether a few motions are enough."""
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    """What --json prints of all this."""
+    notes: Sequence[str] = ()
+    """What a reader has to know of the moves."""
+    on: "Callable[[str], Asked | None]" = lambda _: None
+    """Returns the same for another robot that comes with the package; None if another one than the default
+    was asked for."""
+
+    def feasible(self) -> list[Move]:
+        """Return the moves for which the drives are strong enough."""
+        if self.streams:
+            return list(self.moves)
+        return [
+            one for one in self.moves if Case(self.description, one, limits=self.limits).torque_share <= 1.0
+        ]
+
+    def cases(self, moves: Sequence[Move], arms: Sequence[Variant]) -> list[Case]:
+        """Return a case for each move, with its number, on some arms."""
+        if not moves:
+            raise StudyError("the drives are too weak for all of these moves at these limits")
+        return [
+            Case(
+                self.description, move, arm_seed(self.seed, place), tuple(arms), self.limits, self.payload_error,
+                self.streams, axes={"move": place + 1, "payload_kg": move.mass},
+            )
+            for place, move in enumerate(moves)
+        ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A study that comes with the package."""
+
+    study: Callable[[Asked], Study]
+    always: tuple[str, ...] = ()
+    """Methods that come first, whatever is named."""
+    shapers: tuple[str, ...] = ()
+    """Shapers that are made unless others are named."""
+    menu: Menu | None = None
+    """Menu of the baselines; None if there are none."""
+    options: frozenset[str] = frozenset()
+    """Options that it has, besides those of all presets."""
+    modal: bool = True
+    """Whether each calibration needs a modal model."""
+    least: int = 1
+    """Least number of moves."""
