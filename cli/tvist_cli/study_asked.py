@@ -169,7 +169,7 @@ def _calibration(
         found = calibrations.load(given)
         if modal and found.modal is None:
             raise Failure(
-                f"calibration {found.name} has no modal model: make one with tvist identify --model modal",
+                f"calibration {found.name} has no modal model: make one with tvist identify",
                 code=2,
             )
         return found
