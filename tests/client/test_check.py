@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from tvist_cli.commands.check import check as check_command
 from tvist_cli.commands.watch import _load
+from tvist_cli.connection import Connection
 from tvist_cli.failure import Failure
 from tvist_client import check as checking
 from tvist_client.__main__ import main
@@ -237,7 +238,7 @@ def test_a_robot_that_is_starting_is_not_ready_and_says_how_far_it_is(starting, 
     assert json.loads(capsys.readouterr().out)["starting"] is True
     assert not check(endpoint, alive=True).ok  # an orchestrator waits for it, too
     with pytest.raises(Failure, match=r"^the robot is starting: 45 of 102"):
-        check_command(endpoint)
+        check_command(Connection(endpoint=endpoint))
 
 
 def test_check_waits_for_a_robot_that_starts_and_tells_what_it_hears(starting, endpoint):

@@ -239,7 +239,7 @@ async def test_what_is_put_on_a_wildcard_key_is_not_taken_for_the_robots(realtim
     for key in ("tvist/*/event", "tvist/**"):
         transport._session.put(key, encode(Event(tick=0, kind="protective_stop")))
     await transport.info()  # the puts have passed
-    realtime.post(lambda: realtime.robot.put("event", encode(Event(tick=1, kind="warning"))))
+    realtime.post(lambda: realtime.robot.put("event", Event(tick=1, kind="warning")))
     assert (await anext(events)).kind == "warning"
     await transport.close()
 
