@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.offered import ROBOTS, SOURCES
 from tvist_cli.output import default_output
 
 ENDPOINT = re.compile(r"(tcp|tls|udp|quic|ws|unixsock-stream)/.+")
@@ -19,10 +20,10 @@ HEAVIEST = 100.0
 
 
 def identify(
-    *sources: str,
+    *sources: Annotated[str, SOURCES],
     at: Connection = LOCAL,
     output: Path | None = None,
-    robot: str | None = None,
+    robot: Annotated[str | None, ROBOTS] = None,
     payload: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     declare: bool = False,
     ring_downs: int = 12,
