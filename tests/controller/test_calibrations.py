@@ -75,7 +75,7 @@ def test_it_is_near_the_true_modes_with_any_payload(shipped):
 def test_a_calibration_without_the_model_asked_for_or_of_another_arm_is_refused(shipped):
     for wrong, words in (
         (REPLACE(shipped, robot="UR10e"), "'UR5e', which this arm"),
-        (load("ur5e_5kg"), "--model modal"),
+        (load("ur5e_5kg"), "tvist identify"),
     ):
         with pytest.raises(EstimatorError, match=words):
             modal_estimator(wrong, UR5E, paper_payload(UR5E))

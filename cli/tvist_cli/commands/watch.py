@@ -48,7 +48,7 @@ def watch(
     Args:
         at: Where the robot is, or the robots are.
         states: Show the newest states of all robots that a key with wildcards selects, one line each:
-            tvist/*/state, or **/tvist/*/state for all namespaces.
+            `tvist/*/state`, or `**/tvist/*/state` for all namespaces.
         seconds: Stop after this many seconds.
         json: Print each event, and the state ten times a second, as one JSON object per line; of several robots, one
             object a second.
