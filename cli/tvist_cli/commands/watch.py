@@ -56,6 +56,8 @@ def watch(
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     if states is not None:
+        if at.name is not None:
+            raise Failure("--states is about many robots: leave --name out", code=2)
         with told(MisuseError, code=2):
             many = ManyStates(states, at.endpoint, security=at.security, namespace=at.namespace)
         _watch_for(seconds, _watch_states(many, json=json), "the robots keep running")
