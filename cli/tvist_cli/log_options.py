@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
+from tvist_cli.offered import ROBOTS
 
 if TYPE_CHECKING:
     from tvist_lab.recordings import Recording
@@ -26,7 +27,7 @@ class LogOptions:
     gyroscope, in any format of a log. Repeatable: one for each robot's log."""
     imu_columns: str | None = None
     """Names of the columns of --imu, as for --columns: time=t:ms,accelerometer=a{}:g,gyroscope=w{}:deg/s."""
-    robot: str | None = None
+    robot: Annotated[str | None, ROBOTS] = None
     """Robot that moves the sensor of --imu: name of one that comes with the package, or path of a robot file [that of
     the log, or ur5e]."""
 

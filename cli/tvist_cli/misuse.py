@@ -41,7 +41,8 @@ def lower(name: str | None) -> str | None:
 def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> None:
     """Refuse fractions for whole numbers, which the parser would round."""
     for argument in arguments:
-        if argument.hint is not int and int not in get_args(argument.hint):
+        parts = (argument.hint, *get_args(argument.hint))
+        if int not in (*parts, *(one for part in parts for one in get_args(part))):
             continue
         for token in argument.tokens:
             if not _WHOLE.fullmatch(token.value):

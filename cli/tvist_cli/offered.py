@@ -37,6 +37,12 @@ def _names(kind: str) -> Iterable[str]:
             from tvist_controller.sources.own_plants import named_plants
 
             found = named_plants()
+        case "study":
+            from tvist_cli.study_options import NAMES
+
+            found = NAMES
+        case "source":
+            found = ()
         case "world":
             from tvist_plant.world.scene_file import scenes
 
@@ -48,9 +54,9 @@ def _names(kind: str) -> Iterable[str]:
     return found
 
 
-def _offered(kind: str, ending: str | None = None) -> Parameter:
+def _offered(kind: str, *endings: str) -> Parameter:
     def complete(context: "CompletionContext") -> list[str]:
-        typed, ends = escape(context.incomplete), () if ending is None else (ending, "/")
+        typed, ends = escape(context.incomplete), (*endings, "/") if any(endings) else endings
         return [*_names(kind), *(file for end in ends for file in glob(f"{typed}*{end}"))]  # noqa: PTH207  a text
 
     return Parameter(completer=complete)
@@ -62,5 +68,8 @@ COMPARED = _offered("compared", ".py")
 """Shapers and baselines that studies compare."""
 PLANTS = _offered("plant", ".py")
 WORLDS = _offered("world", ".xml")
+STUDIES = _offered("study", ".toml", ".py")
+SOURCES = _offered("source", "")
+"""Logs of any format."""
 PROFILES = _offered("profile")
 POSES = _offered("pose")

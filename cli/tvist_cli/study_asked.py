@@ -47,7 +47,7 @@ def preset_study(name: str, options: StudyOptions) -> Study:
     preset = PRESETS[name]
     of_others = {one for other in PRESETS.values() for one in other.options} - preset.options
     for option in options.given:
-        if option in of_others:
+        if option in of_others or (option == "baselines" and preset.menu is None):
             raise Failure(f"--{option.replace('_', '-')} is not for {name}: see tvist study --help", code=2)
     _check(options)
     with told(StudyError, MovesError, DescriptionError, CandidateError, *OF_SHAPERS, code=2):

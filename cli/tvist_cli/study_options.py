@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from tvist_cli.offered import COMPARED, PLANTS, ROBOTS
 
-SEVERAL = Parameter(consume_multiple=True)
+SEVERAL = Parameter(consume_multiple=1)
 NAMES = ("moves", "bench", "robustness", "match")
 """Names of the studies that come with the package."""
 
@@ -27,7 +27,7 @@ class StudyOptions:
     for a shaper of your own; or FILE.py with a class that has step(q_ref, info) -> q_star, and optionally
     reset(q) and delay in s [moves: zv; bench and robustness: those of the documentation's page]."""
     baselines: bool = False
-    """Make the moves by the study's baselines, too, as it does if no shapers are named."""
+    """Not with match: make the moves by the study's baselines, too, as it does if no shapers are named."""
     plants: Annotated[list[str] | None, PLANTS, SEVERAL] = None
     """With moves and match, arms with something that the controller does not know, such as stribeck,
     hysteresis, torsion, base, backlash, combined, springs-30 or springs+30 [moves: the arm as described;

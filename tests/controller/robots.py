@@ -7,7 +7,6 @@ from tvist_controller.controller import Controller
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.instruments.report import Sink
 from tvist_controller.line.cycle import ControlCycle
-from tvist_controller.line.elastic_lead import loads_of
 from tvist_controller.line.limits import TorqueRoom
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.trajectory import JointLine, MotionLimits, SetpointStream, quickest_motion
@@ -206,10 +205,3 @@ class Robot:
 
 def bits(states):
     return [encode(state) for state in states]
-
-
-def spring_loads(lead, target):
-    """Torques on all springs of an arm whose links do not bend."""
-    lead.motion[:, lead.joints.astype(int)] = target
-    loads_of(lead)
-    return lead.loads[0]

@@ -36,7 +36,7 @@ def around(hand):
 def identified(path, arm):
     """The options that serve an arm with a calibration of its own."""
     file = str(path.resolve().with_suffix(".json"))
-    fit = ("--model", "modal", "--ring-downs", "8", "--robot", arm.relative_to(ROOT), "--output", file)
+    fit = ("--ring-downs", "8", "--robot", arm.relative_to(ROOT), "--output", file)
     done = finished("-m", "tvist_cli", "identify", *fit, cwd=ROOT)  # its words are in the calibration
     assert done.returncode == 0, done.stderr
     return "--robot", str(arm), "--calibration", file

@@ -29,6 +29,10 @@ CASES = {
     "tvist serve --profile u": {"ursim"},
     "tvist move Q": {"Q1", "Q2", "Q3"},
     "tvist study moves --shapers zvd": {"zvd", "zvdd", "zvddd"},
+    "tvist study b": {"bench"},
+    "tvist study a": {"arm.toml"},
+    "tvist study bench --shapers zvd": {"zvd", "zvdd", "zvddd"},
+    "tvist identify wa": {"wave.script"},
     "tvist move Q1 --shaper el": {"elastic", "elastic-auto", "elastic-position"},
 }
 """Typed lines with what completes their last word."""

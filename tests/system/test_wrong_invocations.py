@@ -41,6 +41,11 @@ MISUSE = [
     (("router", "--listen", "tcp/0.0.0.0:7447"), ["--security", "--insecure"]),
     (("watch", "--states", "tvist/*/event"), ["must end in /state"]),
     (("watch", "--states", "tvist//*/state"), ["is not a key"]),
+    (("watch", "--states", "tvist/*/state", "--name", "ur5e"), ["leave --name out"]),
+    (("study", "moves", "--payload"), ["needs a value"]),
+    (("study", "moves", "--hidden", "1.5"), ["must be a whole number"]),
+    (("study", "match", "--shapers", "zv", "zvd", "--baselines"), ["--baselines is not for match"]),
+    (("identify", "--payload", "--figures", "maps"), ["figures is for a calibration"]),
     (("serve", "--namespace", "Hall 3"), ["namespace", "a-z 0-9"]),
     (("serve", "--connect", "hall"), ["connect is 'hall'"]),
     (

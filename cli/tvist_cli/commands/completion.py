@@ -17,8 +17,11 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
     Args:
         shell: Shell that will read the script.
     """
-    from tvist_cli.main import application  # which imports nothing of the commands before
+    from tvist_cli.main import OF_GROUPS, application  # which imports nothing of the commands before
 
     script = application().generate_completion(prog_name="tvist", shell=shell)
+    # cyclopts' script for bash takes the name of any command for one, wherever it stands, such as the study bench.
+    of_group = f'[[ -z "${{cmd_path[0]}}" || " {" ".join(OF_GROUPS)} " == *" ${{cmd_path[*]}} "* ]]'
+    script = script.replace('if [[ " $all', f'if {of_group} && [[ " $all')
     # zsh reads the file as the body of a function when something is completed for the first time.
     print(script, end='\n_cyclopts_tvist "$@"\n' if shell == "zsh" else "")

@@ -7,6 +7,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, print_json, program, progress, words
 from tvist_cli.pages import Door
 from tvist_cli.paper_tables import print_paper
@@ -32,7 +33,7 @@ def demo(
     tables: bool = False,
     view: bool = False,
     runs: int | None = None,
-    robot: str | None = None,
+    robot: Annotated[str | None, ROBOTS] = None,
     calibration: str | None = None,
     baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
     look: FigureOptions = AS_USUAL,

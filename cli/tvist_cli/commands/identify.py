@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.offered import ROBOTS, SOURCES
 from tvist_cli.output import default_output
 
 ENDPOINT = re.compile(r"(tcp|tls|udp|quic|ws|unixsock-stream)/.+")
@@ -19,10 +20,10 @@ HEAVIEST = 100.0
 
 
 def identify(
-    *sources: str,
+    *sources: Annotated[str, SOURCES],
     at: Connection = LOCAL,
     output: Path | None = None,
-    robot: str | None = None,
+    robot: Annotated[str | None, ROBOTS] = None,
     payload: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     declare: bool = False,
     ring_downs: int = 12,
@@ -74,7 +75,7 @@ def identify(
     """
     masses, found = _masses_and_sources(payload, sources)
     weigh = payload is not None and masses is None
-    places = [one for one in found if "://" in one]
+    places = [one for one in found if one.startswith("ur://")]
     served = [one for one in found if ENDPOINT.fullmatch(one)]
     files = [Path(one) for one in found if one not in places and one not in served]
     elsewhere = at != LOCAL and bool(places or files)
@@ -87,6 +88,8 @@ def identify(
         ("check", check, twin, "--twin"),
         ("yes", yes, places, "a robot at ur://ADDRESS"),
         ("declare", declare, weigh and live, "--payload without a mass, of a robot"),
+        ("figures", figures, not (weigh or twin), "a calibration"),
+        ("ring-downs", ring_downs != 12, live and not weigh, "jogs"),
         ("payload without a mass", weigh, live and not places, "a served robot: name a mass"),
     ):
         if given and not needed:

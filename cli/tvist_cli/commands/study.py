@@ -1,14 +1,16 @@
 """`tvist study`: run a study that comes with the package, or one of your own from a file."""
 
 from pathlib import Path
+from typing import Annotated
 
 from tvist_cli.failure import Failure
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.offered import STUDIES
 from tvist_cli.study_options import AS_SHIPPED, NAMES, StudyOptions
 
 
 def study(
-    study: str,
+    study: Annotated[str, STUDIES],
     /,
     *,
     options: StudyOptions = AS_SHIPPED,

@@ -48,7 +48,7 @@ def watch(
     Args:
         at: Where the robot is, or the robots are.
         states: Show the newest states of all robots that a key with wildcards selects, one line each:
-            tvist/*/state, or **/tvist/*/state for all namespaces.
+            `tvist/*/state`, or `**/tvist/*/state` for all namespaces.
         seconds: Stop after this many seconds.
         json: Print each event, and the state ten times a second, as one JSON object per line; of several robots, one
             object a second.
@@ -56,6 +56,8 @@ def watch(
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     if states is not None:
+        if at.name is not None:
+            raise Failure("--states is about many robots: leave --name out", code=2)
         with told(MisuseError, code=2):
             many = ManyStates(states, at.endpoint, security=at.security, namespace=at.namespace)
         _watch_for(seconds, _watch_states(many, json=json), "the robots keep running")

@@ -170,7 +170,7 @@ def known_friction(
 def _modal(calibration: Calibration, description: RobotDescription) -> ModalModel:
     """Return the modal model of a calibration of this arm."""
     if calibration.modal is None:
-        wanted = "a model of the springs, made by tvist identify; this one has polynomials alone"
+        wanted = "a model that tvist identify makes; this calibration has polynomials alone"
         raise EstimatorError("modal", None, wanted)
     if calibration.robot != description.robot.model:
         raise EstimatorError("robot", calibration.robot, f"{description.robot.model!r}, which this arm is")

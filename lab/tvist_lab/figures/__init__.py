@@ -10,7 +10,7 @@ from tvist_lab.figures.paper_metrics import figure_15, figure_16
 from tvist_lab.figures.pareto import pareto_figure, settling_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure
 from tvist_lab.figures.ring_down import ring_down_figure
-from tvist_lab.figures.sheets import FORMATS, STYLES, StyleError, house_settings, house_style, save
+from tvist_lab.figures.sheets import StyleError, house_settings, house_style, save
 from tvist_lab.figures.studies import residual_by_move_figure, robustness_figure, study_figure, sweep_figure
 from tvist_lab.figures.wrong_frequency import (
     catalogue_figure,
@@ -20,8 +20,6 @@ from tvist_lab.figures.wrong_frequency import (
 )
 
 __all__ = [
-    "FORMATS",
-    "STYLES",
     "Recorded",
     "Shown",
     "StyleError",

@@ -14,8 +14,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-FORMATS = ("png", "pdf", "svg")
-"""Formats of figures: one bitmap, two of lines."""
 STYLES = ("paper", "slides")
 """Style sheets besides the usual one: words in a text beside the figure, and larger type."""
 SUFFIX = ".mplstyle"

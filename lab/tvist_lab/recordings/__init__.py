@@ -3,7 +3,6 @@
 from tvist_lab.recordings.read import read
 from tvist_lab.recordings.recording import (
     STATE_COLUMNS,
-    TRUTH_PREFIX,
     Floats,
     MissingColumnError,
     Recording,
@@ -12,7 +11,6 @@ from tvist_lab.recordings.recording import (
 
 __all__ = [
     "STATE_COLUMNS",
-    "TRUTH_PREFIX",
     "Floats",
     "MissingColumnError",
     "Recording",
