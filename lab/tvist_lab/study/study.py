@@ -96,7 +96,7 @@ class Study:
     splits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Further axes that further summaries distinguish, by the names that these have in --json."""
     show: tuple[str, ...] = ("reduction_percent", "delay_ms")
-    """Measures in the table and in the figure, unless there are columns."""
+    """Measures in the figure, and in the table unless there are columns."""
     columns: tuple[Column, ...] = ()
     """Columns of the table."""
     few: tuple[Column, ...] = ()
