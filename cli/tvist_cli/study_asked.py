@@ -53,6 +53,7 @@ def preset_study(name: str, options: StudyOptions) -> Study:
     with told(StudyError, MovesError, DescriptionError, CandidateError, *OF_SHAPERS, code=2):
         asked = _asked(preset, name, options)
         made = preset.study(asked)
+        made.check()
     if options.save_moves is not None:
         with told(OSError):
             write_moves(options.save_moves, asked.moves)

@@ -362,11 +362,19 @@ def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
             "show is 'delay_ms': must be a tuple",
         ),
         (('"unshaped_peak_m_s2", "shaped_peak_m_s2"', ""), "show is empty"),
+        (
+            ("show=(", 'columns=(Column("x", median("peek")),), show=('),
+            "a column needs 'peek', no measure: there are ",
+        ),
+        (
+            ("show=(", 'columns=(Column("x", "delay_ms"),), show=('),
+            r"'x' needs an expression, such as median\('delay_ms'",
+        ),
         (("robot = load", "raise SystemExit(3)\nrobot = load"), "running it raises SystemExit"),
     ],
 )
 def test_what_is_wrong_with_a_study_is_a_sentence(tmp_path, change, words):
-    text = of_the_page()
+    text = "from tvist_lab.study.columns import Column, median\n" + of_the_page()
     (tmp_path / "speeds.py").write_text(text.replace(*change), encoding="utf-8")
     with pytest.raises(StudyError, match=words):
         read_study(tmp_path / "speeds.py")

@@ -96,7 +96,7 @@ class Study:
     splits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Further axes that further summaries distinguish, by the names that these have in --json."""
     show: tuple[str, ...] = ("reduction_percent", "delay_ms")
-    """Measures in the table and in the figure, unless there are columns."""
+    """Measures in the figure, and in the table unless there are columns."""
     columns: tuple[Column, ...] = ()
     """Columns of the table."""
     few: tuple[Column, ...] = ()
@@ -137,8 +137,7 @@ class Study:
     @property
     def measured(self) -> tuple[str, ...]:
         """All that is measured."""
-        asked = [name for one in self._computed().values() for name in one.meta.root_names()]
-        return tuple(dict.fromkeys((*self.measures, *(name for name in asked if name in MEASURES))))
+        return tuple(dict.fromkeys((*self.measures, *(name for name in self._needed() if name in MEASURES))))
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -173,7 +172,7 @@ class Study:
             if name not in axes:
                 raise StudyError(f"{name!r} is no axis: there are {', '.join(axes)}")
         _check_alone([method.name for method in self.methods], "methods")
-        _ = self.schema
+        self._check_columns()
 
     def _check_case(self, place: str, case: Case) -> None:
         first = self.cases[0]
@@ -183,6 +182,16 @@ class Study:
             if not (isinstance(value, int | float) and value > 0.0):
                 raise StudyError(f"{place} has the {limit} limit {value!r}: must be a positive number")
         _check_alone([arm.name for arm in case.arms], f"arms of {place}")
+
+    def _check_columns(self) -> None:
+        there = self.prepare(self.frame([])).columns
+        for name in self._needed():
+            if name not in there:
+                raise StudyError(f"a column needs {name!r}, no measure: there are {', '.join(MEASURES)}")
+        entry = (*self.keys, *COUNTS, *self._computed())
+        for one in self.shown if self.finish is Study.finish else ():
+            if isinstance(one.of, str) and one.of not in entry:
+                raise StudyError(f"column {one.title!r} needs an expression, such as median({one.of!r})")
 
     def determined_by(self) -> dict[str, Any]:
         """Return what determines the rows, by names that a message can give."""
@@ -205,6 +214,9 @@ class Study:
         worst = map(p5, every) if self.draw is None else ()
         computed = (*(one for one in columns if isinstance(one, pl.Expr)), *worst, *self.more)
         return {one.meta.output_name(): one for one in computed}
+
+    def _needed(self) -> list[str]:
+        return [name for one in self._computed().values() for name in one.meta.root_names()]
 
     def result(self, rows: pl.DataFrame, about: Mapping[str, Any]) -> Result:
         """Return what was found."""
