@@ -12,6 +12,9 @@ from cyclopts import Parameter
 if TYPE_CHECKING:
     from cyclopts.completion import CompletionContext
 
+NAMES = ("moves", "bench", "robustness", "match")
+"""Names of the studies that come with the package."""
+
 
 def _names(kind: str) -> Iterable[str]:
     """Names of a kind; what they need is imported only when something is completed, so that help stays quick."""
@@ -38,8 +41,6 @@ def _names(kind: str) -> Iterable[str]:
 
             found = named_plants()
         case "study":
-            from tvist_cli.study_options import NAMES
-
             found = NAMES
         case "source":
             found = ()

@@ -9,8 +9,6 @@ from cyclopts import Parameter
 from tvist_cli.offered import COMPARED, PLANTS, ROBOTS
 
 SEVERAL = Parameter(consume_multiple=1)
-NAMES = ("moves", "bench", "robustness", "match")
-"""Names of the studies that come with the package."""
 
 
 @Parameter(name="*")

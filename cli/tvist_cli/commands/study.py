@@ -5,8 +5,8 @@ from typing import Annotated
 
 from tvist_cli.failure import Failure
 from tvist_cli.figure_files import AS_USUAL, FigureOptions
-from tvist_cli.offered import STUDIES
-from tvist_cli.study_options import AS_SHIPPED, NAMES, StudyOptions
+from tvist_cli.offered import NAMES, STUDIES
+from tvist_cli.study_options import AS_SHIPPED, StudyOptions
 
 
 def study(
