@@ -45,7 +45,7 @@ def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> N
         if int not in (*parts, *(one for part in parts for one in get_args(part))):
             continue
         for token in argument.tokens:
-            if not _WHOLE.fullmatch(token.value):
+            if token.value and not _WHOLE.fullmatch(token.value):  # without a value, an option may take none
                 raise CoercionError(token=token, argument=argument, target_type=int)
 
 
