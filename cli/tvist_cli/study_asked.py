@@ -113,7 +113,7 @@ def _asked(
         elif calibrated := _calibrations(named):
             others = baselines(calibrated[0], description, masses, error)
     methods = {one.name: one for one in (*always, *named, *others)}
-    for one in methods.values():  # what cannot be made is told before anything is computed
+    for one in methods.values():  # an error here comes before anything is computed
         if isinstance(one, Named):
             one.recipe.elastic(description, one.recipe.make(description, masses[1]))
     share = None
@@ -164,7 +164,7 @@ def _calibration(
     try:
         several = modal or wanted_modes(name, modes, "shaper", known) > 1
         several = several or known.feed_forward_of(name) != "rigid"
-    except RefusalError:  # a method that is none of the library's; that there is none is told when it is made
+    except RefusalError:  # not a shaper of the library; `some` refuses an unknown name
         several = modal = True
     if given is not None:
         found = calibrations.load(given)

@@ -36,7 +36,7 @@ LISTED = 12
 
 @dataclass(frozen=True)
 class Places:
-    """Where a study writes to, each None if it does not."""
+    """Output files and folders of a study; None writes nothing."""
 
     rows: Path | None
     """Folder of its rows."""

@@ -100,7 +100,7 @@ class Plucked(NamedTuple):
     """The mode at one angle of the elbow, by the formula and fitted to the accelerometer after a pluck."""
 
     mass: float
-    """Of the payload [kg]."""
+    """Mass of the payload [kg]."""
     elbow: float
     """[rad]."""
     inertia: float

@@ -20,7 +20,7 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
     from tvist_cli.main import OF_GROUPS, application  # which imports nothing of the commands before
 
     script = application().generate_completion(prog_name="tvist", shell=shell)
-    # cyclopts' script for bash takes the name of any command for one, wherever it stands, such as the study bench.
+    # cyclopts' script for bash takes `bench` in `tvist study bench` for the command `bench`.
     of_group = f'[[ -z "${{cmd_path[0]}}" || " {" ".join(OF_GROUPS)} " == *" ${{cmd_path[*]}} "* ]]'
     script = script.replace('if [[ " $all', f'if {of_group} && [[ " $all')
     # zsh reads the file as the body of a function when something is completed for the first time.

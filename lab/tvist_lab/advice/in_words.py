@@ -16,7 +16,7 @@ NAMED = 3
 
 
 def verdict(advice: Advice, logs: Sequence[Measured]) -> list[str]:
-    """Return what to do in a sentence, and what that rests on in some more."""
+    """Return the advice, and the reasons for it."""
     said = [_first(advice)]
     if advice.ringing:
         said.append(_ringing(advice))

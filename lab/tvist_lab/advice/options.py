@@ -155,7 +155,7 @@ def left_of_modes(stop: Stop, left: Callable[[float, float], float]) -> float | 
 
 
 def smoothed(stop: Stop, added: float) -> float | None:
-    """What is left if the reference is smoothed by a running mean, which lowers its jerk [%].
+    """Return the vibration that remains if a running mean smooths the reference and so lowers its jerk [%].
 
     The mean is as long as `added` [s], by which the motion ends later. None if too little rest was recorded.
     """

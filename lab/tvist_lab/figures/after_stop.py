@@ -44,7 +44,7 @@ SHOWN = (-50.0, 350.0)
 HEADROOM = 1.6
 """Height of the axis over the larger peak [-]: the end of the braking shows, and the peaks are not small."""
 WORDS_AT = 100.0
-"""Where the curves' names begin [ms]."""
+"""Time at which the names of the curves begin [ms]."""
 BEFORE, AFTER = 100.0, 600.0
 """Time shown before and after the stop of the first of several curves [ms]."""
 

@@ -33,7 +33,7 @@ STABLE: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 """Metadata without the date and the program's version, so that equal figures give equal files."""
 in_print: ContextVar[bool] = ContextVar("in_print", default=False)
-"""Whether headings and explanations are left out of the figures, for a caption."""
+"""Whether figures have no headings and explanations, because a caption has them."""
 
 
 class StyleError(ValueError):
@@ -45,7 +45,7 @@ def house_style(*styles: str) -> Iterator[None]:
     """Draw and save figures in this style.
 
     Args:
-        styles: Any of `STYLES`, and paths of style sheets of one's own; later ones take precedence.
+        styles: Any of `STYLES`, and paths of your own style sheets; later ones take precedence.
 
     Raises:
         StyleError: One of them is neither, cannot be read, or has an unknown setting or a wrong value.
@@ -80,7 +80,7 @@ def house_settings(*styles: str) -> dict[str, Any]:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """The settings of a style sheet of one's own."""
+    """The settings of a user's style sheet."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -1,4 +1,4 @@
-"""Which ring-downs contradict the others, and how well fits predict those that they did not see."""
+"""Find ring-downs that contradict the others, and cross-validate the fit."""
 
 from collections.abc import Sequence
 

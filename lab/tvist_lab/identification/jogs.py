@@ -92,7 +92,7 @@ class JogPlan:
     arm: ArmModes
     """The robot file's arm, with the payloads that it carries."""
     at: Floats
-    """Where it stands, shape (n,) [rad]."""
+    """Present joint angles, shape (n,) [rad]."""
     jogs: tuple[Jog, ...]
     """The jogs, one after the other."""
     ways: MotionLimits
@@ -100,7 +100,7 @@ class JogPlan:
     seed: int
     """Seed of the choice."""
     changed: bool
-    """Whether a simulated arm is made to carry one payload after the other."""
+    """Whether the payload of a simulated arm changes between jogs."""
     turned: Floats | None
     """Where the last joint of a robot that takes positions alone turns to, shape (n,) [rad]; None for others."""
 

@@ -9,10 +9,10 @@ from tvist_client.arm import Arm
 from tvist_lab.recordings import Floats
 from tvist_protocol.errors import RefusedError
 
-Measured = TypeVar("Measured")
+Result = TypeVar("Result")
 
 
-async def or_none(measuring: Awaitable[Measured]) -> Measured | None:
+async def or_none(measuring: Awaitable[Result]) -> Result | None:
     """Wait for a motion or a measurement; return None if the robot refuses it because of a collision."""
     try:
         return await measuring

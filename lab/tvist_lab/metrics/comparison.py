@@ -48,7 +48,7 @@ class ComparedMotion:
 
     @property
     def change(self) -> Change:
-        """What is different after the stop."""
+        """Differences after the stop."""
         both = self.first, self.second
         return Change(*(one.peak_m_s2 for one in both), *(one.still_after_ms for one in both))
 

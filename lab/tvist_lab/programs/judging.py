@@ -123,7 +123,7 @@ def _se3(pose: Sequence[float] | Floats) -> pin.SE3:
 
 
 def is_inside(area: Shape, at: Floats) -> bool:
-    """Whether a point in the frame of an area is in it."""
+    """Return whether an area contains a point, which is in its frame."""
     size = np.array(area.size)
     match area.kind:
         case "box":
@@ -201,7 +201,7 @@ def changes(before: Run, now: Run) -> Iterator[Shortcoming]:
 
 
 def _points(run: Run) -> dict[str, Any]:
-    """What is compared of a run; of one that did not compile, just that."""
+    """Return the figures of a run to compare; if it did not compile, only the error."""
     points: dict[str, Any] = {"exit_reason": run["exit_reason"]}
     if run["exit_reason"] == "compile_error":
         return points

@@ -21,7 +21,7 @@ from tvist_plant.user_file import is_name
 OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
 """Columns that only recordings of this controller have, all together."""
 STRANGE = "is no log that tvist reads"
-"""What is said first of a file that is something else."""
+"""First words of the error for a file of another format."""
 LONG_GAP = 0.02
 """Shortest time without rows that a note reports [s]."""
 SWAPPED = 3

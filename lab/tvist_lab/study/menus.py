@@ -9,7 +9,7 @@ from typing import Literal
 from tvist_shaping.named import BUILT_IN
 
 Menu = Literal["bench", "robustness", "baselines", "lesson"]
-"""Where a method is made unless others are named: ShaperBench; robustness; `evaluate`, beside the shaper;
+"""Where a method is made unless others are named: bench; robustness; moves, beside the shaper;
 and where the notebooks offer it.
 """
 Kind = Literal[
