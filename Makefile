@@ -60,7 +60,7 @@ bench: setup
 
 # The tests that take minutes each or need Podman: under an hour in two processes.
 nightly: setup elsewhere
-	$(BESIDE) -m nightly --durations 20
+	$(BESIDE) -m nightly --record-nightly --durations 20
 
 # Random cases of all that is promised of stops, streams, changes and sequences of commands, over five arms in turn.
 CASES ?= 100

@@ -8,6 +8,7 @@ import pytest
 import tests.examples  # noqa: F401  registers the profiles
 from hypothesis import settings
 from tests.durations import Durations, arrange, in_turn, quick, turn_of
+from tests.nightly import NightlyRecord
 
 settings.load_profile("full")
 
@@ -22,6 +23,7 @@ def pytest_addoption(parser):
     parser.addoption(
         "--keep-durations", action="store_true", help="write how long tests took: durations.json"
     )
+    parser.addoption("--record-nightly", action="store_true", help="write the outcome: nightly.json")
     parser.addoption("--quick", action="store_true", help="run what is quick by durations.json")
     parser.addoption("--turn", help="run what is quick, and every n-th of the other cases: 1/2 or 2/2")
     parser.addoption(
@@ -33,6 +35,8 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     if config.option.keep_durations and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Durations())
+    if config.option.record_nightly and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(NightlyRecord())
 
 
 @pytest.hookimpl(wrapper=True)
