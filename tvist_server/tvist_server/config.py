@@ -115,7 +115,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     nothing moves it from here without --enable-motion."""
     enable_motion: bool = False
     """Move the robot at ur://ADDRESS, which is in remote control: a program on its controller follows the set-points of
-    this one. Read docs/how-to/move-a-real-arm.md before: whoever gives this option answers for what moves."""
+    this one. Read docs/how-to/use-a-real-arm.md before: whoever gives this option answers for what moves."""
     speed_cap: Annotated[float, Meta(ge=0.05, le=3.2)] | None = None
     """With --enable-motion: largest speed of every joint in rad/s, for moves, streams and programs alike; the limits of
     the robot file and of the robot itself hold as well [0.5]."""
