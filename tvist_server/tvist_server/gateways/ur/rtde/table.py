@@ -13,7 +13,7 @@ For whoever reads or writes variables of RTDE, and asks where a value comes from
 Made by `python -m tvist_server.gateways.ur.rtde.table > docs/reference/rtde-variables.md`. Each output has one of four
 sources:
 
-- **state**: the value that every client gets in [`state`](../../protocol/README.md#state), equal to the last bit;
+- **state**: the value that every client gets in [`state`](generated/protocol.md#state), equal to the last bit;
 - **io**: terminals, registers and the setup of the tool;
 - **computed**: computed from state and io, as the last column says, when a client asks for it;
 - **constant**: takes the place of something that is not simulated.
