@@ -7,15 +7,13 @@ export OPENBLAS_NUM_THREADS ?= 1
 WORKERS ?= auto
 # How many examples Hypothesis tries in `make test-all`: full, drawn freely, or quick, always the same fifth.
 PROFILE ?= full
-# Which of the cases that are not quick `make test-all` runs: all, or those of one turn, such as 1/2.
-TURN ?=
 READY := .venv/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 # The folders of what they install.
 SOURCES := cli clients controller lab protocol shaping sim_plant testing tvist_server urscript view
 
-.PHONY: acceptance checksums page docs docs-serve release setup demo notebooks test test-all lint elsewhere bench nightly search soak dist format lock schemas clean
+.PHONY: acceptance checksums page docs docs-serve release setup demo notebooks test test-all durations lint elsewhere bench nightly search soak dist format lock schemas clean
 
 setup: $(READY)
 
@@ -42,7 +40,11 @@ test: setup
 	$(BESIDE) --hypothesis-profile quick --quick
 
 test-all: setup
-	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not nightly" --durations 20 $(if $(TURN),--turn $(TURN))
+	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not nightly" --durations 20
+
+# On a quiet machine: how long each test takes, which says what `make test` runs and what is beyond its budget.
+durations: setup
+	$(BESIDE) --hypothesis-profile quick -m "not nightly" --keep-durations
 
 lint: setup
 	$(BIN)/ruff check

@@ -7,7 +7,7 @@ import signal
 import pytest
 import tests.examples  # noqa: F401  registers the profiles
 from hypothesis import settings
-from tests.durations import Durations, arrange, in_turn, quick, turn_of
+from tests.durations import Durations, arrange, quick
 from tests.nightly import NightlyRecord
 
 settings.load_profile("full")
@@ -25,7 +25,6 @@ def pytest_addoption(parser):
     )
     parser.addoption("--record-nightly", action="store_true", help="write the outcome: nightly.json")
     parser.addoption("--quick", action="store_true", help="run what is quick by durations.json")
-    parser.addoption("--turn", help="run what is quick, and every n-th of the other cases: 1/2 or 2/2")
     parser.addoption(
         "--cases", type=_count, default=5, help="number of cases of each test with the mark `search`"
     )
@@ -43,8 +42,6 @@ def pytest_configure(config):
 def pytest_collection_modifyitems(config, items):
     """Mark what needs no mark of its own, see README.md, choose what is quick, and order what runs side by side."""
     chosen = quick(items) if config.option.quick else items
-    if config.option.turn:
-        chosen = in_turn(chosen, *turn_of(config.option.turn))
     if len(chosen) < len(items):
         config.hook.pytest_deselected(items=list(set(items) - set(chosen)))
         items[:] = chosen

@@ -1,33 +1,39 @@
-"""How long tests took, kept in durations.json: it says what begins first, and what is quick.
+"""How long tests took, kept in durations.json: it says what begins first, what is quick, and what is too slow.
 
-When tests run side by side, what is longest begins first. `pytest --quick` runs of each test function as many cases as
-fit into a short time, spread over all, and none of one whose single case takes long. `pytest --turn 1/2` runs all that
-is quick and, of what is not, every second case. `pytest --keep-durations` writes the seconds of every test function
-that it ran, set-up and end included, its cases taken together; what it did not run keeps its figure, and what is no
-longer there is dropped.
+`pytest --keep-durations`, of which `make durations` is the whole, writes the file anew: the seconds of every test
+function, set-up and end included and its cases taken together, and on which machine. When tests run side by side, what
+is longest begins first. `pytest --quick` runs of each test function as many cases as fit into a short time, spread over
+all, and none of one whose single case takes long. `python -m tests.durations` fails if a test is beyond its budget.
 """
 
 import json
 import math
+import os
+import platform
+import sys
 from collections import defaultdict
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
 KEPT = Path(__file__).with_name("durations.json")
 LEAST = 0.1
 """Shorter test functions are kept as one sum a file [s]."""
 OTHERS = "the others"
-QUICK, LONGEST = 1.5, 1.5
+UNKNOWN = 10.0
+"""What a file without figures is taken to need [s]."""
+QUICK = 0.5
 """How long the cases of a quick test function may take together, and how long one [s]."""
+FUNCTION, FILE, CLOCKED = 4.0, 20.0, 450.0
+"""Budgets of a test function, of a file, and of all tests that need the clock [s]."""
 CLOCK = "clock"
 """The group of tests that need time to pass: one process has them all, so there is only one of them at a time."""
 
 
 def kept():
-    """Seconds by file and test function, of the last runs that were kept."""
-    return json.loads(KEPT.read_text()) if KEPT.exists() else {}
+    """Seconds by file and test function, of the last run that was kept."""
+    return json.loads(KEPT.read_text())["seconds"] if KEPT.exists() else {}
 
 
 def quick(items):
@@ -40,34 +46,9 @@ def quick(items):
     return [item for (file, test), cases in functions.items() for item in _few(cases, seconds, file, test)]
 
 
-def in_turn(items, turn, turns):
-    """All cases that are quick, and an equal share of the others, the longest dealt out first."""
-    seconds = kept()
-    cases = defaultdict(int)
-    for item in items:
-        cases[_function(item.nodeid)] += 1
-
-    def took(item):
-        file, test = _function(item.nodeid)
-        return seconds.get(file, {}).get(test, 0.0)
-
-    slow = [item for item in items if took(item) > QUICK]
-    slow.sort(key=lambda item: -took(item) / cases[_function(item.nodeid)])
-    others = {item for at, item in enumerate(slow) if at % turns != turn - 1}
-    return [item for item in items if item not in others]
-
-
-def turn_of(text):
-    """The number of a turn and of all turns, from such as 1/2."""
-    turn, _, turns = text.partition("/")
-    if not (turn.isdigit() and turns.isdigit() and 1 <= int(turn) <= int(turns)):
-        raise pytest.UsageError(f"--turn {text}: it must be a number of a number, as in 1/2")
-    return int(turn), int(turns)
-
-
 def _few(cases, seconds, file, test):
-    each = seconds.get(file, {}).get(test, 0.0) / len(cases)
-    if each > LONGEST:
+    each = seconds.get(file, {test: UNKNOWN}).get(test, 0.0) / len(cases)
+    if each > QUICK:
         return []
     apart = max(1, math.ceil(len(cases) * each / QUICK))
     return cases[::apart]
@@ -91,7 +72,7 @@ def arrange(items):
         group = item.nodeid if item.get_closest_marker("search") else file
         group = CLOCK if item.get_closest_marker("realtime") else group
         item.add_marker(pytest.mark.xdist_group(group))
-        took[group] = max(took[group], sum(seconds.get(file, {OTHERS: 10.0}).values()))
+        took[group] = max(took[group], sum(seconds.get(file, {OTHERS: UNKNOWN}).values()))
     took[CLOCK] = float("inf")
     items.sort(key=lambda item: -took[item.get_closest_marker("xdist_group").args[0]])
 
@@ -101,19 +82,46 @@ class Durations:
 
     def __init__(self):
         self.seconds = defaultdict(lambda: defaultdict(float))
+        self.clocked = 0.0
 
     def pytest_runtest_logreport(self, report):
         file, test = _function(report.nodeid)
         self.seconds[file][test] += report.duration
+        if "realtime" in report.keywords:
+            self.clocked += report.duration
 
     def pytest_sessionfinish(self):
-        whole = {file: tests for file, tests in kept().items() if (ROOT / file).exists()} | {
-            file: _rounded(tests) for file, tests in self.seconds.items()
-        }
-        lines = (f" {json.dumps(file)}: {json.dumps(whole[file])}" for file in sorted(whole))
-        KEPT.write_text("{\n" + ",\n".join(lines) + "\n}\n")
+        machine = {
+            "date": f"{datetime.now(UTC):%Y-%m-%d}", "cpus": os.cpu_count(), "machine": platform.machine(),
+            "python": platform.python_version(), "clocked": round(self.clocked, 1),
+        }  # fmt: skip
+        lines = (
+            f"  {json.dumps(file)}: {json.dumps(_rounded(tests))}"
+            for file, tests in sorted(self.seconds.items())
+        )
+        seconds = ",\n".join(lines)
+        KEPT.write_text(f'{{\n "run": {json.dumps(machine)},\n "seconds": {{\n{seconds}\n }}\n}}\n')
 
 
 def _rounded(tests):
     long = {test: round(took, 1) for test, took in sorted(tests.items()) if took >= LEAST}
     return long | {OTHERS: round(sum(took for took in tests.values() if took < LEAST), 1)}
+
+
+def beyond(content):
+    """Say of each budget that a run has exceeded by how much."""
+    for file, tests in content["seconds"].items():
+        yield from (
+            f"{file}::{test} took {took:g} s: at most {FUNCTION:g} s"
+            for test, took in tests.items()
+            if test != OTHERS and took > FUNCTION
+        )
+        if (whole := sum(tests.values())) > FILE:
+            yield f"{file} took {whole:.1f} s: at most {FILE:g} s"
+    if (clocked := content["run"]["clocked"]) > CLOCKED:
+        yield f"the tests that need the clock took {clocked:g} s: at most {CLOCKED:g} s"
+
+
+if __name__ == "__main__":
+    found = list(beyond(json.loads(KEPT.read_text())))
+    sys.exit("\n".join([*found, "make them smaller or nightly, then `make durations`"]) if found else 0)

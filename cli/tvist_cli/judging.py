@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from tvist_plant.plant import PERIOD
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -55,4 +53,9 @@ def _between(first: "Truth", second: "Truth") -> "Iterator[Truth]":
             ]
             for name in ("tool_acceleration", "flange_pose")
         }
-        yield replace(first, tick=tick, timestamp=first.timestamp + (tick - first.tick) * PERIOD, **mixed)
+        yield replace(
+            first,
+            tick=tick,
+            timestamp=first.timestamp + share * (second.timestamp - first.timestamp),
+            **mixed,
+        )

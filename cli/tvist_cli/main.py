@@ -6,6 +6,7 @@ import shutil
 import signal
 import sys
 import textwrap
+import time
 import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,8 @@ from tvist_server.ending import end_like_interrupted, ending_signals
 if TYPE_CHECKING:
     import cyclopts
 
+BEGAN = time.monotonic()
+"""When this program began, before it imported what takes long."""
 ABOUT = "A robot controller for a flexible arm in simulation, with time-varying input shaping."
 LOG = {
     "record": "Record a served robot as MCAP.",

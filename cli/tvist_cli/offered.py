@@ -49,7 +49,7 @@ def _names(kind: str) -> Iterable[str]:
 
             found = scenes()
         case _:
-            from tvist_server.profiles import ProfileName
+            from tvist_server.options import ProfileName
 
             found = get_args(ProfileName)
     return found

@@ -8,11 +8,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from tvist_cli.compiling import compile_if_new
 from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import err, print_json, say
-from tvist_cli.serving import compile_if_new, introduction, say_recorded, say_who_can_reach
+from tvist_cli.serving import introduction, say_recorded, say_who_can_reach
 from tvist_controller.programs.checking import Finding, check_program
-from tvist_lab.programs.judging import Limits, Run, changes
+from tvist_lab.programs.judging import Run, broken, changes, missed
+from tvist_lab.programs.limits import Limits
 from tvist_lab.programs.results import Shortcoming, as_dict, summary
 from tvist_lab.programs.running import InputError, ProgramServer, run_in_lockstep
 from tvist_lab.programs.watch import ProgramWatch, Said
@@ -180,16 +182,16 @@ class Runner:
         result = {
             "file": named(file), "lockstep": lockstep, "recording": self.config.record, **as_dict(watch)
         }  # fmt: skip
-        broken, missed = [*self.limits.broken(watch)], self.limits.missed(watch.plant)
+        exceeded, misplaced = [*broken(self.limits, watch)], missed(self.limits, watch.plant)
         changed = [] if self.baseline is None else [*changes(self.baseline[named(file)], result)]
-        failures = [*_ended(watch, errors), *broken, *missed, *changed]
+        failures = [*_ended(watch, errors), *exceeded, *misplaced, *changed]
         result |= {"ok": not failures, "failures": [asdict(one) for one in failures]}
         failure = _failure(file, watch, errors)
-        for one in (*broken, *missed, *changed):
+        for one in (*exceeded, *misplaced, *changed):
             say(f"{named(file)}:{'' if one.line is None else f'{one.line}:'} {one.text}")
         if failure is None and failures:
-            parts = [f"broke {counted(len(broken), 'limit')}"] if broken else []
-            parts += [f"missed {counted(len(missed), 'expectation')}"] if missed else []
+            parts = [f"broke {counted(len(exceeded), 'limit')}"] if exceeded else []
+            parts += [f"missed {counted(len(misplaced), 'expectation')}"] if misplaced else []
             parts += [f"differs from the baseline in {counted(len(changed), 'point')}"] if changed else []
             failure = Failure(f"{named(file)} {' and '.join(parts)}")
         return Ran(result, summary(watch), failure, server)

@@ -1,8 +1,8 @@
-"""The options of a robot: each field of `ServeConfig` is one, with its docstring as its help."""
+"""The options of a robot: each field of `ServeOptions` is one, with its docstring as its help."""
 
 import inspect
 from collections.abc import Callable, Collection, Iterator, Mapping
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Group, Parameter
 from msgspec import inspect as types
@@ -12,8 +12,11 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.misuse import lower
 from tvist_cli.offered import PLANTS, PROFILES, ROBOTS, SHAPERS, WORLDS
 from tvist_protocol.schema import field_docs
-from tvist_server.config import ServeConfig, from_mapping
 from tvist_server.option_values import StartError, read_start_file
+from tvist_server.options import ServeOptions
+
+if TYPE_CHECKING:
+    from tvist_server.config import ServeConfig
 
 Command = TypeVar("Command", bound=Callable[..., object])
 _BOXES = {
@@ -42,7 +45,7 @@ _IN_ANY_CASE = ("profile", "shaper", "clock")
 
 
 def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Command]:
-    """Give a command, whose last parameter is `**given`, the fields of `ServeConfig` as options.
+    """Give a command, whose last parameter is `**given`, the fields of `ServeOptions` as options.
 
     Args:
         only: Names of the fields, if not all of them.
@@ -51,7 +54,7 @@ def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Comman
     def decorate(command: Command) -> Command:
         signature = inspect.signature(command)
         *own, _ = signature.parameters.values()
-        options = [_option(field) for field in fields(ServeConfig) if not only or field.name in only]
+        options = [_option(field) for field in fields(ServeOptions) if not only or field.name in only]
         # The parser reads the options of a function from here.
         command.__signature__ = signature.replace(parameters=own + options)  # type: ignore[attr-defined]
         return command
@@ -59,13 +62,15 @@ def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Comman
     return decorate
 
 
-def configuration(given: Mapping[str, Any], file: str | None, **defaults: object) -> ServeConfig:
+def configuration(given: Mapping[str, Any], file: str | None, **defaults: object) -> "ServeConfig":
     """Return what the command line gives, beyond that what the file does, and beyond that `defaults`.
 
     Raises:
         Failure: A value is invalid, with exit code 2.
         UserFileError: The file has the wrong kind of content.
     """
+    from tvist_server.config import from_mapping
+
     source = "configuration" if file is None else f"configuration {file}"
     with told(StartError, code=2):
         return from_mapping(defaults | content_of(file) | dict(_plain(given)), source)
@@ -99,7 +104,7 @@ def _option(field: FieldInfo) -> inspect.Parameter:
 
 def _help(field: FieldInfo) -> str:
     """Return a field's docstring, with the default where a word can say it."""
-    text, default = field_docs(ServeConfig)[field.name], field.default
+    text, default = field_docs(ServeOptions)[field.name], field.default
     if isinstance(default, bool) or not isinstance(default, str | int | float):
         return text
     word = f"{default:g}" if isinstance(default, float) else default

@@ -1,64 +1,91 @@
 """What the commands that serve a robot have in common."""
 
+import asyncio
+import gc
 import os
 import time
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
-from tvist_cli.output import err, progress, say
-
-if TYPE_CHECKING:
-    from tvist_controller.setup import Setup
-    from tvist_server.config import ServeConfig
-    from tvist_server.server import Recording, Server
-    from tvist_server.workers import Workers
-
-
-BEGAN = time.monotonic()
-"""When this program began, nearly: what takes long to import comes after."""
-SAY_EVERY = 10.0
-"""Shortest time between two lines about progress where stderr is no terminal [s]."""
-
-
-def compile_if_new(tell: Callable[[int, int], None] = lambda *_: None) -> None:
-    """Compile what is not on disk yet, on all processors, and show how far that is, since it takes long.
-
-    Args:
-        tell: Called with the number of kernels that are compiled, and of all.
-    """
-    from tvist_server.kernels import KERNELS, KernelsError, compiled
-
-    done = compiled()
-    tell(done, len(KERNELS))
-    if done == len(KERNELS):
-        return
-    say("compiling what a robot computes for this processor; this happens once and takes up to a minute")
-    try:
-        compile_shown(None, tell)
-    except KernelsError as error:  # the robot compiles for itself
-        say(f"warning: the next start compiles again: {error}")
+from tvist_cli.compiling import compile_if_new, compile_shown
+from tvist_cli.failure import Failure, told
+from tvist_cli.main import BEGAN
+from tvist_cli.output import say
+from tvist_controller.setup import Setup
+from tvist_server.config import ServeConfig
+from tvist_server.ending import Ending
+from tvist_server.gateways.base import GatewayError
+from tvist_server.kernels import KernelsError
+from tvist_server.option_values import StartError
+from tvist_server.recording import RecorderError
+from tvist_server.server import Recording, Server
+from tvist_server.workers import Workers, WorkersError
 
 
-def compile_shown(processes: int | None, tell: Callable[[int, int], None] = lambda *_: None) -> None:
-    """Compile ahead as `tvist_server.kernels` does, and show how far that is, as a bar or in lines."""
-    from tvist_server.kernels import KERNELS, compile_ahead
+def serve_robots(config: ServeConfig) -> None:
+    """Serve robots until a signal ends this process."""
+    gc.freeze()
+    gc.enable()
+    with told(StartError, code=2):
+        ending = Ending()
+        if config.workers > 1:
+            _several(config, ending)
+            return
+        # Now there is something to clean up, which an exception sees to.
+        with told(GatewayError, RecorderError), ending.at_once():
+            server = Server(config, prepare=compile_if_new)
 
-    said, shown = time.monotonic(), 0
-    with progress(len(KERNELS), "kernels", "the next start continues") as advance:
+    setups = [robot.setup for robot in server.robots]
 
-        def show(done: int, total: int) -> None:
-            nonlocal said, shown
-            tell(done, total)
-            advance(done - shown, None)
-            if not err.is_terminal and done > shown and time.monotonic() - said >= SAY_EVERY:
-                say(f"{done} of {total} kernels are compiled")
-                said = time.monotonic()
-            shown = done
+    def ready() -> None:
+        if server.granted:
+            say(f"on time: {'; '.join(server.granted)}")
+        _say_ready(setups, config)
 
-        compile_ahead(processes, show)
+    say_who_can_reach(server, config, len(setups))
+    asyncio.run(server.run(ready, ending))
+    ending.close()
+    if server.failure is not None:
+        raise Failure(server.failure)
+    errors = say_recorded(server.recordings)
+    if errors:
+        raise Failure("; ".join(errors))
+    leave(server, 0)
 
 
-def introduction(setups: Sequence["Setup"], profile: str | None) -> str:
+def compile_all(processes: int | None = None) -> None:
+    """Compile ahead, in this number of processes."""
+    if processes is not None and processes < 1:
+        raise Failure(f"compile is {processes}: must be at least 1", code=2)
+    with told(KernelsError):
+        compile_shown(processes)
+    say(f"everything is compiled, after {time.monotonic() - BEGAN:.0f} s")
+
+
+def _several(config: ServeConfig, ending: Ending) -> None:
+    """Serve the robots in several processes."""
+    with told(WorkersError, GatewayError):
+        with ending.at_once():
+            workers = Workers(config, compile_if_new)
+        say_who_can_reach(workers, config, len(workers.setups))
+        try:
+            workers.run(lambda: _say_ready(workers.setups, config), ending)
+        finally:
+            ending.close()
+            errors = say_recorded(workers.recordings)
+    if errors:
+        raise Failure("; ".join(errors))
+
+
+def _say_ready(setups: Sequence[Setup], config: ServeConfig) -> None:
+    took = time.monotonic() - BEGAN
+    spread = f" in {config.workers} processes" if config.workers > 1 else ""
+    say(
+        f"{introduction(setups, config.profile_in_force)} {config.place}{spread}, "
+        f"clock {config.clock}; ready after {took:.1f} s. Press Control+C to stop."
+    )
+
+
+def introduction(setups: Sequence[Setup], profile: str | None) -> str:
     """Describe what listens: one robot with its settings, or the names of several."""
     first = setups[0]
     how = f"shaper {first.shaper}" + ("" if profile is None else f", profile {profile}")
@@ -70,7 +97,7 @@ def introduction(setups: Sequence["Setup"], profile: str | None) -> str:
     return f"a server of {len(names)} robots ({listed}; {how}) listens"
 
 
-def say_who_can_reach(server: "Server | Workers", config: "ServeConfig", robots: int) -> None:
+def say_who_can_reach(server: Server | Workers, config: ServeConfig, robots: int) -> None:
     """Say where UR's interfaces are open, and where anyone can move the robots."""
     for address, ports in server.ur:
         listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
@@ -82,7 +109,7 @@ def say_who_can_reach(server: "Server | Workers", config: "ServeConfig", robots:
         say(f"anyone who can reach {endpoint} can move {whom}")
 
 
-def say_recorded(recordings: "Sequence[Recording]") -> list[str]:
+def say_recorded(recordings: Sequence[Recording]) -> list[str]:
     """Say where each robot was recorded; return the errors that have ended recordings."""
     for recording in recordings:
         if recording.error is None:
@@ -91,7 +118,7 @@ def say_recorded(recordings: "Sequence[Recording]") -> list[str]:
     return [recording.error for recording in recordings if recording.error is not None]
 
 
-def leave(server: "Server", code: int) -> None:
+def leave(server: Server, code: int) -> None:
     """End the process with an exit code if the network would keep it; all that is ours is closed.
 
     Zenoh would wait for ten seconds, for a client that has stopped reading.

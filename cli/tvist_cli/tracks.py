@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tvist_cli.compiling import compile_if_new
 from tvist_cli.failure import Failure, told
 from tvist_cli.judging import judge
 from tvist_cli.output import progress
 from tvist_cli.pages import Door, serve_page
-from tvist_cli.serving import compile_if_new
 
 if TYPE_CHECKING:
     from tvist_lab.recordings.mcap_file import RecordingFile

@@ -9,7 +9,8 @@ from tests.controller.robots import NoArm
 from tests.lab.test_programs import MOVES, run
 
 from tvist_controller.sources.own_plants import OwnPlant
-from tvist_lab.programs.judging import BaselineError, Limits, changes, read_baseline
+from tvist_lab.programs.judging import BaselineError, broken, changes, read_baseline
+from tvist_lab.programs.limits import Limits
 from tvist_lab.programs.results import as_dict, junit
 
 UNCOMPILED = {
@@ -48,11 +49,11 @@ def texts(found):
 
 class TestLimits:
     def test_those_that_are_kept_say_nothing(self, watch):
-        assert texts(limits(10.0, 100.0, 3.2, 5.0).broken(watch)) == []
-        assert texts(Limits().broken(watch)) == []
+        assert texts(broken(limits(10.0, 100.0, 3.2, 5.0), watch)) == []
+        assert texts(broken(Limits(), watch)) == []
 
     def test_each_that_is_broken_says_where_and_when(self, watch):
-        found = list(limits(0.3, 1.0, 0.5, 0.1).broken(watch))
+        found = list(broken(limits(0.3, 1.0, 0.5, 0.1), watch))
         assert [one.kind for one in found] == [
             "max_seconds",
             *["max_shake"] * 3,
@@ -68,7 +69,7 @@ class TestLimits:
 
     def test_a_shake_that_nobody_knows_breaks_its_limit(self):
         mute = run(MOVES[0], plant=OwnPlant("mine.py:NoArm", "", lambda *_: NoArm()), truth=False)
-        (found,) = Limits(max_shake=5.0).broken(mute)
+        (found,) = broken(Limits(max_shake=5.0), mute)
         assert (found.line, "not known" in found.text) == (2, True)
 
 

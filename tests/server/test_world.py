@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from tests.controller.robots import UR5E, Robot
 
-from tvist_lab.programs.judging import Limits, is_inside
+from tvist_lab.programs.judging import is_inside, missed
+from tvist_lab.programs.limits import Limits
 from tvist_lab.programs.running import run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
@@ -75,7 +76,7 @@ def test_a_program_lifts_a_box_and_its_recording_does_the_same_again(tmp_path):
     assert re.fullmatch(r"cell: the gripper holds something (59|60)\.\d mm wide", said)
     assert 3.0 < watch.hardest.speed < 100.0
     expected = Limits(expect=["box in left", "box in nowhere", "ball in left"])
-    said = [one.text for one in expected.missed(watch.plant)]
+    said = [one.text for one in missed(expected, watch.plant)]
     assert "which is not in left" in said[0]
     assert "has no area 'nowhere': it has left" in said[1]
     assert "has no body 'ball': it has finger left, finger right, box" in said[2]

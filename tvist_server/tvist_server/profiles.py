@@ -1,14 +1,12 @@
 """Profiles: sets of options for a purpose. An option that is given explicitly takes precedence over the profile's."""
 
 from collections.abc import Mapping
-from typing import Literal
 
 from msgspec import Struct
 
 from tvist_controller.kinematics.postures import is_of_ur_form
 from tvist_plant.description import RobotDescription
-
-ProfileName = Literal["ursim", "real"]
+from tvist_server.options import ProfileName
 
 UR_START = (-1.60, -1.727, -2.203, -0.808, 1.595, -0.031)
 """Posture in which URSim starts a six-joint arm, away from all singular postures [rad]."""

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from tvist_cli.compiling import compile_if_new
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, print_json, program, progress, words
 from tvist_cli.pages import Door
 from tvist_cli.paper_tables import print_paper
-from tvist_cli.serving import compile_if_new
 from tvist_cli.studying import give
 from tvist_cli.tracks import MAGNIFY, recorded
 

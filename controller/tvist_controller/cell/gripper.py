@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from tvist_plant.plant import PERIOD
-
 OPEN, CLOSED = 3, 230
 """Positions of open fingers and of fingers that meet [counts]; real ones differ by a few counts."""
 ACTIVATION: Final = 500
@@ -164,6 +162,8 @@ class Gripper:
     @property
     def _step(self) -> float:
         """Way of the fingers in a tick [counts]."""
+        from tvist_plant.plant import PERIOD  # the port's number is read by the options, without the plant
+
         slow, fast = SPEEDS[self.stroke]
         share = 0.0 if self._written["ATR"] else 1.0 if self._activating else self._written["SPE"] / 255.0
         return (slow + share * (fast - slow)) * PERIOD / self.stroke * (CLOSED - OPEN)

@@ -1,10 +1,7 @@
 """What runs are judged by: limits, what they are to leave behind, and an earlier run in lockstep."""
 
-import math
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,93 +9,60 @@ import msgspec
 import numpy as np
 import pinocchio as pin
 
+from tvist_lab.programs.limits import EXPECTED, UNITS, Limits
 from tvist_lab.programs.results import Shortcoming, seconds
 from tvist_lab.programs.watch import Fastest, ProgramWatch
 from tvist_plant.model import Floats
 from tvist_plant.plant import PERIOD, Plant, Shape
 from tvist_plant.user_file import UserFileError, read_text
 
-UNITS = {"max_shake": "m/s²", "max_seconds": "s", "max_joint_speed": "rad/s", "max_tool_speed": "m/s",
-         "max_force": "N"}  # fmt: skip
-"""Units of the limits."""
-_EXPECTED = re.compile(r"\s*(?P<body>.+?) in (?P<area>.+)")
+
+def broken(limits: Limits, watch: ProgramWatch) -> Iterator[Shortcoming]:
+    """Say of each limit that a run broke where and when, and of the shake after each stop that broke it."""
+    if limits.max_seconds is not None and watch.seconds > limits.max_seconds:
+        yield _more(limits, "max_seconds", f"it ran for {watch.seconds:.3f} s", None)
+    if limits.max_shake is not None:
+        yield from _shaken(limits, watch, limits.max_shake)
+    joint, tool, hardest = watch.fastest_joint, watch.fastest_tool, watch.hardest
+    yield from _fast(limits, "max_joint_speed", joint, f"joint {joint.joint} turned with")
+    yield from _fast(limits, "max_tool_speed", tool, "the tool moved with")
+    yield from _fast(limits, "max_force", hardest, "the arm was touched with")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """What a run must keep and leave behind; None where there is no limit."""
+def missed(limits: Limits, plant: Plant) -> list[Shortcoming]:
+    """Say which bodies are not where they are expected."""
+    said = (_missed(text, plant) for text in limits.expect or ())
+    return [Shortcoming("expect", f"{text} (--expect)") for text in said if text is not None]
 
-    max_shake: float | None = None
-    """Fail if the tool's acceleration after a stop exceeds this, in m/s², without gravity and from 10 ms until 0.3 s
-    after the stop."""
-    max_seconds: float | None = None
-    """Fail if a program runs for longer than this, in s as the robot counts it; --timeout would end it."""
-    max_joint_speed: float | None = None
-    """Fail if a joint turns faster than this, in rad/s."""
-    max_tool_speed: float | None = None
-    """Fail if the tool centre point moves faster than this, in m/s."""
-    max_force: float | None = None
-    """Fail if the world of --world touches the arm with a larger force than this, in N."""
-    expect: list[str] | None = None
-    """BODY in AREA, repeatable: fail if this body of --world does not end in this area, which is a site of its file."""
 
-    def check(self) -> None:
-        """Refuse limits that nothing can keep.
+def _shaken(limits: Limits, watch: ProgramWatch, most: float) -> Iterator[Shortcoming]:
+    for number, move in enumerate(watch.moves, 1):
+        if move.ended is None:
+            continue
+        line = move.line or None
+        stop = f"after move {number}, which stopped at {seconds(move.rests or move.ended):.3f} s"
+        if move.peak is not None and move.peak > most:
+            yield _more(limits, "max_shake", f"{stop}, the tool shook with {move.peak:.3g} m/s²", line)
+        elif move.peak is None and (move.rests is not None or move.stopped is None):
+            why = f"{stop}, it is not known how much the tool shook: this arm does not tell (--max-shake)"
+            yield Shortcoming("max_shake", why, line)
 
-        Raises:
-            ValueError: One is not finite and more than 0, or what is expected is not BODY in AREA.
-        """
-        for name, unit in UNITS.items():
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < math.inf:
-                option = name.replace("_", "-")
-                raise ValueError(f"{option} is {value:g} {unit}: must be finite and more than 0")
-        for text in self.expect or ():
-            if _EXPECTED.fullmatch(text) is None:
-                raise ValueError(f"expect is {text!r}: must be BODY in AREA, such as 'box 1 in pallet'")
 
-    def broken(self, watch: ProgramWatch) -> Iterator[Shortcoming]:
-        """Say of each limit that a run broke where and when, and of the shake after each stop that broke it."""
-        if self.max_seconds is not None and watch.seconds > self.max_seconds:
-            yield self._more("max_seconds", f"it ran for {watch.seconds:.3f} s", None)
-        if self.max_shake is not None:
-            yield from self._shaken(watch, self.max_shake)
-        joint, tool, hardest = watch.fastest_joint, watch.fastest_tool, watch.hardest
-        yield from self._fast("max_joint_speed", joint, f"joint {joint.joint} turned with")
-        yield from self._fast("max_tool_speed", tool, "the tool moved with")
-        yield from self._fast("max_force", hardest, "the arm was touched with")
+def _fast(limits: Limits, name: str, fastest: Fastest, what: str) -> Iterator[Shortcoming]:
+    most = getattr(limits, name)
+    if most is not None and fastest.speed > most:
+        text = f"{what} {fastest.speed:.3g} {UNITS[name]} at {seconds(fastest.tick):.3f} s"
+        yield _more(limits, name, text, fastest.line or None)
 
-    def missed(self, plant: Plant) -> list[Shortcoming]:
-        """Say which bodies are not where they are expected."""
-        said = (_missed(text, plant) for text in self.expect or ())
-        return [Shortcoming("expect", f"{text} (--expect)") for text in said if text is not None]
 
-    def _shaken(self, watch: ProgramWatch, most: float) -> Iterator[Shortcoming]:
-        for number, move in enumerate(watch.moves, 1):
-            if move.ended is None:
-                continue
-            line = move.line or None
-            stop = f"after move {number}, which stopped at {seconds(move.rests or move.ended):.3f} s"
-            if move.peak is not None and move.peak > most:
-                yield self._more("max_shake", f"{stop}, the tool shook with {move.peak:.3g} m/s²", line)
-            elif move.peak is None and (move.rests is not None or move.stopped is None):
-                why = f"{stop}, it is not known how much the tool shook: this arm does not tell (--max-shake)"
-                yield Shortcoming("max_shake", why, line)
-
-    def _fast(self, name: str, fastest: Fastest, what: str) -> Iterator[Shortcoming]:
-        most = getattr(self, name)
-        if most is not None and fastest.speed > most:
-            text = f"{what} {fastest.speed:.3g} {UNITS[name]} at {seconds(fastest.tick):.3f} s"
-            yield self._more(name, text, fastest.line or None)
-
-    def _more(self, name: str, what: str, line: int | None) -> Shortcoming:
-        text = f"{what}, more than {getattr(self, name):g} (--{name.replace('_', '-')})"
-        return Shortcoming(name, text, line)
+def _more(limits: Limits, name: str, what: str, line: int | None) -> Shortcoming:
+    text = f"{what}, more than {getattr(limits, name):g} (--{name.replace('_', '-')})"
+    return Shortcoming(name, text, line)
 
 
 def _missed(text: str, plant: Plant) -> str | None:
     """Say why a body is not in an area; None if it is."""
-    expected = _EXPECTED.fullmatch(text)
+    expected = EXPECTED.fullmatch(text)
     assert expected is not None
     body, name = expected["body"].strip(), expected["area"].strip()
     things, places = plant.things(), plant.places()

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from tvist_cli.compiling import compile_if_new
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import out, print_json, say
-from tvist_cli.serving import compile_if_new
 from tvist_cli.shapers_of import load_given
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"

@@ -1,0 +1,157 @@
+"""Run programs in URScript one after the other, and print how they ended."""
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.output import print_json, say
+from tvist_cli.program_runs import Ran, Runner, Tell, named, read_script
+from tvist_cli.robot_options import configuration, content_of
+from tvist_cli.serving import leave
+from tvist_lab.programs.judging import BaselineError, Run, read_baseline
+from tvist_lab.programs.limits import Limits
+from tvist_lab.programs.results import junit as junit_of
+from tvist_server.config import ServeConfig
+from tvist_server.option_values import StartError
+from tvist_server.server import Server
+
+
+def run_programs(
+    file: Sequence[Path],
+    given: dict[str, Any],
+    *,
+    lockstep: bool,
+    inputs: Sequence[str],
+    timeout: float | None,
+    limits: Limits,
+    junit: Path | None,
+    baseline: Path | None,
+    config: str | None,
+    json: bool,
+) -> None:
+    """Do what `tvist run` does without --check."""
+    _check_files(file, lockstep=lockstep)
+    if timeout is not None and not 0.0 < timeout < math.inf:
+        raise Failure(f"timeout is {timeout:g} s: must be finite and more than 0", code=2)
+    _check_written(junit, baseline)
+    before = None if baseline is None else _baseline(baseline, file, lockstep=lockstep)
+    with told(ValueError, code=2):
+        limits.check()
+    texts = [read_script(one) for one in file]
+    checked = _configuration(given, config, lockstep=lockstep)
+    if checked.record is not None and len(file) > 1:
+        raise Failure(f"record is {checked.record}: it keeps one run, and these are {len(file)}", code=2)
+    runner = Runner(checked, inputs, timeout, limits, before, Tell(quiet=json))
+    ran = _run_all(runner, file, texts)
+    results = [one.result for one in ran]
+    failure = ran[0].failure if len(file) == 1 else _of_several(ran, len(file))
+    if json:
+        print_json(results[0] if len(file) == 1 else _together(results, failure))
+    elif failure is None:
+        say(ran[0].account if len(file) == 1 else f"{len(file)} programs ran as they should")
+    if junit is not None:
+        with told(OSError):
+            junit.write_bytes(junit_of(results))
+        say(f"the results are in {junit}")
+    sys.stdout.flush()
+    _leave(ran[0].server, failure)
+    if failure is not None:
+        raise failure
+
+
+def _leave(server: Server | None, failure: Failure | None) -> None:
+    """End the process here if the network would keep it."""
+    if server is not None and not server.left:
+        if failure is not None:
+            say(f"tvist: {failure}")
+        leave(server, 0 if failure is None else failure.code)
+
+
+def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str]) -> list[Ran]:
+    """Run programs one after the other; of several, say at once how each ended."""
+    ran: list[Ran] = []
+    for number, (file, text) in enumerate(zip(files, texts, strict=True), 1):
+        if len(files) > 1:
+            runner.tell.which = f"{number} of {len(files)}: "
+        ran.append(runner.run(file, text))
+        failure = ran[-1].failure
+        if len(files) > 1:
+            say(f"{named(file)}: {ran[-1].account}" if failure is None else f"{failure}")
+        if failure is not None and failure.code == 130:
+            break
+    return ran
+
+
+def _together(results: list[dict[str, Any]], failure: Failure | None) -> dict[str, Any]:
+    """What --json prints of several programs."""
+    return {
+        "ok": failure is None,
+        "failed": sum(not result["ok"] for result in results),
+        "seconds": round(sum(result.get("seconds", 0.0) for result in results), 6),
+        "programs": results,
+    }
+
+
+def _of_several(ran: Sequence[Ran], count: int) -> Failure | None:
+    """Why the runs of several programs have failed; None if they have not."""
+    failed = [one for one in ran if one.failure is not None]
+    if not failed:
+        return None
+    last = failed[-1].failure
+    assert last is not None
+    if last.code == 130:
+        return Failure(f"{last}; {len(ran) - 1} of {count} programs had ended", code=130)
+    names = ", ".join(one.result["file"] for one in failed)
+    return Failure(f"{len(failed)} of {count} programs failed: {names}")
+
+
+def _check_files(files: Sequence[Path], *, lockstep: bool) -> None:
+    """Refuse several programs in real time, and one that cannot be told from another."""
+    if len(files) > 1 and not lockstep:
+        raise Failure(
+            f"tvist run runs several programs only in lockstep: give --lockstep, or --check, or leave {files[1]} out",
+            code=2,
+        )
+    names = [named(one) for one in files]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise Failure(f"{twice} is given twice: give each program once", code=2)
+
+
+def _check_written(junit: Path | None, baseline: Path | None) -> None:
+    """Refuse a file that cannot be written, before anything runs."""
+    if junit is None:
+        return
+    if junit.is_dir() or not junit.parent.is_dir():
+        why = "that is a folder" if junit.is_dir() else f"there is no folder {junit.parent}"
+        raise Failure(f"junit is {junit}: {why}", code=2)
+    if baseline is not None and junit.absolute() == baseline.absolute():
+        raise Failure("junit and baseline are the same file: give each its own", code=2)
+
+
+def _baseline(path: Path, files: Sequence[Path], *, lockstep: bool) -> Mapping[str, Run]:
+    """The baseline's runs by the names of their programs."""
+    if not lockstep:
+        raise Failure(
+            "--baseline needs --lockstep, in which equal programs run alike to the last bit", code=2
+        )
+    with told(BaselineError, OSError, code=2):
+        return read_baseline(path, list(map(named, files)))
+
+
+def _configuration(given: dict[str, Any], file: str | None, *, lockstep: bool) -> ServeConfig:
+    """The robot's configuration: that of `tvist serve` for one robot, with the profile `ursim`."""
+    for name in ("listen", "ur", "ur_allow"):
+        if lockstep and name in given:
+            option = name.replace("_", "-")
+            raise Failure(
+                f"--lockstep and --{option} exclude each other: in lockstep there is no network", code=2
+            )
+    with told(StartError, code=2):
+        content = content_of(file)
+    for key, instead in (("robots", "tvist run has one robot"), ("clock", "tvist run has --lockstep")):
+        if key in content:
+            raise Failure(f"configuration {file}: leave {key} out, since {instead}", code=2)
+    return configuration({**given, "clock": "free" if lockstep else "realtime"}, file, profile="ursim")
