@@ -12,7 +12,7 @@ HEAD = """\
 All variables of RTDE, and where their values come from. Printed by `python -m tvist_server.gateways.ur.rtde.table`.
 An output has one of four sources:
 
-- **state**: the value in [`state`](../../../protocol/README.md#state) at the same tick, equal to the last bit;
+- **state**: the value in [`state`](protocol.md#state) at the same tick, equal to the last bit;
 - **io**: terminals, registers, payload and tool centre point;
 - **computed**: computed from state and io, as the last column describes;
 - **constant**: stands in for something that is not simulated.
