@@ -180,9 +180,9 @@ async def plan_jogs(
             f"at least {least} are needed, {RING_DOWNS} are recommended"
         )
     speed = min(info.limits.velocity)
-    ways = replace(
-        WAYS, velocity=min(WAYS.velocity, speed), **({"acceleration": GENTLE} if positions else {})
-    )
+    ways = replace(WAYS, velocity=min(WAYS.velocity, speed))
+    if positions:
+        ways = replace(ways, acceleration=GENTLE, jerk=LIMITS.jerk)
 
     def planned() -> JogPlan:
         at, arm = np.array(state.target_q), ArmModes(description, carried)
