@@ -245,6 +245,8 @@ def tell(folder, words, endpoint):
     return told
 
 
+@pytest.mark.realtime
+@pytest.mark.nightly
 class TestTutorial:
     def test_every_command_works_in_its_order(self, story):
         _, said = story
@@ -275,6 +277,8 @@ class TestSnippets:
         assert results.attempted > 0
         assert results.failed == 0
 
+    @pytest.mark.realtime
+    @pytest.mark.nightly
     @pytest.mark.parametrize("text", blocks("python"))
     def test_scripts_run(self, text, request, tmp_path):
         folder = ROOT
