@@ -53,7 +53,7 @@ def make(figures, recorded, found):
         return [{"shaper": name, **figures} for name in ("zv", "auto")] * 2
 
     def published(name):
-        return json.loads((DOCS / "reference" / f"{name}.json").read_text(encoding="utf-8"))
+        return json.loads((DOCS / "results" / f"{name}.json").read_text(encoding="utf-8"))
 
     modes = np.array([np.linspace(7.0, 9.0, 5), np.linspace(0.2, 0.3, 5)])
     known = SHAPERS.values()

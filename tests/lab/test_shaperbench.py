@@ -449,7 +449,7 @@ class TestScores:
         assert lost["double_s_as_zv"]["fault"] == "gives NaN at tick 7 (payload error +0 %)"
 
     def test_the_published_page_says_when_it_was_made_and_what_it_lacks(self, ur5e, modal):
-        reference = Path(__file__).parents[2] / "docs" / "reference"
+        reference = Path(__file__).parents[2] / "docs" / "results"
         published = json.loads((reference / "leaderboard.json").read_text(encoding="utf-8"))
         _, first, *_ = (reference / "shaperbench.md").read_text(encoding="utf-8").split("\n\n")
         now = [one.name for one in bench(ur5e, modal)] + [arm.name for arm in (*ARMS, *STICKING)]

@@ -14,7 +14,7 @@ VELOCITY, ACCELERATION, JERK = 1.5, 2.0, 100.0
 TOLERANCE = 1e-6
 """Share of a limit that is rounding."""
 STREAMED = 1e-4
-"""Likewise in a stream, where it is more than rounding in one of a thousand: decision 8 says why."""
+"""Likewise in a stream, where one of a thousand exceeds rounding: the fade may have to wait for room."""
 names = st.sampled_from([n for n, entry in SHAPERS.items() if entry.zeta_max > 0.5 and entry.peak == 1.0])
 seeds = st.integers(0, 2**32 - 1)
 VARYING = Polynomial(

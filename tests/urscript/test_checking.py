@@ -1,7 +1,5 @@
 """What a checker tells, and what has limits."""
 
-import doctest
-from pathlib import Path
 
 import pytest
 from tests.conformance.served import finished
@@ -128,8 +126,3 @@ def test_an_error_of_a_file_has_its_position(tmp_path):
             f"{path}:3:15: sqrt takes at most 1 argument, but 2 are given",
         ],
     )
-
-
-def test_the_readme_is_true():
-    readme = Path(__file__).parents[2] / "urscript" / "README.md"
-    assert doctest.testfile(str(readme), module_relative=False).failed == 0
