@@ -27,7 +27,7 @@ def test_it_takes_the_names_of_its_own_poses_and_is_recorded_analyzed_and_replay
 
 
 def test_its_moves_are_evaluated_beside_every_baseline():
-    same = ("--robot", "one-joint", "--moves", 1, "--payload", 1)
+    same = ("--robot", "one-joint", "--moves", 2, "--payload", 1)
     said = tvist("study", "moves", *same, "--json").assert_done().json
     assert said["calibration"] == "one-joint_1kg"
     assert {move["payload_kg"] for move in said["moves"]} == {1.0}
@@ -38,13 +38,13 @@ def test_its_moves_are_evaluated_beside_every_baseline():
 
 def test_it_is_identified_at_its_own_poses(tmp_path):
     path = tmp_path / "mine.json"
-    options = ("--ring-downs", 6, "--payload", 1, "--output", path)
+    options = ("--ring-downs", 8, "--payload", 1, "--output", path)
     said = tvist("identify", "--robot", "one-joint", *options).assert_done().out
     assert f"tvist serve --calibration {path} --robot one-joint" in " ".join(said.split())
     calibration = calibration_from_json(path.read_bytes())
     assert calibration.robot == "one-joint arm"
     assert calibration.polynomial.joints == (1,)
-    assert calibration.provenance.configurations >= 5
+    assert calibration.provenance.configurations >= 6
     assert calibration.provenance.arm == fingerprint(load("one-joint"))
 
 

@@ -37,7 +37,7 @@ def made_again(told, folder):
         assert (one["arm"], one["disturbances"]) == ("clean", [])
     assert 0.0 < told["free_of_collision"] <= 1.0
     web_page = re.sub(r'"data:[^"]*"', "", (folder / "report.html").read_text(encoding="utf-8"))
-    assert "(1 move)" in web_page
+    assert "(2 moves)" in web_page
     assert not any(word in web_page for word in ("p5", "median", "one of twenty"))
     assert web_page.count("<img") == 2
 
@@ -72,7 +72,7 @@ def with_bands(told, _):
     assert curves["zv"]["residual_percent"][200] == pytest.approx(0.0, abs=1e-9)
 
 
-RANDOM = "study moves --moves 1 --seed 5 --clean --shapers auto --save-moves drawn.json"
+RANDOM = "study moves --moves 2 --seed 5 --clean --shapers auto --save-moves drawn.json"
 SENSITIVITY = "shapers --sensitivity zv ei --errors -20 20 --figures . --format pdf --output out.json"
 RUNS = [
     (f"{RANDOM} --figures . --report report.html", {"moves.png", "one_move.png"}, made_again),

@@ -6,6 +6,7 @@ import socket
 import struct
 
 from tests.conformance.wire import Wire
+from tests.system.waiting import eventually
 
 from tvist_plant.description import load
 
@@ -71,23 +72,21 @@ def test_whatever_becomes_of_the_client_the_arm_stops_inside_its_limits_and_a_re
     path = tmp_path / "run.mcap"
     with lockstep(51, path, start=",".join(map(str, HOME))) as (served, host), Wire(served.endpoint) as wire:
         wire.listen("event", "state")
-        clock = take_clock(wire)
-        wire.step(clock, 1)
         for manner, becomes in MANNERS.items():
             seen = len(wire.received["event"])
-            with (
-                socket.create_server((host, 0)) as server,
-                socket.create_connection((host, 30002)) as script,
-            ):
-                script.sendall(PROGRAM.format(host=host, port=server.getsockname()[1]).encode())
-                while not any(event["kind"] == "program_started" for event in wire.received["event"][seen:]):
-                    wire.step(clock, 1)
-                answers = begin_step(wire, clock, 3000)
-                stream, _ = server.accept()
+            with socket.create_server((host, 0)) as server, Wire(served.endpoint) as stepper:
+                clock = take_clock(stepper)
+                stepper.step(clock, 1)
+                begin_step(stepper, clock, 100_000)  # until this client goes
+                with socket.create_connection((host, 30002)) as script:
+                    script.sendall(PROGRAM.format(host=host, port=server.getsockname()[1]).encode())
+                    stream, _ = server.accept()
                 with stream:
                     steer(stream, ([a + 0.2 * math.sin(0.01 * n) for a in HOME] for n in range(150)))
                     becomes(stream)
-                    assert len(list(answers)) == 1
+                    stopped = wire.wait("event", lambda one: one["kind"] == "program_stopped", since=seen)
+                    wire.until(stopped["tick"] + 260)
+            eventually(lambda: wire.info()["stepper"] is None)
             events = wire.received["event"][seen:]
             said = [event["why"] for event in events if event["kind"] == "text"]
             errors = [event["why"] for event in events if event["kind"] == "warning" and event.get("line")]
