@@ -1,6 +1,5 @@
 """What a checker tells, and what has limits."""
 
-
 import pytest
 from tests.conformance.served import finished
 
