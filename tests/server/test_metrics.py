@@ -59,11 +59,7 @@ def test_the_page_of_reference_is_up_to_date():
 
 
 @pytest.mark.parametrize("address", ["", "here", "127.0.0.1:", "127.0.0.1:70000", "1.2.3.4:x"])
-def test_what_is_no_address_is_refused(address):
+def test_what_is_no_address_is_refused_and_a_port_alone_is_the_loopback_interface_s(address):
     with pytest.raises(GatewayError, match="must be ADDRESS:PORT"):
         place(address)
-
-
-def test_a_port_alone_is_the_loopback_interfaces():
-    assert place("9447") == ("127.0.0.1", 9447)
-    assert place("[::1]:9447") == ("::1", 9447)
+    assert (place("9447"), place("[::1]:9447")) == (("127.0.0.1", 9447), ("::1", 9447))
