@@ -109,11 +109,7 @@ def wave(**changes):
     """f_d = 10.5 + 20 sin(q) in [Hz], ζ = 0.3, held in 6 to 15 Hz."""
     parameters = {"f_d_range": (6.0, 15.0), "zeta_range": (0.05, 0.5)} | changes
     return Polynomial(
-        joints=[0],
-        degree=1,
-        f_d_coefficients=[10.5, 0, 20],
-        zeta_coefficients=[0.3, 0, 0],
-        **parameters,
+        joints=[0], degree=1, f_d_coefficients=[10.5, 0, 20], zeta_coefficients=[0.3, 0, 0], **parameters
     )
 
 

@@ -5,16 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_shaping import (
-    SHAPERS,
-    ImpulseError,
-    Impulses,
-    ShaperRangeError,
-    product,
-    residual,
-    zv,
-    zvd,
-)
+from tvist_shaping import SHAPERS, ImpulseError, Impulses, ShaperRangeError, product, residual, zv, zvd
 
 frequencies = st.floats(1e-6, 1e6)
 shares = st.floats(0.0, 1.0, exclude_max=True)
