@@ -4,13 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.search.draws import WITHIN, mass, own_limits, postures
+from tests.search.draws import WITHIN, own_limits
 from tests.search.subject import Subject, refused, speeds, torques
 
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.setup import body, paper_payload
+from tvist_controller.setup import paper_payload
 from tvist_plant.description import load
 from tvist_protocol import commands as c
 from tvist_protocol.kinematics import ForwardKinematics
@@ -53,28 +52,6 @@ def moved(arm, shaper, start, goal, payload, limits):
 
 
 @pytest.mark.parametrize(
-    ("name", "shaper"),
-    [
-        ("ur3e", "zv"),
-        ("ur5e", "ei3"),
-        ("ur10e", "um_zv"),
-        ("ur16e", "auto"),
-        ("ur20", "zv"),
-        ("ur30", "ei3"),
-        (SEVEN, "zv"),
-    ],
-)
-def test_moves_at_all_limits_keep_them(name, shaper):
-    arm, random = load(name), np.random.default_rng(30)
-    limits = own_limits(arm)
-    done = 0
-    while done < 2:
-        payload, (start, goal) = paper_payload(arm, mass(arm, random)), postures(arm, random, 2)
-        if CollisionModel(arm, body(payload)).meeting(start) is None:
-            done += moved(arm, shaper, start, goal.tolist(), payload, limits)
-
-
-@pytest.mark.parametrize(
     ("name", "shaper", "start", "goal"),
     [
         (
@@ -92,7 +69,9 @@ def test_moves_at_all_limits_keep_them(name, shaper):
     ],
     ids=["seven", "ur30"],
 )
-def test_so_do_those_that_are_heavy_for_a_moment_or_hardly_lighter_when_slower(name, shaper, start, goal):
+def test_moves_that_are_heavy_for_a_moment_or_hardly_lighter_when_slower_keep_all_limits(
+    name, shaper, start, goal
+):
     arm = load(name)
     assert moved(arm, shaper, start, goal, paper_payload(arm), own_limits(arm))
 

@@ -129,15 +129,6 @@ def test_a_guided_motion_stops_inside_the_range_and_keeps_the_limits(kind, field
     assert ending(arm).code == "limit_position"
 
 
-def test_a_posture_in_collision_is_not_reached():
-    arm = robot()
-    arm.send(m.ServoJ, q=(1.57, 0.3, 0.5, -1.57, -1.57, 0.0), lookahead=0.2)
-    arm.until_rest()
-    ended = ending(arm)
-    assert (ended.code, ended.id) == ("collision", 1)
-    assert arm.controller.motion.collisions.meeting(np.array(arm.states[-1].target_q)) is None
-
-
 @pytest.mark.parametrize(("fraction", "ticks"), [(1.0, 1), (0.5, 2), (0.25, 4)])
 def test_the_slider_stretches_a_step_at_constant_acceleration(fraction, ticks):
     arm = robot()
@@ -254,24 +245,3 @@ def test_stop_l_keeps_the_tool_on_its_line():
     arm.until_rest()
     assert off_line(poses(arm), xd).max() < 1e-9
     assert (len(arm.states) - begun) * H == pytest.approx(np.hypot(0.2, 0.1) / 2.0, abs=5 * H)
-
-
-@pytest.mark.parametrize("kind", [m.ServoJ, m.SpeedJ, m.SpeedL])
-def test_a_stop_during_a_stop_is_not_gentler(kind):
-    fields = {
-        m.ServoJ: {"q": BESIDE},
-        m.SpeedJ: {"qd": (0.5, *REST[1:])},
-        m.SpeedL: {"xd": (0.2, *REST[1:])},
-    }[kind]
-    ticks = []
-    for gentler in (False, True):
-        arm = robot()
-        arm.send(kind, **fields)
-        arm.tick(60)
-        arm.send(m.StopJ, acceleration=4.0)
-        arm.tick(3)
-        if gentler:
-            arm.send(c.Stop, deceleration=1.0)
-        arm.until_rest()
-        ticks.append(len(arm.states))
-    assert ticks[0] == ticks[1]

@@ -12,14 +12,8 @@ from tests.plant.arms import chain
 from tvist_controller.instruments import wrench as module
 from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.wrench import (
-    ACTUAL_MOMENT,
-    ACTUAL_Q,
     DAMPING,
     NEAR_SINGULAR,
-    ROWS,
-    SHAPED_MOMENT,
-    SHAPED_QD,
-    SHAPED_QDD,
 )
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.least_squares import solve_in_place
@@ -153,18 +147,3 @@ def test_the_force_is_that_of_the_formula(arm, offset):
         wanted = by_numpy(placed(model, q, offset)[2], torque)
         module.force_at(links, q, torque, found)
         np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max())
-
-
-def test_an_estimate_is_that_of_its_formula_to_the_last_bit(arm):
-    body, random = RigidBody(arm), np.random.default_rng(5)
-    drives, offset = arm.drives, [0.1, -0.2, 0.3, 0.4, -1.0, 2.0]
-    for _ in range(30):
-        motion = random.uniform(-3.0, 3.0, (ROWS, 6))
-        found = body.external(motion, offset)
-        share = motion[SHAPED_QD] / drives.friction_width
-        friction = np.array(drives.coulomb_friction) * (share if drives.linear_friction else np.tanh(share))
-        expected = motion[SHAPED_MOMENT] + np.array(drives.rotor_inertia) * motion[SHAPED_QDD] + friction
-        torque, force = expected - motion[ACTUAL_MOMENT], np.empty(6)
-        assert found[6:].tolist() == torque.tolist()
-        module.force_at(body._tool.chain, motion[ACTUAL_Q], torque, force)
-        assert found[:6].tolist() == force.tolist()

@@ -4,7 +4,6 @@ import itertools
 
 import numpy as np
 import pytest
-from tests.search import changes, streams
 
 from tvist_controller.about import info_of
 from tvist_controller.foresight.collision import CLEARANCE
@@ -35,18 +34,6 @@ def test_what_is_foreseen_is_what_happens_to_the_bit(name):
         assert (line.position == expected).all()
     assert line.at_rest
     assert np.abs(np.diff(ahead[resting_after(ahead) :], axis=0)).max(initial=0.0) <= STILL
-
-
-@pytest.mark.parametrize("number", range(4))
-def test_no_stream_brings_the_reference_into_the_clearance_however_it_ends(number):
-    outcome = streams.judge(UR5E, streams.draw(UR5E, number))
-    assert outcome.kept, outcome
-
-
-@pytest.mark.parametrize("number", range(10))
-def test_no_change_in_motion_leads_the_reference_into_the_clearance(number):
-    outcome = changes.judge(UR5E, number)
-    assert outcome.kept, outcome
 
 
 @pytest.mark.parametrize("shaper", ["none", "zv", "ei3"])

@@ -190,17 +190,6 @@ def test_it_cannot_be_put_anywhere():
     assert isinstance(Robot(plant=NoArm()).send(SimulationReset, q=tuple(UR5E.poses["Q2"])), Done)
 
 
-def test_a_plant_needs_one_of_two_ways_to_begin():
-    class Neither:
-        payload = UR5E.payload
-
-        def step(self, command):  # noqa: ARG002  as the interface has it
-            raise AssertionError
-
-    with pytest.raises(ValueError, match="Neither has neither reset nor measure"):
-        Controller(setup(), Neither())
-
-
 class Cut(OwnArm):
     """An arm whose cable may be cut: each method then raises what no method of a plant should."""
 

@@ -156,21 +156,6 @@ def test_pause_holds_the_motion_and_play_goes_on_with_it(robot):
     assert reached(robot) == [Q2.tolist()]
 
 
-def test_a_motion_that_ends_while_it_is_paused_leaves_the_next_line_to_play(robot):
-    play(robot, "paper.urp")
-    until(robot, lambda: len(reached(robot)) == 1)
-    until(robot, lambda: robot.events[-1].kind == "motion_started")
-    robot.tick(440)  # it brakes: a pause would not end it sooner
-    robot.send(ProgramPause)
-    robot.tick(LONG)
-    _, now, line = state(robot)
-    assert now == "PAUSED"
-    robot.send(ProgramPlay)
-    until(robot, stopped(robot))
-    assert line in {3, 4}
-    assert reached(robot) == ALL
-
-
 def test_a_safeguard_between_two_lines_has_the_next_one_wait(robot):
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)

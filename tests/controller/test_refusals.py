@@ -12,7 +12,7 @@ from tvist_controller.planning.filter_planner import (
     make_estimator,
     wanted_modes,
 )
-from tvist_controller.refusal import RefusalError, check_body
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
@@ -87,6 +87,7 @@ def path(*segments):
 
 COEFFICIENTS = POLYNOMIAL["f_d_coefficients"]
 TOO_MANY = Registers(bank="input_double", first=47, values=(1.0, 2.0))
+NO_BIT = Registers(bank="input_bit", values=(2,))
 FIXED = {"name": "fixed", "f_d": (8.0,), "zeta": (0.2,)}
 WRONG = [
     (c.TakeControl, {"client": "b"}, "no_control", "token"),
@@ -146,7 +147,8 @@ WRONG = [
     (SetRegisters, {"bank": "input_int", "values": (True,)}, "out_of_range", "values[0]"),
     (SetRegisters, {"bank": "input_bit", "values": (True, 1)}, "out_of_range", "values[1]"),
     (SetRegisters, {"bank": "input_double", "values": (False,)}, "out_of_range", "values[0]"),
-    (SetRegisters, {"bank": "input_int", "values": (8,), "also": (TOO_MANY,)}, "out_of_range", "values"),
+    (SetRegisters, {"bank": "input_int", "values": (8,), "also": (TOO_MANY,)}, "out_of_range", "also[0].values"),
+    (SetRegisters, {"bank": "input_int", "values": (8,), "also": (NO_BIT,)}, "out_of_range", "also[0].values[0]"),
     (SetRegisters, {"bank": "output_double", "values": (1.5,), "token": None}, "missing_field", "token"),
     (SimulationReset, {"q": Q2_[:2]}, "out_of_range", "q"),
     (SimulationReset, {"q": Q2_, "shaper": "zvv"}, "unknown_shaper", "shaper"),
@@ -278,11 +280,6 @@ def test_a_move_that_would_last_for_hours_is_refused():
     assert robot.send(c.MoveJ, q=Q2_) == Accepted(id=1)
 
 
-@pytest.mark.parametrize("inertia", [REST, (0.01, 0, 0, 0.01, 0, 0.02), (0, 0, 0, 0.01, 0, 0.01)])
-def test_points_discs_and_rods_are_bodies(inertia):
-    check_body(Payload(mass=1.0, com=(0.0, 0.0, 0.0), inertia=inertia), rated=5.0)
-
-
 @pytest.mark.parametrize("name", BUILT_IN.names())
 def test_every_shaper_that_is_named_can_be_chosen(name):
     modes = wanted_modes(name, 1, "name")
@@ -307,13 +304,6 @@ def test_a_calibration_comes_as_a_map_or_by_its_name_or_is_the_server_s_own():
     own = calibration(name="own")
     for named in (None, "own"):
         assert estimator(own, name="polynomial", calibration=named).calibration is own
-
-
-def test_modal_takes_the_calibration_that_comes_with_the_package():
-    source = estimator(calibration(name="own"), name="modal")
-    assert (source.name, source.calibration.name) == ("modal", "ur5e_modal")
-    assert source.estimator(3, DISC).modes == 3
-    assert estimator(name="modal", calibration="ur5e_modal") == source
 
 
 def test_the_number_of_modes_is_that_of_the_estimator_or_the_filter_s_own():

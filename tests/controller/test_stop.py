@@ -4,7 +4,6 @@ import itertools
 
 import numpy as np
 import pytest
-from tests.search.stops import draw, judge
 
 from tvist_controller.foresight.stops import STEP, StopPlanner
 from tvist_controller.line.differentiator import Target
@@ -29,17 +28,6 @@ def until_rest(line):
     while not line.at_rest:
         out.append(run(line, 1)[0])
     return np.array(out)
-
-
-@pytest.mark.parametrize("number", range(8))
-def test_every_kind_of_stop_stays_on_the_way_behind_the_motion_and_rests_no_later(number):
-    """Against the same motion left alone: on its line, at no tick further along it, no later, within the torque."""
-    outcome = judge(UR5E, draw(UR5E, number))
-    assert outcome.kept, outcome
-    duration, way = outcome.told
-    if duration is not None:
-        assert duration == pytest.approx(outcome.duration, abs=3 * H), "the event says how long it takes"
-        assert way == pytest.approx(outcome.way, abs=1e-6), "and how far it goes"
 
 
 def test_a_stop_that_torque_would_let_go_through_the_floor_is_no_later_than_the_move():

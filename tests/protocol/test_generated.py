@@ -33,11 +33,6 @@ def test_every_generated_file_is_up_to_date():
     assert not stray(FOLDER, files)
 
 
-def test_a_part_without_markers_is_an_error():
-    with pytest.raises(ValueError, match="markers"):
-        filled("no markers", {"keys": "table"})
-
-
 def test_a_part_is_filled_in_between_its_markers():
     text = "a\n<!-- generated: keys -->\nold\n<!-- end -->\nb\n"
     once = filled(text, {"keys": "new"})

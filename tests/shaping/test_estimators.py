@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tvist_shaping import EstimatorError, Fixed, Polynomial, terms
 from tvist_shaping.estimators.basis import BasisFunctions
-from tvist_shaping.estimators.polynomial import MARGIN, evaluate, saturate
+from tvist_shaping.estimators.polynomial import MARGIN, saturate
 
 WIDE = {"f_d_range": (1e-3, 1e3), "zeta_range": (0.0, 0.99)}
 configurations = st.lists(st.floats(-6.3, 6.3), min_size=6, max_size=6)
@@ -25,15 +25,6 @@ def polynomial(degree=2, joints=(1, 2, 3), seed=0, **changes):
         **WIDE,
     }
     return Polynomial(**(parameters | changes)), parameters
-
-
-def test_a_fixed_estimator_says_the_same_everywhere():
-    estimator = Fixed([6.7, 15.0], [0.34, 0.14])
-    for q in (np.zeros(6), np.ones(6)):
-        f_d, zeta = estimator.estimate(q)
-        np.testing.assert_array_equal(f_d, [6.7, 15.0])
-        np.testing.assert_array_equal(zeta, [0.34, 0.14])
-    assert (estimator.modes, estimator.f_d_min, estimator.zeta_max) == (2, 6.7, 0.34)
 
 
 @pytest.mark.parametrize(
@@ -183,26 +174,3 @@ def test_a_configuration_with_too_few_joints_is_refused():
     for q in (np.zeros((2, 3)), np.zeros(6)):
         with pytest.raises(EstimatorError, match="q is"):
             terms(q, joints=p["joints"], degree=2)
-
-
-@given(configurations)
-def test_the_compiled_kernels_equal_their_python_source(q):
-    random = np.random.default_rng(5)
-    b = BasisFunctions((1, 2, 3), 3)
-    arguments = (
-        np.array(q),
-        np.array(b.joints),
-        random.normal(size=3),
-        b.multiples(),
-        random.normal(size=(2, len(b))),
-        np.array([[-5.0, 5.0], [-1.0, 1.0]]),
-    )
-    compiled, plain = np.empty((2, 2, 1))
-    assert evaluate(*arguments, compiled) == evaluate.py_func(*arguments, plain)
-    np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-13)
-    assert saturate(q[0], -5.0, 5.0) == saturate.py_func(q[0], -5.0, 5.0)
-
-
-def test_an_estimator_prints_its_parameters():
-    assert repr(Fixed([6.7], [0.34])) == "Fixed(f_d=[6.7], zeta=[0.34])"
-    assert "f_d_range=(6.0, 15.0)" in repr(wave())
