@@ -156,22 +156,6 @@ def test_a_reset_into_a_meeting_is_refused_with_the_posture_and_the_bodies(name,
     assert 1 < refused < 39
 
 
-def test_a_refused_reset_leaves_a_motion_running_and_changes_nothing():
-    robot, plain = Robot(), Robot()
-    for one in (robot, plain):
-        one.send(c.MoveJ, q=tuple(Q2))
-        one.tick(50)
-    reply = robot.send(SimulationReset, q=tuple(DOWN), seed=7, mode="IDLE", shaper="ei")
-    assert (reply.code, reply.where) == ("collision", "q")
-    far = {"mass": 3.0, "com": (0.3, 0.0, 0.3), "inertia": INERTIA}
-    low = robot.send(SimulationReset, q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0), payload=Carried(**far))
-    assert (low.code, "payload and floor" in low.why) == ("collision", True)
-    for one in (robot, plain):
-        one.until_rest()
-    assert robot.states == plain.states
-    assert robot.events == plain.events
-
-
 def test_no_robot_starts_in_a_meeting():
     with pytest.raises(ValueError, match=r"start: at q = \[0, 0.6, .*wrist_2 and floor would overlap by"):
         Robot(q=tuple(DOWN))

@@ -165,14 +165,6 @@ def test_equal_commands_and_seed_give_equal_bits():
     assert story(Robot(seed=4)) == story(Robot(seed=4))
 
 
-def test_another_seed_gives_another_noise_and_the_same_reference():
-    a, b = Robot(seed=1), Robot(seed=2)
-    story(a)
-    story(b)
-    assert (a.column("target_q") == b.column("target_q")).all()
-    assert (a.column("actual_tool_accelerometer") != b.column("actual_tool_accelerometer")).any(axis=1).all()
-
-
 def test_missed_ticks_are_published():
     robot = Robot()
     robot.controller.counters.missed_ticks += 3

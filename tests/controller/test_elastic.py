@@ -208,27 +208,6 @@ def test_position_and_velocity_of_the_motors_stay_continuous_through_whatever_ha
     assert (np.abs(torque) <= LIMIT).all()
 
 
-def test_rounded_setpoints_make_little_torque_ripple():
-    """Set-points at 125 Hz, rounded to 1e-5 rad, some a tick late: at most 5 % of the rating."""
-    ticks = 4
-    random, torques = np.random.default_rng(5), []
-    motion = quickest_motion(JointLine(Q3, Q3 + 0.4), PAPER, H)
-    q = [motion.next() for _ in range(round(motion.duration / H))]
-    late = random.integers(0, 2, len(q))
-    for rounding in (0.0, 1e-5):
-        cycle = line("elastic-auto", Q3, description=UR5E.clean())
-        stream, found, due = cycle.stream(ticks * H, MotionLimits(1.5, 2.4, 200.0)), [], {}
-        for number, value in enumerate(q[::ticks]):
-            sent, tick = (np.round(value / rounding) * rounding, late[number]) if rounding else (value, 0)
-            due.setdefault(number * ticks + int(tick), []).append((number + 1, sent))
-        for tick in range(len(q)):
-            for number, sent in due.get(tick, ()):
-                stream.offer(number, sent)
-            found.append(cycle.step().command.torque)
-        torques.append(np.array(found))
-    assert (np.abs(torques[1] - torques[0]) / LIMIT).max() <= 0.05
-
-
 def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
     weak = msgspec.structs.replace(
         UR5E, limits=msgspec.structs.replace(UR5E.limits, torque=tuple(0.05 * t for t in UR5E.limits.torque))

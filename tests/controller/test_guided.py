@@ -144,19 +144,6 @@ def test_the_slider_stretches_a_step_at_constant_acceleration(fraction, ticks):
     assert steps[begun : begun + ticks + 1] == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("first", "then", "acceleration"),
-    [((0, 0, 0, 0, 3.1, 0), (0, 0, 0, 0, -3.1, 3.1), 5.0), ((0, 0, 0, 0, 1, 0), (0, 0, 0, 0, -1, 3.1), 5.0)],
-)
-def test_joints_that_turn_back_keep_reduced_speed(first, then, acceleration):
-    arm = Robot(q=(-1.0, -1.3, 1.4, -1.6, -1.6, 0.0))
-    arm.send(SimulationInject, fault="reduced")
-    for qd in (first, then):
-        arm.send(m.SpeedJ, qd=qd, acceleration=acceleration)
-        arm.tick(200)
-    assert np.abs(arm.column("target_qd")).max() <= arm.controller.motion.motions.slowest * (1.0 + 1e-9)
-
-
 def test_reduced_speed_limits_what_is_guided():
     most = 0.25 * UR5E.limits.velocity[0]
     for kind, fields in (

@@ -155,7 +155,7 @@ def test_forward_of_inverse_is_the_pose_and_the_nearest_posture_is_returned(meas
     rng, ik, worst = np.random.default_rng(1), InverseKinematics(UR5E), 0.0
     limit = UR5E.limits.position
     assert ik._closed
-    for _ in range(share(3_000)):
+    for _ in range(share(500)):
         q, near = rng.uniform(-2 * np.pi, 2 * np.pi, (2, 6))
         pose = pose_of(UR5E, q)
         found = ik.solve(*pose, near)
@@ -165,13 +165,13 @@ def test_forward_of_inverse_is_the_pose_and_the_nearest_posture_is_returned(meas
             nearest(every(UR5E, pose), near, limit), abs=1e-7
         )
         np.testing.assert_allclose(ik.solve(*pose, q), q, rtol=0, atol=1e-6)
-    measured("largest error of 3,000 poses [m, rad]", worst)
+    measured("largest error of 500 poses [m, rad]", worst)
     assert worst <= 1e-12
 
 
 def test_no_posture_is_missed():
     rng = np.random.default_rng(2)
-    for _ in range(500):
+    for _ in range(60):
         pose = pose_of(UR5E, rng.uniform(-np.pi, np.pi, 6))
         assert not list(missed(UR5E, pose, rng))
 
@@ -179,7 +179,7 @@ def test_no_posture_is_missed():
 @pytest.mark.parametrize("make", [random_ur, random_spherical])
 def test_arms_with_any_lengths_and_signs_are_solved_in_closed_form(make, measured):
     rng, worst = np.random.default_rng(3), 0.0
-    for _ in range(share(200)):
+    for _ in range(share(100)):
         description = make(rng)
         ik = InverseKinematics(description)
         assert ik._closed
@@ -261,7 +261,7 @@ def test_the_nearest_posture_is_found_where_postures_merge_or_a_joint_is_free(ca
         assert error(description, pose, found) <= 1e-10
         distance = np.linalg.norm(found - near)
         assert distance <= np.linalg.norm(q - near) + 1e-6
-        for start in near + rng.uniform(-np.pi, np.pi, (32, 6)):
+        for start in near + rng.uniform(-np.pi, np.pi, (16, 6)):
             if approach(links, *pose, near, start) < 1e-9 and np.all(
                 np.abs(start) <= description.limits.position
             ):

@@ -13,7 +13,6 @@ from tvist_protocol.modes import RuntimeState
 from tvist_protocol.replies import Accepted, Done
 
 from .robots import PAPER, Q1, Q3, ROUNDING, H, Robot
-from .streams import there_and_back
 
 
 def at_rest(q, limits, period, reach=np.inf, torque=None):
@@ -89,7 +88,7 @@ def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalle
 )
 def test_after_catching_up_with_what_moves_it_passes_to_the_bit_again(motion, jump):
     """The closer, the slower: as fast as the signal could still brake, so that it is not overshot."""
-    time = np.arange(4000) * H
+    time = np.arange(2500) * H
     walk = np.stack([motion(time) + jump * (time > 1.0), 0.1 * motion(time)], axis=1)
     limiter = at_rest(walk[0], PAPER, H)
     out = followed(limiter, walk[1:])
@@ -103,30 +102,6 @@ def test_after_catching_up_with_what_moves_it_passes_to_the_bit_again(motion, ju
     assert not equal[began + 1, 0]
     assert equal[caught_up:].all()
     assert equal[:, 1].all(), "the other joint is not held back"
-
-
-@pytest.mark.parametrize(
-    "limits",
-    [PAPER, MotionLimits(3.0, 40.0, 2000.0), MotionLimits(0.2, 2.0, 40.0), MotionLimits(1.5, 4.0, 9.0)],
-)
-def test_a_motion_made_at_the_very_limits_passes_to_the_bit(limits):
-    motion = there_and_back(limits)
-    walk = motion(np.arange(3000) * H)
-    limiter = at_rest(walk[0], limits, H)
-    assert (followed(limiter, walk[1:]) == walk).all()
-    assert not limiter.limited
-
-
-def test_the_range_is_never_left_however_hard_the_signal_drives_at_its_end():
-    reach = np.array([1.0, 2.0])
-    for speed in (0.3, 1.4, 5.0):
-        limiter = at_rest(np.zeros(2), PAPER, H, reach=reach)
-        walk = [np.minimum([speed * k * H, -speed * k * H], reach) for k in range(1500)]
-        walk = [np.maximum(point, -reach) for point in walk]
-        out = followed(limiter, walk)
-        assert_within(out, PAPER)
-        assert (np.abs(out) <= reach + 1e-9).all()
-        assert out[-1] == pytest.approx(walk[-1], abs=20 * PAPER.jerk * H**3)
 
 
 class Narrow:
@@ -243,7 +218,7 @@ def accelerations(q):
     return np.abs(np.diff(q, 2, axis=0)).max() / H**2
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_whatever_the_slider_does_acceleration_and_velocity_stay_inside_the_limits(seed):
     random = np.random.default_rng(seed)
     speeds = np.repeat(random.choice([0.0, 0.1, 0.5, 0.8, 1.0], 400), random.integers(5, 200, 400))

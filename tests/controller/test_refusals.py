@@ -27,6 +27,8 @@ from .robots import POLYNOMIAL, Q1, Q2, Q3, UR5E, NoArm, Robot, bits, calibratio
 
 Q1_, Q2_, Q3_ = tuple(Q1), tuple(Q2), tuple(Q3)
 REST, NAN = (0.0,) * 6, float("nan")
+LOW = (0.0, 0.6, 0.0, -1.57, 0.0, 0.0)
+"""The upper arm points below the horizon, into the floor."""
 DISC = paper_payload(UR5E)
 BODY = {"mass": 1.0, "com": DISC.com, "inertia": DISC.inertia}
 IMPOSSIBLE = (1.0, 0.9, 0.0, 1.0, 0.0, 1.0)
@@ -147,12 +149,23 @@ WRONG = [
     (SetRegisters, {"bank": "input_int", "values": (True,)}, "out_of_range", "values[0]"),
     (SetRegisters, {"bank": "input_bit", "values": (True, 1)}, "out_of_range", "values[1]"),
     (SetRegisters, {"bank": "input_double", "values": (False,)}, "out_of_range", "values[0]"),
-    (SetRegisters, {"bank": "input_int", "values": (8,), "also": (TOO_MANY,)}, "out_of_range", "also[0].values"),
-    (SetRegisters, {"bank": "input_int", "values": (8,), "also": (NO_BIT,)}, "out_of_range", "also[0].values[0]"),
+    (
+        SetRegisters,
+        {"bank": "input_int", "values": (8,), "also": (TOO_MANY,)},
+        "out_of_range",
+        "also[0].values",
+    ),
+    (
+        SetRegisters,
+        {"bank": "input_int", "values": (8,), "also": (NO_BIT,)},
+        "out_of_range",
+        "also[0].values[0]",
+    ),
     (SetRegisters, {"bank": "output_double", "values": (1.5,), "token": None}, "missing_field", "token"),
     (SimulationReset, {"q": Q2_[:2]}, "out_of_range", "q"),
     (SimulationReset, {"q": Q2_, "shaper": "zvv"}, "unknown_shaper", "shaper"),
     (SimulationReset, {"q": Q2_, "payload": HEAVY}, "out_of_range", "payload.inertia"),
+    (SimulationReset, {"q": LOW, "seed": 7, "mode": "IDLE", "shaper": "ei"}, "collision", "q"),
     (SimulationInject, {"fault": "gravity"}, "unknown_fault", "fault"),
     (SimulationInject, {"fault": "nan", "value": 1.0}, "out_of_range", "value"),
     (SimulationInject, torque(), "missing_field", "joint"),

@@ -54,19 +54,12 @@ def test_anybody_may_stop_and_ask_for_control_that_is_free_or_his():
 LONG = {"type": "set_estimator", "token": "anna#1", "name": "polynomial", "calibration": {"a": JUNK}}
 
 
-@pytest.mark.parametrize(
-    ("changes", "answer"),
-    [
-        ({"token": "x"}, ("stale_token", "token")),
-        ({"token": None}, ("missing_field", "token")),
-        ({"type": "move_j"}, ("malformed", "")),
-        ({"type": "nonsense"}, ("malformed", "")),
-        ({"type": None}, ("malformed", "")),
-        ({"type": JUNK}, ("malformed", "type")),
-        ({"token": JUNK}, ("malformed", "token")),
-        ({}, ("unknown_field", "calibration.a")),
-    ],
-)
+@pytest.mark.parametrize(("changes", "answer"), [
+    ({"token": "x"}, ("stale_token", "token")), ({"token": None}, ("missing_field", "token")),
+    ({"type": "move_j"}, ("malformed", "")), ({"type": "nonsense"}, ("malformed", "")),
+    ({"type": None}, ("malformed", "")), ({"type": JUNK}, ("malformed", "type")),
+    ({"token": JUNK}, ("malformed", "token")), ({}, ("unknown_field", "calibration.a")),
+])  # fmt: skip
 def test_of_a_long_message_little_is_read_before_its_sender_is_known(changes, answer):
     data = msgpack.packb(LONG | changes)
     assert EXPLAINED_BYTES < len(data) <= MAX_BYTES

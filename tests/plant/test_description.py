@@ -22,7 +22,7 @@ from tvist_plant.description import (
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import rigid_model
 from tvist_plant.robot_tables import Payload
-from tvist_plant.similar import RULE, Scale, counterpart
+from tvist_plant.similar import RULE, Scale
 from tvist_plant.user_file import UserFileError
 
 from .arms import chain
@@ -70,6 +70,10 @@ def test_a_file_by_its_path_is_the_same_as_the_name(tmp_path, ur5e):
         ),
         ("Q1 = [0.0, ", "Q1 = [", "poses.Q1"),
         ("[robot]", "[robot", "line 8"),
+        ('kinematics = "published', 'kinematic = "published', "provenance.kinematic"),
+        ('drives           = "measured:', 'drives = "guessed:', "must be one of published, measured"),
+        ("[27500.0,", "[-27500.0,", "drives.gear_stiffness[0] is -27500.0: must be more than 0"),
+        ("a     = [", "b     = [", "kinematics.b"),
     ],
 )
 def test_a_wrong_file_is_one_sentence_that_names_file_and_key(tmp_path, old, new, key):
@@ -177,21 +181,12 @@ def test_another_arm_has_another_one(description):
     assert fingerprint(description) != fingerprint(UR5E)
 
 
-@pytest.mark.parametrize(
-    "description",
-    [
-        changed("robot", name="left", model="Other"),
-        scaled("limits", "position"),
-        scaled("limits", "torque"),
-        changed("payload", mass=1.0),
-        changed("sensors", accelerometer_noise=1.0),
-        changed("drives", gear_error_amplitude=0.0),
-        changed("drives", friction_feedforward=0.0),
-        REPLACE(UR5E, poses={}),
-        UR5E.clean(),
-        UR5E.quiet(),
-    ],
-)
+@pytest.mark.parametrize("description", [
+    changed("robot", name="left", model="Other"), scaled("limits", "position"), scaled("limits", "torque"),
+    changed("payload", mass=1.0), changed("sensors", accelerometer_noise=1.0),
+    changed("drives", gear_error_amplitude=0.0), changed("drives", friction_feedforward=0.0),
+    REPLACE(UR5E, poses={}), UR5E.clean(), UR5E.quiet(),
+])  # fmt: skip
 def test_the_same_arm_under_another_name_with_other_limits_has_the_same(description):
     assert fingerprint(description) == fingerprint(UR5E)
 
@@ -248,33 +243,6 @@ def test_a_loaded_arm_is_damped_like_the_ur5e_and_slower_if_it_is_longer(name, m
     assert found.zeta[0] == pytest.approx(own.zeta[0], rel=0.1)
     scale = Scale(arm.kinematics, arm.limits.torque)
     assert bool(found.f_d[0] < own.f_d[0]) == (scale.length > 1.0)
-
-
-@pytest.mark.parametrize(
-    ("joints", "expected"),
-    [(1, [0]), (4, [0, 1, 2, 3]), (5, [0, 2, 3, 4, 5]), (6, [0, 1, 2, 3, 4, 5]), (7, [0, 1, 1, 2, 3, 4, 5])],
-)
-def test_joints_have_counterparts(joints, expected):
-    assert [counterpart(joint, joints) for joint in range(joints)] == expected
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ('kinematics = "published', 'kinematic = "published', "provenance.kinematic: there is no such table"),
-        ('drives           = "measured:', 'drives = "guessed:', "must be one of published, measured"),
-        ("[27500.0,", "[-27500.0,", "drives.gear_stiffness[0] is -27500.0: must be more than 0"),
-        ("a     = [", "b     = [", "kinematics.b is not a key"),
-    ],
-)
-def test_a_wrong_table_is_refused_in_a_sentence(old, new, said, tmp_path):
-    text = file_of("ur5e")
-    assert old in text
-    path = tmp_path / "mine.toml"
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises(DescriptionError) as error:
-        load(path)
-    assert said in str(error.value)
 
 
 SEVEN = Path(__file__).parent / "urdf" / "seven.urdf"

@@ -160,10 +160,3 @@ def test_a_twisted_gear_pulls_both_ways(ur5e, arm):
     assert torque[arm.joints[2]] == pytest.approx(32.5)
     assert torque[12] == pytest.approx(-32.5)
     assert np.count_nonzero(torque) == 2
-
-
-def test_both_kinds_of_friction_have_the_same_slope_at_rest(ur5e, arm):
-    real, clean = (LinearPart.of(arm, description.drives) for description in (ur5e, ur5e.clean()))
-    np.testing.assert_array_equal(real.damping, clean.damping)
-    slope = real.damping[10, 10] - ur5e.drives.gear_damping[0] - ur5e.drives.velocity_gain[0]
-    assert slope == pytest.approx(60.0)

@@ -126,17 +126,11 @@ def test_pressed_a_surface_yields_by_the_stiffness_it_has_whatever_the_arm_carri
     assert upward[2] == pytest.approx(force[2], rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("shape", "turned"),
-    [
-        ('euler="90 0 0" pos="0 0 0.1"', True),
-        ('axisangle="1 0 0 90" pos="0 0 0.1"', True),
-        ('xyaxes="1 0 0 0 0 1" pos="0 0 0.1"', True),
-        ('zaxis="0 1 0" pos="0 0 0.1"', True),
-        ('fromto="0 -0.05 0.1 0 0.05 0.1"', True),
-        ('pos="0 0 0.1"', False),
-    ],
-)
+@pytest.mark.parametrize(("shape", "turned"), [
+    ('euler="90 0 0" pos="0 0 0.1"', True), ('axisangle="1 0 0 90" pos="0 0 0.1"', True),
+    ('xyaxes="1 0 0 0 0 1" pos="0 0 0.1"', True), ('zaxis="0 1 0" pos="0 0 0.1"', True),
+    ('fromto="0 -0.05 0.1 0 0.05 0.1"', True), ('pos="0 0 0.1"', False),
+])  # fmt: skip
 def test_a_tool_is_turned_as_the_scene_says(tmp_path, shape, turned):
     """A capsule across the flange is as wide as it is long, in its own frame and in that of its body."""
     tool = f'<geom type="capsule" size="0.01 0.05" {shape}/>'

@@ -15,7 +15,7 @@ from tvist_protocol.channels import tag
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.journal import Entry, entry_of, message_of
 from tvist_protocol.programs import Interpreter
-from tvist_protocol.recorded import JsonReader, to_json, topics, viewer_schema
+from tvist_protocol.recorded import JsonReader, to_json, viewer_schema
 
 KINDS = (State, Event, Truth, Io, Entry)
 
@@ -119,18 +119,6 @@ def test_what_is_no_message_is_a_protocol_error(kind, data):
 def test_fields_of_a_later_version_are_ignored():
     data = to_json(STATE)[:-1] + b',"mood":"good"}'
     assert JsonReader(State).read(data) == STATE
-
-
-def test_topics_are_named_as_the_keys():
-    assert list(topics("ur5e").values()) == [
-        "tvist/ur5e/state",
-        "tvist/ur5e/event",
-        "tvist/ur5e/truth",
-        "tvist/ur5e/io",
-        "tvist/ur5e/journal",
-    ]
-    with pytest.raises(ProtocolError):
-        topics("*")
 
 
 COMMAND_TAGS = {tag(kind) for kind in get_args(Command)}

@@ -209,7 +209,7 @@ def assert_equal(one, other):
 
 @pytest.mark.parametrize("name", SHAPERS)
 @pytest.mark.parametrize("modes", [1, 2])
-def test_every_shaper(name, modes):
+def test_many_samples_at_once_are_what_they_are_one_by_one_with_every_shaper(name, modes):
     shaper = SHAPERS[name]
     made = estimator() if modes == 1 else Fixed([7.0, 15.0], [0.1, 0.15])
     one, other = (TvistFilter(shaper, made.fork(), joints=4) for _ in range(2))
@@ -224,14 +224,14 @@ def test_every_shaper(name, modes):
 
 
 @pytest.mark.parametrize(("name", "modes"), [("auto", 4), ("elastic", 1)])
-def test_other_filters(name, modes):
+def test_so_they_are_with_filters_that_are_no_shapers(name, modes):
     known = Fixed([7.0, 15.0, 21.0, 33.0][:modes], [0.1] * modes)
     one, other = (make_filter(name, known, joints=4) for _ in range(2))
     samples = walk(300)
     np.testing.assert_array_equal(one.filter_all(samples), [other.filter(sample) for sample in samples])
 
 
-def test_along_a_path():
+def test_so_they_are_along_a_path():
     one, other = (TvistFilter(SHAPERS["zv"], estimator(), joints=4) for _ in range(2))
     for tvist in (one, other):
         tvist.reset(np.zeros(1), lambda s: np.array([s[0], s[0] ** 2, 0.5 * s[0], 0.0]))
@@ -239,7 +239,7 @@ def test_along_a_path():
     np.testing.assert_array_equal(one.filter_all(samples), [other.filter(sample) for sample in samples])
 
 
-def test_nothing_and_wrong_shapes():
+def test_no_samples_are_none_and_wrong_shapes_are_refused():
     tvist = TvistFilter(SHAPERS["zv"], estimator(), joints=4)
     assert tvist.filter_all(np.empty((0, 4))).shape == (0, 4)
     with pytest.raises(ShapingError, match="shape"):

@@ -115,18 +115,18 @@ def check(make, runs, seen):
         for column, make in enumerate(ESTIMATORS)
     ],
 )
-def test_a_filter(kind, estimator, ticks):
+def test_a_fork_of_a_filter_repeats_it_to_the_bit_and_leaves_it_alone(kind, estimator, ticks):
     check(lambda: FILTERS[kind](ESTIMATORS[estimator]), (ticks, 150), said)
 
 
-def test_a_filter_of_several_modes():
+def test_a_fork_of_a_filter_of_several_modes_does_the_same():
     for make in (fixed, modal, mistaken):
         check(lambda make=make: TvistFilter(shaper("zv"), make(2), joints=JOINTS), (200, 100), said)
         check(lambda make=make: SteadyFilter(product(3), make(3), joints=JOINTS), (200, 100), said)
         check(lambda make=make: SteadyFilter(short(2), make(2), joints=JOINTS), (200, 100), said)
 
 
-def test_an_aimed_filter_that_has_been_told_its_end():
+def test_a_fork_of_an_aimed_filter_goes_on_to_the_end_that_was_told():
     def make():
         tvist = AimedFilter(short(1), modal(1), joints=JOINTS)
         tvist.aim([1.0, 0.5])
@@ -136,7 +136,7 @@ def test_an_aimed_filter_that_has_been_told_its_end():
 
 
 @pytest.mark.parametrize(("estimator", "ticks"), [*zip(ESTIMATORS, (0, 1, 100, 400), strict=True)])
-def test_a_fade(estimator, ticks):
+def test_a_fork_of_a_fade_repeats_it_to_the_bit(estimator, ticks):
     """In its first tick, under way, and finished; also where both filters ask one estimator."""
 
     def make(shared):
@@ -157,31 +157,6 @@ def test_a_fade(estimator, ticks):
         assert fade.fork().old is not fade.old
     assert {0: 0.0, 1: 0.0, 400: 1.0}.get(ticks, shares[0]) == shares[0]
     assert ticks != 100 or 0.0 < shares[0] < 1.0
-
-
-def test_a_modal_estimator_keeps_following_a_mode_that_is_no_longer_the_lowest():
-    """The copy follows what the original followed; one made anew takes the lowest."""
-    two = Drivetrain((9e3, 9e3), (0.3, 0.3), (150.0, 150.0), (15.0, 15.0))
-    followed = Modal(lambda x: np.diag([1.0 + x[0], 2.0]), two, modes=1)
-    for x in np.linspace(0.0, 2.0, 200):
-        followed.poles(np.array([x]))
-    further = np.array([2.001])
-    ahead, anew = followed.fork().poles(further), Modal(followed._mass_matrix, two, modes=1).poles(further)
-    assert ahead == followed.poles(further)
-    assert ahead.imag > 1.05 * anew.imag
-
-
-def test_reset_and_taking_over_are_the_copy_s_own():
-    """Neither a reset of the copy nor a filter that goes on from it touches the original."""
-    for kind, estimator in EVERY:
-        tvist = FILTERS[kind](ESTIMATORS[estimator])
-        never = FILTERS[kind](ESTIMATORS[estimator])
-        before, after = np.split(path(1, 200), [150])
-        output(tvist, before)
-        output(never, before)
-        tvist.fork().reset([1.0, -1.0])
-        tvist.fork().filter([0.3, 0.4])
-        np.testing.assert_array_equal(output(tvist, after), output(never, after))
 
 
 LIMITS = {"velocity": 7.0, "acceleration": 34.0, "jerk": 600.0}

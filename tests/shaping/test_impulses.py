@@ -95,19 +95,12 @@ def test_a_damping_beyond_a_shapers_validity_is_refused_with_what_to_take(name):
         entry.function(10.0, entry.zeta_max)
 
 
-@pytest.mark.parametrize(
-    ("A", "tau", "why"),
-    [
-        ([0.5, 0.5], [0.0], "shape"),
-        ([], [], "shape"),
-        ([[1.0]], [[0.0]], "shape"),
-        ([0.5, math.nan], [0.0, 1.0], "A is .* finite"),
-        ([0.5, 0.5], [0.0, math.inf], "tau is .* finite"),
-        ([0.5, 0.5], [0.1, 1.0], "ascend from 0"),
-        ([0.4, 0.3, 0.3], [0.0, 1.0, 0.5], "ascend from 0"),
-        ([0.5, 0.5 + 2e-9], [0.0, 1.0], "sum to 1"),
-    ],
-)
+@pytest.mark.parametrize(("A", "tau", "why"), [
+    ([0.5, 0.5], [0.0], "shape"), ([], [], "shape"), ([[1.0]], [[0.0]], "shape"),
+    ([0.5, math.nan], [0.0, 1.0], "A is .* finite"), ([0.5, 0.5], [0.0, math.inf], "tau is .* finite"),
+    ([0.5, 0.5], [0.1, 1.0], "ascend from 0"), ([0.4, 0.3, 0.3], [0.0, 1.0, 0.5], "ascend from 0"),
+    ([0.5, 0.5 + 2e-9], [0.0, 1.0], "sum to 1"),
+])  # fmt: skip
 def test_what_is_no_train_of_impulses_is_refused(A, tau, why):
     with pytest.raises(ImpulseError, match=why):
         Impulses(A, tau)
@@ -188,18 +181,6 @@ def test_the_bands_are_those_of_the_golden_table(name, percent, golden):
     impulses = SHAPERS[name].function(8.0, 0.0)
     assert band(impulses, 8.0, 0.0, percent / 100) == pytest.approx((8.0 * low, 8.0 * high), abs=1e-3)
     assert SHAPERS[name].band(percent / 100) == pytest.approx((low, high), abs=1e-4)
-
-
-def test_damping_never_narrows_a_band_nor_raises_what_is_left_at_the_design():
-    for entry in (SHAPERS[name] for name in ("zv", "mzv", "zvd", "zvdd", "zvddd", "ei", "ei2", "ei3")):
-        widths, lefts = [], []
-        for zeta in np.arange(0.0, 0.95, 0.05):
-            impulses = entry.function(1.0, zeta)
-            low, high = band(impulses, 1.0, zeta, 0.05)
-            widths.append(high - low)
-            lefts.append(residual(1.0, zeta, impulses))
-        assert all(later >= earlier for earlier, later in pairwise(widths)), entry.name
-        assert all(later <= earlier + 1e-12 for earlier, later in pairwise(lefts)), entry.name
 
 
 def test_a_band_without_an_end_is_infinite_and_one_without_its_middle_is_none():
@@ -394,19 +375,10 @@ def test_a_length_that_no_filter_has_is_refused_with_the_lengths_that_there_are(
         BUILT_IN.check(name)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "elastic-",
-        "elastic-x",
-        "elastic-16-16",
-        "auto-16",
-        "zv-16",
-        "elastic-016",
-        "elastic-\uff11\uff16",
-        f"elastic-{'9' * 5000}",
-    ],
-)
+@pytest.mark.parametrize("name", [
+    "elastic-", "elastic-x", "elastic-16-16", "auto-16", "zv-16", "elastic-016", "elastic-\uff11\uff16",
+    f"elastic-{'9' * 5000}",
+])  # fmt: skip
 def test_any_other_name_is_unknown(name):
     with pytest.raises(UnknownShaperError):
         BUILT_IN.check(name)

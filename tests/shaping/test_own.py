@@ -176,22 +176,6 @@ def test_a_shaper_that_declares_less_than_it_does_is_refused(field, declared):
         check_shaper(mine)
 
 
-@pytest.mark.parametrize(
-    ("field", "declared"),
-    [
-        ("duration_periods", "0.5"),
-        ("duration_periods", np.nan),
-        ("zeta_max", 1.5),
-        ("zeta_max", 0),
-        ("peak", 0.5),
-    ],
-)
-def test_a_shaper_that_declares_what_cannot_be_is_refused(field, declared):
-    values = {"name": "mine", "description": "", "function": zv, "duration_periods": 0.5} | {field: declared}
-    with pytest.raises(DesignError, match=field):
-        check_shaper(Shaper(**values))
-
-
 def turned(kind, name):
     """A filter whose function can be told to fail, and that function."""
     if kind == "taps":

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from tvist_shaping import SHAPERS, Estimator, Fade, FilterError, Fixed, TvistFilter, product, residual, zv
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.impulse_train import Impulses
-from tvist_shaping.steady import AimedFilter, ProductDesign, ShortDesign, SteadyFilter
+from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
 from tvist_shaping.taps import average, length, mean_delay, product_taps
 
 H = 0.002
@@ -246,14 +246,6 @@ def test_a_mode_that_is_held_is_said_though_the_design_has_room_for_it(kind):
     assert tvist.clipped
 
 
-def test_an_aimed_filter_says_of_the_end_it_is_told_whether_it_is_clipped():
-    tvist = AimedFilter(design("short"), Falling(4), joints=1)
-    tvist.aim([2.0])
-    assert tvist.clipped
-    tvist.aim([0.5])
-    assert not tvist.clipped
-
-
 def test_where_the_programme_is_not_solved_the_old_taps_stand_and_it_is_said():
     tvist = a_filter("short")
     before = tvist._designed.copy()
@@ -267,18 +259,6 @@ def test_where_the_programme_is_not_solved_the_old_taps_stand_and_it_is_said():
     for _ in range(8):
         tvist.filter([0.0])
     assert not tvist.clipped
-
-
-def test_a_short_design_gets_longer_and_shorter_with_the_arm_and_no_faster_than_it_may():
-    tvist = a_filter("short")
-    lengths = []
-    for q in np.concatenate([np.linspace(0.0, 2.2, 1500), np.linspace(2.2, 0.0, 1500)]):
-        tvist.filter([q])
-        lengths.append(tvist.design._length)
-    lengths = np.array(lengths)
-    assert lengths[1500:1800].min() < 0.85 * lengths[0]
-    assert lengths[-1] == pytest.approx(lengths[0], rel=0.1)
-    assert np.abs(np.diff(lengths)).max() <= 0.15 * 4 * H * (1 + 1e-9)
 
 
 @pytest.mark.parametrize(

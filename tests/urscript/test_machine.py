@@ -1,7 +1,5 @@
 """The machine: ticks, budget, threads, critical sections, and what its user gives it."""
 
-from collections.abc import Generator
-
 import pytest
 
 from tvist_urscript import (
@@ -11,13 +9,9 @@ from tvist_urscript import (
     ScriptError,
     Signature,
     compile_script,
-    costs,
     parameters,
-    signature,
-    signatures,
     to_str,
 )
-from tvist_urscript.expressions import START
 from tvist_urscript.machine import OVERDRAFT, PATIENCE
 from tvist_urscript.statements import PIECE
 from tvist_urscript.threads import MOST_THREADS
@@ -125,28 +119,6 @@ def test_any_exception_of_a_built_in_is_an_error_at_its_call(kind):
     assert not machine.running
 
 
-def test_all_threads_end_where_one_fails_at_its_end():
-    closed = []
-
-    def hold(value):
-        try:
-            yield
-        finally:
-            closed.append(value)
-            raise KeyError(value)
-
-    script = compile_script(
-        "def p():\nthread t():\n hold(1)\nend\nrun t()\nhold(2)\nend",
-        {"hold": Signature(parameters("v"), blocks=True)},
-    )
-    machine = Machine(script, {"hold": hold})
-    machine.resume()
-    with pytest.raises(ScriptError, match="line 3, column 2: internal error: KeyError"):
-        machine.end()
-    assert sorted(closed) == [1, 2]
-    assert not machine.running
-
-
 def test_a_thread_finishes_before_it_waits_for_another():
     order = []
 
@@ -166,19 +138,6 @@ def test_a_thread_finishes_before_it_waits_for_another():
         assert order[0] == ("finish", 0), waiting
 
 
-def test_a_thread_that_restarts_itself_keeps_nothing():
-    robot = Robot("thread t():\n run t()\nend\nrun t()\nwhile True:\n sync()\nend")
-    starts = []
-    for _ in range(50):
-        before = robot.machine._started
-        robot.ticks(1)
-        starts.append(robot.machine._started - before)
-        assert len(robot.machine.living) <= 3
-    assert 1 <= max(starts) <= EVALUATIONS // START
-    youngest = robot.machine._threads[-1]
-    assert youngest.parent is None or youngest.parent.number == 0
-
-
 def test_kill_reaches_threads_whose_parent_has_ended():
     robot = Robot(
         "thread c():\n move(7)\nend\nthread b():\n run c()\nend\nthread a():\n run b()\n move(1)\nend\n"
@@ -187,11 +146,6 @@ def test_kill_reaches_threads_whose_parent_has_ended():
     robot.ticks(2)
     assert sorted(robot.closed) == [1, 7]
     assert robot.machine.living == [0]
-
-
-def test_a_function_that_is_not_given_is_told_at_once():
-    with pytest.raises(ValueError, match="say"):
-        Machine(compile_script("say(1)", SIGNATURES), {})
 
 
 def test_each_thread_finishes_before_it_ends_but_no_killed_one():
@@ -308,34 +262,6 @@ def test_a_spent_thread_keeps_its_critical_section_and_a_waiting_one_gives_it_up
     )
     robot.ticks(20, budget=100)
     assert robot.said == ["1", "2", "3"]
-
-
-class Functions:
-    """A class of functions that scripts may call."""
-
-    @costs(180)
-    def movej(
-        self, q: object, a: object = 1.4, name: object = "x", on: object = True
-    ) -> Generator[None, None, object]:
-        yield
-        return q, a, name, on
-
-    def read(self):
-        return 0
-
-    def wait(self):
-        yield
-
-    def _private(self):
-        pass
-
-
-def test_a_signature_is_that_of_the_method():
-    known = signatures(Functions)
-    assert list(known) == ["movej", "read", "wait"]
-    assert known["movej"] == Signature(parameters("q", a=1.4, name="x", on=True), blocks=True, cost=180)
-    assert known["movej"] == signature(Functions().movej)
-    assert (known["movej"].required, known["read"].blocks, known["wait"].blocks) == (1, False, True)
 
 
 def test_arguments_are_computed_in_the_order_of_the_text():
