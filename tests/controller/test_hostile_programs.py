@@ -94,13 +94,9 @@ ENDS = ("halt", "protective_stop()", "x = 1 / 0", "halt()", "stop()")
 EFFECTS = ("set_standard_digital_out({n}, i % 2 == 0)", "write_output_integer_register({n}, i)",
            "write_output_float_register({n}, i)", "textmsg(i)", "set_analog_out(0, 0.5)", "x = x + 1")  # fmt: skip
 MOVES = (
-    "movej({q}, r=0.01)",
-    "movej({q})",
-    "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.01)",
-    "sync()",
-    "sleep(0.01)",
+    "movej({q}, r=0.01)", "movej({q})", "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.01)", "sync()", "sleep(0.01)",
     "servoj({q})",
-)
+)  # fmt: skip
 
 
 def stopping(seed):

@@ -185,22 +185,11 @@ PLANNED = [
     (m.MovePath, {"segments": (TOO_GENTLE,)}, "out_of_range", "segments[0].acceleration"),
 ]
 WITH_TOKEN = [
-    (c.KeepAlive, {}),
-    (c.ReleaseControl, {}),
-    (c.MoveJ, {"q": Q2_}),
-    (c.ServoStart, {}),
-    (c.ServoStop, {}),
-    (c.Stop, {}),
-    (c.SetShaper, {"name": "ei"}),
-    (c.SetEstimator, FIXED),
-    (c.SetPayload, BODY),
-    (SimulationReset, {"q": Q2_}),
-    (SimulationStep, {"ticks": 1}),
-    (c.PowerOn, {}),
-    (c.PowerOff, {}),
-    (c.UnlockProtectiveStop, {}),
-    (SimulationInject, {"fault": "protective_stop"}),
-]
+    (c.KeepAlive, {}), (c.ReleaseControl, {}), (c.MoveJ, {"q": Q2_}), (c.ServoStart, {}), (c.ServoStop, {}),
+    (c.Stop, {}), (c.SetShaper, {"name": "ei"}), (c.SetEstimator, FIXED), (c.SetPayload, BODY),
+    (SimulationReset, {"q": Q2_}), (SimulationStep, {"ticks": 1}), (c.PowerOn, {}), (c.PowerOff, {}),
+    (c.UnlockProtectiveStop, {}), (SimulationInject, {"fault": "protective_stop"}),
+]  # fmt: skip
 
 
 def assert_refused(robot, twin, table):
