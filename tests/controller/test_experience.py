@@ -24,7 +24,6 @@ from tvist_lab.replay import replay
 from tvist_plant.description import load
 from tvist_protocol.codec import decode, encode
 from tvist_protocol.commands import Forget, MoveJ, SetPayload, Stop, TakeControl
-from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event, State
 from tvist_server.option_values import StartError
@@ -39,16 +38,13 @@ Q1, Q2 = ROBOT.poses["Q1"], ROBOT.poses["Q2"]
 
 
 class Recalling:
-    """Keeps the motions that it studies, and teaches a payload after the first one."""
+    """Keeps the motions that it studies."""
 
-    def __init__(self, mass=None):
-        self.motions, self.mass = [], mass
+    def __init__(self):
+        self.motions = []
 
     def study(self, motion):
         self.motions.append(motion)
-        if self.mass is None or len(self.motions) != 1:
-            return None
-        return PayloadLesson(payload=paper_payload(ROBOT, self.mass), why=f"it carries {self.mass:g} kg")
 
 
 class Served:
