@@ -187,11 +187,3 @@ def test_an_entry_that_holds_no_message_says_so(entry, code, says):
     assert caught.value.code == code
     assert caught.value.where == "message"
     assert says in caught.value.why
-
-
-def test_a_calibration_that_no_client_could_send_is_refused():
-    nan = float("nan")
-    message = {"type": "set_estimator", "token": "t", "name": "polynomial", "calibration": {"a": nan}}
-    with pytest.raises(ProtocolError) as caught:
-        message_of(Entry(tick=0, kind="command", message=message))
-    assert caught.value.code == "out_of_range"

@@ -18,7 +18,6 @@ from tvist_shaping import (
     UnknownShaperError,
     band,
     ei,
-    none,
     product,
     residual,
     shaper,
@@ -181,11 +180,6 @@ def test_the_bands_are_those_of_the_golden_table(name, percent, golden):
     impulses = SHAPERS[name].function(8.0, 0.0)
     assert band(impulses, 8.0, 0.0, percent / 100) == pytest.approx((8.0 * low, 8.0 * high), abs=1e-3)
     assert SHAPERS[name].band(percent / 100) == pytest.approx((low, high), abs=1e-4)
-
-
-def test_a_band_without_an_end_is_infinite_and_one_without_its_middle_is_none():
-    assert band(zvd(1.0, 0.9), 1.0, 0.9, 0.05)[1] == math.inf
-    assert all(map(math.isnan, band(none(1.0, 0.0), 1.0, 0.0, 0.05)))
 
 
 def test_bad_input_is_named():

@@ -104,6 +104,14 @@ def test_a_killed_thread_leaves_its_motion():
     assert robot.said == ["7"]
 
 
+def test_an_error_of_one_thread_ends_the_others():
+    robot = Robot('thread t():\n sync()\n fail("x")\nend\nrun t()\nmove(2)')
+    robot.ticks(1)
+    with pytest.raises(ScriptError):
+        robot.ticks(1)
+    assert robot.closed == [2]
+
+
 @pytest.mark.parametrize(
     "kind", [KeyError, AttributeError, AssertionError, NameError, RuntimeError, MemoryError]
 )
