@@ -232,3 +232,21 @@ def test_stop_l_keeps_the_tool_on_its_line():
     arm.until_rest()
     assert off_line(poses(arm), xd).max() < 1e-9
     assert (len(arm.states) - begun) * H == pytest.approx(np.hypot(0.2, 0.1) / 2.0, abs=5 * H)
+
+
+@pytest.mark.parametrize(("kind", "fields"), [
+    (m.ServoJ, {"q": BESIDE}), (m.SpeedJ, {"qd": (0.5, *REST[1:])}), (m.SpeedL, {"xd": (0.2, *REST[1:])}),
+])  # fmt: skip
+def test_a_gentler_stop_during_a_stop_changes_nothing(kind, fields):
+    ticks = []
+    for gentler in (False, True):
+        arm = robot()
+        arm.send(kind, **fields)
+        arm.tick(60)
+        arm.send(m.StopJ, acceleration=4.0)
+        arm.tick(3)
+        if gentler:
+            arm.send(c.Stop, deceleration=1.0)
+        arm.until_rest()
+        ticks.append(len(arm.states))
+    assert ticks[0] == ticks[1]

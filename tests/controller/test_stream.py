@@ -140,6 +140,17 @@ def test_a_step_of_half_a_radian_stays_within_the_limits(period):
     assert stream.limited > 0
 
 
+@pytest.mark.parametrize("jerk", [0.1, 100.0])
+def test_coming_to_rest_is_no_journey_however_low_the_jerk_limit(jerk):
+    """A stream may have any acceleration; taking 40 rad/s² back at 0.1 rad/s³ would last 400 s."""
+    stream = start(limits=MotionLimits(3.0, 40.0, jerk))
+    play(stream, regular(lambda t: 0.5 * 39.0 * t * t, 20), 20)
+    out = play(stream, {}, 2000, first=20)
+    assert np.ptp(out[-100:]) < 1e-12
+    v, a, ramp = 39.0 * 20 * H, 40.0, 0.02
+    assert abs(out[-1] - out[0]) < (v + a * ramp) ** 2 / (2 * a) + 2 * (v + a * ramp) * ramp
+
+
 def delay(period):
     """B-spline and spare, two periods and one, of a stream that is in time; a tick less, as it is known at once."""
     return 3 * period - H
