@@ -179,6 +179,13 @@ def test_a_thread_killed_in_a_move_leaves_it_to_the_stop_that_follows():
     assert -1.6 < slowest < -0.9
 
 
+def test_two_threads_cannot_move_the_arm_at_once():
+    robot = a_robot()
+    run(robot, f"thread go():\n movej({NEAR})\n end", "run go()", "sleep(0.1)", f"movej({list(URSIM)})")
+    assert "another thread is controlling the robot" in failure(robot).why
+    assert robot.until_rest()
+
+
 def test_speedj_returns_after_its_time_and_keeps_the_speed_until_the_program_ends():
     robot = a_robot()
     run(robot, "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.3)", "textmsg(get_target_joint_speeds()[0])", "sleep(0.2)")

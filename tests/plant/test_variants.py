@@ -101,6 +101,7 @@ UR5E = load("ur5e")
 def test_a_hidden_robot_differs_from_its_file_within_the_shares_and_nowhere_else(robot: str) -> None:
     """All drawn values are within their shares over many seeds, reach both halves, and nothing else changes."""
     known = load(robot)
+    assert hidden(known, 11) == hidden(known, 11) != hidden(known, 12)
     ratios: dict[str, list[float]] = {name: [] for name in (*DRIVES, *LINKS)}
     for seed in range(60):
         found = hidden(known, seed)
