@@ -30,7 +30,7 @@ def pytest_addoption(parser):
     )
     parser.addoption("--quick", action="store_true", help="run what is quick by durations.json")
     parser.addoption(
-        "--cases", type=_count, default=5, help="number of cases of each test with the mark `search`"
+        "--cases", type=_count, default=2, help="number of cases of each test with the mark `search`"
     )
     parser.addoption("--seed", type=int, default=0, help="seed of these cases")
 
