@@ -25,7 +25,7 @@ LENGTH, SHARES = 0.06, (0.6, 0.6, 1.0)
 """Length of a jog for the fastest joint [rad], and shares of the joints from the base on: all big joints move at once,
 so that every mode is excited.
 """
-LIMITS = MotionLimits(velocity=2.625, acceleration=6.125, jerk=535.9375)
+LIMITS = MotionLimits(velocity=2.6, acceleration=6.1, jerk=540.0)
 """Limits of the quickest jog: quicker than a client's `move_j`, so that an arm that a servo moves softly rings, too."""
 SKIPPED, SAMPLES = round(BEGINS / PERIOD), round(LONGEST / PERIOD)
 NOISE = 0.03
