@@ -26,6 +26,7 @@ from tvist_lab.identification.twin_file import twin_file
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.recordings import RecordingError
 from tvist_lab.served import ServedError, served_robot
+from tvist_lab.whole_file import write_whole
 from tvist_plant.description import DescriptionError, RobotDescription, load
 from tvist_protocol.calibration import calibration_to_json
 from tvist_protocol.errors import RefusedError
@@ -62,7 +63,7 @@ def from_logs(
     with told(RecordingError, OSError), waiting("identifying") as step:
         if twin:
             made = fit_twin(arm, logs[: len(files)], logs[len(files) :], step)
-            output.write_text(twin_file(made, typed()), encoding="utf-8")
+            write_whole(output, twin_file(made, typed()).encode())
         else:
             found = _calibrated(arm, Measured(tuple(logs)), output, step)
     if twin:
@@ -78,7 +79,7 @@ def from_logs(
 
 def _calibrated(arm: RobotDescription, measured: Measured, output: Path, step: Progress) -> Found:
     found = calibrate(arm, measured, name=output.stem, command=typed(), progress=step)
-    output.write_bytes(calibration_to_json(found.calibration))
+    write_whole(output, calibration_to_json(found.calibration))
     return found
 
 

@@ -169,7 +169,9 @@ def number(value: float | None, digits: int = 3) -> str:
 
 def write_json(path: Path, result: dict[str, Any]) -> None:
     """Write a result to a file, indented for people."""
-    path.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+    from tvist_lab.whole_file import write_whole
+
+    write_whole(path, msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
 
 
 def default_output(path: Path) -> Path:
@@ -182,8 +184,7 @@ def default_output(path: Path) -> Path:
 def write_report(path: Path, page: "Page") -> None:
     """Write a web page, all of it or nothing, and say where it is."""
     from tvist_lab.report import render
-    from tvist_lab.whole_file import whole_file
+    from tvist_lab.whole_file import write_whole
 
-    with whole_file(path) as stream:
-        stream.write(render(page).encode(errors="replace"))  # a file's name need not be text
+    write_whole(path, render(page).encode(errors="replace"))  # a file's name need not be text
     say(f"the report is in {path}")

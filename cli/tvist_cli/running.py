@@ -14,6 +14,7 @@ from tvist_cli.serving import leave
 from tvist_lab.programs.judging import BaselineError, Run, read_baseline
 from tvist_lab.programs.limits import Limits
 from tvist_lab.programs.results import junit as junit_of
+from tvist_lab.whole_file import write_whole
 from tvist_server.config import ServeConfig
 from tvist_server.option_values import StartError
 from tvist_server.server import Server
@@ -54,7 +55,7 @@ def run_programs(
         say(ran[0].account if len(file) == 1 else f"{len(file)} programs ran as they should")
     if junit is not None:
         with told(OSError):
-            junit.write_bytes(junit_of(results))
+            write_whole(junit, junit_of(results))
         say(f"the results are in {junit}")
     sys.stdout.flush()
     _leave(ran[0].server, failure)

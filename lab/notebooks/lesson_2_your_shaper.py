@@ -200,7 +200,7 @@ def _(try_on_moves):
                 f"**{_best[0.25]}** is better. With the right one `zv` leaves {_left['zv', 0.0]} and `ei` "
                 f"{_left['ei', 0.0]}: **{_best[0.0]}** is better. `zv` makes the moves {_delay['zv']:.0f} ms longer, "
                 f"`ei` {_delay['ei']:.0f} ms. What is left with the right frequency is of other modes, of "
-                "friction and of the gears: `docs/reference/floors.md` says how much of which."
+                "friction and of the gears: `docs/results/floors.md` says how much of which."
             )
         }
     )

@@ -32,6 +32,19 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
         raise
 
 
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file, all of it or nothing; to links and devices, such as /dev/stdout, the bytes go as they are.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        path.write_bytes(content)
+        return
+    with whole_file(path) as stream:
+        stream.write(content)
+
+
 def _umask() -> int:
     """Mask of this process's new files, which temporary files do not follow."""
     mask = os.umask(0o077)

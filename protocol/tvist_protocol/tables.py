@@ -1,4 +1,4 @@
-"""The tables of the protocol's README, made from the message types."""
+"""The tables of the protocol's generated pages, made from the message types."""
 
 from collections.abc import Iterable, Mapping
 from enum import IntEnum
@@ -31,7 +31,7 @@ _LISTS = {
 
 
 def tables() -> dict[str, str]:
-    """Return the Markdown of every generated part of the README, by the name in its markers."""
+    """Return the Markdown of every table of the generated pages, by its name."""
     return {
         "keys": _table(("key", "kind", "by", "carries", "what"), map(_channel_row, CHANNELS)),
         "commands": _messages(COMMANDS),
@@ -96,12 +96,12 @@ def _message(kind: Struct, schema: Schema) -> str:
     fields = {field: part for field, part in schema["properties"].items() if field != "type"}
     text = " ".join((kind.__doc__ or "").split())
     if list(fields) == ["token"]:
-        return f"#### `{name}`\n\n{text} Carries `token` alone."
+        return f"### `{name}`\n\n{text} Carries `token` alone."
     rows = (
         (f"`{field}`", _values(part), _default(field, part, schema), part["description"])
         for field, part in fields.items()
     )
-    return f"#### `{name}`\n\n{text}\n\n{_table(('field', 'values', 'default', 'meaning'), rows)}"
+    return f"### `{name}`\n\n{text}\n\n{_table(('field', 'values', 'default', 'meaning'), rows)}"
 
 
 def _default(field: str, part: Schema, schema: Schema) -> str:

@@ -71,13 +71,8 @@ def test_a_program_reads_as_it_should(host, robot):
 
 
 def test_errors_come_out_of_calls_and_of_blocks(host, robot):
-    def fail():
-        with robot.control("me"):
-            assert host.holder == "me"
-            raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        fail()
+    with pytest.raises(ZeroDivisionError), robot.control("me"):
+        raise ZeroDivisionError
     assert host.holder is None
     with robot.control("me") as arm:
         with pytest.raises(RefusedError):
@@ -91,7 +86,11 @@ def test_errors_come_out_of_calls_and_of_blocks(host, robot):
         assert motion.stopped == raised.value.event
 
 
-def test_iterators_end_with_the_connection(host):
+async def test_iterators_end_with_the_connection_also_beside_a_running_loop(host):
+    await asyncio.to_thread(iterate_and_close, host)
+
+
+def iterate_and_close(host):
     robot = Robot.over(LoopbackTransport(host))
     states = robot.states()
     with robot.control("me") as arm:
@@ -125,14 +124,3 @@ def test_a_connection_that_fails_leaves_no_thread_behind(endpoint):
     with pytest.raises(NotConnectedError):
         Robot.connect(endpoint)
     assert "tvist-client" not in {thread.name for thread in threading.enumerate()}
-
-
-def test_it_may_be_used_beside_a_running_loop(host):
-    def use():
-        with Robot.over(LoopbackTransport(host)) as robot:
-            return robot.info().model
-
-    async def main():
-        return await asyncio.to_thread(use)
-
-    assert asyncio.run(main()) == "UR5e"

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tvist_client import (
-    LineSegment,
     LoopbackTransport,
     MisuseError,
     MotionStoppedError,
@@ -42,30 +41,13 @@ async def test_a_move_is_waited_for_by_letting_a_deterministic_number_of_ticks_p
         assert (await robot.state()).target_q == pytest.approx(NEAR)
 
 
-async def test_a_move_that_is_not_waited_for_can_be_waited_for_later(robot):
-    async with robot.control("me") as arm:
-        motion = await arm.move_j(NEAR, wait=False)
-        assert (motion.started, motion.done, motion.ended) == (None, None, False)
-        assert await robot.advance(10) == 10
-        assert motion.started == 1
-        assert (await motion.wait()).done > 10
-
-
-@pytest.mark.parametrize("kind", ["move_j", "move_l", "move_c", "move_path", "speed_j"])
+@pytest.mark.parametrize("kind", ["move_j", "speed_j"])
 async def test_a_stopped_motion_raises_with_its_event(robot, kind):
     async with robot.control("me") as arm:
-        await arm.reset((0.2, -1.4, 1.7, -1.8, -1.5, 0.3))
-        via, pose = [
-            await robot.forward_kinematics((0.2, -1.4, 1.7 + by, -1.8, -1.5, 0.3)) for by in (0.1, 0.2)
-        ]
-        motion = await {
-            "move_j": lambda: arm.move_j((0.4, -1.4, 1.7, -1.8, -1.5, 0.3), wait=False),
-            "move_l": lambda: arm.move_l(pose, wait=False),
-            "move_c": lambda: arm.move_c(via, pose, wait=False),
-            "move_path": lambda: arm.move_path([LineSegment(pose=pose)], wait=False),
-            "speed_j": lambda: arm.speed_j(SLOW),
-        }[kind]()
-        await robot.advance(5)
+        motion = await (arm.move_j(NEAR, wait=False) if kind == "move_j" else arm.speed_j(SLOW))
+        assert (motion.started, motion.done, motion.ended) == (None, None, False)
+        assert await robot.advance(5) == 5
+        assert motion.started == 1
         await arm.stop()
         with pytest.raises(MotionStoppedError, match=r"motion 1 was stopped at tick \d+: ") as raised:
             await motion.wait()
@@ -131,7 +113,7 @@ async def test_a_stream_the_robot_ended_is_said_to_have_ended(robot, more):
             await stream(arm)
 
 
-async def test_an_error_inside_a_stream_is_the_one_that_comes_out(robot):
+async def test_an_error_inside_a_stream_is_the_one_that_comes_out_and_control_is_released(host, robot):
     async def stream(arm):
         async with arm.servo() as servo:
             with pytest.raises(MisuseError, match="no set-points"):
@@ -141,9 +123,10 @@ async def test_an_error_inside_a_stream_is_the_one_that_comes_out(robot):
             await robot.advance(50)
             raise KeyError("mine")
 
-    async with robot.control("me") as arm:
-        with pytest.raises(KeyError, match="mine"):
+    with pytest.raises(KeyError, match="mine"):
+        async with robot.control("me") as arm:
             await stream(arm)
+    assert host.holder is None
 
 
 async def test_refusals_carry_the_reply_and_end_neither_control_nor_the_robot(host, robot):
@@ -161,13 +144,6 @@ async def test_refusals_carry_the_reply_and_end_neither_control_nor_the_robot(ho
     with pytest.raises(RefusedError, match="another"):
         async with robot.control("me"):
             pass
-
-
-async def test_control_is_released_when_the_block_fails(host, robot):
-    with pytest.raises(ZeroDivisionError):
-        async with robot.control("me"):
-            raise ZeroDivisionError
-    assert host.holder is None
 
 
 async def test_with_a_duration_a_guided_motion_returns_after_that_and_the_arm_still_moves(host, robot):
@@ -199,7 +175,7 @@ async def test_where_another_client_steps_its_ticks_are_waited_for(host, robot):
         assert not moving.result().ended
 
 
-@pytest.mark.parametrize("answer", [b"\x80", b"\xc1", encode(Done()), b"\x81\xa4type\xa4what"])
+@pytest.mark.parametrize("answer", [b"\xc1", encode(Done()), b"\x81\xa4type\xa4what"])
 async def test_an_answer_that_is_none_is_an_error_that_says_so(host, robot, answer):
     host.answers["take_control"] = answer
     with pytest.raises(UnexpectedReplyError):

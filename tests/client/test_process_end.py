@@ -27,20 +27,13 @@ robot.on_state(print)
 loop.close()
 print("end of main")
 """
-BLOCKING = """
-import sys
-from tvist_client.blocking import Robot
-robot = Robot.connect(sys.argv[1])
-states = robot.states()
-next(states)
-print("end of main")
-"""
 FAILING = """
 import sys
 from tvist_client.blocking import Robot
 robot = Robot.connect(sys.argv[1])
 control = robot.control("me")
 control.__enter__()
+next(robot.states())
 raise SystemExit("end of main")
 """
 INTERRUPTED = """
@@ -57,7 +50,7 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.parametrize("program", [ASYNCHRONOUS, ABANDONED, BLOCKING, FAILING])
+@pytest.mark.parametrize("program", [ASYNCHRONOUS, ABANDONED, FAILING])
 def test_a_program_that_forgets_to_close_ends_all_the_same(realtime, endpoint, program):
     ended = subprocess.run(
         [sys.executable, "-c", program, endpoint], capture_output=True, text=True, timeout=100, check=False
@@ -67,13 +60,8 @@ def test_a_program_that_forgets_to_close_ends_all_the_same(realtime, endpoint, p
 
 
 def test_an_interrupted_program_gives_control_back_and_ends(realtime, endpoint):
-    program = subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTED, endpoint],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    with program:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", INTERRUPTED, endpoint], **pipes) as program:
         assert program.stdout.readline() == "listens\n"
         realtime.post(lambda: realtime.robot.put("event", Event(tick=1, kind="warning", why="it waits")))
         assert program.stdout.readline() == "it waits\n"

@@ -2,6 +2,7 @@
 
 import inspect
 import pydoc
+from itertools import product
 
 import msgspec
 import numpy as np
@@ -174,14 +175,6 @@ async def test_a_command_is_sent_as_it_was_asked_for(host, robot, name):
     assert sent(host, wanted) == check(wanted)
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_the_blocking_client_sends_the_same(host, name):
-    call, wanted, host.answers[tag(COMMANDS[name][1])] = COMMANDS[name]
-    with blocking.Robot.over(LoopbackTransport(host)) as robot, robot.control("me") as arm:
-        call(arm)
-    assert sent(host, wanted) == check(wanted)
-
-
 @pytest.mark.parametrize("name", QUESTIONS)
 async def test_questions_need_no_control_and_are_answered_by_tuples(host, robot, name):
     call, wanted, host.answers[tag(QUESTIONS[name][1])] = QUESTIONS[name]
@@ -190,24 +183,17 @@ async def test_questions_need_no_control_and_are_answered_by_tuples(host, robot,
     assert host.commands == [check(wanted)]
 
 
-@pytest.mark.parametrize("name", QUESTIONS)
-def test_the_blocking_client_asks_the_same(host, name):
-    call, wanted, host.answers[tag(QUESTIONS[name][1])] = QUESTIONS[name]
-    with blocking.Robot.over(LoopbackTransport(host)) as robot:
-        assert (call(robot),) == msgspec.structs.astuple(QUESTIONS[name][2])
-    assert host.commands == [check(wanted)]
+def test_the_blocking_client_sends_the_same(host):
+    with blocking.Robot.over(LoopbackTransport(host)) as robot, robot.control("me") as arm:
+        for name, (call, wanted, answer) in (COMMANDS | QUESTIONS).items():
+            host.answers, host.commands = {tag(wanted): answer}, []
+            call(robot if name in QUESTIONS else arm)
+            assert sent(host, wanted) == check(wanted), name
+        host.answers = {}
 
 
 @pytest.mark.parametrize(
-    ("name", "reply"),
-    [
-        ("move_j", Done()),
-        ("move_l", Accepted(token="t")),
-        ("move_path", Posture(q=Q)),
-        ("speed_j", Done()),
-        ("inverse", Done()),
-        ("forward", Done()),
-    ],
+    ("name", "reply"), [("move_j", Done()), ("move_l", Accepted(token="t")), ("inverse", Done())]
 )
 async def test_an_answer_of_another_kind_is_an_error_that_names_both(host, robot, name, reply):
     call, wanted, _ = (COMMANDS | QUESTIONS)[name]
@@ -235,9 +221,8 @@ POSITIONAL = """
 """Arguments that programs may give without their names."""
 
 
-@pytest.mark.parametrize("name", SENT)
-def test_help_describes_every_argument_of_a_command(name):
-    for owner in (Arm, blocking.Arm, Robot, blocking.Robot):
+def test_help_describes_every_argument_of_a_command():
+    for name, owner in product(SENT, (Arm, blocking.Arm, Robot, blocking.Robot)):
         method = getattr(owner, name, None)
         if method is not None and (owner, name) not in {(Robot, "stop"), (blocking.Robot, "stop")}:
             arguments = list(inspect.signature(method).parameters)[1:]
@@ -261,10 +246,7 @@ def test_arguments_that_may_be_given_by_position_stay():
     [
         (lambda arm: arm.move_j(), r"move_j\(\): missing a required argument: 'q'"),
         (lambda arm: arm.move_j([0.0] * 6, 1.5), r"move_j\(\): too many positional arguments"),
-        (
-            lambda arm: arm.move_j([0.0] * 6, speed=1),
-            r"move_j\(\): got an unexpected keyword argument 'speed'",
-        ),
+        (lambda arm: arm.move_j(Q, speed=1), r"move_j\(\): got an unexpected keyword argument 'speed'"),
     ],
 )
 def test_an_argument_that_a_command_lacks_is_named_with_it(host, wrong, said):

@@ -1,6 +1,9 @@
 """The client over real Zenoh sessions."""
 
 import asyncio
+import gc
+import socket
+import struct
 import threading
 from contextlib import ExitStack
 
@@ -14,11 +17,11 @@ from tvist_client import (
     MotionStoppedError,
     NotConnectedError,
     Robot,
-    StreamStoppedError,
     ZenohTransport,
 )
 from tvist_client.across import Place
 from tvist_client.fleet import Fleet
+from tvist_client.transports import certificates
 from tvist_client.transports import zenoh as zenoh_transport
 from tvist_client.transports.zenoh import robots_at
 from tvist_protocol.codec import encode
@@ -97,17 +100,12 @@ async def test_presence_is_announced_before_control_is_taken_and_withdrawn_after
     assert noted == ["seen me", "take_control", "release_control", "gone me"]
 
 
-async def test_the_lease_is_kept_alive_while_nothing_is_sent(realtime, robot, note):
-    async with robot.control("me", lease_s=0.1):
-        for _ in range(3):
-            await note(realtime, "keep_alive")
-
-
-async def test_keeping_alive_ends_when_control_is_lost_and_the_block_ends_in_peace(
+async def test_the_lease_is_kept_alive_until_control_is_lost_and_the_block_ends_in_peace(
     realtime, robot, note, caplog
 ):
     async with robot.control("me", lease_s=0.1):
-        await note(realtime, "keep_alive")
+        for _ in range(3):
+            await note(realtime, "keep_alive")
         realtime.post(realtime.robot.controller.session.release)
         await note(realtime, "keep_alive")
         await robot.info()  # its answer comes after the refusal
@@ -153,20 +151,6 @@ async def test_setpoints_arrive_numbered_and_in_order(realtime, robot):
     assert arrived == sorted(set(arrived))
 
 
-async def test_a_stream_the_robot_ends_ends_here_too(realtime, robot):
-    async def stream(arm):
-        async with arm.servo() as servo:
-            ended = robot.events()
-            servo.set((await robot.state()).target_q)
-            while (await anext(ended)).kind != "stream_stopped":
-                pass
-            servo.set(NEAR)
-
-    async with robot.control("me") as arm:
-        with pytest.raises(StreamStoppedError, match="ended at tick"):
-            await stream(arm)
-
-
 async def test_a_stop_by_anybody_ends_the_wait_for_a_motion(realtime, robot, endpoint):
     async with robot.control("me") as arm, await Robot.connect(endpoint) as bystander:
         started = bystander.events()
@@ -182,15 +166,9 @@ async def test_everything_that_waits_fails_when_the_robot_goes_away(realtime, ro
     arms, states, events = robot.control("me"), robot.states(), robot.events()
     async with arms as arm:
         started = robot.events()
-        waits = [
-            asyncio.create_task(coroutine)
-            for coroutine in (
-                arm.keep_alive(),
-                arm.move_j(FAR, velocity=0.05),
-                robot.advance(10_000),
-                _exhaust(states),
-            )
-        ]
+        moves = arm.move_j(FAR, velocity=0.05)
+        waiting = (arm.keep_alive(), moves, robot.advance(10_000), _exhaust(states))
+        waits = [asyncio.create_task(one) for one in waiting]
         await anext(started)
         await anext(events)
         waits.append(asyncio.create_task(_exhaust(events)))
@@ -242,6 +220,24 @@ async def test_what_is_put_on_a_wildcard_key_is_not_taken_for_the_robots(realtim
     realtime.post(lambda: realtime.robot.put("event", Event(tick=1, kind="warning")))
     assert (await anext(events)).kind == "warning"
     await transport.close()
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
+def test_a_connection_that_was_reset_gives_no_reason_and_is_closed(monkeypatch):
+    """The peer has reset each connection before its client can say a word."""
+    connect = socket.create_connection
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def connected(*args):
+            made = connect(*args)
+            peer, _ = server.accept()
+            peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            peer.close()
+            return made
+
+        monkeypatch.setattr(socket, "create_connection", connected)
+        assert certificates.why_refused(f"tls/127.0.0.1:{server.getsockname()[1]}", None) is None
+    gc.collect()
 
 
 async def _exhaust(stream):

@@ -136,6 +136,7 @@ class TestContents:
         assert all(line.endswith(f"=={common['version']}") for line in ours)
 
 
+@pytest.mark.nightly
 class TestFresh:
     @pytest.mark.parametrize("name", ["tvist-protocol", "tvist-shaping", "tvist-urscript"])
     def test_the_readmes_first_examples_run(self, fresh, name):

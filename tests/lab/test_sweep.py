@@ -33,7 +33,7 @@ payloads = [1.5, "uniform"]
 errors = [{}, {payload = 20, stiffness = 15, frequency = -5}]
 seed = 4
 """
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to" / "sweep.md"
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to" / "evaluate-a-shaper.md"
 
 
 def tasks_of(folder, text=SPEC):
@@ -275,7 +275,9 @@ def test_the_page_has_an_example_and_names_every_key(tmp_path):
     (example,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "springs.toml").write_text(example, encoding="utf-8")
     assert read_spec(tmp_path / "springs.toml").rows == 3 * 3 * 4 * 20
-    keys = re.findall(r"^\| `(\w+)` \|", text.partition("## Run it")[0], re.MULTILINE)
+    (table,) = re.findall(r"^\| key \|.*?\n\n", text, re.MULTILINE | re.DOTALL)
+    rows = re.findall(r"^\| (`[^|]*`) \|", table, re.MULTILINE)
+    keys = [key for row in rows for key in re.findall(r"`(\w+)`", row)]
     assert sorted(keys) == sorted(Spec.__struct_fields__)
 
 

@@ -3,6 +3,7 @@
 import os
 import threading
 import time
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
@@ -43,20 +44,21 @@ class FakeHost:
         self.warned.append(why)
 
 
-def served(robots, **options):
-    """Robots driven in real time until each has ticked enough."""
+@contextmanager
+def ticking(*robots, **options):
+    """Robots driven in real time until each has ticked enough, and what else is waited for has come."""
     clock = Realtime(robots, PERIOD, **options)
     clock.start()
+    yield clock
     for robot in robots:
         assert robot.host.reached.wait(WAIT)
     clock.close()
-    return clock
 
 
-@pytest.mark.parametrize("number", [1, 2, 7])
-def test_one_thread_ticks_all_robots_and_says_how_late_each_was(number):
-    robots = [Mailbox(FakeHost()) for _ in range(number)]
-    clock = served(robots)
+def test_one_thread_ticks_all_robots_and_says_how_late_each_was():
+    robots = [Mailbox(FakeHost()) for _ in range(3)]
+    with ticking(*robots) as clock:
+        pass
     assert {name for robot in robots for name in robot.host.threads} == {"tvist-tick"}
     for robot in robots:
         assert clock.punctuality(robot).ticks == robot.host.ticks >= 5
@@ -68,25 +70,22 @@ def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
     robot, seen = Mailbox(FakeHost()), []
     for number in range(100):
         robot.post(lambda number=number: seen.append((number, robot.host.ticks)))
-    clock = Realtime([robot], PERIOD)
-    clock.start()
-    assert robot.host.reached.wait(WAIT)
-    robot.post(lambda: seen.append("last"))
-    clock.close()
+    with ticking(robot):
+        assert robot.host.reached.wait(WAIT)
+        robot.post(lambda: seen.append("last"))
     assert seen == [*((number, 0) for number in range(100)), "last"]
 
 
 def test_an_arm_that_does_not_begin_its_tick_keeps_no_client_waiting_and_is_told_of_once():
     paces = [True, False, False, True, False]
     robot = Mailbox(FakeHost(), pace=lambda timeout: paces.pop(0) if paces else time.sleep(timeout))
-    clock = Realtime([robot], PERIOD)
-    clock.start()
     answered = threading.Event()
-    while paces:
-        time.sleep(PERIOD)
-    robot.post(answered.set)
-    assert answered.wait(WAIT)
-    clock.close()
+    robot.host.reached.set()
+    with ticking(robot):
+        while paces:
+            time.sleep(PERIOD)
+        robot.post(answered.set)
+        assert answered.wait(WAIT)
     assert robot.host.ticks == 2
     assert ["does not begin" in why for why in robot.host.warned] == [True, True]
 
@@ -97,10 +96,8 @@ def test_an_arm_that_fails_while_it_begins_its_tick_has_it_from_the_clock_and_st
 
     host, failures = FakeHost(), []
     host.fail = failures.append
-    clock = Realtime([Mailbox(host, pace=fails)], PERIOD)
-    clock.start()
-    assert host.reached.wait(WAIT)
-    clock.close()
+    with ticking(Mailbox(host, pace=fails)):
+        pass
     assert set(failures) == {"no cable"}
     assert host.failure is None
 
@@ -114,14 +111,13 @@ class Failing(FakeHost):
 def test_a_tick_or_job_that_fails_ends_its_robot_alone_whose_clients_are_still_answered(caplog, failing):
     other, robot, answered = Mailbox(FakeHost()), Mailbox(Failing()), threading.Event()
     robot.host.error = ArithmeticError if failing == "tick" else None
-    clock = Realtime([other, robot], PERIOD)
     if failing == "job":
         robot.post(lambda: 1 / 0)
-    clock.start()
-    assert other.host.reached.wait(WAIT)
-    robot.post(answered.set)
-    assert answered.wait(WAIT)
-    clock.close()
+    robot.host.reached.set()
+    with ticking(other, robot):
+        assert other.host.reached.wait(WAIT)
+        robot.post(answered.set)
+        assert answered.wait(WAIT)
     assert other.host.failure is None
     assert "see the log" in robot.host.failure
     assert robot.host.left
@@ -177,9 +173,10 @@ def test_real_time_priority_is_asked_for_by_the_tick_thread_and_next_to_it_for_w
         asked.append((threading.current_thread().name, which, policy, parameter.sched_priority))
 
     monkeypatch.setattr(os, "sched_setscheduler", ask)
-    served([Mailbox(FakeHost())])
-    assert asked == []
-    served([Mailbox(FakeHost())], priority=True)
+    for options in ({}, {"priority": True}):
+        assert asked == []
+        with ticking(Mailbox(FakeHost()), **options):
+            pass
     policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK  # what a thread with this priority starts has none
     assert asked == [
         ("tvist-tick", 0, policy, punctual.PRIORITY),
@@ -193,7 +190,8 @@ def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypa
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     robot = Mailbox(FakeHost())
-    served([robot], priority=True)
+    with ticking(robot, priority=True):
+        pass
     (record,) = caplog.records
     assert record.levelname == "WARNING"
     assert "real-time priority is not permitted (Operation not permitted)" in record.getMessage()
@@ -246,10 +244,9 @@ def test_an_overload_is_told_to_the_robot_s_clients_when_it_begins_and_when_it_e
 
     monkeypatch.setattr("tvist_server.clock.time", SimpleNamespace(monotonic=lambda: passed[0], sleep=sleep))
     robot = Mailbox(Slow())
-    clock = Realtime([robot], PERIOD)
-    clock.start()
-    assert told.wait(WAIT)
-    clock.close()
+    robot.host.reached.set()
+    with ticking(robot):
+        assert told.wait(WAIT)
     began, ended = robot.host.warned[:2]
     assert "is overloaded: " in began
     assert "Next: " in began

@@ -6,14 +6,13 @@ from importlib import resources
 
 import msgspec
 import pytest
-from tests.controller.robots import UR5E, Robot, calibration, cut, setup
+from tests.controller.robots import UR5E, calibration, cut, setup
 
 from tvist_controller.kinematics.postures import is_of_ur_form
 from tvist_controller.setup import Setup, paper_payload
 from tvist_controller.sources import calibrations
 from tvist_plant.description import load
 from tvist_plant.user_file import UserFileError
-from tvist_protocol import commands as c
 from tvist_protocol.calibration import calibration_to_json
 from tvist_server.config import ServeConfig, from_mapping
 from tvist_server.moving.servo_lag import ServoLag
@@ -37,21 +36,16 @@ def sentence(action, *arguments):
     ("values", "named"),
     [
         ({"shapper": "zv"}, "shapper"),
-        ({"payload": -1.0}, "payload"),
-        ({"payload": float("nan")}, "payload"),
-        ({"payload": "5 kg"}, "payload"),
-        ({"speed": 0.0}, "speed"),
-        ({"speed": 1000.0}, "speed"),
-        ({"seed": -1}, "seed"),
-        ({"seed": 1.5}, "seed"),
-        ({"name": "UR 5"}, "name"),
-        ({"name": "a/b"}, "name"),
+        *(({"payload": payload}, "payload") for payload in (-1.0, float("nan"), "5 kg")),
+        *(({"speed": speed}, "speed") for speed in (0.0, 1000.0)),
+        *(({"seed": seed}, "seed") for seed in (-1, 1.5)),
+        *(({"name": name}, "name") for name in ("UR 5", "a/b")),
+        *(({"workers": workers}, "workers") for workers in (0, 257)),
         ({"clock": "real"}, "clock"),
         ({"listen": "tcp/127.0.0.1:7447"}, "listen"),
         ({"start": [0, "x"]}, "start"),
         ({"truth": "yes"}, "truth"),
         ({"profile": "urzim"}, "profile"),
-        *(({"workers": workers}, "workers") for workers in (0, 257, "two")),
         ({"robots": "ur5e*2", "name": "ur5e"}, "robots and name exclude each other"),
         ({"robots": "ur5e*2", "robot": "ur5e"}, "robots and robot exclude each other"),
     ],
@@ -77,12 +71,8 @@ def test_a_key_or_value_that_cannot_be(values, named):
         ({"calibration": "nowhere.json"}, "calibration 'nowhere.json'"),
         ({"calibration": "no\0where"}, "null"),
         *(({"robots": text}, "a robot is missing") for text in ("", "ur5e,", "*3")),
-        *(
-            ({"robots": text}, repr(text))
-            for text in ("ur5e*", "ur5e*0", "ur5e*-1", "ur5e*1.5", "ur5e*2*2", "ur5e*²")
-        ),
+        *(({"robots": text}, repr(text)) for text in ("ur5e*", "ur5e*0", "ur5e*1.5", "ur5e*2*2", "ur5e*²")),
         ({"robots": "ur5e*65"}, "from 1 to 64"),
-        ({"robots": "ur5e*99999999999999999999"}, "from 1 to 64"),
         ({"robots": "ur5e*40,ur5e*40"}, "at most 64"),
         ({"robots": "My Robot.toml"}, "My Robot.toml"),
         ({"robots": "ur5e*2,ur5e-1.toml"}, "ur5e-1"),
@@ -120,13 +110,6 @@ def test_a_folder_for_the_last_second_that_is_none_is_refused_and_not_found_out_
     assert config(dump=str(tmp_path)).dump_folder() == tmp_path
 
 
-def test_the_defaults_are_the_paper_s():
-    made = config().setup()
-    assert made.q == UR5E.poses["Q1"]
-    assert made.payload == paper_payload(UR5E)
-    assert (made.name, made.shaper, made.seed, made.clock, made.truth) == ("ur5e", "zv", 0, "realtime", False)
-
-
 @pytest.mark.parametrize(("robot", "name"), [("ur5e", "ur5e_5kg"), ("one-joint", "one-joint_1kg")])
 def test_the_default_calibration_belongs_to_the_robot(robot, name):
     made = from_mapping({"robot": robot}, "tvist.toml").setup()
@@ -153,17 +136,15 @@ def test_a_robot_that_no_calibration_belongs_to_says_what_to_do(tmp_path):
     assert config(robot=str(file)).setup().calibration is None
 
 
-@pytest.mark.parametrize("start", ["0.1,-1,2,0,0,0.5", " 0.1, -1, 2, 0, 0, 0.5", [0.1, -1, 2, 0, 0, 0.5]])
+@pytest.mark.parametrize("start", [" 0.1, -1,2,0,0,0.5", [0.1, -1, 2, 0, 0, 0.5]])
 def test_a_start_by_its_angles(start):
     assert config(start=start).setup().q == (0.1, -1.0, 2.0, 0.0, 0.0, 0.5)
 
 
-@pytest.mark.parametrize("mass", [0.0, 2.5])
-def test_another_payload_is_the_same_disc_in_less_steel(mass):
-    payload = config(payload=mass).setup().payload
-    assert payload.mass == mass
-    assert payload.com == UR5E.payload.com
-    assert payload.inertia == pytest.approx([value * mass / 5.0 for value in UR5E.payload.inertia])
+def test_another_payload_is_the_same_disc_in_less_steel():
+    payload = config(payload=2.5).setup().payload
+    assert (payload.mass, payload.com) == (2.5, UR5E.payload.com)
+    assert payload.inertia == pytest.approx([value / 2.0 for value in UR5E.payload.inertia])
 
 
 def test_a_payload_above_the_rating_is_refused_and_says_how_to_insist():
@@ -182,25 +163,17 @@ def test_the_payload_of_a_robot_file_is_declared_too(tmp_path):
     assert config(robot=str(path), payload=4.0).setup().payload.mass == 4.0
 
 
-def test_what_is_carried_may_be_above_the_rating(tmp_path):
-    file = tmp_path / "state.toml"
-    file.write_text(STATE.replace("mass = 1.5", "mass = 20"))
-    assert config(state=str(file)).setup().carried.mass == 20.0
-
-
-def test_a_calibration_of_another_robot(tmp_path):
-    path = tmp_path / "other.json"
-    path.write_bytes(calibration_to_json(calibration(robot="UR10e")))
-    text = sentence(config(calibration=str(path)).setup)
-    assert "UR10e" in text
-    assert "UR5e" in text
-
-
-@pytest.mark.parametrize("content", [b"", b"{}", b"\xff", b'{"name": "x", "colour": 1}'])
-def test_a_broken_calibration_file_is_named(tmp_path, content):
-    path = tmp_path / "broken.json"
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (calibration_to_json(calibration(robot="UR10e")), "UR10e"),
+        *((content, "mine.json") for content in (b"", b"{}", b"\xff", b'{"name": "x", "colour": 1}')),
+    ],
+)
+def test_a_calibration_that_is_broken_or_of_another_robot_is_refused(tmp_path, content, said):
+    path = tmp_path / "mine.json"
     path.write_bytes(content)
-    assert str(path) in sentence(config(calibration=str(path)).setup)
+    assert said in sentence(config(calibration=str(path)).setup)
 
 
 def test_a_file_that_cannot_be_read_or_is_no_toml(tmp_path):
@@ -208,29 +181,22 @@ def test_a_file_that_cannot_be_read_or_is_no_toml(tmp_path):
     broken = tmp_path / "broken.toml"
     broken.write_text("name = ")
     assert "broken.toml" in sentence(read_start_file, broken, "configuration", dict)
+    for key in ("robot", "state", "calibration"):
+        with pytest.raises(UserFileError, match=f"{key}.*{tmp_path} is a directory"):
+            config(**{key: str(tmp_path)}).setup()
 
 
-@pytest.mark.parametrize("key", ["robot", "state", "calibration"])
-def test_a_file_that_is_none_is_not_taken_for_a_wrong_value(key, tmp_path):
-    with pytest.raises(UserFileError, match=f"{key}.*{tmp_path} is a directory"):
-        config(**{key: str(tmp_path)}).setup()
-
-
-@pytest.mark.parametrize("own", [None, calibration()])
-def test_a_setup_comes_back_from_its_recording(own):
-    made = setup(calibration=own, seed=3, truth=True, shaper="ei")
+def test_a_setup_comes_back_from_its_recording_if_no_part_is_missing():
+    made = setup(calibration=calibration(), seed=3, truth=True, shaper="ei")
     assert Setup.from_builtins(made.to_builtins()) == made
+    for missing in ("description", "q", "payload", "calibration", "seed"):
+        content = made.to_builtins()
+        del content[missing]
+        with pytest.raises(ValueError, match=missing):
+            Setup.from_builtins(content)
 
 
-@pytest.mark.parametrize("missing", ["description", "q", "payload", "calibration", "seed"])
-def test_a_recording_s_start_that_lacks_a_part(missing):
-    content = setup().to_builtins()
-    del content[missing]
-    with pytest.raises(ValueError, match=missing):
-        Setup.from_builtins(content)
-
-
-@pytest.mark.parametrize("joints", [1, 2, 5, 6])
+@pytest.mark.parametrize("joints", [1, 6])
 def test_a_setup_of_any_number_of_joints_is_checked_for_that_number(joints):
     description = cut(joints)
     setup(description).check()
@@ -245,7 +211,7 @@ shaper = "ei"
 seed = 3
 
 [payload]
-mass = 1.5
+mass = 20
 com = [0.0, 0.0, 0.05]
 inertia = [0.01, 0, 0, 0.01, 0, 0.01]
 """
@@ -253,12 +219,13 @@ inertia = [0.01, 0, 0, 0.01, 0, 0.01]
 
 @pytest.mark.parametrize("name", ["state.toml", "state.json"])
 def test_a_state_to_start_in_goes_before_the_rest(tmp_path, name):
+    """What is carried may be above the rating."""
     file = tmp_path / name
     content = tomllib.loads(STATE)
     file.write_text(json.dumps(content) if name.endswith("json") else STATE)
     found = config(state=str(file), shaper="zv", start="Q1").setup()
     assert (found.q, found.mode, found.shaper, found.seed) == (tuple(content["q"]), "POWER_OFF", "ei", 3)
-    assert found.carried.mass == 1.5
+    assert found.carried.mass == 20.0
     assert found.payload.mass == 5.0
     assert Setup.from_builtins(found.to_builtins()) == found
 
@@ -301,25 +268,21 @@ def test_the_servo_of_a_robot_that_is_moved_is_the_calibrations_unless_another_i
     file = tmp_path / "mine.json"
     known = msgspec.structs.replace(calibration(), robot="UR5e", servo_lag_s=0.05, servo_gain=900.0)
     file.write_bytes(calibration_to_json(known))
-    given = {
-        "calibration": str(file),
-        "shaper": "none",
-        "enable_motion": True,
-        "plant": "ur://127.0.0.1",
-    } | values
-    moved = config(**given)
+    given = {"calibration": str(file), "shaper": "none", "enable_motion": True, "plant": "ur://127.0.0.1"}
+    moved = config(**(given | values))
     assert moved.setup().plant.maker.keywords["lag"] == (lag and ServoLag(*lag))
 
 
-def test_without_a_profile_every_option_has_the_default_it_always_had():
+def test_without_a_profile_every_option_has_the_paper_s_value():
     made, shipped = ServeConfig().setup(), load("ur5e")
     assert ServeConfig().profile_in_force is None
     assert made.description == shipped
     assert (made.q, made.payload, made.carried) == (shipped.poses["Q1"], paper_payload(shipped), None)
-    assert (made.shaper, made.compensate_sag, made.shape_servo) == ("zv", False, False)
+    assert (made.name, made.shaper, made.seed, made.clock, made.truth) == ("ur5e", "zv", 0, "realtime", False)
+    assert (made.compensate_sag, made.shape_servo) == (False, False)
 
 
-@pytest.mark.parametrize("options", [{"ur": True}, {"profile": "ursim"}, {"ur": True, "profile": "ursim"}])
+@pytest.mark.parametrize("options", [{"ur": True}, {"profile": "ursim"}])
 def test_ursim_is_the_profile_of_ur_s_interfaces(options):
     made = config(**options).setup()
     assert made.q == UR_START
@@ -329,31 +292,21 @@ def test_ursim_is_the_profile_of_ur_s_interfaces(options):
     assert made.description == UR5E.quiet().without_floor()
 
 
-@pytest.mark.parametrize("options", [{"profile": "real"}, {"ur": True, "profile": "real"}])
-def test_real_is_a_robot_without_a_profile_in_ur_s_posture(options):
-    made = config(**options).setup()
+def test_real_is_a_robot_without_a_profile_in_ur_s_posture():
+    made = config(ur=True, profile="real").setup()
     assert made.q == UR_START
-    assert msgspec.structs.asdict(made.payload) == msgspec.structs.asdict(config().setup().payload)
     assert made.to_builtins() | {"q": None} == config().setup().to_builtins() | {"q": None}
 
 
 @pytest.mark.parametrize("profile", ["ursim", "real"])
-@pytest.mark.parametrize(
-    ("option", "read", "expected"),
-    [
-        ({"payload": 2.0}, lambda made: made.payload.mass, 2.0),
-        ({"start": "Q3"}, lambda made: made.q, UR5E.poses["Q3"]),
-        ({"shaper": "ei"}, lambda made: made.shaper, "ei"),
-        ({"quiet": True}, lambda made: made.description.sensors, UR5E.quiet().sensors),
-        ({"quiet": False}, lambda made: made.description.sensors, UR5E.sensors),
-        ({"floor": True}, lambda made: made.description.collision, UR5E.collision),
-        ({"floor": False}, lambda made: made.description.collision, UR5E.without_floor().collision),
-        ({"compensate_sag": True}, lambda made: made.compensate_sag, True),
-        ({"compensate_sag": False}, lambda made: made.compensate_sag, False),
-    ],
-)
-def test_an_explicit_option_takes_precedence(profile, option, read, expected):
-    assert read(config(profile=profile, **option).setup()) == expected
+@pytest.mark.parametrize("on", [False, True])
+def test_explicit_options_take_precedence(profile, on):
+    switches = dict.fromkeys(("quiet", "floor", "compensate_sag"), on)
+    made = config(profile=profile, payload=2.0, start="Q3", shaper="ei", **switches).setup()
+    assert (made.payload.mass, made.q, made.shaper) == (2.0, UR5E.poses["Q3"], "ei")
+    assert made.description.sensors == (UR5E.quiet() if on else UR5E).sensors
+    assert made.description.collision == (UR5E if on else UR5E.without_floor()).collision
+    assert made.compensate_sag is on
 
 
 def test_a_state_takes_precedence_too(tmp_path):
@@ -368,22 +321,6 @@ def test_an_arm_that_is_not_of_ur_s_form_starts_in_its_own_posture():
     assert made.q == load("one-joint").poses["Q1"]
     assert made.payload.mass == 0.0
     assert [is_of_ur_form(arm) for arm in (UR5E, cut(5), load("one-joint"))] == [True, False, False]
-
-
-@pytest.mark.parametrize(("options", "reply"), [({}, "Accepted"), ({"floor": True}, "Refused")])
-def test_the_posture_of_all_zeros_is_reached_where_there_is_no_floor(options, reply):
-    made = config(profile="ursim", start="0,-0.5,-0.5,-1.6,1.6,0", **options).setup()
-    robot = Robot(made.description, q=made.q, payload=made.payload, shaper=made.shaper)
-    assert type(robot.send(c.MoveJ, q=(0.0,) * 6)).__name__ == reply
-
-
-def test_the_options_are_part_of_a_recording_and_older_ones_have_none():
-    made = setup(compensate_sag=True, shape_servo=True, description=UR5E.without_floor())
-    content = made.to_builtins()
-    assert Setup.from_builtins(content) == made
-    del content["compensate_sag"], content["shape_servo"], content["description"]["collision"]["has_floor"]
-    older = Setup.from_builtins(content)
-    assert (older.compensate_sag, older.shape_servo, older.description) == (False, False, UR5E)
 
 
 def test_a_robot_file_may_have_no_floor(tmp_path):

@@ -4,11 +4,9 @@ import subprocess
 import sys
 
 import pytest
-from tests import forked
 
 from tvist_server import kernels
 
-ALONE = "from tvist_server.kernels import KERNELS; print(*sorted(kernel.name for kernel in KERNELS))"
 TICKING = """
 import sys
 from pathlib import Path
@@ -77,24 +75,6 @@ def begun(monkeypatch):
     return programs, started
 
 
-def test_the_share_grows_from_look_to_look(begun, monkeypatch):
-    begun[0].update(a="input()", b="input()")
-    monkeypatch.setattr(kernels, "KERNELS", "abc")
-    looks = iter(["a", "ab", "ab"])
-    monkeypatch.setattr(kernels, "held", lambda _: next(looks, "abc"))
-    told = []
-
-    def tell(*share):
-        told.append(share)
-        if len(told) == 5:  # nothing is left to do
-            for process in begun[1]:
-                process.stdin.write(b"\n")
-                process.stdin.flush()
-
-    kernels.compile_ahead(2, tell)
-    assert told[:5] == [(1, 3), (2, 3), (2, 3), (3, 3), (3, 3)]
-
-
 def test_a_failure_is_told_in_one_sentence(begun):
     begun[0].update(a="pass", b="raise SystemExit(3)", c="print('noise'); raise SystemExit('no room')")
     with pytest.raises(kernels.KernelsError, match=r"^no room$"):
@@ -112,16 +92,6 @@ def test_a_signal_ends_the_processes_that_compile(begun):
     assert [process.returncode for process in begun[1]] == [-9, -9]
 
 
-def test_the_kernels_of_a_robot_are_the_same_whatever_else_is_imported():
-    """What is forked comes from a process that has imported everything."""
-    alone, after_all = (
-        run([sys.executable, "-c", ALONE], capture_output=True, text=True, check=True).stdout.split()
-        for run in (subprocess.run, forked.run)
-    )
-    assert len(alone) > 50
-    assert alone == after_all
-
-
 def test_a_served_robot_loads_no_kernel_while_it_ticks(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", TICKING, str(tmp_path)], capture_output=True, text=True, check=True
@@ -136,12 +106,6 @@ def test_a_robot_with_all_its_motions_and_shapers_compiles_nothing_that_is_not_c
 ):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     subprocess.run([sys.executable, "-m", "tvist_cli", "serve", "--compile"], check=True)
-    program = (
-        "from tvist_server.kernels import KERNELS\n"
-        "print(*[kernel.name for kernel in KERNELS if not kernel.holds()])"
-    )
-    missing = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert missing.stdout == "\n"
     ahead = sorted(tmp_path.rglob("*.kernel"))
     from tests.conftest import __file__ as shared
 

@@ -1,8 +1,6 @@
 """Plants of one's own and hidden robots: found, made for a robot, kept in a recording by name or seed, and replayed."""
 
-import json
 import pickle
-from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -14,7 +12,7 @@ from tvist_controller.about import info_of
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.setup import Setup, body
 from tvist_controller.sources.own_files import OwnFileError
-from tvist_controller.sources.own_plants import OwnPlant, RecordedPlant, load_plant, named_plants
+from tvist_controller.sources.own_plants import OwnPlant, load_plant
 from tvist_lab.in_process import free_setup
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
@@ -63,7 +61,6 @@ def place(tmp_path):
 
 
 def test_an_installed_one_is_found_by_its_name():
-    assert {"mujoco", "combined"} <= set(named_plants())
     made = load_plant("mujoco").make(UR5E, body(setup().payload))
     assert type(made).__name__ == MujocoArm.__name__
     with pytest.raises(OwnFileError, match=r"must be FILE\.py:NAME, or one of calibrated, .*mujoco"):
@@ -87,17 +84,14 @@ def test_one_that_cannot_be_made_says_why(place, name, said):
 @pytest.mark.parametrize("kind", ["import", "make"])
 def test_a_signal_that_ends_the_process_meanwhile_is_no_fault_of_its_file(tmp_path, kind):
     file = tmp_path / "slow.py"
-    body_of = (
-        "from tvist_server.ending import SignalExit\ndef make(description, payload): raise SignalExit(0)\n"
-    )
-    file.write_text(body_of + ("make(0, 0)\n" if kind == "import" else ""))
+    text = "from tvist_server.ending import SignalExit\ndef make(*_): raise SignalExit(0)\n"
+    file.write_text(text + ("make(0, 0)\n" if kind == "import" else ""))
     with pytest.raises(SignalExit):
         load_plant(f"{file}:make").make(UR5E, UR5E.payload)
 
 
 def test_a_configuration_names_it_and_a_worker_finds_it_again(place):
     made = ServeConfig(plant=place).setup()
-    assert made.plant == load_plant(place)
     assert pickle.loads(pickle.dumps(made.plant)) == made.plant  # noqa: S301  our own
     file = Path(place.rsplit(":", 1)[0])
     file.write_text(ECHO + "\n")
@@ -107,49 +101,34 @@ def test_a_configuration_names_it_and_a_worker_finds_it_again(place):
         pickle.loads(other)  # noqa: S301  our own
 
 
-def moved(chosen: Setup, path=None, ticks: int = 700):
-    """The states of a move, and what its recorder was told; the recording is at the path."""
+def moved(chosen, path, ticks=300):
+    """The recording of a move."""
     host = LoopbackHost(chosen)
     token = decode_reply(host.request("a", encode(c.TakeControl(client="a", lease_s=30.0)))).token
     assert decode_reply(host.request("a", encode(c.MoveJ(token=token, q=tuple(Q2.tolist()))))).id == 1
-    controller, states = host.controller, []
-    start = json.loads(json.dumps(controller.setup.to_builtins()))
-    if path is None:
-        return [controller.tick()[0] for _ in range(ticks)], start, info_of(controller)
-    with Recorder(path, info_of(controller), start) as recorder:
+    controller = host.controller
+    with Recorder(path, info_of(controller), controller.setup.to_builtins(), overwrite=True) as recorder:
         for entry in host.entries:
             recorder.journal(entry)
         for _ in range(ticks):
-            states.append(controller.tick()[0])
-            recorder.state(states[-1])
-    return states, start, info_of(controller)
-
-
-def recorded(folder, plant=None):
-    """The recording of a move."""
-    moved(setup(plant=plant), folder / "run.mcap", ticks=300)
-    return read(folder / "run.mcap")
+            recorder.state(controller.tick()[0])
+    return read(path)
 
 
 def test_a_setup_survives_its_recording_and_a_run_its_replay(tmp_path, place):
     own = load_plant(place)
-    content = recorded(tmp_path, own)
+    content = moved(setup(plant=own), tmp_path / "run.mcap")
     assert content.start["plant"] == {"place": place, "sha256": own.sha256}
-    kept = json.loads(json.dumps(setup(plant=own).to_builtins()))
-    assert Setup.from_builtins(kept, plant=own) == setup(plant=own)
-    assert own.recorded == RecordedPlant(place, own.sha256)
+    assert Setup.from_builtins(content.start, plant=own) == setup(plant=own)
     assert replay_file(content, plant=own).first_difference is None
     with pytest.raises(ReplayError, match=f"give --plant {place}"):
         replay_file(content)
-
-
-def test_a_replay_of_a_real_arm_says_why_there_is_none(tmp_path, place):
-    at = "ur://192.168.0.10"
-    content = recorded(tmp_path, OwnPlant(at, "", load_plant(place).maker))
+    real = "ur://192.168.0.10"
+    content.start["plant"] = {"place": real, "sha256": ""}
     with pytest.raises(ReplayError, match="it cannot be replayed"):
         replay_file(content)
     with pytest.raises(OwnFileError, match="only tvist serve takes"):
-        load_plant(at)
+        load_plant(real)
 
 
 def test_only_the_process_that_serves_it_makes_it():
@@ -157,8 +136,7 @@ def test_only_the_process_that_serves_it_makes_it():
 
 
 def test_a_plant_is_not_taken_where_there_was_none(tmp_path, place):
-    content = recorded(tmp_path)
-    assert replay_file(content).first_difference is None
+    content = moved(setup(), tmp_path / "run.mcap", 10)
     with pytest.raises(ReplayError, match="was served without the plant"):
         replay_file(content, plant=load_plant(place))
 
@@ -177,29 +155,21 @@ SEED = 314159
 """Of a hidden robot."""
 
 
-def test_a_hidden_robot_replays_to_the_last_bit_and_moves_otherwise_than_its_file(tmp_path):
-    path = tmp_path / "hidden.mcap"
-    states, start, _ = moved(setup(hidden=SEED), path)
-    again = replay_file(read(path))
-    assert again.first_difference is None
-    assert not again.truths
-    plain, _, _ = moved(setup())
-    other, _, _ = moved(setup(hidden=SEED + 1))
-    for one in (plain, other):
-        assert np.abs(np.array(states[-1].actual_q) - one[-1].actual_q).max() > 1e-5
-    assert [state.target_q for state in states] == [state.target_q for state in plain]
-    assert Setup.from_builtins(start) == replace(setup(hidden=SEED))
-
-
-def test_only_the_seed_tells_of_it():
+def test_a_hidden_robot_replays_to_the_last_bit_and_only_its_seed_tells_of_it(tmp_path):
     """Recorded setup and published info are those of the file, and no value that was drawn is in them or in a state."""
-    states, start, info = moved(setup(hidden=SEED), ticks=50)
-    _, plain_start, plain_info = moved(setup(), ticks=50)
-    assert start.pop("hidden") == SEED
-    assert (start, info) == (plain_start, plain_info)
+    found = moved(setup(hidden=SEED), tmp_path / "hidden.mcap")
+    again = replay_file(found)
+    assert (again.first_difference, len(again.truths)) == (None, 0)
+    plain, other = (moved(setup(**hidden), tmp_path / "x.mcap") for hidden in ({}, {"hidden": SEED + 1}))
+    for one in (plain, other):
+        assert np.abs(np.array(found.states[-1].actual_q) - one.states[-1].actual_q).max() > 1e-5
+    assert [state.target_q for state in found.states] == [state.target_q for state in plain.states]
+    assert Setup.from_builtins(found.start) == setup(hidden=SEED)
+    assert found.start.pop("hidden") == SEED
+    assert (found.start, found.info) == (plain.start, plain.info)
     truly, carried = hidden(UR5E, SEED), hidden_payload(body(setup().payload), SEED)
     secrets = [*truly.drives.gear_stiffness, *truly.drives.velocity_gain, *carried.com, carried.mass]
-    told = msgspec.json.encode((start, info, states)).decode()
+    told = msgspec.json.encode((found.start, found.info, found.states)).decode()
     assert not [value for value in secrets if f"{value!r}"[:9] in told]
 
 

@@ -9,75 +9,50 @@ from tvist_protocol.stream import Event, State
 from tvist_server.gateways.base import Gateway
 from tvist_server.publisher import Publisher
 
-ROBOT = Robot()
-STATE, IO = ROBOT.tick(), ROBOT.controller.io()
-REPORT = ROBOT.controller.report
-TRUTH = ROBOT.controller.truth()
-
 
 class NotingGateway(Gateway):
-    """Keeps what is published."""
+    """Keeps what is published, unless it fails."""
 
-    def __init__(self):
-        self.published = []
+    def __init__(self, *, fails=False):
+        self.published, self.fails = [], fails
 
     def publish(self, topic, _message, data):
+        if self.fails:
+            raise ZeroDivisionError
         self.published.append((topic, data))
 
     def close(self):
         """Nothing is open."""
 
 
-class FailingGateway(NotingGateway):
-    """Cannot publish anything."""
-
-    def publish(self, *_):
-        raise ZeroDivisionError
-
-
-def publisher(*gateways):
-    made = Publisher()
-    made.open(gateways)
-    return made
-
-
-def topics(gateway):
-    return [topic for topic, _ in gateway.published]
-
-
-def test_messages_go_to_every_gateway_in_their_order():
-    one, other = NotingGateway(), NotingGateway()
-    made = publisher(one, other)
-    made.event(Event(tick=1, kind="warning"))
-    made.report(REPORT)
-    assert one.published == other.published
-    assert topics(one) == ["event", "state"]
-    assert decode(Event, one.published[0][1]).tick == 1
-    assert decode(State, one.published[1][1]) == STATE
-
-
-def test_a_gateway_that_fails_is_logged_and_the_others_get_the_message(caplog):
-    gateway = NotingGateway()
-    made = publisher(FailingGateway(), gateway)
-    made.io(IO)
-    made.report(REPORT)
-    assert caplog.text.count("is not published") == 2
-    assert topics(gateway) == ["io", "state"]
+def test_a_gateway_that_fails_is_logged_and_the_others_get_each_message_in_order(caplog):
+    robot, gateways, publisher = (
+        Robot(),
+        [NotingGateway(fails=fails) for fails in (False, True, False)],
+        Publisher(),
+    )
+    publisher.open(gateways)
+    state = robot.tick()
+    publisher.event(Event(tick=1, kind="warning"))
+    publisher.io(robot.controller.io())
+    publisher.report(robot.controller.report)
+    assert caplog.text.count("is not published") == 3
+    assert gateways[0].published == gateways[2].published
+    assert [topic for topic, _ in gateways[0].published] == ["event", "io", "state"]
+    assert decode(State, gateways[0].published[2][1]) == state
 
 
 def test_what_no_gateway_takes_is_not_made():
-    gateway = NotingGateway()
-    made = publisher(gateway)
+    robot, gateway, publisher = Robot(truth=True), NotingGateway(), Publisher()
+    publisher.open([gateway])
     gateway.takes = {"event"}
-    report = copy(REPORT)
+    state, report = robot.tick(), copy(robot.controller.report)
     report.made = report.written = None
-    made.report(report)
-    made.truth(TRUTH)
-    made.event(Event(tick=1, kind="warning"))
-    made.io(IO)
-    assert topics(gateway) == ["event"]
-    assert report.made is None
-    assert report.written is None
+    publisher.report(report)
+    publisher.truth(robot.controller.truth())
+    publisher.event(Event(tick=1, kind="warning"))
+    assert [topic for topic, _ in gateway.published] == ["event"]
+    assert (report.made, report.written) == (None, None)
     gateway.takes = {"event", "state"}
-    made.report(report)
-    assert decode(State, gateway.published[-1][1]) == STATE
+    publisher.report(report)
+    assert decode(State, gateway.published[-1][1]) == state

@@ -1,25 +1,59 @@
-"""What the system counts of a thread that waits for a processor."""
+"""What the system gives and counts of threads, and what the tick thread does not give to others."""
 
 import os
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
+from tvist_controller.kinematics import arm
+from tvist_controller.safety import payload_student
+from tvist_plant.description import load
 from tvist_server import punctual
+from tvist_server.studies import Studies
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="counted by Linux")
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="asked of Linux")
+
+
+def in_a_thread(job):
+    """Run a job on the first processor alone."""
+
+    def run():
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+        job()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
 
 
 def test_a_thread_knows_how_long_it_has_waited_for_a_processor():
     def wait():
-        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
         with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:  # on the same processor
             while punctual.waited_us() < 1e4:
                 pass
             busy.kill()
 
-    thread = threading.Thread(target=wait)
-    thread.start()
-    thread.join()
+    in_a_thread(wait)
+
+
+def test_studies_run_on_other_processors_than_the_tick_thread():
+    studies, found = Studies(), []
+
+    def tick():
+        ended = studies.later(lambda: found.append(os.sched_getaffinity(0)))
+        while not ended():
+            time.sleep(0.001)
+
+    in_a_thread(tick)
+    studies.close()
+    assert found == [os.sched_getaffinity(0)]
+
+
+def test_compiled_code_is_loaded_before_the_first_tick(monkeypatch):
+    compiled, called = arm.torques_of, []
+    monkeypatch.setattr(arm, "torques_of", lambda *given: called.append(given) or compiled(*given))
+    payload_student.PayloadStudent(load("ur5e"))
+    assert called

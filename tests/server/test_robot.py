@@ -1,10 +1,11 @@
 """What a served robot tells between two ticks."""
 
+from types import SimpleNamespace
+
 from tests.controller.robots import setup
 
 from tvist_lab.recordings.mcap_file import read
 from tvist_protocol import commands as c
-from tvist_protocol.codec import encode
 from tvist_protocol.io import Io, SetIo
 from tvist_protocol.programs import ProgramLoad, ProgramPlay
 from tvist_protocol.replies import Done
@@ -14,23 +15,16 @@ from tvist_server.gateways.base import Gateway
 from tvist_server.robot import ServedRobot
 
 
-class NoLateness:
-    """A clock whose ticks are not watched."""
-
-    def punctuality(self, _robot):
-        return None
-
-
-class IoGateway(Gateway):
-    """Keeps what is told of inputs, outputs, registers and programs."""
+class Told(Gateway):
+    """Keeps what is told of a kind."""
 
     setpoints_refused = 0
 
-    def __init__(self):
-        self.told = []
+    def __init__(self, kind):
+        self.kind, self.told = kind, []
 
     def publish(self, _topic, message, _data):
-        if isinstance(message, Io):
+        if isinstance(message, self.kind):
             self.told.append(message)
 
     def close(self):
@@ -38,20 +32,14 @@ class IoGateway(Gateway):
 
 
 def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_last_commands(tmp_path):
-    robot, gateway, replies = ServedRobot(setup(clock="lockstep"), None, tmp_path), IoGateway(), []
+    robot, gateway = ServedRobot(setup(clock="lockstep"), None, tmp_path), Told(Io)
     robot.open([gateway])
-
-    def send(command):
-        robot.reception.request(encode(command), replies.append)
-        robot.driven.jobs.do_waiting()
-        return replies[-1]
-
-    token = send(c.TakeControl(client="a")).token
-    assert send(SimulationStep(token=token, ticks=1)) == Done(tick=1)
+    token = robot.request(c.TakeControl(client="a")).token
+    assert robot.request(SimulationStep(token=token, ticks=1)) == Done(tick=1)
     assert gateway.told[-1].program_state == "STOPPED"
-    assert send(ProgramLoad(name="paper.urp")) == Done()
-    assert send(ProgramPlay(token=token)) == Done()
-    robot.tell_telemetry(NoLateness())
+    assert robot.request(ProgramLoad(name="paper.urp")) == Done()
+    assert robot.request(ProgramPlay(token=token)) == Done()
+    robot.tell_telemetry(SimpleNamespace(punctuality=lambda _: None))
     robot.driven.jobs.do_waiting()
     assert [(io.program, io.program_state) for io in gateway.told[1:]] == [("paper.urp", "PLAYING")]
 
@@ -69,18 +57,12 @@ def test_the_recording_has_inputs_and_outputs_from_the_first_tick_on(tmp_path):
 
 
 def test_a_robot_that_is_stepped_does_not_say_a_state_twice(tmp_path):
-    robot, told = ServedRobot(setup(clock="lockstep"), None, tmp_path), []
-
-    class StateGateway(IoGateway):
-        def publish(self, _topic, message, _data):
-            if isinstance(message, State):
-                told.append(message.tick)
-
-    robot.open([StateGateway()])
+    robot, gateway = ServedRobot(setup(clock="lockstep"), None, tmp_path), Told(State)
+    robot.open([gateway])
     token = robot.request(c.TakeControl(client="a")).token
     for now in (1, 2):
         robot.request(SimulationStep(token=token, ticks=1))
         robot.repeat()
-        assert told == list(range(1, now + 1))
+        assert [state.tick for state in gateway.told] == list(range(1, now + 1))
     robot.repeat()
-    assert told == [1, 2, 2]
+    assert [state.tick for state in gateway.told] == [1, 2, 2]

@@ -20,7 +20,7 @@ def played(robots, ticks, start=1000.0, delay=lambda _: 0.0):
     return [(robot, now, late, missed) for robot, late, missed, now in begun]
 
 
-@pytest.mark.parametrize("robots", [1, 4, 5, 64])
+@pytest.mark.parametrize("robots", [1, 5])
 def test_all_robots_tick_in_turn_after_one_wake_up_a_period(robots):
     begun = played(robots, 20 * robots)
     assert [robot for robot, *_ in begun] == list(range(robots)) * 20
@@ -31,7 +31,7 @@ def test_all_robots_tick_in_turn_after_one_wake_up_a_period(robots):
     assert all(late == 0.0 and missed == 0 for _, _, late, missed in begun)
 
 
-@pytest.mark.parametrize("robots", [2, 5, 16])
+@pytest.mark.parametrize("robots", [2, 16])
 def test_robots_that_take_less_than_their_share_wake_up_together_and_only_the_first_can_be_late(robots):
     schedule, now, woken = Schedule(robots, PERIOD, 0.0), 0.0, 0
     for _ in range(20 * robots):
@@ -70,10 +70,9 @@ def test_a_long_delay_is_made_up_for_by_fifty_ticks_of_each_robot_and_the_rest_i
 
 def test_after_minutes_the_deadlines_have_not_drifted():
     robots, start = 3, 1e6
-    schedule, ticks = Schedule(robots, PERIOD, start), 300_000
+    schedule, ticks = Schedule(robots, PERIOD, start), 90_000
     for _ in range(ticks):
         schedule.begin(schedule.due)
-    assert ticks % robots == 0
     assert schedule.due == pytest.approx(start + PERIOD * (1 + ticks / robots), abs=1e-5)
 
 
@@ -89,8 +88,7 @@ def loaded(overload, schedule, now, seconds, takes):
     return said, ticks, now
 
 
-@pytest.mark.parametrize("periods", [1.25, 1.9, 8.3, 350.0])
-@pytest.mark.parametrize("speed", [0.5, 1.0, 10.0])
+@pytest.mark.parametrize(("periods", "speed"), [(1.25, 1.0), (8.3, 10.0), (350.0, 0.5)])
 def test_more_are_never_missed_than_were_due_and_what_is_due_is_the_wall_clock_s(periods, speed):
     period = PERIOD / speed
     takes = periods * period
@@ -129,6 +127,5 @@ def test_between_the_two_limits_nothing_changes():
     assert not any(second(overload, 50) for _ in range(20))
     assert [bool(second(overload, 100)) for _ in range(2)] == [False, True]
     assert not any(second(overload, 50) for _ in range(20))
-    assert [bool(second(overload, missed)) for missed in (24, 24, 24, 24, 25, 24, 24, 24, 24, 24)] == [
-        False
-    ] * 9 + [True]
+    told = [bool(second(overload, missed)) for missed in (*[24] * 4, 25, *[24] * 5)]
+    assert told == [False] * 9 + [True]

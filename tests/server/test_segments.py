@@ -21,8 +21,6 @@ from tvist_server.recording.segments import Segments
 from tvist_server.recording.writer import heading
 
 KEEP = 100
-
-
 IO = golden("io", Io)
 
 
@@ -48,13 +46,6 @@ def names(folder):
     return sorted(place.name for place in folder.iterdir())
 
 
-def segments(path):
-    return Segments(
-        path, topics(INFO.name), heading(INFO, {"seed": 1}), dict.fromkeys(topics(INFO.name), 0),
-        overwrite=False, keep=KEEP,
-    )  # fmt: skip
-
-
 def run_names(path, run, numbers):
     return [segment_name(path.name, run, number) for number in numbers]
 
@@ -74,23 +65,14 @@ def assert_whole(content, last, at_least=KEEP):
 
 def record_all(path, ticks):
     with Recorder(path, INFO, {"seed": 1}, keep=KEEP, wait=True) as recorder:
+        take = {State: recorder.state, Truth: recorder.truth, Event: recorder.event, Io: recorder.io}
         for message in messages(ticks):
-            match message:
-                case State():
-                    recorder.state(message)
-                case Truth():
-                    recorder.truth(message)
-                case Event():
-                    recorder.event(message)
-                case Io():
-                    recorder.io(message)
-                case Entry():
-                    recorder.journal(message)
+            take.get(type(message), recorder.journal)(message)
     assert recorder.error is None
     return recorder
 
 
-@pytest.mark.parametrize("ticks", [10, 40, KEEP, KEEP + 1, 2 * KEEP, 2 * KEEP + 1, 777])
+@pytest.mark.parametrize("ticks", [10, KEEP, KEEP + 1, 777])
 def test_a_recording_holds_the_last_ticks_in_segments_of_a_quarter_of_them_each(ticks, path):
     recorder = record_all(path, ticks)
     last = (ticks - 1) // 25 + 1
@@ -102,29 +84,6 @@ def test_a_recording_holds_the_last_ticks_in_segments_of_a_quarter_of_them_each(
         assert content.dropped == {"state": 0, "event": 0, "truth": 0, "io": 0, "journal": 0}
         assert_whole(content, ticks, at_least=min(ticks, KEEP))
         assert len(read_log(named)) == len(content.states)
-
-
-def test_it_can_be_read_after_any_message_as_if_the_process_had_been_killed(path):
-    written = segments(path)
-    for number, message in enumerate(messages(260)):
-        written.write(message)
-        if number % 97 == 0 and number > 60:
-            written.flush()
-            content = read(path)
-            assert not content.complete
-            assert content.dropped is None
-            last = content.states[-1].tick
-            assert message.tick - 10 <= last <= message.tick
-            ticks = [state.tick for state in content.states]
-            assert ticks == list(range(ticks[0], last + 1))
-            assert len(ticks) >= min(KEEP, message.tick) - 10
-            assert [event.tick for event in content.events][:3] == [
-                t for t in range(ticks[0], last) if t % 7 == 0
-            ][:3]
-    written.close()
-    whole = names(path.parent)[:-1]
-    assert len(whole) == 4
-    assert all(read(path.with_name(name)).complete for name in whole)
 
 
 def test_what_a_segment_lacks_is_counted_in_it_and_in_the_whole(path):
@@ -143,15 +102,9 @@ def test_what_a_segment_lacks_is_counted_in_it_and_in_the_whole(path):
 def test_files_of_several_recordings_are_not_read_as_one(path):
     record(path, 30)
     record(path, 30)
-    with Recorder(path, INFO, {}) as recorder:
-        recorder.state(STATE)
-    for named in (path.parent, path.with_name("*.mcap")):
-        for reader in (read, read_log):
-            with pytest.raises(
-                RecordingError,
-                match=r"names 3 recordings, run-1-part\*\.mcap, run-2-part\*\.mcap, run\.mcap: give one",
-            ):
-                reader(named)
+    for named, reader in ((path.parent, read), (path.with_name("*.mcap"), read_log)):
+        with pytest.raises(RecordingError, match=r"names 2 recordings, run-1-part\*\.mcap, run-2-part"):
+            reader(named)
     with pytest.raises(RecordingError, match=r"x-\*\.mcap names no recording"):
         read(path.with_name("x-*.mcap"))
 
@@ -163,16 +116,9 @@ def test_a_recording_without_one_of_its_middle_segments_is_refused(path):
         read(path)
 
 
-@pytest.mark.parametrize("name", ["run[1].mcap", "run*.mcap", "log.2026-11-29"])
-def test_any_name_of_a_recording_names_its_segments(path, name):
-    record(path.with_name(name), 30)
-    record(path.with_name(name), 30)
-    assert ticks_of(path.with_name(name)) == ticks_of(path.with_name(segment_name(name, 2, None)))
-
-
 def record(path, ticks, killed=False):
     """Record ticks; killed, the files are left as they are."""
-    recorder = Recorder(path, INFO, {}, keep=KEEP, wait=True)
+    recorder = Recorder(path, INFO, {"seed": 1}, keep=KEEP, wait=True)
     for message in messages(ticks):
         if isinstance(message, State):
             recorder.state(message)
@@ -193,23 +139,32 @@ def kept(path, number):
     return path.with_name(segment_name(path.name, number, None))
 
 
-@pytest.mark.parametrize("killed", [False, True])
-@pytest.mark.parametrize("name", ["run.mcap", "run", "a.b.mcap"])
+@pytest.mark.parametrize(
+    ("name", "killed"),
+    [
+        ("run.mcap", True),
+        ("run", False),
+        ("run[1].mcap", False),
+        ("run*.mcap", True),
+        ("a.2026-11-29", False),
+    ],
+)
 def test_a_recording_of_an_earlier_run_stays_and_the_name_alone_is_that_of_the_latest(name, killed, path):
     path = path.with_name(name)
     record(path, 330, killed)
     before = ticks_of(path)
+    assert before[-1] > 320
+    assert before == list(range(before[0], before[-1] + 1))
     assert len(before) >= KEEP - 10
+    assert read(path).complete is not killed
     record(path, 120)
     assert ticks_of(kept(path, 1)) == before
     assert ticks_of(path) == ticks_of(kept(path, 2)) == list(range(1, 121))
 
 
 def test_the_five_newest_are_kept_and_files_of_other_names_stay(path):
-    strange = [
-        path.with_name(name)
-        for name in ("run.1.mcap", "run-1.mcap", "run-x-part0001.mcap", "run-01-part0001.mcap")
-    ]
+    names_of_others = ("run.1.mcap", "run-1.mcap", "run-x-part0001.mcap", "run-01-part0001.mcap")
+    strange = [path.with_name(name) for name in names_of_others]
     for place in strange:
         place.write_bytes(b"mine")
     for number in range(1, 9):
@@ -260,12 +215,8 @@ def test_a_file_of_the_name_itself_stays_and_is_what_the_name_means(path, caplog
     assert ticks_of(kept(path, 1)) == list(range(1, 21))
 
 
-@pytest.mark.parametrize("ticks", [0, 20])
-def test_what_another_process_writes_is_never_deleted(ticks, path):
+def test_what_another_process_writes_is_never_deleted(path):
     with Recorder(path, INFO, {}, keep=KEEP, wait=True) as first:
-        for message in messages(ticks):
-            if isinstance(message, State):
-                first.state(message)
         for _ in range(7):
             record(path, 10)
     assert first.error is None
@@ -290,22 +241,14 @@ def test_a_segment_that_was_moved_is_completed_where_it_is_and_the_next_one_take
 
 
 def test_replay_says_that_the_beginning_is_forgotten(path):
-    with Recorder(path, INFO, {"seed": 1}, keep=KEEP, wait=True) as recorder:
-        for message in messages(350):
-            if isinstance(message, State):
-                recorder.state(message)
+    record(path, 350)
     with pytest.raises(ReplayError, match="has forgotten all before tick 226, so its run cannot be repeated"):
         replay_file(read(path))
 
 
 @pytest.mark.parametrize(
     ("name", "segment"),
-    [
-        ("run.mcap", "run-2-part0003.mcap"),
-        ("run", "run-2-part0003"),
-        (".mcap", ".mcap-2-part0003"),
-        ("a.b.c", "a.b-2-part0003.c"),
-    ],
+    [("run", "run-2-part0003"), (".mcap", ".mcap-2-part0003"), ("a.b.c", "a.b-2-part0003.c")],
 )
 def test_the_name_of_a_segment_tells_recording_run_and_number(name, segment):
     assert segment_name(name, 2, 3) == segment

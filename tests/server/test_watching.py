@@ -5,6 +5,7 @@ import struct
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_server.rtde.client import RtdeClient, RtdeError
 from tvist_server.rtde.codec import PackageKind, package
@@ -25,16 +26,12 @@ def data(*numbers):
     return package(PackageKind.DATA, b"\x01" + struct.pack(f">{len(numbers)}d", *numbers))
 
 
+@examples(40)
 @given(st.lists(st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), max_size=20), st.integers(1, 200))
 def test_rows_are_the_same_however_the_bytes_are_cut(rows, size):
     client = RtdeClient(NEEDED, OPTIONAL)
-    stream = b"".join(
-        [
-            *answers(b"DOUBLE,VECTOR3D,DOUBLE"),
-            package(PackageKind.START, b"\x01"),
-            *(data(*row) for row in rows),
-        ]
-    )
+    begin = [*answers(b"DOUBLE,VECTOR3D,DOUBLE"), package(PackageKind.START, b"\x01")]
+    stream = b"".join([*begin, *(data(*row) for row in rows)])
     found = [row for at in range(0, len(stream), size) for row in client.receive(stream[at : at + size]).rows]
     assert client.started
     assert [[*row["timestamp"], *row["q"], *row["payload"]] for row in found] == rows
@@ -64,6 +61,7 @@ def test_a_recipe_that_cannot_be_read_is_refused(types, word):
         client.receive(b"".join(answers(types)))
 
 
+@examples(40)
 @given(st.lists(st.integers(0, 9), min_size=1, max_size=200), st.sampled_from([1, 4]), st.floats(0.0, 9.0))
 def test_rows_and_gaps_add_up_to_the_time_of_the_robot(gaps, interval, jitter):
     """A gap of 0 is a row that comes twice; when rows arrive does not matter."""

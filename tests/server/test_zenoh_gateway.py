@@ -12,6 +12,7 @@ import msgpack
 import pytest
 import zenoh
 from tests import forked
+from tests.conformance.session import plain_session as connect
 from tests.places import free_endpoint
 
 from tvist_protocol.codec import MAX_BYTES
@@ -63,22 +64,8 @@ class NotingDesk:
             threading.Thread(target=reply, args=(lambda: data,)).start()
 
 
-def connect(endpoint):
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
-    config.insert_json5("scouting/multicast/enabled", "false")
-    return zenoh.open(config)
-
-
 def replies(session, key, payload=None, timeout=WAIT):
     return list(session.get(key, payload=payload, timeout=timeout))
-
-
-def subscribe(session, key):
-    received = queue.Queue()
-    session.declare_subscriber(key, received.put)
-    return received
 
 
 @pytest.fixture
@@ -104,13 +91,7 @@ def gateway(network, desk):
 
 
 @pytest.fixture
-def lockstep_gateway(network, desk):
-    return network.gateway("ur5e", desk, lockstep=True, truth=True)
-
-
-@pytest.fixture
-def session(endpoint, request):
-    request.getfixturevalue("lockstep_gateway" if "lockstep_gateway" in request.fixturenames else "gateway")
+def session(endpoint, gateway):
     with connect(endpoint) as session:
         yield session
 
@@ -151,7 +132,7 @@ def test_a_setpoint_on_a_wildcard_key_or_too_large_is_counted_and_dropped(gatewa
 
 
 def test_a_client_is_seen_before_the_command_it_sends_next_and_its_going_is_seen(gateway, desk, endpoint):
-    for number in range(20):
+    for number in range(5):
         client = connect(endpoint)
         _token = client.liveliness().declare_token(f"tvist/ur5e/client/me {number}")
         replies(client, "tvist/ur5e/command", b"take")
@@ -174,18 +155,6 @@ def test_the_end_of_a_session_is_told_while_its_token_is_held_elsewhere(gateway,
     assert desk.next() == ("gone", "me", session)
 
 
-def test_what_is_published_arrives_with_its_encoding(gateway, session):
-    received = subscribe(session, "tvist/ur5e/*")
-    replies(session, "tvist/ur5e/info")  # the subscription has passed
-    for topic in ("state", "event", "telemetry", "truth"):  # truth is not told here
-        gateway.publish(topic, None, topic.encode())
-    samples = [received.get(timeout=WAIT) for _ in range(3)]
-    assert {s.payload.to_string(): str(s.key_expr) for s in samples} == {
-        topic: f"tvist/ur5e/{topic}" for topic in ("state", "event", "telemetry")
-    }
-    assert {str(s.encoding) for s in samples} == {"application/msgpack"}
-
-
 def taken(gateway, topic, *, taken):
     """Wait until a gateway takes a topic, or does no longer."""
     end = time.monotonic() + WAIT
@@ -194,7 +163,7 @@ def taken(gateway, topic, *, taken):
         time.sleep(0.002)
 
 
-@pytest.mark.parametrize("key", ["tvist/ur5e/state", "tvist/*/state", "**"])
+@pytest.mark.parametrize("key", ["tvist/ur5e/state", "**"])
 def test_in_real_time_states_are_taken_while_somebody_subscribes_to_them(gateway, session, endpoint, key):
     assert gateway.takes == {"event", "telemetry", "io"}
     with connect(endpoint) as other:
@@ -215,7 +184,7 @@ def test_in_real_time_states_are_taken_while_somebody_subscribes_to_them(gateway
 def test_who_subscribed_before_the_robot_was_ready_gets_its_states(network, endpoint, desk):
     network.expect(["ur5e"], desk)
     with connect(endpoint) as early:
-        subscribe(early, "tvist/ur5e/truth")
+        early.declare_subscriber("tvist/ur5e/truth", queue.Queue().put)
         replies(early, "tvist/ur5e/info")
         told = []
         gateway = network.gateway("ur5e", desk, lockstep=False, truth=False, wanted=told.append)
@@ -258,16 +227,13 @@ def test_a_port_in_use_is_one_clear_sentence(network, endpoint):
 
 READER = """
 import json, sys, zenoh
-config = zenoh.Config()
-config.insert_json5("mode", '"client"')
-config.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
-config.insert_json5("scouting/multicast/enabled", "false")
+from tests.conformance.session import plain_session
 counts = {"state": 0, "event": 0}
 def on(sample):
     counts[str(sample.key_expr).split("/")[2]] += 1
     if sample.payload.to_bytes() == b"last":
         print(json.dumps(counts), flush=True)
-with zenoh.open(config) as session:
+with plain_session(sys.argv[1]) as session:
     direct = zenoh.handlers.Callback(on, indirect=False)
     session.declare_subscriber("tvist/ur5e/state", direct)
     session.declare_subscriber("tvist/ur5e/event", direct)
@@ -294,26 +260,3 @@ def test_a_reader_that_stops_loses_states_but_no_event_and_never_holds_up_the_pu
         assert counts["event"] == 201  # had a put waited for it, Zenoh would have cut it off in the end
         assert counts["state"] < 2000
         reader.stdin.close()
-
-
-FORGETFUL = """
-import sys, time, zenoh
-from tvist_server.gateways.network import Network
-class Desk:
-    def request(self, data, reply): reply(bytes)
-    def setpoint(self, data): pass
-    def info(self, reply): reply(bytes)
-    def client_seen(self, name, session=""): pass
-    def client_gone(self, name, session=""): pass
-    def session_gone(self, session): pass
-gateway = Network([sys.argv[1]]).gateway("ur5e", Desk(), lockstep=False, truth=False)
-gateway.publish("state", None, b"x")
-print("end of main")
-"""
-
-
-def test_a_process_that_forgets_to_close_ends_all_the_same(endpoint):
-    ended = forked.run(
-        [sys.executable, "-c", FORGETFUL, endpoint], capture_output=True, text=True, timeout=100, check=True
-    )
-    assert (ended.stdout, ended.stderr) == ("end of main\n", "")

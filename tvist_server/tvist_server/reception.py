@@ -52,7 +52,7 @@ class Reception(Desk):
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; the reply comes from another thread, or at once if the command is rejected."""
         # Read without a lock: the controller replaces its standing as a whole. A lease may end before the command gets
-        # its turn, so the tick thread checks it again (decision 14).
+        # its turn, so the tick thread checks it again.
         standing = self._host.standing
         self._hand_in(admit(data, standing.lease, standing.clock), answer)
 

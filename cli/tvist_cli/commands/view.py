@@ -62,8 +62,10 @@ def view(
         raise Failure(
             f"the recording lasts {shows.lasts:.0f} s: --html takes at most {LONGEST_S:.0f} s", code=2
         )
+    from tvist_lab.whole_file import write_whole
+
     with told(OSError):
-        html.write_text(shows.page(magnify), encoding="utf-8")
+        write_whole(html, shows.page(magnify).encode())
     err.print(f"wrote {html}")
 
 

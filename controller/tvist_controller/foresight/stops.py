@@ -1,4 +1,4 @@
-"""Planning of stops: what decision 13 calls a permitted stop, and the quickest of them."""
+"""Planning of stops: which are permitted (docs/explanations/design-notes.md says why), and the quickest of them."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence

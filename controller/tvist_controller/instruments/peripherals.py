@@ -171,13 +171,14 @@ class Peripherals:
     def set_registers(self, command: SetRegisters) -> None:
         """Write registers: all of them, or none."""
         runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
-        for run in runs:
+        for number, run in enumerate(runs):
+            where = f"also[{number - 1}].values" if number else "values"
             there = BITS if run.bank.endswith("bit") else NUMBERS
             if run.first + len(run.values) > there:
                 why = f"first is {run.first} with {len(run.values)} values; {run.bank} has {there} registers"
-                raise RefusalError("out_of_range", "values", why, there)
+                raise RefusalError("out_of_range", where, why, there)
             for k, value in enumerate(run.values):
-                _check(k, value, run.bank)
+                _check(f"{where}[{k}]", value, run.bank)
         for run in runs:
             for place, value in enumerate(run.values, run.first):
                 self.write(run.bank, place, value)
@@ -233,7 +234,7 @@ class Peripherals:
         return analog_value(self.analog_shares[number], voltage=bool(self._analog_types >> (2 + number) & 1))
 
 
-def _check(k: int, value: Register, bank: Bank) -> None:
+def _check(where: str, value: Register, bank: Bank) -> None:
     """Refuse a value that is invalid for its bank."""
     if bank.endswith("bit"):
         fits, wanted = isinstance(value, bool), "true or false"
@@ -243,5 +244,4 @@ def _check(k: int, value: Register, bank: Bank) -> None:
     else:
         fits, wanted = not isinstance(value, bool), "a number"
     if not fits:
-        why = f"values[{k}] is {value}; {bank} registers take {wanted}"
-        raise RefusalError("out_of_range", f"values[{k}]", why)
+        raise RefusalError("out_of_range", where, f"{where} is {value}; {bank} registers take {wanted}")

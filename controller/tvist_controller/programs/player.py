@@ -114,8 +114,8 @@ class ProgramPlayer:
             self._told, self._access.peripherals.changed = now, True
 
     def _give_turns(self, tick: int) -> None:
-        # Evaluations are counted rather than timed, so that a run is the same live, in lockstep and in a replay
-        # (decision 26). What a tick takes beyond them, the next ticks pay.
+        # Evaluations are counted rather than timed, so that a run is the same live, in lockstep and in a replay.
+        # What a tick takes beyond them, the next ticks pay.
         self.sockets.answer()
         left = self._left = min(self._left, 0) + EVALUATIONS
         if not self._all:

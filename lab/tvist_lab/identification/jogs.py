@@ -58,8 +58,10 @@ FIRST = 0.55
 """Quickness of the first jog over what its torques permit, since nobody knows how loud the arm rings [-]."""
 LOUD, LATER = 0.15, 0.1
 """Rms of the acceleration per axis to aim at, as after a program's motion [m/s^2], so much later than the stop [s]."""
-INEXACT = 0.03
-"""Share of a ring-down after a jog that no model explains [-]."""
+INEXACT, STICKING = 0.03, 0.2
+"""Share of a ring-down after a jog that no model explains [-], also of an arm whose motors stick."""
+STICKS = 1.5
+"""Friction at break-away over that in motion from which on a motor sticks [-]."""
 WAYS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 """Limits of the ways to the jogs."""
 GENTLE = 1.0
@@ -178,9 +180,9 @@ async def plan_jogs(
             f"at least {least} are needed, {RING_DOWNS} are recommended"
         )
     speed = min(info.limits.velocity)
-    ways = replace(
-        WAYS, velocity=min(WAYS.velocity, speed), **({"acceleration": GENTLE} if positions else {})
-    )
+    ways = replace(WAYS, velocity=min(WAYS.velocity, speed))
+    if positions:
+        ways = replace(ways, acceleration=GENTLE, jerk=LIMITS.jerk)
 
     def planned() -> JogPlan:
         at, arm = np.array(state.target_q), ArmModes(description, carried)
@@ -289,7 +291,7 @@ async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progres
                 found = replace(found, friction=friction, no_friction="")
             except IdentificationError as error:  # springs can be measured all the same
                 found = replace(found, no_friction=str(error))
-        logs = await _jogs(robot, control, plan, info, found.servo, progress)
+        logs = await _jogs(robot, control, plan, info, found, progress)
     finally:
         if plan.changed:
             with contextlib.suppress(ClientError, RefusedError):
@@ -306,9 +308,12 @@ async def _lag(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) ->
 
 
 async def _jogs(
-    robot: Robot, control: Arm, plan: JogPlan, info: Info, servo: ServoResponse | None, progress: Progress
+    robot: Robot, control: Arm, plan: JogPlan, info: Info, known: Measured, progress: Progress
 ) -> list[Log]:
     """Return the recordings of those jogs that the robot did not refuse."""
+    servo = known.servo
+    sticks = any(one.quantity == "breakaway" and one.value > STICKS for one in known.friction)
+    inexact = STICKING if sticks else INEXACT
     begins = BEGINS if plan.turned is None else UNKNOWN if servo is None else servo.delay
     logs, share, carried = list[Log](), FIRST, None
     for number, jog in enumerate(plan.jogs, 1):
@@ -321,7 +326,7 @@ async def _jogs(
         if recording is None:
             continue
         driven = () if servo is None else servo.poles
-        logs.append(Log(f"jog {number}", replace(recording, info=info), payload, begins, INEXACT, driven))
+        logs.append(Log(f"jog {number}", replace(recording, info=info), payload, begins, inexact, driven))
         heard = stops_of(logs[-1:])[0][-1].ringing
         loud = 0.0 if heard is None else heard.rms_after(LATER)
         share = float(np.clip(share * np.sqrt(LOUD / max(loud, 1e-3)), GENTLEST, 1.0))

@@ -18,6 +18,7 @@ from tvist_lab.study.asked import Asked, Preset
 from tvist_lab.study.columns import Column, of_group, share
 from tvist_lab.study.held_out import LEAST, bootstrap
 from tvist_lab.study.study import Study, StudyError
+from tvist_lab.words import counted
 from tvist_plant.variants import variant
 
 NEITHER, TOO_FEW = "no difference shown", "too few moves vibrate"
@@ -30,7 +31,7 @@ EXACT = "Of the medians, first minus second in points, with its 95 % interval, w
 def study(asked: Asked) -> Study:
     """Return the study of two shapers, side by side."""
     if len(asked.methods) != 2:
-        raise StudyError(f"shapers are {len(asked.methods)} different ones: give two as --shapers")
+        raise StudyError(f"shapers names {counted(len(asked.methods), 'shaper')}: must be two different ones")
     moves, names = asked.feasible(), [one.name for one in asked.methods]
     if len(moves) < LEAST:
         raise StudyError(

@@ -1,9 +1,12 @@
 """What the tests of UR's interfaces share: a control that records, and snapshots of a real controller."""
 
+import asyncio
 import contextlib
 from collections.abc import Callable
+from functools import cache
 from types import SimpleNamespace
 
+import msgspec
 import pytest
 
 from tvist_controller.controller import Controller
@@ -88,27 +91,15 @@ class FakeControl:
         return [command for command in self.commands if isinstance(command, kind)]
 
 
+@cache
+def controller_at_rest():
+    q, payload = UR5E.poses["Q1"], paper_payload(UR5E)
+    return Controller(Setup(description=UR5E, q=q, payload=payload, calibration=None, clock="lockstep"))
+
+
 def io(**changes) -> Io:
     """Everything off, the paper's payload declared."""
-    values = {
-        "tick": 0,
-        "actual_digital_input_bits": 0,
-        "actual_digital_output_bits": 0,
-        "standard_analog_input": [0.0, 0.0],
-        "standard_analog_output": [0.0, 0.0],
-        "analog_io_types": 0,
-        "tool_analog_input": [0.0, 0.0],
-        "input_bit_register": [0] * 4,
-        "input_int_register": [0] * 48,
-        "input_double_register": [0.0] * 48,
-        "output_bit_register": [0] * 4,
-        "output_int_register": [0] * 48,
-        "output_double_register": [0.0] * 48,
-        "tcp_offset": [0.0] * 6,
-        "payload": paper_payload(UR5E),
-        "target_speed_fraction": 1.0,
-    }
-    return Io(**(values | changes))
+    return msgspec.structs.replace(controller_at_rest().io(), **changes)
 
 
 class Robot:
@@ -180,6 +171,15 @@ def robot(snapshots) -> SimpleNamespace:
         report_refusal=reported.append,
         reported=reported,
     )
+
+
+@pytest.fixture
+async def later(monkeypatch):
+    """The loop's clock stands, and jumps by so many seconds."""
+    loop = asyncio.get_running_loop()
+    passed = [loop.time()]
+    monkeypatch.setattr(loop, "time", lambda: sum(passed))
+    return passed.append
 
 
 @pytest.fixture

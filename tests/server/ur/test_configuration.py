@@ -18,16 +18,12 @@ def config(**values) -> ServeConfig:
     return from_mapping({"ur": True, **values}, "tvist.toml")
 
 
-def test_they_are_where_ur_has_them():
+def test_they_are_where_ur_has_them_but_one_can_be_moved_and_another_kept_shut():
     assert config().interfaces(0) == ("127.0.0.1", UrPorts().open())
-
-
-def test_one_can_be_moved_and_another_kept_shut():
     _, ports = config(ur_ports={"rtde": 31004, "dashboard": 0}).interfaces(0)
-    assert ports == {
-        **{interface: port for interface, port in UrPorts().open().items() if interface != "dashboard"},
-        "rtde": 31004,
-    }
+    expected = UrPorts().open() | {"rtde": 31004}
+    del expected["dashboard"]
+    assert ports == expected
 
 
 def test_of_several_robots_each_has_the_next_address():
@@ -36,13 +32,10 @@ def test_of_several_robots_each_has_the_next_address():
     assert config(ur_address="::1").interfaces(0)[0] == "::1"
 
 
-@pytest.mark.parametrize(
-    ("values", "named"),
-    [({"ur_address": "robot"}, "ur_address is 'robot'"), ({"ur_address": "127.0.0.300"}, "ur_address")],
-)
-def test_an_address_that_is_none_is_named(values, named):
-    with pytest.raises(StartError, match=named):
-        config(**values).interfaces(0)
+@pytest.mark.parametrize("address", ["robot", "127.0.0.300"])
+def test_an_address_that_is_none_is_named(address):
+    with pytest.raises(StartError, match=f"ur_address is '{address}'"):
+        config(ur_address=address).interfaces(0)
 
 
 def test_an_arm_with_seven_joints_is_refused_since_the_last_would_be_missing():
@@ -58,18 +51,12 @@ def test_an_arm_with_seven_joints_is_refused_since_the_last_would_be_missing():
     assert from_mapping(seven, "tvist.toml").setups()[0].description.joints == 7
 
 
-def test_everywhere_is_no_address_for_several():
+def test_everywhere_is_no_address_for_several_and_what_is_no_port_or_door_is_named():
     with pytest.raises(StartError, match="one address each"):
         config(ur_address=EVERYWHERE).interfaces(1)
-
-
-@pytest.mark.parametrize(
-    ("ports", "named"),
-    [({"rtd": 30004}, "rtd"), ({"rtde": 70000}, "rtde"), ({"rtde": -1}, "rtde"), ({"rtde": "x"}, "rtde")],
-)
-def test_a_port_or_door_that_is_none_is_named(ports, named):
-    with pytest.raises(StartError, match=named):
-        config(ur_ports=ports)
+    for ports in ({"rtd": 30004}, {"rtde": 70000}, {"rtde": -1}, {"rtde": "x"}):
+        with pytest.raises(StartError, match=next(iter(ports))):
+            config(ur_ports=ports)
 
 
 def test_nobody_else_reaches_them_unasked():

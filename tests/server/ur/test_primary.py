@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.controller.robots import UR5E, cut
+from tests.examples import examples
 
 from tvist_plant.description import load
 from tvist_protocol import commands as c
@@ -34,9 +35,6 @@ def state_of(snapshot, description=UR5E):
     ((kind, body),) = split(data)
     assert kind == 16
     return dict(parts(body)), data
-
-
-# ---------------------------------------------------------------------- robot state
 
 
 def test_parts_lengths_and_order_are_those_of_the_recording(snapshot):
@@ -94,15 +92,11 @@ def test_kinematics_and_configuration_are_the_descriptions(snapshot):
     assert struct.unpack(">6I24dI", found[5]) == (*[2**32 - 1] * 6, *nothing, *table, 0)
     numbers = struct.unpack(">53d4i", found[6])
     assert numbers[:12] == tuple(side * most for most in limits.position for side in (-1, 1))
-    assert list(batched(numbers[12:24])) == list(zip(limits.velocity, limits.acceleration, strict=True))
+    assert (numbers[12:24:2], numbers[13:24:2]) == (limits.velocity, limits.acceleration)
     assert min(numbers[24:29]) > 0
     assert numbers[29:53] == (*table, *nothing)
     assert all(numbers[53:55])  # the masterboard and the controller's box
     assert numbers[55:] == (1, 3)
-
-
-def batched(numbers):
-    return zip(numbers[::2], numbers[1::2], strict=True)
 
 
 def test_terminals(ur5e):
@@ -126,15 +120,11 @@ def test_terminals(ur5e):
     assert (tool[2:5], tool[8]) == ((1.25, 0.5, 48.0), 253)
 
 
-@pytest.mark.parametrize("joints", [1, 3, 5])
-def test_an_arm_with_fewer_joints_fills_the_same_package(ur5e, joints):
-    arm = cut(joints)
+def test_an_arm_with_fewer_joints_fills_the_same_package(ur5e):
+    arm = cut(3)
     found, data = state_of(ur5e(arm, q=arm.poses["Q1"]).tick(), arm)
     assert len(data) == 1386
-    assert found[1][joints * 41 :] == bytes((6 - joints) * 41)
-
-
-# ---------------------------------------------------------------------- the session's stream
+    assert found[1][3 * 41 :] == bytes(3 * 41)
 
 
 class At:
@@ -174,13 +164,12 @@ def test_states_come_at_10_hz_even_where_ticks_were_left_out(robot, control, sen
     assert len(sent) == 1
 
 
-@pytest.mark.parametrize(("modes", "told"), [((1, 1, 3, 3, 1), [3, 1]), ((3, 3, 1), [1])])
-def test_the_safety_mode_is_told_when_it_changes_and_not_before(robot, control, sent, snapshot, modes, told):
+def test_the_safety_mode_is_told_when_it_changes_and_not_before(robot, control, sent, snapshot):
     interface = session(robot, control, sent.append)
-    for tick, mode in enumerate(modes, start=1):
+    for tick, mode in enumerate((3, 3, 1, 1, 3, 1), start=1):
         interface.sample(At(snapshot, tick, safety_mode=mode))
     changes = [message(data) for data in sent if data[4] == 20]
-    assert [(one.kind, one.values["mode"]) for one in changes] == [(5, mode) for mode in told]
+    assert [(one.kind, one.values["mode"]) for one in changes] == [(5, 1), (5, 3), (5, 1)]
 
 
 def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning_after_the_state(
@@ -216,9 +205,6 @@ def test_warnings_are_lines_of_the_log_and_other_events_are_not_told(robot, cont
     assert (line.kind, line.values) == (0, {"text": "mind the gap"})
 
 
-# ---------------------------------------------------------------------- messages
-
-
 def test_messages_say_what_they_are_given():
     key = message(messages.key(5_000_000, "PROGRAM_XXX_STARTED", "move"))
     assert (key.time, key.source, key.kind) == (5_000_000, 254, 7)
@@ -230,14 +216,12 @@ def test_messages_say_what_they_are_given():
     assert window.values["flags"] == [False] * 3
 
 
+@examples(40)
 @given(st.text(max_size=3000))
 def test_no_text_makes_a_message_that_clients_take_for_garbage(text):
     for made in (messages.text(0, text), messages.key(0, text, text), messages.popup(0, text, text)):
         assert len(made) <= 2000
         message(made)
-
-
-# ---------------------------------------------------------------------- the ear: units
 
 
 PROGRAM = """def rtde():
@@ -284,9 +268,6 @@ def test_a_stream_is_cut_into_the_same_units_wherever_it_is_split(sample, ending
             units += intake.feed(stream[at : at + size])
         assert units == whole
         assert intake.held == 0
-    for at in range(len(stream)):
-        intake = Intake()
-        assert intake.feed(stream[:at]) + intake.feed(stream[at:]) == whole
 
 
 def test_a_line_that_is_too_long_does_not_swallow_the_next():
@@ -301,37 +282,28 @@ def test_a_line_that_is_too_long_does_not_swallow_the_next():
         assert sum(unit.too_long for unit in units) == 1
 
 
-# ---------------------------------------------------------------------- the ear: orders
+ORDERS = {
+    "power on": [c.PowerOn(token="the-token", release_brakes=False)],
+    "power off": [c.PowerOff(token="the-token")],
+    "set robotmode run": [c.PowerOn(token="the-token")],
+    "set unlock protective stop": [c.UnlockProtectiveStop(token="the-token")],
+    "  stop   program  # now": [ProgramStop()],
+    "set sim": [],
+    "set real": [],
+}
+PROGRAMS = ("movej([0,0,0,0,0,0])\n", PROGRAM, "sec f():\nend\n", "power onto\n", "éß\n", "# a\n\nhalt\n")
 
 
-@pytest.mark.parametrize(
-    ("text", "commands"),
-    [
-        ("power on", [c.PowerOn(token="the-token", release_brakes=False)]),
-        ("power off", [c.PowerOff(token="the-token")]),
-        ("set robotmode run", [c.PowerOn(token="the-token")]),
-        ("set unlock protective stop", [c.UnlockProtectiveStop(token="the-token")]),
-        ("stop program", [ProgramStop()]),
-        ("  stop   program  # now", [ProgramStop()]),
-        ("set sim", []),
-        ("set real", []),
-    ],
-)
-def test_commands_that_are_no_urscript_act_and_a_simulated_arm_stays_one(
-    robot, control, sent, text, commands
-):
-    session(robot, control, sent.append).receive(text.encode() + b"\r\n")
-    assert control.commands == commands
-    assert not sent
-    assert not robot.told
-
-
-@pytest.mark.parametrize(
-    "text", ["movej([0,0,0,0,0,0])\n", PROGRAM, "sec f():\nend\n", "power onto\n", "éß\n", "# a\n\nhalt\n"]
-)
-def test_everything_else_is_a_program_and_goes_to_the_controller_as_it_was_sent(robot, control, sent, text):
-    session(robot, control, sent.append).receive(text.encode())
-    assert control.commands == [ProgramRun(token="the-token", text=text)]
+def test_orders_act_and_everything_else_goes_to_the_controller_as_it_was_sent(robot, control, sent):
+    """A simulated arm stays one."""
+    interface, expected = session(robot, control, sent.append), []
+    for text, commands in ORDERS.items():
+        interface.receive(text.encode() + b"\r\n")
+        expected += commands
+    for text in PROGRAMS:
+        interface.receive(text.encode())
+        expected.append(ProgramRun(token="the-token", text=text))
+    assert control.commands == expected
     assert not sent + robot.told
 
 
@@ -362,12 +334,13 @@ REPORTS = {
 """What was sent until the connection ended, and the only line that the console is told."""
 
 
-@pytest.mark.parametrize("text", REPORTS, ids=range(len(REPORTS)))
-def test_what_became_of_a_script_is_one_line_on_the_console(robot, control, sent, text):
-    interface = session(robot, control, sent.append)
-    interface.receive(text)
-    interface.closed()
-    assert robot.reported == [REPORTS[text].format(control.peer)]
+def test_what_became_of_a_script_is_one_line_on_the_console(robot, control, sent):
+    for text, said in REPORTS.items():
+        interface = session(robot, control, sent.append)
+        interface.receive(text)
+        interface.closed()
+        assert robot.reported.pop() == said.format(control.peer)
+        assert robot.reported == []
 
 
 def test_a_text_that_is_not_valid_is_told_to_everybody_and_on_the_console(robot, control, sent):
@@ -405,27 +378,15 @@ def test_without_control_or_at_a_read_only_port_commands_are_answered_with_210(
     assert robot.reported[0].endswith(f"was refused: {why}")
 
 
-@pytest.mark.parametrize(
-    ("text", "safety", "kinds"),
-    [
-        (b"power on\n", 1, []),
-        (b"set robotmode run\n", 1, []),
-        (b"set unlock protective stop\n", 1, []),
-        (b"set unlock protective stop\n", 3, [0]),
-    ],
-)
-def test_what_is_so_already_is_no_failure_and_a_stop_that_cannot_be_left_yet_is_one(
-    robot, control, sent, text, safety, kinds
-):
+def test_what_is_so_already_is_no_failure_and_a_stop_that_cannot_be_left_yet_is_one(robot, control, sent):
     control.refuse("wrong_mode", why="it is stopping")
-    robot.latest = At(robot.latest, 1, safety_mode=safety)
-    session(robot, control, sent.append).receive(text)
-    assert [message(data).kind for data in sent] == kinds
+    interface, snapshot = session(robot, control, sent.append), robot.latest
+    for safety, kinds in ((1, []), (3, [0])):
+        robot.latest = At(snapshot, 1, safety_mode=safety)
+        interface.receive(b"power on\nset robotmode run\nset unlock protective stop\n")
+        assert [message(data).kind for data in sent] == kinds
 
 
-@pytest.mark.parametrize(
-    ("name", "number"),
-    [("ur3e", 3), ("ur5e", 1), ("ur10e", 2), ("ur16e", 4), ("ur20", 7), ("ur30", 8), ("one-joint", 0)],
-)
-def test_the_robot_type_is_ur_s_number_of_the_model(name, number):
-    assert robot_type(load(name)) == number
+def test_the_robot_type_is_ur_s_number_of_the_model():
+    numbers = {"ur3e": 3, "ur5e": 1, "ur10e": 2, "ur16e": 4, "ur20": 7, "ur30": 8, "one-joint": 0}
+    assert {name: robot_type(load(name)) for name in numbers} == numbers

@@ -111,7 +111,7 @@ class SettingFunctions(Family):
         yield from self._arm.finish()
         command = SetPayload(token=OWN_TOKEN, mass=mass, com=com, inertia=inertia, transition_time=seconds)
         # Planned beside the ticks and taken after a fixed number of them, as a move is: so it takes effect at the same
-        # tick on every machine (decision 26).
+        # tick on every machine.
         ordered = self._access.plans.later(command)
         for _ in range(DELAY):
             yield

@@ -144,7 +144,7 @@ class UrInterfaces(Gateway):
         """Let clients in after the first tick; the running event loop serves them."""
         await self._first_tick()
         # One event loop beside the tick thread serves all clients: a process of its own would be a millisecond late and
-        # decode everything twice, and a thread for each client would compete with the tick (decision 12).
+        # decode everything twice, and a thread for each client would compete with the tick.
         self._loop = asyncio.get_running_loop()
         limit = ConnectionLimit(self._loop.time, self._coming_and_going.tell)
         self._connections = limit.taken

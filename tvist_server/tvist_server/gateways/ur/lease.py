@@ -11,8 +11,8 @@ from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_server.gateways.base import Desk
 from tvist_server.gateways.ur.later import Later, begin
 
-# The longest that the protocol allows, since the control of a host ends with its connections and not with time
-# (decision 12). ALIVE is wall time, the lease robot's time, which may pass many times faster in lockstep.
+# The longest that the protocol allows, since the control of a host ends with its connections and not with time.
+# ALIVE is wall time, the lease robot's time, which may pass many times faster in lockstep.
 LEASE = 3600.0
 """Duration of the lease without renewal [s]; it is renewed every `ALIVE`."""
 ALIVE = 10.0
