@@ -312,7 +312,8 @@ async def _jogs(
 ) -> list[Log]:
     """Return the recordings of those jogs that the robot did not refuse."""
     servo = known.servo
-    sticks = any(one.quantity == "breakaway" and one.value > STICKS for one in known.friction)
+    told = [one for one in known.friction if one.quantity == "breakaway" and one.status == "identified"]
+    sticks = any(one.value > STICKS for one in told)
     inexact = STICKING if sticks else INEXACT
     begins = BEGINS if plan.turned is None else UNKNOWN if servo is None else servo.delay
     logs, share, carried = list[Log](), FIRST, None
