@@ -15,7 +15,7 @@ from tvist_lab.studies.moves import example
 from tvist_lab.studies.robustness import ERRORS, cells
 from tvist_shaping import SHAPERS, custom, residual
 
-REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
 TICKS = 1500
 UNSHAPED = "#d55e00"
 MODE = ("estimated_f_d", "estimated_zeta")
@@ -55,7 +55,7 @@ def judged(count, *, counts=True):
 
 
 def published(name):
-    return json.loads((REFERENCE / f"{name}.json").read_text(encoding="utf-8"))
+    return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
 
 
 ENTRY = {"reduction_percent_median": 90.0, "reduction_percent_p5": 80.0, "delay_ms_median": 50.0}
