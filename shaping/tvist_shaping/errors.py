@@ -1,4 +1,4 @@
-"""Errors, with one class for each condition; each has its data as attributes and a readable message.
+"""Errors, one class for each condition; each has its data as attributes and a readable message.
 
 ShapingError
 ├── ImpulseError          A and τ are not an impulse train

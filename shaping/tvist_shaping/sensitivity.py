@@ -78,7 +78,7 @@ def band(impulses: Impulses, f_d: float, zeta: float, V: float) -> tuple[float, 
 
 
 def _end(grid: Floats, zeta: float, impulses: Impulses, limit: float) -> float:
-    """Return the point of the grid where the residual first exceeds the limit; the grid starts below it."""
+    """Return where the residual first exceeds the limit along the grid, whose first point is below it."""
     outside = np.flatnonzero(residual(grid, zeta, impulses) > limit)
     if outside.size == 0:
         return math.inf
