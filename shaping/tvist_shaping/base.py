@@ -145,13 +145,10 @@ class Filter(Forked, ABC):
         """
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
-        """Shape one sample.
+        """Shape one sample; return the shaped reference x*_i, shape (width,), as a new array.
 
         Args:
             q_ref: Reference x_i, shape (width,), finite: joint angles [rad], or the parameter of a path.
-
-        Returns:
-            Shaped reference x*_i, shape (width,), as a new array.
 
         Raises:
             ShapingError: q_ref has another shape.
@@ -161,13 +158,10 @@ class Filter(Forked, ABC):
         return self._q_star.copy()
 
     def filter_all(self, q_ref: npt.ArrayLike) -> Floats:
-        """Shape many samples, one by one as `filter` does, with the same result to the last bit.
+        """Shape many samples one by one, as `filter` does, with the same bits; return x*_i, shape (T, width).
 
         Args:
             q_ref: References x_i, one for each tick, shape (T, width), finite.
-
-        Returns:
-            Shaped references x*_i, shape (T, width).
 
         Raises:
             ShapingError: The samples have another shape.

@@ -84,11 +84,10 @@ def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = ""
 def product(trains: Sequence[Impulses]) -> Impulses:
     """Convolve the impulse trains of several modes, which suppresses all of them.
 
+    The result has amplitudes A_i B_j … [-] at the times τ_i + σ_j + … [s], sorted by time, shape (Π N,).
+
     Args:
         trains: One train for each mode, at least one.
-
-    Returns:
-        Amplitudes A_i B_j … [-] at the times τ_i + σ_j + … [s], sorted by time, shape (Π N,).
 
     Raises:
         ImpulseError: There are no trains.

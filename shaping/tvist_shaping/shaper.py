@@ -53,14 +53,13 @@ class Shaper:
         return impulses
 
     def band(self, V: float = 0.05, zeta: float = 0.0) -> tuple[float, float]:
-        """Return the range of the ratio of true to assumed frequency in which at most V is left.
+        """Return the lowest and highest ratio of true to assumed frequency at which at most V is left [-].
+
+        Both are NaN if even the ratio 1 leaves more; see `sensitivity.band`.
 
         Args:
             V: Permitted residual vibration [-], 0 < V < 1.
             zeta: Damping ratio, both assumed and true [-].
-
-        Returns:
-            Lowest and highest ratio [-], as in `sensitivity.band`: NaN if even 1 is not inside.
 
         Raises:
             ShapingError: V or ζ is out of range.

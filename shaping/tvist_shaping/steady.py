@@ -49,15 +49,12 @@ class Design(Forked, ABC):
 
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Compute the taps for a reference that has always been at rest.
+        """Compute the taps for a reference that has always been at rest; return False if a delay was clipped.
 
         Args:
             f_d: Damped frequencies [Hz], shape (modes,).
             zeta: Damping ratios [-], shape (modes,).
             taps: Result, shape (taps,), with sum 1.
-
-        Returns:
-            Whether the taps are as required; False if a delay was clipped.
         """
 
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:  # noqa: ARG002

@@ -25,13 +25,10 @@ class Estimator(Forked, ABC):
 
     @abstractmethod
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
-        """Estimate the modes at a configuration.
+        """Return f_d [Hz] and ζ [-] at a configuration, each of shape (modes,); these arrays are not modified later.
 
         Args:
             q: Joint angles [rad], shape (joints,), finite.
-
-        Returns:
-            f_d [Hz] and ζ [-], each of shape (modes,). The estimator does not modify these arrays later.
         """
 
     def settle(self, q: Floats) -> tuple[Floats, Floats]:

@@ -85,16 +85,15 @@ def _rows(n: int, total: int) -> Iterator[tuple[int, ...]]:
 def terms(
     q: npt.ArrayLike, *, joints: Sequence[int], degree: int, centre: npt.ArrayLike | None = None
 ) -> Floats:
-    """Return the design matrix for fitting the coefficients of a `Polynomial` with these parameters.
+    """Return the design matrix for fitting the coefficients of a `Polynomial` with these parameters [-].
+
+    Its shape is (N, terms), in the order of the coefficients.
 
     Args:
         q: Configurations [rad], shape (N, n).
-        joints: Selected joints; all further arguments are as in `Polynomial`.
+        joints: Selected joints; this and all further arguments are as in `Polynomial`.
         degree: Highest total degree.
         centre: Centre of the angles [rad], shape (len(joints),).
-
-    Returns:
-        Values [-], shape (N, terms), in the order of the coefficients.
 
     Raises:
         EstimatorError: A parameter is invalid.

@@ -73,13 +73,12 @@ class Drivetrain:
         return inertia, damping, stiffness
 
     def poles(self, mass: Floats) -> tuple[Complex, Complex]:
-        """Compute all vibrating poles, as eigenvalues of the whole linear system.
+        """Return all vibrating poles, as eigenvalues of the whole linear system, and their shapes.
+
+        Poles are in the order of frequency, shape (k,) [1/s]; shapes are (k, L) with largest entry 1.
 
         Args:
             mass: M(q), shape (L, L) [kg m^2].
-
-        Returns:
-            Poles in the order of their frequency, shape (k,) [1/s], and their shapes, (k, L), with largest entry 1.
         """
         inertia, damping, stiffness = self.system(mass)
         L, N = len(self.stiffness), len(inertia)
