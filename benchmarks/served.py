@@ -53,7 +53,7 @@ async def reader(seconds: float, tell: Tell) -> dict[str, Figure]:
     found: dict[str, list[float]] = {name: [] for name in READER}
     lines: list[float] = []
     async with served([]) as server, helper("bare_tick", endpoint) as bare:
-        await server.robot.state()  # its client reads from now on
+        await server.robot.state()  # subscribes its client
         for number in range(OF_READER):
             tell(f"round {number + 1} of {OF_READER}: a robot that one client reads, its line, and bare puts")
             lines.append(in_process())

@@ -4,7 +4,7 @@ When numba loads a kernel, it prepares to compile others: it imports everything 
 that is installed, and parses the intermediate code. Here both wait until something really is compiled.
 """
 
-# The types of numba are not whole.
+# numba's type information is incomplete.
 # mypy: disable-error-code="no-untyped-call,attr-defined"
 
 import pickle
@@ -37,7 +37,7 @@ def to_bytes(result: Any) -> bytes:
 
 def from_bytes(target: Any, content: bytes) -> Any:
     """Restore a kernel, numba's `CompileResult`; the content must be trusted, since it can run any code."""
-    name, code, intermediate, defined, needed, rest = pickle.loads(content)  # noqa: S301  ours, or root's
+    name, code, intermediate, defined, needed, rest = pickle.loads(content)  # noqa: S301  written by this user or root
     _offer_memory()
     if any(binding.address_of_symbol(symbol) is None for symbol in needed):
         target.refresh()  # imports everything that numba can compile, including functions in C

@@ -45,7 +45,7 @@ def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
     else:
         widest = low * (2.0 - ends) / ends
         raise DesignError("band", high, f"at most {widest:g} at its upper end for {MOST} impulses and this V")
-    # The equal-ripple shaper, in units of the lower end, so that its band begins at 1.
+    # The equal-ripple shaper, in units of the lower end, so that its band starts at 1.
     x = np.asarray((np.arange(N) - (N - 1) / 2.0) / 2.0 * ends, dtype=float)
     humps = _humps(N, V) / ends
     if N > 2 and ratio < humps[-1]:

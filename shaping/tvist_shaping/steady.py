@@ -258,7 +258,7 @@ class SteadyFilter(Filter):
 
     def _unshare(self) -> None:
         super()._unshare()
-        if self.design.constant:  # nothing of it ever changes
+        if self.design.constant:  # nothing in it changes
             return
         self.design = self.design.fork()
         self._designed, self._taps = self._designed.copy(), self._taps.copy()

@@ -229,7 +229,7 @@ def vibration(rows: "Sequence[Row]", until: float) -> list[tuple[float, float]]:
 
     `rows` start at the stop of the reference.
     """
-    from tvist_plant.tool_acceleration import tool_acceleration, upward  # not in every run of pytest
+    from tvist_plant.tool_acceleration import tool_acceleration, upward  # imported only if needed
 
     stop, slack = rows[0].time, 1e-9
     late = [row for row in rows if AFTER_STOP + slack < row.time - stop <= until + slack]

@@ -78,7 +78,7 @@ def _with_links_of_the_site(page: Path) -> str:
     for match in reversed(links(text)):
         target, mark, anchor = match["target"].partition("#")
         path = linked(page, target)
-        if path == TRY:  # its anchor says what it shows
+        if path == TRY:  # its anchor selects the scene
             way = sources.way(page.relative_to(ROOT), Path(TRY.name))
             text = text[: match.start()] + way + mark + anchor + text[match.end() :]
         elif path.suffix != ".md" and path.suffix not in sources.PICTURES:

@@ -41,7 +41,7 @@ class Lines:
     def __init__(self, *, several: bool) -> None:
         self._several = several
 
-    def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
+    def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, since texts can be long
         """Drop line breaks inside statements, and add the ends of statements that no line break marks."""
         brackets = 0
         last = END

@@ -26,7 +26,7 @@ _MISSING = object()
 Steps = Generator[Any, None, Any]
 
 
-class Halted(Exception):  # noqa: N818  no error: the script has said `halt`
+class Halted(Exception):  # noqa: N818  no error: the script has executed `halt`
     """Raised by `halt` to unwind the running thread; the machine then ends all threads."""
 
 
@@ -137,7 +137,7 @@ class Machine:
         self.left, self._held = budget, False
         missed, self._missed = self._missed, []
         self._turns = missed + [thread for thread in self._threads if thread not in missed]
-        for thread in self._turns:  # it grows where a thread starts another
+        for thread in self._turns:  # it grows when a thread starts another
             if thread.ended:
                 continue
             short = self._held or self.left <= 0 or self.left < min(thread.owes, budget)
@@ -166,7 +166,7 @@ class Machine:
         for thread in reversed(threads):
             try:
                 self._close(thread)
-            except Exception as error:  # noqa: BLE001  the others have to end as well
+            except Exception as error:  # noqa: BLE001  the other threads have to end, too
                 failed = failed or error
         if failed is not None:
             raise failure(failed) from failed

@@ -71,7 +71,7 @@ class Position:
     def charge(self, cost: int, *, check: bool) -> list[ast.stmt]:
         """Return statements that take a cost from the budget and, with `check`, yield it if the budget is spent.
 
-        The machine charges what is yielded to a later tick.
+        The machine charges a yielded cost to a later tick.
         """
         if cost == 0 and not check:
             return []

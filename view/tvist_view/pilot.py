@@ -49,7 +49,7 @@ class Pilot:
         self._task: asyncio.Task[None] | None = None
         self._jog = (0, 0.0)
         self._jog_until = self._jog_heard = 0.0
-        self._jog_barred = False  # until the button is let go
+        self._jog_barred = False  # until the button is released
         self._jogging: asyncio.Task[None] | None = None
         self._changing = asyncio.Lock()
 
@@ -151,7 +151,7 @@ class Pilot:
         return list((await self._robot.state()).target_q)
 
     async def make_ready(self, arm: Arm) -> None:
-        """Release what a client can release, and switch the power on; show what is left to do."""
+        """Release what a client can release, and switch the power on; show what remains to be done."""
         if (await self._robot.info()).moved is None:  # stops of a real robot are released at the robot
             await arm.inject("normal")
         await make_ready(self._robot, arm, power_on=True)

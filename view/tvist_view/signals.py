@@ -119,7 +119,7 @@ class Running:
     def update(self) -> None:
         """Compute the signals of the messages received."""
         states = list(self._states)
-        if self._truths:  # a state waits for its truth, and those after it with it
+        if self._truths:  # a state waits for its truth, and later states wait, too
             known = itertools.takewhile(
                 lambda state: state.tick in self._truths or self._is_late(state), states
             )
