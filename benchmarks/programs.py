@@ -14,9 +14,9 @@ from tvist_protocol.programs import ProgramRun
 from tvist_protocol.simulation import SimulationStep
 
 CASES, LINES = 60, 1200
-"""Number of commands that the idle loop distinguishes, and of lines of the long program."""
+"""Number of commands that the idle loop distinguishes, and lines of the long program."""
 TICKS, PAIRS, COMPILED = 250, 40, 10
-"""Number of ticks of a run, of pairs of runs, and of times that the long program is compiled."""
+"""Ticks of a run, pairs of runs, and repetitions of compiling the long program."""
 
 
 PART = """  def part_{0}(count):

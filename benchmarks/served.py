@@ -33,11 +33,11 @@ KINDS = (
 )
 """Figures: key, number of recipes, and description of the clients."""
 ADDRESS, BRIDGED = "127.0.0.1", "127.42.7.1"
-"""Addresses of the robot that clients of RTDE read, and of one before which a bridge stands."""
+"""Addresses of the robot that RTDE clients read, and of the robot behind a bridge."""
 OF_MANY = 0.4
 """Time for each number of robots, as a share of the time for one robot [-]."""
 SEVERAL, SLOWER = 8, 0.25
-"""Number of robots of a process, and their speed relative to real time, so that none is late."""
+"""Number of robots in a process, and their speed relative to real time, at which none is late."""
 
 
 def in_process() -> float:

@@ -40,9 +40,9 @@ FLAGS = (
     "--no-first-run",
 )
 FIRST_S, NEXT_S = 120.0, 60.0
-"""Time that the browser may take for the first picture, and for each later one [s]."""
+"""Time limits of the browser for the first frame and for each later one [s]."""
 SLOW, SLOW_S = 5, 0.4
-"""After a stop everything is this much slower, for this long [s]: the arm rings for a few tenths of a second."""
+"""Factor of slow motion after a stop, and its duration [s]: the arm vibrates for a few tenths of a second."""
 REST_S = 1.0
 """Time shown after a stop, unless the next motion starts earlier [s]."""
 LEAD_S = 0.25

@@ -24,7 +24,7 @@ from tools.executed import ROOT, executed, shortest
 from tools.mutations import SOURCES, Mutant, product
 
 LIMIT, HANGS, COMPILING = 60.0, 20, 400.0
-"""Seconds that pytest has, that one test has, and that the kernels have to be compiled before."""
+"""Time limits of a run of pytest, of one test in it, and of compiling the kernels beforehand [s]."""
 SAME = ("file", "owner", "text", "kind", "before", "after")
 """Fields by which a mutant is found again when its line has moved."""
 

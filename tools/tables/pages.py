@@ -34,7 +34,7 @@ METHOD = Column(
 BOTH = Column("less", lambda one: "/".join(cells([one], (robustness.LESS, robustness.WORST))[0]))
 """Cell with the median and the 5th percentile of the reduction."""
 FINE, ALIKE = ("-5 %", "+5 %"), ("zv_3_modes_frozen_at_end",)
-"""Errors that the page of robustness leaves out, and shapers that it has by another name."""
+"""Errors that the robustness page leaves out, and shapers that it shows by another name."""
 LEFT_OUT = ("worst arm", "moving", "q̇/limit", "µs")
 """Columns of `tvist study bench` that its page leaves out."""
 

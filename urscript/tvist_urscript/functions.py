@@ -18,7 +18,7 @@ MOST_STATEMENTS = 4000
 MOST_NODES = 10_000
 """Most operations, names, calls and statements of one function, for the same reason."""
 PART, PART_NODES = 200, 1000
-"""Size at which a part of a long main function ends: in statements, and in what MOST_NODES counts."""
+"""Largest part of a long main function, in statements and in the nodes that MOST_NODES counts."""
 
 
 class Functions(Statements):

@@ -7,7 +7,7 @@ from tvist_urscript.tree import Node
 
 LOAD, STORE = ast.Load(), ast.Store()
 HERE, MISSING, DEPTH = "machine", "MISSING", "depth"
-"""Names that compiled functions use: the machine, a missing argument, depth."""
+"""Names in compiled functions: the machine, a missing argument, the depth of calls."""
 
 
 class Position:

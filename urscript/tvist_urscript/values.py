@@ -19,7 +19,7 @@ DEEPEST = 20
 LONGEST_TEXT = 1023
 """Longest string, in bytes of UTF-8."""
 LOWEST, HIGHEST = -(2**31), 2**31 - 1
-"""Integers have 32 bits; a result beyond them is a float."""
+"""Range of integers, which have 32 bits; a result outside it is a float."""
 
 
 class Array:
