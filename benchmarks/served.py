@@ -97,7 +97,6 @@ async def rtde(seconds: float, tell: Tell) -> dict[str, Figure]:
 
 
 async def _share(pid: int, seconds: float) -> float:
-    """Return the share of a core that a process uses."""
     used, began = cpu_seconds(pid), time.monotonic()
     await asyncio.sleep(seconds)
     return (cpu_seconds(pid) - used) / (time.monotonic() - began)

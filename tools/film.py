@@ -143,7 +143,6 @@ def browser() -> str | None:
 
 @asynccontextmanager
 async def _browser(url: str) -> AsyncIterator[asyncio.subprocess.Process]:
-    """Run a headless browser that shows a page."""
     program = browser()
     if program is None:
         raise FilmError("films are drawn by Chromium, and there is none: apt-get install chromium")

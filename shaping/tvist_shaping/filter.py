@@ -177,7 +177,6 @@ class TvistFilter(Filter):
         return self._eased[0].copy(), self._eased[1].copy()
 
     def _suppress(self, modes: tuple[Floats, Floats]) -> None:
-        """Set the impulses for these modes."""
         self.f_d, self.zeta = modes
         self.clipped = self.estimator.clipped
         try:
@@ -188,7 +187,6 @@ class TvistFilter(Filter):
             self.fault = None
 
     def _computed(self) -> Impulses:
-        """Compute the shaper's impulses for the present modes."""
         give, f_d, zeta = self.shaper.impulses, self.f_d, self.zeta
         if len(f_d) == 1:  # the usual case, faster without lists
             impulses = give(f_d.item(), zeta.item())

@@ -144,7 +144,6 @@ def custom(
 
 
 def _checked(train: Train, zeta_max: float, f_d: float, zeta: float) -> Impulses:
-    """Check a mode and return its impulses."""
     check_mode(
         f_d, zeta, zeta_max, "" if zeta_max == 1.0 else "more than V is left: take a higher V or ei_of"
     )

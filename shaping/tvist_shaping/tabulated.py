@@ -64,7 +64,6 @@ class Tabulated:
         return coefficients, last
 
     def _tabulate(self, number: int) -> tuple[Floats, Floats]:
-        """Compute the polynomials from the solutions at this number of nodes."""
         k, zeta_max = np.arange(number), self.zeta_max
         nodes = np.cos((k + 0.5) * math.pi / number)[::-1]
         values, last, x, zeta = [], self._start, self._start, 0.0

@@ -186,7 +186,6 @@ def _check(name: str, value: float, least: float) -> None:
 
 
 def _each(name: str, given: float | Sequence[float] | None, own: Sequence[float]) -> Sequence[float]:
-    """Return a limit for each joint."""
     if given is None:
         return own
     limits = [float(given)] * len(own) if isinstance(given, int | float) else [float(one) for one in given]

@@ -81,7 +81,6 @@ def modules() -> list[Module]:
 
 
 def _exports(tree: ast.Module) -> set[str]:
-    """Return the names in `__all__`."""
     for node in tree.body:
         if isinstance(node, ast.Assign) and any(
             isinstance(target, ast.Name) and target.id == "__all__" for target in node.targets

@@ -102,7 +102,6 @@ def _is_called_alone(head: tree.Function, statements: list[tree.Statement]) -> b
 
 
 def _statements(text: str) -> tree.Function:
-    """Return the statements and functions that are added to a program."""
     statements = _parsed(text, several=True)
     for statement in statements:
         if isinstance(statement, tree.Function) and statement.kind == "sec":

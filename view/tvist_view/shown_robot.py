@@ -121,7 +121,6 @@ class ShownRobot:
                 self._introduce(watcher)
 
     async def _shows(self, robot: Robot, info: Info) -> None:
-        """Show the robot until it is gone."""
         if info.geometry is None:
             raise GeometryError(
                 f"a {info.model} on a server of version {info.version} does not send its geometry: update the server"

@@ -47,7 +47,6 @@ class Tab:
             return
 
     def __aiter__(self) -> AsyncIterator[str | bytes]:
-        """Iterate over the tab's messages until it is gone."""
         return aiter(self._connection)
 
 

@@ -43,7 +43,6 @@ class BasisFunctions:
         self.centre.setflags(write=False)
 
     def __len__(self) -> int:
-        """Number of terms."""
         n, degree = len(self.joints), self.degree
         return sum(2**i * comb(n, i) * comb(degree, i) for i in range(n + 1))
 
