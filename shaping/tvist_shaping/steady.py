@@ -49,7 +49,7 @@ class Design(Forked, ABC):
 
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Compute the taps for a reference that has always been at rest; return False if a delay was clipped.
+        """Compute the taps for a reference that has always been at rest; return False if they miss a requirement.
 
         Args:
             f_d: Damped frequencies [Hz], shape (modes,).
