@@ -1,4 +1,4 @@
-"""The parts of a server: robots, their interfaces, and what drives them."""
+"""Builds the parts of a server: robots, their interfaces and their clocks."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,11 +21,7 @@ if TYPE_CHECKING:
 def made_robot(
     setup: Setup, config: ServeConfig, observe: Callable[[Controller], Sink] | None, *, several: bool
 ) -> ServedRobot:
-    """Return a robot that is about to be served; see `Server`.
-
-    Raises:
-        StartError: It cannot be.
-    """
+    """Create a robot to serve; raise StartError if that is impossible."""
     path = None
     if config.record is not None:
         path = recording_of(config.record, setup.name) if several else Path(config.record)
@@ -37,13 +33,12 @@ def made_robot(
 
 
 def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Return the endpoints to listen on, and the settings that protect them.
+    """Return the endpoints to listen on and the Zenoh settings that protect them.
 
-    Raises:
-        StartError: An endpoint is none, or other machines could reach an unprotected one.
+    Raise StartError if an endpoint is invalid, or unprotected and reachable from other machines.
     """
     check_endpoints("connect", config.connect)
-    # A router checks the certificates of those who reach the robot through it.
+    # The router checks the certificates of clients that reach the robot through it.
     return guarded(
         config.endpoints,
         names,
@@ -54,10 +49,9 @@ def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dic
 
 
 def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrInterfaces":
-    """Return UR's interfaces of a robot, whose number gives their address.
+    """Create UR's interfaces of robot `number`, counted from 0.
 
-    Raises:
-        StartError: Other machines could reach them unprotected, or they cannot be there.
+    Raise StartError if other machines could reach them without --insecure, or if the addresses are invalid.
     """
     from tvist_server.gateways.ur.interfaces import UrInterfaces
     from tvist_server.gateways.ur.rtde.inputs import matching
@@ -80,11 +74,7 @@ def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrIn
 
 
 def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
-    """Check that an arm that gives the tick is alone, and that nothing else is to give it.
-
-    Raises:
-        StartError: It is not.
-    """
+    """Raise StartError if a plant sets the tick and either it is not alone or another clock is configured."""
     if not any(robot.driven.pace for robot in robots):
         return
     if config.clock != "realtime" or config.speed != 1.0:
@@ -98,9 +88,9 @@ def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
 
 
 def make_clocks(config: ServeConfig, robots: Sequence[ServedRobot]) -> list[Clock]:
-    """Create one clock for all robots in real time, one for each robot in lockstep.
+    """Create one clock for all robots in real time, or one for each robot in lockstep.
 
-    In lockstep no message may be lost, so a robot waits for its slow clients, and must not delay other robots.
+    In lockstep a robot waits for slow clients so that no message is lost; this must not delay other robots.
     """
     if config.clock == "realtime":
         driven = [robot.driven for robot in robots]

@@ -28,8 +28,8 @@ def options(endpoint: str) -> str:
 def is_local(endpoint: str) -> bool:
     """Return whether only this machine can reach an endpoint.
 
-    When in doubt, an endpoint counts as reachable from other machines: if the protocol is unknown, if its host name
-    cannot be looked up, or if any one of the name's addresses is not local.
+    In doubt the answer is no: for an unknown protocol, a host name that does not resolve, or one with any
+    address that is not local.
     """
     if protocol(endpoint) in LOCAL_PROTOCOLS:
         return True
@@ -42,7 +42,7 @@ def is_local(endpoint: str) -> bool:
 
 
 def _addresses(host: str) -> list[ipaddress.IPv4Address | ipaddress.IPv6Address]:
-    """Return all addresses of a host; empty if there is no such host or no host is named."""
+    """Return all addresses of a host; empty if there are none."""
     if not host:
         return []
     try:

@@ -29,15 +29,15 @@ AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key"
 _LINE = 'a line is "NAME" = "operator", "viewer", "robot" or "router"'
 
 HANDSHAKE_MS = 60_000
-"""Longest time for a TLS handshake [ms]. Zenoh accepts no client for 100 ms after each failed handshake (its issue
-2685), so a hundred that fail at once delay the next client by 10 s, and a handshake must outlast that. Since at most
-ten can fail per second, no more than 600 are in progress."""
+"""Longest TLS handshake [ms]. After a failed handshake Zenoh accepts no client for 100 ms (its issue 2685),
+so a hundred failures at once delay the next client by 10 s, which a handshake must outlast. At most ten
+handshakes fail per second, so at most 600 are in progress."""
 
 LIMITS: Mapping[str, Any] = {
-    # Largest message that the server assembles from fragments; the gateway refuses messages above MAX_BYTES.
+    # Largest message assembled from fragments; the gateway refuses messages above MAX_BYTES.
     "transport/link/rx/max_message_size": 2 * MAX_BYTES,
 }
-"""Zenoh settings of a session that other machines can reach, by path."""
+"""Zenoh settings, by path, of a session that other machines can reach."""
 
 
 def guarded(
@@ -50,8 +50,8 @@ def guarded(
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on and the settings that protect them.
 
-    Raises:
-        StartError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
+    Raise StartError if an endpoint is invalid, or unprotected and reachable from other machines, or if a
+    certificate or the list of roles is missing.
     """
     secured, settings, roles = _protected(listen, security, insecure=insecure)
     access = open_access(robots, namespace) if roles is None else access_control(robots, roles, namespace)
@@ -61,21 +61,13 @@ def guarded(
 def guarded_router(
     listen: Sequence[str], *, security: str | None, insecure: bool
 ) -> tuple[list[str], dict[str, Any]]:
-    """Return the same for a router; without certificates, everyone may connect as a robot or a client.
-
-    Raises:
-        StartError: See `guarded`.
-    """
+    """Return the same for a router; without certificates, anyone may connect as a robot or a client."""
     secured, settings, roles = _protected(listen, security, insecure=insecure)
     return secured, settings if roles is None else {**settings, "access_control": router_access(roles)}
 
 
 def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
-    """Check the form of endpoints.
-
-    Raises:
-        StartError: One has another form.
-    """
+    """Raise StartError if an endpoint is malformed."""
     for endpoint in endpoints:
         if not is_endpoint(endpoint):
             raise StartError(
@@ -86,7 +78,7 @@ def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
 def _protected(
     listen: Sequence[str], security: str | None, *, insecure: bool
 ) -> tuple[list[str], dict[str, Any], dict[str, Role] | None]:
-    """Return endpoints, the settings of their transport, and the roles by name if there are certificates."""
+    """Return endpoints, transport settings, and the roles by name if there are certificates."""
     check_endpoints("listen", listen)
     if security is not None:
         if insecure:
@@ -108,11 +100,7 @@ def _protected(
 
 
 def guarded_interfaces(address: str, *, insecure: bool) -> None:
-    """Refuse to open UR's interfaces, which cannot authenticate clients, where other machines would reach them.
-
-    Raises:
-        StartError: Other machines could reach them.
-    """
+    """Raise StartError if other machines could reach UR's interfaces, which cannot authenticate clients."""
     if not insecure and not ipaddress.ip_address(address).is_loopback:
         raise StartError(
             f"ur_address is {address}, which other machines can reach, and UR's interfaces do not authenticate "
@@ -138,8 +126,8 @@ def roles_in(folder: Path) -> dict[str, Role]:
 def _secured(endpoint: str) -> str:
     """Check an endpoint for use with `--security`.
 
-    Another protocol is refused rather than converted to TLS: the server would otherwise listen on a different endpoint
-    than the one requested, and a client of tcp/ would get no answer and no explanation.
+    Another protocol is refused rather than converted to TLS: the server would otherwise not listen on the
+    requested endpoint, and a client of tcp/ would get neither an answer nor an explanation.
     """
     if protocol(endpoint) != "tls":
         address = endpoint.partition("/")[2] or "<address>:<port>"
@@ -176,7 +164,7 @@ def _settings(security: str) -> dict[str, Any]:
 
 
 def _check_pair(folder: Path) -> None:
-    """Try a TLS handshake with itself, since Zenoh would not report clearly what is wrong with the files."""
+    """Attempt a TLS handshake with itself, because Zenoh's errors do not say what is wrong with the files."""
     for name in (AUTHORITY, CERTIFICATE, KEY):
         try:
             read_bytes(folder / name, "certificate or key")
@@ -186,7 +174,7 @@ def _check_pair(folder: Path) -> None:
         server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         server.load_cert_chain(folder / CERTIFICATE, folder / KEY)
         client = ssl.create_default_context(cafile=folder / AUTHORITY)
-        client.check_hostname = False  # clients alone know the name by which they reach the robot
+        client.check_hostname = False  # only clients know the name by which they reach the robot
         _shake_hands(server, client)
     except ssl.SSLCertVerificationError as error:
         why = f"no client would trust {CERTIFICATE}: {error.verify_message}"

@@ -1,6 +1,7 @@
-"""Figures of the robots for Prometheus, over HTTP; they can be read and nothing can be changed.
+"""Prometheus figures of the robots over HTTP, read-only.
 
-`python -m tvist_server.gateways.metrics > docs/reference/generated/metrics.md` writes the page that lists them.
+`python -m tvist_server.gateways.metrics > docs/reference/generated/metrics.md` writes the page that lists
+them.
 """
 
 import contextlib
@@ -17,17 +18,14 @@ if TYPE_CHECKING:
     from prometheus_client.metrics_core import Metric
     from prometheus_client.registry import Collector
 else:
-    Collector = object  # the library is imported when figures are asked for
+    Collector = object  # the library is imported when figures are requested
 
 LABELS = ("namespace", "robot")
 MICRO = 1e-6
 
 
 class MetricsGateway(Gateway):
-    """Keeps a robot's newest messages for whoever asks; it takes no input.
-
-    `newest` returns the robot's newest state when somebody asks, from any thread.
-    """
+    """Keeps a robot's newest messages for Prometheus; `newest` returns the newest state, from any thread."""
 
     setpoints_refused = 0
     takes: Collection[Topic] = frozenset[Topic]({"event", "telemetry"})
@@ -40,9 +38,9 @@ class MetricsGateway(Gateway):
         self.telemetry: Telemetry | None = None
         """Newest telemetry."""
         self.events: Counter[str] = Counter()
-        """Number of events of each kind."""
+        """Number of events by kind."""
         self.warnings: Counter[str] = Counter()
-        """Number of warnings of each code; empty for those that have none."""
+        """Number of warnings by code; empty: no code."""
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
         if isinstance(message, Telemetry):
@@ -57,7 +55,7 @@ class MetricsGateway(Gateway):
             self.warnings[event.code or ""] += 1
 
     def look(self) -> None:
-        """Take the newest state; before the figures are read."""
+        """Fetch the newest state, before the figures are read."""
         self.state = self._newest() or self.state
 
     def close(self) -> None:
@@ -65,10 +63,9 @@ class MetricsGateway(Gateway):
 
 
 class Metrics(Collector):
-    """An HTTP server for Prometheus; `collect` computes the figures when somebody asks. Port 0 takes any.
+    """An HTTP server for Prometheus; `collect` computes the figures on request. Port 0 takes any free port.
 
-    Raises:
-        GatewayError: The server cannot listen there, or prometheus_client is not installed.
+    Raise GatewayError if the server cannot listen on `address`, or if prometheus_client is not installed.
     """
 
     def __init__(self, address: str) -> None:
@@ -87,10 +84,10 @@ class Metrics(Collector):
         except (OSError, socket.gaierror) as error:
             raise GatewayError(f"cannot publish metrics on {address}: {error.strerror or error}") from error
         self.page = f"http://{f'[{host}]' if ':' in host else host}:{self._server.server_port}/metrics"
-        """Address of the page with the figures."""
+        """URL of the page with the figures."""
 
     def gateway(self, namespace: str, robot: str, newest: Callable[[], State | None]) -> MetricsGateway:
-        """Create the gateway of a robot; arguments as for the gateway."""
+        """Create the gateway of a robot; arguments as for `MetricsGateway`."""
         gateway = MetricsGateway(namespace, robot, newest)
         self.add(gateway)
         return gateway
@@ -100,13 +97,13 @@ class Metrics(Collector):
         self._robots.append(gateway)
 
     def close(self) -> None:
-        """Stop publishing the page."""
+        """Stop serving the page."""
         with contextlib.suppress(OSError):
             self._server.shutdown()
             self._server.server_close()
 
     def collect(self) -> "Iterator[Metric]":
-        """Yield the figures of all robots; robots that have sent no telemetry yet have only those of their states."""
+        """Yield the figures of all robots; a robot without telemetry has only those of its state."""
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
         for robot in self._robots:
@@ -154,7 +151,7 @@ class Metrics(Collector):
         )
 
     def _counted(self, name: str, what: str, label: str) -> "Metric":
-        """Return how many events or warnings there were of each kind or code."""
+        """Return the number of events or warnings for each kind or code."""
         from prometheus_client.core import CounterMetricFamily
 
         family = CounterMetricFamily(name, what, labels=(*LABELS, label))
@@ -212,11 +209,7 @@ COUNTERS = (
 
 
 def place(address: str) -> tuple[str, int]:
-    """Split `ADDRESS:PORT`; without an address it is the loopback interface.
-
-    Raises:
-        GatewayError: It is neither.
-    """
+    """Split `ADDRESS:PORT`, or `PORT` of the loopback interface; raise GatewayError if it is neither."""
     host, _, port = address.rpartition(":")
     if not (port.isascii() and port.isdigit() and len(port) < 6 and int(port) < 65536):
         raise GatewayError(
@@ -243,7 +236,7 @@ change once a second. [Operate many robots](../../how-to/operate-many-robots.md#
 
 
 def page() -> str:
-    """Return the page of the reference that lists all figures."""
+    """Return the reference page that lists all figures."""
     metrics = Metrics("0")
     families = list(metrics.collect())
     metrics.close()

@@ -20,12 +20,11 @@ CLOSE_WAIT = 0.2
 
 
 class Answers:
-    """Sends replies to queries.
+    """Sends replies to queries from its own thread.
 
-    A reply has the quality of service that its client asked for, by default BLOCK. A client that sends queries and
-    stops reading therefore blocks the thread that answers until its link is closed, after 1 s in real time and 5 s in
-    lockstep. Because a separate thread answers, the messages published 500 times a second still reach other clients
-    in time.
+    A reply has the quality of service that its client chose, by default BLOCK. A client that asks and does
+    not read therefore blocks the answering thread until its link is closed, after 1 s in real time and 5 s in
+    lockstep. The messages published 500 times a second must reach other clients meanwhile.
     """
 
     def __init__(self) -> None:
@@ -35,11 +34,11 @@ class Answers:
         self._thread.start()
 
     def to(self, query: zenoh.Query, key: str) -> Callable[[Reply | Callable[[], bytes]], None]:
-        """Return the function that answers a query on a key, with a reply or what makes an encoded one."""
+        """Return a function that answers a query with a reply, or with a function that returns an encoded one."""
         return lambda reply: self._queue.put((query, key, reply))
 
     def close(self) -> None:
-        """Send the answers still waiting, unless that takes longer than `CLOSE_WAIT`."""
+        """Send the queued answers, for at most `CLOSE_WAIT`."""
         self._queue.put(None)
         self._thread.join(CLOSE_WAIT)
         self._closed = True
@@ -53,6 +52,7 @@ class Answers:
 
 
 def _send(query: zenoh.Query, key: str, reply: Reply | Callable[[], bytes]) -> None:
-    # If the client has left or the session is closed, the answer is no longer needed. Here Zenoh ends the query.
+    # If the client has left or the session is closed, the answer is not needed. Leaving this block ends the
+    # query.
     with contextlib.suppress(zenoh.ZError), query:
         query.reply(key, reply() if callable(reply) else encode(reply), encoding=ENCODING)

@@ -9,13 +9,10 @@ EVERY: Final = 1.0
 
 
 class Notices:
-    """Writes at most one line a second, however many are passed to it.
+    """Passes at most one line a second to `say`. Use it in the event loop's thread.
 
-    The first line is written at once. Of the lines that follow within a second, only the newest is written when the
-    second is over, together with the number of lines left out. All methods are called in the event loop's thread.
-
-    Args:
-        say: Takes a line, without its line feed.
+    The first line is written at once. Of the lines within the following second, only the newest is written,
+    at its end, with the number of omitted lines.
     """
 
     def __init__(self, say: Callable[[str], None]) -> None:

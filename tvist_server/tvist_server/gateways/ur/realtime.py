@@ -1,6 +1,6 @@
 """UR's real-time interface, ports 30003 and 30013: all values of a tick, at every tick.
 
-One package of 1220 bytes: its length as an int32, then 152 doubles, big-endian.
+A package has 1220 bytes: its length as an int32, then 152 doubles, big-endian.
 """
 
 from struct import Struct
@@ -52,7 +52,7 @@ LAYOUT: Final[tuple[tuple[str | None, int], ...]] = (
     ("payload_cog", 3),
     ("payload_inertia", 6),
 )
-"""Doubles of the package: the snapshot's attribute and its length; reserved ones have no name and are 0."""
+"""Doubles of the package: attribute of the snapshot and its length; reserved ones have no name and are 0."""
 
 PACKAGE: Final = Struct(f">i{sum(count for _, count in LAYOUT)}d")
 _KEY: Final = "realtime"
@@ -79,7 +79,7 @@ def package(snapshot: Snapshot) -> bytes:
 class RealtimeSession(ScriptSession):
     """One client of the real-time interface.
 
-    What it sends is treated as URScript, and answered on the primary interface; what comes over the read-only port is
+    Its input is treated as URScript and answered on the primary interface; input on the read-only port is
     ignored.
     """
 

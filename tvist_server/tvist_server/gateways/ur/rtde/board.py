@@ -1,6 +1,6 @@
-"""What the RTDE clients of a robot read: every value is written once a tick, and every recipe gathers its bytes there.
+"""Data packages of RTDE clients: each value is written once a tick, and each recipe gathers its bytes.
 
-What no recipe names is not computed.
+Values that no recipe names are not computed.
 """
 
 from collections.abc import Iterable
@@ -28,15 +28,15 @@ class Board:
         self._snapshot: Snapshot | None = None
         """Snapshot of the last tick."""
         self._packages: dict[tuple[bytes, str], bytes] = {}
-        """Packages of the last tick by head and names."""
+        """Packages of the last tick, by head and names."""
 
     def begin(self, client: object, recipe: OutputRecipe) -> None:
-        """Note that a client reads a recipe, which is valid, instead of what it read before."""
+        """Note that a client reads a valid recipe, instead of its previous one."""
         self._recipes[client] = recipe
         self._bytes = self._snapshot = None
 
     def end(self, client: object) -> None:
-        """Note that a client reads nothing more."""
+        """Note that a client stops reading."""
         if self._recipes.pop(client, None) is not None:
             self._bytes = self._snapshot = None
 
@@ -44,7 +44,7 @@ class Board:
         """Return the package of a tick for a recipe that a client reads; `head` precedes the variables."""
         try:
             gathered = self._at(snapshot)
-        except Exception:  # noqa: BLE001  what a variable raises concerns those alone who read it
+        except Exception:  # noqa: BLE001  an error in a variable must only affect its readers
             self._bytes = self._snapshot = None
             alone = _Bytes([recipe], snapshot)
             alone.write(snapshot)
@@ -71,7 +71,7 @@ def _package(head: bytes, data: bytes) -> bytes:
 
 
 class _Bytes:
-    """Bytes of the variables that some recipes name; the snapshot tells how many joints the arm has."""
+    """Bytes of the variables of some recipes; the snapshot determines the number of joints."""
 
     def __init__(self, recipes: Iterable[OutputRecipe], snapshot: Snapshot) -> None:
         different = {recipe.text: recipe for recipe in recipes}.values()
@@ -102,7 +102,7 @@ class _Bytes:
             self._of_io.write(snapshot, self._buffer)
             self._io = snapshot.io
         self._others.write(snapshot, self._buffer)
-        # The quickest mode; all places are inside.
+        # The fastest mode; all indices are in range.
         self._gathered = self._numbers.take(self._index, mode="clip").tobytes()
 
     def of(self, recipe: OutputRecipe) -> bytes:
@@ -110,10 +110,10 @@ class _Bytes:
         return self._gathered[self._spans[recipe.text]]
 
     def _places_of(self, name: str) -> list[int]:
-        """Places of the bytes of a variable.
+        """Return the places of a variable's bytes.
 
-        A vector that is too short is filled with zeros, since clients expect six entries of an arm with fewer joints.
-        Robots with more joints are refused before they are served, see `UrPorts`.
+        A short vector is filled with zeros, because clients expect six entries; see `UrPorts` for more
+        joints.
         """
         (part, number), wire = PARTS[name], OUTPUTS[name]
         place, size = self._places[part], wire.size // wire.length
@@ -129,7 +129,7 @@ class _Place(NamedTuple):
     """Place of a part in the buffer."""
 
     first: int
-    """Place of its first byte."""
+    """Index of its first byte."""
     entries: int
     """Number of its entries."""
     of_machine: bool
@@ -137,9 +137,9 @@ class _Place(NamedTuple):
 
 
 class _Packing:
-    """Writes parts one behind the other, by one call, from the place `first` on; adds the place of each to `places`.
+    """Writes parts consecutively from the index `first` on, in one call; adds the place of each to `places`.
 
-    The snapshot tells the lengths of lists.
+    The snapshot determines the lengths of lists.
     """
 
     def __init__(self, parts: list[Part], snapshot: Snapshot, first: int, places: dict[Part, _Place]) -> None:
