@@ -1,4 +1,4 @@
-"""Why a robot may not be moved, or does not follow any more: one sentence each, which says what to do."""
+"""Reasons why a robot must not be moved or no longer follows, each with the remedy."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -16,21 +16,21 @@ from tvist_server.ur_model import series
 
 MODEL, REMOTE = "get robot model", "is in remote control"
 QUESTIONS = MODEL, REMOTE
-"""What the dashboard is asked."""
+"""Questions for the dashboard."""
 LEAST_MINOR = {3: 14, 5: 9}
-"""Oldest software that our program is written for, by its major version; every later major version will do."""
+"""Oldest supported minor version of the robot's software by major version; later major versions are all supported."""
 NEAR = 0.01
-"""Largest angle by which joints may differ from where they should be [rad]."""
+"""Largest deviation of a joint from its expected angle [rad]."""
 SAME_MASS = 0.05
 """Largest difference of two masses that count as equal [kg]."""
 SAME_PLACE, SAME_TURN = 1e-3, 0.01
-"""Largest difference of two tools that count as equal [m, rad]."""
+"""Largest difference of two tool centre points that count as equal [m, rad]."""
 STILL = 1e-3
-"""Speed below which a joint stands [rad/s]."""
+"""Speed below which a joint is at rest [rad/s]."""
 LEANING = 0.15
 """Largest angle between the measured and the expected direction of gravity [rad]."""
 PLAUSIBLE = 2.0
-"""Largest difference of the measured gravity from the real one, of an accelerometer that tells something [m/s²]."""
+"""Largest error of the measured gravity for which the accelerometer is used [m/s²]."""
 _AGAIN = "then power on here"
 _SAFETY = {
     SafetyMode.PROTECTIVE_STOP: "it has made a protective stop: see why, and unlock it at the robot, then here",
@@ -63,20 +63,20 @@ FELL_SILENT = Halt(
 
 
 class Wanted(NamedTuple):
-    """What is said here about the robot."""
+    """What tvist was told about the robot."""
 
     description: RobotDescription
     """The robot file."""
     payload: Payload
-    """Payload that it should have been told."""
+    """Payload that the robot should have been told."""
     tool: tuple[float, ...] | None = None
-    """Tool centre point that it should have been told; None for any."""
+    """Tool centre point that the robot should have been told; None: any."""
     q: tuple[float, ...] | None = None
-    """Where it should stand [rad]; None for anywhere."""
+    """Joint angles at which the robot should be [rad]; None: any."""
 
 
 def answers_trouble(wanted: Wanted, answers: Mapping[str, str], own: Configuration | None) -> str | None:
-    """Return why a robot may not be moved by what its interfaces have answered; None if it may."""
+    """Return why the answers of a robot's interfaces forbid moving it; None if they allow it."""
     model = wanted.description.robot.model
     told = answers.get(MODEL)
     if told is not None and series(told) != series(model):
@@ -91,7 +91,7 @@ def answers_trouble(wanted: Wanted, answers: Mapping[str, str], own: Configurati
 
 
 def remote_trouble(answers: Mapping[str, str]) -> str | None:
-    """Return why it takes no program; None if it does."""
+    """Return why the robot accepts no program; None if it accepts programs."""
     if answers.get(REMOTE) == "false":
         return (
             "it is in local control, or another client controls it: switch it to remote control at its teach pendant, "
@@ -101,7 +101,7 @@ def remote_trouble(answers: Mapping[str, str]) -> str | None:
 
 
 def version_trouble(version: Sequence[int]) -> str | None:
-    """Return why software of a version (major, minor, …) does not run our program; None if it does."""
+    """Return why software of a version (major, minor, …) does not run `follow.script`; None if it does."""
     major, minor = version[:2]
     least = LEAST_MINOR.get(major, 0 if major > max(LEAST_MINOR) else None)
     if least is not None and minor >= least:
@@ -111,12 +111,9 @@ def version_trouble(version: Sequence[int]) -> str | None:
 
 
 def state_trouble(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> str | None:
-    """Return why a robot may not be moved as it is now; None if it may.
+    """Return why a robot must not be moved in its present state; None if it may be.
 
-    Args:
-        wanted: What is said of it here.
-        sight: What it says.
-        may_play: Whether the program that runs on it is ours.
+    `may_play` is True if the program that runs on it is ours.
     """
     mode, safety, runtime = sight.modes
     if mode == RobotMode.DISCONNECTED:
@@ -173,12 +170,10 @@ def _load_trouble(wanted: Wanted, sight: Sight) -> str | None:
 
 
 def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> str | None:
-    """Return why the robot may not be mounted as the robot file says; None if it is.
+    """Return why the robot may not be mounted as its file says; None if it is.
 
-    Args:
-        description: The robot file.
-        q: Joint angles at rest, shape (6,) [rad].
-        felt: Mean specific force in the flange frame, shape (3,) [m/s²].
+    `q` are the joint angles at rest, shape (6,) [rad]; `felt` is the mean specific force in the flange frame,
+    shape (3,) [m/s²].
     """
     up = Arm(description).pose(q)[0] @ felt / np.linalg.norm(felt)
     leans = float(np.arccos(np.clip(up[2], -1.0, 1.0)))
@@ -191,12 +186,12 @@ def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> 
 
 
 def tells_gravity(felt: Floats) -> bool:
-    """Return whether an accelerometer at rest, shape (3,) [m/s²], tells where gravity is."""
+    """Return whether an accelerometer at rest, shape (3,) [m/s²], plausibly measures gravity."""
     return bool(abs(np.linalg.norm(felt) - GRAVITY) <= PLAUSIBLE)
 
 
 def halt_by_modes(modes: tuple[int, int, int]) -> Halt | None:
-    """Return why a robot can follow no program, by its modes; None if it can."""
+    """Return why the robot's modes prevent it from following any program; None if they do not."""
     mode, safety, _ = modes
     if safety not in _MOVABLE:
         name = SafetyMode(safety).name if safety in {*SafetyMode} else str(safety)
@@ -209,12 +204,7 @@ def halt_by_modes(modes: tuple[int, int, int]) -> Halt | None:
 
 
 def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
-    """Return why our program, which has begun, does not follow any more; None if it does.
-
-    Args:
-        ended: What it says.
-        modes: Modes of the robot, by which it can follow.
-    """
+    """Return why the running program no longer follows; None if it does. `ended` is the program's `Ended` register."""
     _, safety, runtime = modes
     if ended in {*Ended} and ended != Ended.NOT:
         return Halt(_ENDED[Ended(ended)], safety)
@@ -227,7 +217,7 @@ def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
 
 
 def _apart(one: Floats, other: Floats) -> int | None:
-    """Return the joint that differs most, if that is too much."""
+    """Return the joint that differs most, if it differs by more than `NEAR`."""
     joint = int(np.argmax(np.abs(one - other)))
     return joint if abs(one[joint] - other[joint]) > NEAR else None
 

@@ -1,5 +1,5 @@
-"""Real-time data exchange as both of its ends have it: packages, types of variables, and the end that reads.
+"""RTDE (real-time data exchange): packages, types of variables, and the client's end.
 
-A package consists of its size in bytes, header included (uint16), its type (uint8) and a payload; numbers are
+A package consists of its size in bytes including the header (uint16), its type (uint8) and a payload;
 big-endian.
 """

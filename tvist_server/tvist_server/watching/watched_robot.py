@@ -1,6 +1,6 @@
-"""The robot that is watched, as a plant: it gives the ticks, and gets no command; what moves it writes its inputs.
+"""A real robot as a plant that gives the ticks but takes no command; `MovedRobot` writes its inputs.
 
-A lost connection is looked for again once a second, without delaying the thread that ticks.
+A lost connection is retried once a second, without delaying the tick thread.
 """
 
 import time
@@ -25,32 +25,32 @@ from tvist_server.watching.place import Place
 from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, RowCount, has_real_payload, sight_of
 
 LOOKED_AT = 25
-"""Number of rows from which the time between two is found."""
+"""Number of rows that determine the row rate."""
 INTERVALS = {1: "500", 4: "125"}
-"""Control periods between two rows, and the rate of such a robot [Hz]."""
+"""Control periods between two rows, and the row rate of such a robot [Hz]."""
 TEXTS = 10
-"""Most texts of the robot's that are passed on in a second, and that wait for its next row."""
+"""Largest number of the robot's texts passed on in a second, and queued for its next row."""
 RETRY = 1.0
 """Time between two attempts to connect [s]."""
 TELL_EVERY = 1.0
-"""Shortest time between two sentences about missing rows [s]."""
+"""Shortest time between two reports about missing rows [s]."""
 OTHER = 0.03
-"""Distance of the tool from where the robot file has it, from which on the robot is another model [m]; calibrated
-kinematics differ by some millimetres."""
+"""Smallest distance of the tool from the robot file's pose that indicates another model [m]; a calibration of
+the kinematics shifts it by some millimetres."""
 
 
 class WatchedRobot(RealArm):
     """Reads one robot, and writes the inputs that are claimed.
 
     Args:
-        place: Where it is.
+        place: Address of the robot.
         description: The robot file.
-        payload: Payload, in case it does not say what it carries.
-        outputs: Types and ranges of further variables that are needed, by name.
+        payload: Payload to assume if the robot does not report one.
+        outputs: Types and ranges of further required variables, by name.
         inputs: Types of the inputs to claim, by name.
 
     Raises:
-        PlantError: There is none, or it is none that can be watched.
+        PlantError: There is no robot, or it cannot be watched.
     """
 
     def __init__(
@@ -74,11 +74,11 @@ class WatchedRobot(RealArm):
         self._sights: deque[tuple[Sight, Row]] = deque()
         self._connection: Connection | None = None
         self.looked_at: list[Row] = []
-        """Rows that were read before the first tick."""
+        """Rows read before the first tick."""
         self._checked = False
         """Whether the present connection has sent a row of the right robot."""
         self._lost = 0.0, ""
-        """When the connection was lost [s], and why; nothing while it is there."""
+        """Time [s] and reason of the loss of the connection; empty while connected."""
         self._retry_at = self._told_at = self._texts_at = 0.0
         self._untold = self._room = self._left_out = 0
         self._notes: list[str] = []
@@ -93,16 +93,16 @@ class WatchedRobot(RealArm):
         return self._last.measured
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Return the latest measurements: the command goes nowhere."""
+        """Return the latest measurements and ignore the command."""
         del command
         return self._last.measured
 
     def first(self) -> Sight:
-        """Return what it said before the first tick."""
+        """Return the last row from before the first tick."""
         return self._last
 
     def interval(self) -> float:
-        """Return the time between two of its rows [s]."""
+        """Return the time between two rows [s]."""
         return self._interval * PERIOD
 
     def sight(self) -> Sight:
@@ -131,11 +131,11 @@ class WatchedRobot(RealArm):
 
     @property
     def connected(self) -> bool:
-        """Whether it is connected."""
+        """Whether the robot is connected."""
         return self._connection is not None
 
     def write(self, numbers: Sequence[float]) -> None:
-        """Write all inputs, in their order; nothing happens while there is no connection."""
+        """Write all inputs, in order, if there is a connection."""
         if self._connection is not None:
             self._connection.write(numbers)
 
@@ -148,7 +148,7 @@ class WatchedRobot(RealArm):
     # ------------------------------------------------------------------ rows
 
     def _look(self) -> None:
-        """Read some rows before the server ticks: what the robot is, and how fast."""
+        """Read rows before the server ticks to determine the robot's model and row rate."""
         self._connect()
         rows = self.looked_at
         try:
@@ -159,7 +159,7 @@ class WatchedRobot(RealArm):
                     raise LostError(f"{self._place} sends only {len(rows)} rows in {ANSWERS:g} s")
             self._check(rows[-1])
             self.version = self._client.version
-            """Version of its software: major, minor, bugfix, build."""
+            """Software version: major, minor, bugfix, build."""
             lacking = self._client.lacking
         finally:
             self.close()
@@ -200,7 +200,7 @@ class WatchedRobot(RealArm):
         return Connection(self._place, self._address, client)
 
     def _rows(self, timeout: float) -> list[Row]:
-        """Return the rows that have come, and note what the robot says with them."""
+        """Return the rows that have come, and keep the robot's messages."""
         assert self._connection is not None
         rows, texts = list(self._connection.rows(timeout)), self._connection.texts
         if (now := time.monotonic()) - self._texts_at >= 1.0:
@@ -215,11 +215,7 @@ class WatchedRobot(RealArm):
         return rows
 
     def _check(self, row: Row) -> None:
-        """Check that the tool is where the robot file has it; without a tool in the row nothing can be said.
-
-        Raises:
-            LostError: It is elsewhere.
-        """
+        """Raise LostError if the tool is not where the robot file has it; without a tool in the row, only note that."""
         if "tcp_offset" not in row:
             self._notes.append(f"whether it is a {self._model} is unknown, since it does not tell its tool")
             return
@@ -265,9 +261,9 @@ class WatchedRobot(RealArm):
         return sight
 
     def _lose(self, error: LostError | RtdeError) -> None:
-        """Give up the connection, and say so in a tick of its own; once for each reason.
+        """Close the connection and report it in a tick of its own, once for each reason.
 
-        That nobody answers there is news only if it is the first.
+        After another loss, an unreachable robot is not reported again.
         """
         self.close()
         now, why = time.monotonic(), str(error)
