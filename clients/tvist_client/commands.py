@@ -1,6 +1,6 @@
-"""The commands of an arm under control, and the questions to a robot; `commands.pyi` says their arguments.
+"""Commands of an arm under control, and questions to a robot.
 
-`make schemas` writes that file. All else of a command stands in its message in `tvist_protocol`.
+`commands.pyi`, written by `make schemas`, has their arguments.
 """
 
 from tvist_client.command import Leased, asking, beginning, dating, guiding, moving, sending, stopping
@@ -55,7 +55,7 @@ class Commands(Leased):
 
 
 class Questions:
-    """Questions to a robot about its kinematics, for which no control is needed."""
+    """Questions to a robot about its kinematics, which need no control."""
 
     inverse_kinematics = asking(kinematics.InverseKinematics, Posture)
     forward_kinematics = asking(kinematics.ForwardKinematics, ToolPose, 1)

@@ -17,7 +17,7 @@ class Channel:
     """One key.
 
     Attributes:
-        key: The key, with `{robot}` and `{client}` where names go.
+        key: The key, with `{robot}` and `{client}` as placeholders of names.
         kind: `put`, a queryable, or a liveliness token.
         by: Side that puts, asks or declares.
         messages: Types of the messages that are put or asked.

@@ -29,7 +29,7 @@ class Limits(Struct, frozen=True, kw_only=True, gc=False):
 
 
 class Stopping(Struct, frozen=True, kw_only=True, gc=False):
-    """Stop of the joint that takes longest to stop, with the arm stretched out, for the reference of a rigid arm."""
+    """Stop of the slowest joint with the arm stretched out, computed for the reference of a rigid arm."""
 
     payload: float
     """Mass at the flange [kg]."""
@@ -137,4 +137,4 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """Address of the robot if it is only watched: its own controller moves it, and commands that concern the arm are
     refused; null if this server moves it."""
     moved: str | None = None
-    """Address of the robot's own controller, through which this server moves it; null if there is none."""
+    """Address of the robot's own controller, through which this server moves the arm; null if there is none."""

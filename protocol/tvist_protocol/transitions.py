@@ -1,7 +1,7 @@
 """Activities of a robot and the transitions between them, as one table.
 
-The server uses the table and the protocol's README shows it as a diagram. A trigger is a command or one of
-`HAPPENINGS`. A trigger without a row for a state is refused, or cannot happen, in that state.
+The server uses the table, and the generated reference shows it as a diagram. A trigger is a command or one of
+`HAPPENINGS`; without a row for a state it is refused, or cannot happen, in that state.
 """
 
 from dataclasses import dataclass
@@ -26,9 +26,8 @@ class Activity(StrEnum):
     STREAMING = "STREAMING"
     """The arm follows a stream of set-points."""
     GUIDED = "GUIDED"
-    """The arm follows `servo_j`, `speed_j` or `speed_l`, each of which replaces the one before, or gives way to forces
-    by `force_mode` or `freedrive`.
-    """
+    """The arm follows `servo_j`, `speed_j` or `speed_l`, each replacing its predecessor, or is compliant in
+    `force_mode` or `freedrive`."""
     ENDING = "ENDING"
     """A stream has ended, and the arm comes to rest through the filter."""
     STOPPING = "STOPPING"
@@ -116,7 +115,8 @@ _ROBOT_MODES = {
     _A.IDLE: RobotMode.IDLE,
 }
 for _activity in Activity:
-    # Attributes of the members, since looking up another member takes ten times as long, and this is done every tick.
+    # Stored as attributes of the members, because looking up another member takes ten times as long, every
+    # tick.
     _activity.robot_mode = _ROBOT_MODES.get(_activity, RobotMode.RUNNING)
     _activity.moving = _activity in _MOVING
     _activity.protective = _activity in {_A.PROTECTIVE_STOPPING, _A.PROTECTIVE_STOP}
@@ -186,7 +186,8 @@ def after(activity: Activity, trigger: str) -> Activity | None:
 def diagram(states: type[StrEnum]) -> str:
     """Return the part of the table for these states as a Mermaid state diagram.
 
-    Transitions back to the same state are left out; those common to all motions that can be stopped are drawn once.
+    Transitions back to the same state are omitted; those common to all motions that can be stopped are drawn
+    once.
     """
     arrows: dict[tuple[str, str], list[str]] = {}
     for row in TRANSITIONS:

@@ -40,7 +40,7 @@ class ProgramFolder:
             return []
 
     def read(self, name: str) -> str | None:
-        """Return the text of a program, ignoring its path; None if there is no such file. `X.urp` also finds `X.script`.
+        """Return a program's text, ignoring its path; None if there is no such file. `X.urp` also finds `X.script`.
 
         Raise UserFileError if the file is not a program that the controller can run.
         """
