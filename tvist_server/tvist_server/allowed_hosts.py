@@ -25,10 +25,9 @@ class AllowedHosts:
         self._networks = [network for text in given if (network := _network(text)) is not None]
 
     def allows(self, name: str, address: str, origin: str | None) -> bool:
-        """Return whether a program may connect to `address`, to which the host name `name` resolved.
+        """Return whether a program from `origin` (None: unknown) may connect to `address`, which `name` resolved to.
 
-        `origin` is the address that sent the program; None: unknown. The loopback interface is allowed only
-        to programs from this machine, or if it is listed itself.
+        The loopback interface is open only to programs from this machine, or if it is listed itself.
         """
         to, sender = _ip(address), None if origin is None else _ip(origin)
         if _is_here(to):  # a name or a wide network must not open it as a side effect

@@ -33,10 +33,7 @@ def made_robot(
 
 
 def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Return the endpoints to listen on and the Zenoh settings that protect them.
-
-    Raise StartError if an endpoint is invalid, or unprotected and reachable from other machines.
-    """
+    """Return the endpoints to listen on and the settings that protect them; StartError for unprotected exposure."""
     check_endpoints("connect", config.connect)
     # The router checks the certificates of clients that reach the robot through it.
     return guarded(
@@ -49,10 +46,7 @@ def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dic
 
 
 def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrInterfaces":
-    """Create UR's interfaces of robot `number`, counted from 0.
-
-    Raise StartError if other machines could reach them without --insecure, or if the addresses are invalid.
-    """
+    """Create the UR interfaces of a robot by its index; StartError if others could reach them unprotected."""
     from tvist_server.gateways.ur.interfaces import UrInterfaces
     from tvist_server.gateways.ur.rtde.inputs import matching
 
@@ -88,10 +82,7 @@ def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
 
 
 def make_clocks(config: ServeConfig, robots: Sequence[ServedRobot]) -> list[Clock]:
-    """Create one clock for all robots in real time, or one for each robot in lockstep.
-
-    In lockstep a robot waits for slow clients so that no message is lost; this must not delay other robots.
-    """
+    """Create one clock for all robots in real time; in lockstep one each, since waiting for clients delays others."""
     if config.clock == "realtime":
         driven = [robot.driven for robot in robots]
         return [Realtime(driven, PERIOD, config.speed, priority=config.realtime_priority)]

@@ -1,7 +1,4 @@
-"""Clocks of served robots: the wall clock, or a client's steps.
-
-One thread owns a controller; other threads reach it through a queue of jobs.
-"""
+"""Clocks of served robots, the wall clock or a client's steps; one thread owns a controller and takes jobs."""
 
 import contextlib
 import ctypes
@@ -34,22 +31,14 @@ SET_TIMER_SLACK = 29
 
 
 class Mailbox:
-    """A robot as a clock sees it: its host, and the jobs to do between two ticks.
-
-    Args:
-        host: Host of the controller.
-        patience: Returns how long a step may wait for a socket that a program reads [s].
-        pace: Waits for the arm's next tick, at most for the given time [s]; returns whether it began. None: a
-            clock ticks.
-        interval: Tick of an arm that counts its own missed ticks [s]; None: it does not.
-    """
+    """A robot as a clock sees it: its host, and the jobs to do between two ticks."""
 
     def __init__(
         self,
         host: Host,
-        patience: Callable[[], float] = float,
-        pace: Callable[[float], bool] | None = None,
-        interval: float | None = None,
+        patience: Callable[[], float] = float,  # how long a step may wait for a socket [s]
+        pace: Callable[[float], bool] | None = None,  # waits up to a time [s] for the arm's tick
+        interval: float | None = None,  # tick of an arm that counts its own missed ticks [s]
     ) -> None:
         self.host, self.pace, self.interval = host, pace, interval
         self._patience = patience
@@ -85,10 +74,9 @@ class Mailbox:
             self.host.leave_arm()
 
     def attend(self, stepper: str | None) -> bool:
-        """Do other clients' jobs between the ticks of a client's step; return whether the step may continue.
+        """Do other clients' jobs between the ticks of a client's step, and wait for data that a program waits for.
 
-        If a program waits for data, wait for such jobs too, so that time does not pass before the data can
-        arrive.
+        Return whether the step may continue.
         """
         self.jobs.do_others(stepper)
         while not self.ending and (left := self._patience()) > 0.0:
@@ -165,22 +153,15 @@ class Lockstep(Clock):
 
 
 class Realtime(Clock):
-    """Ticks of all robots in one thread, at every `period` of the monotonic clock or of one arm.
-
-    Args:
-        robots: Robots to tick.
-        period: Tick [s].
-        speed: Simulation speed relative to real time [-].
-        priority: Whether to request real-time priority.
-    """
+    """Ticks of all robots in one thread, at every period of the monotonic clock, or of one arm."""
 
     def __init__(
         self,
         robots: Sequence[Mailbox],
-        period: float,
-        speed: float = 1.0,
+        period: float,  # [s]
+        speed: float = 1.0,  # simulation time per real time [-]
         *,
-        priority: bool = False,
+        priority: bool = False,  # whether to request real-time priority
     ) -> None:
         super().__init__(robots)
         self._period = period / speed

@@ -99,10 +99,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return Path(self.dump)
 
     def keep_ticks(self) -> int | None:
-        """Return the least number of ticks that a recording keeps; None: all.
-
-        Raise StartError if `keep` is not a duration, or if nothing is recorded.
-        """
+        """Return the least number of ticks to keep in the recording (None: all); StartError if `keep` is invalid."""
         if self.keep is None:
             return None
         if self.record is None:
@@ -114,10 +111,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return AllowedHosts(self.ur_allow)
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
-        """Return the address and ports of robot `number`'s UR interfaces and gripper.
-
-        Raise StartError if `ur_address` is not an IP address, or if it has too few successors.
-        """
+        """Return address and ports of a robot's UR interfaces, by its index; StartError if there is no such address."""
         try:
             first = ipaddress.ip_address(self.ur_address)
             address = first + number
@@ -227,11 +221,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
     def _plant(
         self, cell: Cell | None, description: RobotDescription, calibration: Calibration | None
     ) -> OwnPlant | None:
-        """Return the plant, or the scene around the arm; None: the simulated arm of the robot file.
-
-        Raise ValueError if the plant is not found or if a scene excludes it, UserFileError as `load_plant`
-        does.
-        """
+        """Return the plant, or the scene around the arm; None: the simulated arm. ValueError for a contradiction."""
         world = self._scene(cell)
         if world is not None:
             if self.plant is not None or self.hidden is not None:
@@ -260,10 +250,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return self.world or (None if cell is None else cell.world)
 
     def _lag(self, calibration: Calibration | None) -> ServoLag | None:
-        """Return the lag of a real robot that tvist moves: the option's, or else the calibration's.
-
-        Raise ValueError if it is out of range.
-        """
+        """Return the lag of a real robot from the option or else the calibration; ValueError if it is out of range."""
         if self.servo_lag == "simulated":
             return ServoLag.simulated()
         if self.servo_lag is not None:

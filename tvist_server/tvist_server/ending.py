@@ -14,10 +14,7 @@ LONGEST = 4.5
 
 
 def ending_signals() -> list[signal.Signals]:
-    """Return the signals that shut this process down.
-
-    SIGHUP is omitted if it is already ignored: a process started with `nohup` must outlive its terminal.
-    """
+    """Return the signals that shut this process down: not SIGHUP if it is ignored, as after `nohup`."""
     ends = [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         ends.append(signal.SIGHUP)
@@ -89,10 +86,7 @@ class Ending:
             self._raises = False
 
     def hear(self, heard: Callable[[], object]) -> None:
-        """Set a function that the main thread calls when a signal comes, or now if one has come.
-
-        It may raise RuntimeError if the shutdown is already over.
-        """
+        """Set a function that the main thread calls at a signal, or now if one has come; it may raise RuntimeError."""
         self._heard = heard
         if self._wish is not None:
             heard()

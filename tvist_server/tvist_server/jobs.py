@@ -15,11 +15,7 @@ class _Job(NamedTuple):
 
 
 class Jobs:
-    """Jobs in order of arrival.
-
-    One job may be a client's step, which takes long. Jobs of other clients are done between two ticks of the
-    step; jobs of the stepping client wait for its end, so that they keep their order.
-    """
+    """Jobs in order of arrival. During a client's step, jobs of others are done between its ticks, its own after it."""
 
     def __init__(self) -> None:
         self._new: SimpleQueue[_Job] = SimpleQueue()

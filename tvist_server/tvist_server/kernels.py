@@ -68,7 +68,7 @@ def warm_up() -> None:
 
 
 def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> None:
-    """Compile every kernel of a served robot that is not on disk, in this many processes (None: one per processor).
+    """Compile every kernel of a served robot that is not on disk, in so many processes (None: one per processor).
 
     `tell` gets the progress. Raise KernelsError if a kernel could not be compiled or stored.
     """

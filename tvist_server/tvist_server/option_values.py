@@ -35,12 +35,7 @@ class StartError(ValueError):
 
 
 def read_start_file(path: str | Path, what: str, kind: type[T]) -> T:
-    """Read a TOML file, or a JSON file if its name ends in .json, and check its content; messages call it `what`.
-
-    Raises:
-        StartError: The file cannot be read, or a key is unknown, missing or out of range.
-        UserFileError: The file is not text, too large or nested too deeply.
-    """
+    """Read a TOML or .json file and check its content; StartError or UserFileError if it is invalid."""
     try:
         is_json = Path(path).suffix == ".json"
         return checked(parse_json(read_bytes(path, what)) if is_json else read_toml(path, what), kind)
@@ -101,10 +96,7 @@ class Member:
 
 
 def members(text: str, most: int = MOST) -> list[Member]:
-    """Return the robots of a list such as `ur5e*2,other.toml`: ROBOT[*COUNT], separated by commas.
-
-    A robot is named after its file. A robot that is listed several times gets a number: `ur5e-1`, `ur5e-2`.
-    """
+    """Return the robots of a list such as `ur5e*2,other.toml`, named after their files: ur5e-1, ur5e-2, other."""
     robots: list[str] = []
     for entry in text.split(","):
         robot, star, count = entry.strip().partition("*")

@@ -13,10 +13,7 @@ ProfileName = Literal["ursim", "real"]
 
 
 class ServeOptions(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Options of `tvist serve` and keys of its configuration file; their docstrings are the help of the command line.
-
-    A default that is no plain value stands in brackets.
-    """
+    """Options of `tvist serve` and keys of its configuration file; the docstrings are the help, with [default]."""
 
     name: RobotName = DEFAULT_NAME
     """Name of the robot on the network."""

@@ -7,10 +7,9 @@ ENDS, ENDS_AFTER = 0.05, 5
 
 
 class Overload:
-    """Counts a robot's due and missed ticks, which are `period` apart [s].
+    """Counts a robot's due and missed ticks, `period` apart [s], in seconds measured in due ticks.
 
-    A second is measured in due ticks. A pause of the whole machine is one long second with almost all ticks
-    missed, which alone is no overload.
+    A pause of the whole machine is one long second with almost all ticks missed, which alone is no overload.
     """
 
     def __init__(self, period: float) -> None:
@@ -23,11 +22,7 @@ class Overload:
         self._seconds = 0
 
     def note(self, missed: int) -> str | None:
-        """Count a tick that starts; return a message if the overload starts or ends.
-
-        `missed` are the ticks that the schedule reports: this one if it is late, and those left out before
-        it.
-        """
+        """Count a tick and the `missed` ones that its schedule reports; return a message if overload starts or ends."""
         self.due += max(1, missed)
         self.missed += missed
         due, missed = self.due - self._due, self.missed - self._missed

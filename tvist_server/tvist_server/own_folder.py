@@ -10,10 +10,10 @@ _PREFIX = "tvist-own-"
 
 
 class OwnFolder:
-    """A folder that only this user can enter, until `close`.
+    """A folder that only this user can enter, until `close`; locked while this process or a fork of it lives.
 
-    It is locked while this process or a fork of it lives. Unlocked folders of this user are left over from
-    killed processes and are removed first. Raise OSError if there is no folder for temporary files.
+    Unlocked folders of this user are left over from killed processes and are removed first. May raise
+    OSError.
     """
 
     def __init__(self) -> None:

@@ -51,26 +51,18 @@ class _Waiting(NamedTuple):
 class PlanAhead:
     """Passes commands to the controller in order, with a finished plan if planning takes long.
 
-    A plan starts from the controller's state when the command's turn comes. If something that it depends on
-    has changed when the controller gets it, it is made again. Commands wait while an earlier one is being
-    planned, except renewals of the lease. A command that stops the arm is carried out at once and again in
-    its turn, so that it ends both the present motion and any motion that was sent before it and would start
-    after it.
-
-    Args:
-        host: Host of the controller.
-        planner: Makes plans; used only by this thread.
-        post: Queues a job for the controller's thread.
-        complete: Adds what a command names but does not contain, such as a file, or refuses it; used only by
-            this thread.
+    A plan starts from the controller's state when the command's turn comes; if something that it depends on
+    has changed when the controller gets it, it is made again. Commands wait while an earlier one is planned,
+    except renewals of the lease. A command that stops the arm is carried out at once and again in its turn,
+    so that it ends both the present motion and any motion that was sent before it and would start after it.
     """
 
     def __init__(
         self,
         host: Host,
-        planner: Planner,
-        post: Callable[[Callable[[], None]], None],
-        complete: Callable[[Admitted], Admitted | Refused] | None = None,
+        planner: Planner,  # used only by this thread
+        post: Callable[[Callable[[], None]], None],  # queues a job for the controller's thread
+        complete: Callable[[Admitted], Admitted | Refused] | None = None,  # adds a file or refuses
     ) -> None:
         self._host, self._planner, self._post, self._complete = host, planner, post, complete
         self._lock = threading.Lock()
@@ -164,10 +156,7 @@ class PlanAhead:
         self._post(lambda: answer(reply))
 
     def _present(self) -> Snapshot:
-        """Return the present state, which only the controller's thread may read.
-
-        It does so just before a tick, so that most plans are ready long before the next one.
-        """
+        """Return the present state; the controller's thread reads it, just before a tick."""
         present = SimpleQueue[Snapshot]()
         self._post(lambda: present.put(self._host.controller.snapshot()))
         return present.get()

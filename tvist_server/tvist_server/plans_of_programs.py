@@ -10,11 +10,10 @@ from tvist_protocol.commands import Command
 
 
 class PlansOfPrograms:
-    """Plans commands for the controller, which takes each plan at a tick that does not depend on this thread.
+    """Plans commands for the controller in a thread of its own, the only user of `planner`.
 
-    A program line starts a fixed number of ticks after it is called, so a run is the same on every machine.
-    If a plan takes longer, the controller waits for it and its ticks are late. `planner` is used only by this
-    thread.
+    A program line starts a fixed number of ticks after its call, so a run is the same on every machine. If a
+    plan takes longer, the controller waits for it and its ticks are late.
     """
 
     def __init__(self, planner: Planner) -> None:

@@ -1,8 +1,4 @@
-"""Translates programs saved by PolyScope to URScript.
-
-A saved program is XML. A program with nodes that `polyscope_nodes` cannot translate is refused, because
-leaving them out would change what it does.
-"""
+"""Translates programs saved by PolyScope (XML) to URScript; one with unknown nodes is refused."""
 
 from tvist_plant.user_file import UserFileError, xml
 from tvist_protocol.errors import short
@@ -45,10 +41,7 @@ def program(name: str, body: str) -> str:
 
 
 def with_external_control(text: str, sent: str) -> str:
-    """Replace the External Control nodes by the text that a client has sent.
-
-    Its header, up to the line `# HEADER_END`, is put first, since its functions must not be inside a loop.
-    """
+    """Replace the External Control nodes by a client's text; its header goes first, as functions cannot be in loops."""
     header, mark, part = sent.partition(_HEADER_ENDS)
     if not mark:
         header, part = "", sent

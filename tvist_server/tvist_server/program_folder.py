@@ -40,10 +40,7 @@ class ProgramFolder:
             return []
 
     def read(self, name: str) -> str | None:
-        """Return a program's text, ignoring its path; None if there is no such file. `X.urp` also finds `X.script`.
-
-        Raise UserFileError if the file is not a program that the controller can run.
-        """
+        """Return a program's text, ignoring its path (None: no such file); UserFileError if it is not a program."""
         file = PurePosixPath(name).name
         candidates = [file, file.removesuffix(URP) + SCRIPT] if file.endswith(URP) else [file]
         for candidate in candidates:
@@ -60,10 +57,7 @@ class ProgramFolder:
         return None
 
     def complete(self, admitted: Admitted) -> Admitted | Refused:
-        """Add the text to a command that loads a program of the folder; return other commands unchanged.
-
-        The robot's journal thus contains the program as it was when it was loaded.
-        """
+        """Add the text to a command that loads a program of the folder, so that the journal contains it."""
         command = admitted.command
         if not isinstance(command, ProgramLoad) or command.text is not None:
             return admitted

@@ -1,8 +1,7 @@
 """Passes one robot's states, events and figures to the gateways, in the controller's thread.
 
-In real time no gateway blocks: Zenoh drops what finds no room, and UR's interfaces count what they drop. In
-lockstep gateways wait for clients between two ticks, since no state may be lost. Messages that no gateway
-takes are not made.
+In real time no gateway blocks; in lockstep gateways wait for clients between two ticks, since no state may be
+lost.
 """
 
 import logging

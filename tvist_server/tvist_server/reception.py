@@ -24,22 +24,14 @@ CarryOut = Callable[[Admitted, Answer], None]
 
 
 class Reception(Desk):
-    """The desk of one robot: admits valid messages and rejects others at once, without the controller.
-
-    Args:
-        host: Host of the controller; only its thread-safe methods are called here.
-        post: Queues a job for the controller's thread.
-        carry_out: Carries out admitted commands.
-        complete_info: Adds to an encoded `info` what the controller does not know, in the thread that answers
-            clients.
-    """
+    """The desk of one robot: admits valid messages and rejects others at once, without the controller."""
 
     def __init__(
         self,
-        host: Host,
+        host: Host,  # only its thread-safe methods are called here
         post: Post,
         carry_out: CarryOut,
-        complete_info: Callable[[bytes], bytes] | None = None,
+        complete_info: Callable[[bytes], bytes] | None = None,  # adds to an encoded `info`
     ) -> None:
         self._host, self._post, self._carry_out = host, post, carry_out
         self._complete_info = complete_info

@@ -43,29 +43,18 @@ LOCAL = "127.0.0.1"
 class ServedRobot:
     """A robot with its own resources; robots share only the process, the tick thread and the network.
 
-    Args:
-        setup: Initial setup.
-        record: File to record into.
-        dump: Folder for the last second before a failure.
-        observe: Makes a further sink of the controller's messages.
-        programs: Folder with programs that clients load by name.
-        hosts: Machines that programs may connect to besides their sender; None: none.
-        keep: Least number of ticks that the recording keeps; None: all.
-
-    Raises:
-        ValueError: The setup is invalid.
-        RecordingError: The recording cannot be written.
+    Raise ValueError if the setup is invalid, RecorderError if the recording cannot be written.
     """
 
     def __init__(
         self,
         setup: Setup,
-        record: Path | None,
-        dump: Path,
-        observe: Callable[[Controller], Sink] | None = None,
-        programs: ProgramFolder | None = None,
-        hosts: AllowedHosts | None = None,
-        keep: int | None = None,
+        record: Path | None,  # file to record into
+        dump: Path,  # folder for the last second before a failure
+        observe: Callable[[Controller], Sink] | None = None,  # makes a further sink
+        programs: ProgramFolder | None = None,  # programs that clients load by name
+        hosts: AllowedHosts | None = None,  # besides the sender of a program
+        keep: int | None = None,  # least number of ticks in the recording; None: all
     ) -> None:
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
@@ -141,10 +130,7 @@ class ServedRobot:
         self.publisher.open(gateways)
 
     def request(self, command: Command) -> Reply:
-        """Carry out a command of this process, in the controller's thread or before the clock starts.
-
-        What is done before the first tick does not depend on this machine's speed.
-        """
+        """Carry out a command of this process, in the controller's thread or, reproducibly, before the first tick."""
         return self._host.request(encode(command), LOCAL)
 
     def repeat(self) -> None:
@@ -291,10 +277,7 @@ class ServedRobot:
         self.driven.post(hear)
 
     def ask_gripper(self, request: bytes, answer: Callable[[bytes], None]) -> None:
-        """Carry out a request to the cell's gripper before the next tick, from any thread.
-
-        `answer` takes the answer, in the controller's thread.
-        """
+        """Carry out a request to the cell's gripper before the next tick; `answer` runs in the controller's thread."""
         self.driven.post(lambda: answer(self._host.ask_gripper(request)))
 
     def warn(self, why: str) -> None:

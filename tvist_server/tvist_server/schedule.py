@@ -8,10 +8,7 @@ CATCH_UP = 50
 
 
 class Followed:
-    """Ticks that the arm starts itself, `period` apart [s]; `start` is the present time [s].
-
-    If `counts` is False, the arm counts the ticks that it leaves out by its own clock.
-    """
+    """Ticks that the arm starts itself, `period` apart [s]; with `counts` False, the arm counts its missed ticks."""
 
     due = math.inf
     """Time from which the next tick may start: unknown."""
@@ -30,15 +27,10 @@ class Schedule:
     """Absolute deadlines, a period apart for each robot; the thread wakes up once a period.
 
     Waking up with cold caches costs a good part of a tick, so all robots whose deadlines follow within a
-    period tick one after another. The deadlines are spread evenly over the period, so a robot is late only if
-    those before it took more than their share; a tick before its deadline is not late. A tick that starts a
-    period late or more is counted as missed and made up for at once. Deadlines never move, so there is no
-    drift even after a week.
-
-    Args:
-        robots: Number of robots.
-        period: Period of each robot's ticks [s].
-        start: Present time; the first tick is due a period later [s].
+    period tick one after another. The deadlines are spread evenly, so a robot is late only if those before it
+    took more than their share; a tick before its deadline is not late. A tick that starts a period late or
+    more is counted as missed and made up for at once. Deadlines never move, so there is no drift. `start` is
+    the present time; the first tick is due a period later [s].
     """
 
     def __init__(self, robots: int, period: float, start: float) -> None:

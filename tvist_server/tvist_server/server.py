@@ -52,25 +52,16 @@ class Recording(NamedTuple):
 class Server:
     """One or more robots on the network.
 
-    Args:
-        config: Configuration of the robots.
-        observe: Makes an observer of a robot's messages, which informs people instead of the console.
-        share: Robots that this process serves, if others serve the rest; None: all.
-        prepare: Does slow work before the robots are made and reports its progress to the given function;
-            clients learn meanwhile that the robots are starting.
-
-    Raises:
-        StartError: The configuration is invalid.
-        RecordingError: A recording cannot be written.
-        GatewayError: The server cannot listen on an endpoint.
+    Raise StartError for an invalid configuration, RecorderError or GatewayError if a recording or an endpoint
+    fails.
     """
 
     def __init__(
         self,
         config: ServeConfig,
-        observe: Callable[[Controller], Sink] | None = None,
-        share: Share | None = None,
-        prepare: Prepare | None = None,
+        observe: Callable[[Controller], Sink] | None = None,  # used instead of the console
+        share: Share | None = None,  # robots of this process; None: all
+        prepare: Prepare | None = None,  # does slow work before the robots are made
     ) -> None:
         setups = config.setups()
         check_together(config, len(setups))
@@ -123,10 +114,7 @@ class Server:
             raise
 
     def share_control(self, host: str, token: str) -> None:
-        """Let clients of UR's interfaces at the address `host` use a lease that this process holds as `ur-ADDRESS`.
-
-        Call this before `start`.
-        """
+        """Let UR clients at the address `host` use a lease that this process holds as `ur-ADDRESS`; before `start`."""
         for interfaces in self._interfaces:
             interfaces.adopt(host, token)
 
@@ -219,10 +207,7 @@ class Server:
                 self._network.close()
 
     async def run(self, ready: Callable[[], None], ending: Ending) -> None:
-        """Serve until a signal comes or all robots have failed; `failure` then gives the reason.
-
-        `ready` is called once the robots tick and answer.
-        """
+        """Serve until a signal comes or all robots have failed (see `failure`); call `ready` once the robots answer."""
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
         self.start()

@@ -28,10 +28,7 @@ def shares(robots: int, workers: int) -> list[range]:
 
 
 def check_together(config: ServeConfig, robots: int) -> None:
-    """Check durations, folders, and the options for network and processes.
-
-    Raise StartError if one is wrong or excluded.
-    """
+    """Check durations, folders, and the options for network and processes; StartError if one is wrong or excluded."""
     config.keep_ticks()
     config.dump_folder()
     config.program_folder(config.name)

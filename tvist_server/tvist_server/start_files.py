@@ -62,12 +62,7 @@ class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 def shaped_by(setup: Setup, shaper: str) -> Setup:
-    """Return a setup with another shaper, given by its name or as FILE.py:NAME, which is then loaded.
-
-    Raises:
-        OwnFileError: The file contains no such shaper, or it fails for this arm's modes.
-        UserFileError: FILE.py is not a text file, or too large.
-    """
+    """Return a setup with another shaper, by name or FILE.py:NAME; OwnFileError or UserFileError if that fails."""
     if not is_file(shaper):
         return replace(setup, shaper=shaper)
     own = load_own(shaper)
@@ -79,10 +74,7 @@ def shaped_by(setup: Setup, shaper: str) -> Setup:
 
 
 def calibration_for(name: str | None, description: RobotDescription) -> Calibration | None:
-    """Load a calibration for a robot: one of the package's by name, a file, or `none`.
-
-    None stands for the package's calibration for this model.
-    """
+    """Load a calibration: one of the package's, a file, or `none`; None: the package's for this model."""
     model = description.robot.model
     name = calibrations.default_for(model) if name is None else name
     if name is None:

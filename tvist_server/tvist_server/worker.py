@@ -95,10 +95,10 @@ class First:
 def meet_clients(
     config: ServeConfig, names: Sequence[str], listen: Sequence[str], guard: Mapping[str, Any], first: First
 ) -> None:
-    """Run the process that clients connect to: a router for the others, which answers for robots that are starting.
+    """Run the process that clients connect to: a router, which also answers for robots that are starting.
 
-    It reports `Made`, then receives progress. Told that all robots are ready, it reports `Ready` once it
-    reaches them; told to end, it reports `Ended`.
+    It reports `Made`, receives progress, reports `Ready` once it reaches all robots, and `Ended` when told to
+    end.
     """
     place, starting = config.namespace or "", Starting()
     try:
@@ -147,8 +147,8 @@ def work(config: ServeConfig, share: Share, first: First) -> None:
     """Serve robots until the first process ends it or dies.
 
     Told to begin, it makes its robots and reports `Made`; told to go on, it starts them and reports `Ready`;
-    told to end, it reports `Ended`. It ignores signals, because a terminal sends them to all processes and
-    the first one handles them.
+    told to end, it reports `Ended`. It ignores signals, which a terminal sends to all processes: the first
+    one handles them.
     """
     ending = Ending()
     ending.close()  # ignores signals

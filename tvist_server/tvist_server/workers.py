@@ -1,8 +1,7 @@
 """Several processes that serve robots behind one endpoint.
 
-Clients connect to a process without robots, a router to which the others connect over a private socket. Each
-robot ticks in one of the others. The first process has no network, because a process with threads should not
-fork.
+Clients connect to a process without robots, a router to which the others connect over a private socket. The
+first process has no network, because a process with threads should not fork.
 """
 
 import contextlib
@@ -55,11 +54,7 @@ class _Worker:
 class Workers:
     """The first process: it starts the others, and ends with them.
 
-    Raises:
-        StartError: The configuration is invalid.
-        UserFileError: A named file has the wrong kind of content.
-        GatewayError: The server cannot listen on an endpoint.
-        WorkersError: A process cannot serve its robots.
+    May raise StartError, UserFileError or GatewayError, or WorkersError if a process cannot serve its robots.
     """
 
     def __init__(self, config: ServeConfig, prepare: Prepare | None = None) -> None:
@@ -96,7 +91,7 @@ class Workers:
     def run(self, ready: Callable[[], None], ending: Ending) -> None:
         """Serve until a signal comes.
 
-        Raise WorkersError if a process has died or a robot has stopped; all others have then ended in order.
+        WorkersError if a process died or a robot stopped, after all others have ended.
         """
         heard, wake = multiprocessing.Pipe(duplex=False)
         ending.hear(lambda: wake.send(None))
@@ -265,10 +260,7 @@ def _begin(
 
 
 def _rehearse(setup: Setup) -> None:
-    """Compile and load what a robot needs, so that the forked processes share its memory.
-
-    A plug-in arm is not made here: only the process that serves it may do that.
-    """
+    """Compile and load what a robot needs, for forked processes to share; a plug-in arm is made only where served."""
     setup = replace(setup, plant=None)
     warm_up()
     planner = Planner(setup)

@@ -1,10 +1,9 @@
 """Rights of clients on the network, as rules for Zenoh's access control.
 
-Zenoh silently denies everything that no rule allows. A rule applies only to keys that its key expression
-includes: a rule for `tvist/ur5e/state` does not allow `tvist/**`. Flows are named from the server's point of
-view: `ingress` is what a client sends, `egress` what it receives. A client learns of a subscriber or
-queryable only through its declaration, so declarations need permission on egress; without it, a client would
-not even send its put or query.
+Zenoh silently denies everything that no rule allows. A rule for `tvist/ur5e/state` does not allow `tvist/**`.
+Flows are the server's: `ingress` is what a client sends, `egress` what it receives. Declarations need
+permission on egress: without it, a client knows of no subscriber or queryable and sends neither puts nor
+queries.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,11 +25,7 @@ MESSAGES = (
 
 
 def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: str = "") -> dict[str, Any]:
-    """Return Zenoh's `access_control` settings for a server with certificates; `roles` has at least one entry.
-
-    Roles are given by the certificates' common names. Clients without a role or a certificate are denied
-    everything.
-    """
+    """Return Zenoh's `access_control` settings for a server with certificates; no role (by common name), no access."""
     robots = [_at(namespace, robot) for robot in robots]
     viewing, operating = _viewing(robots), _operating(robots)
     rules_of: dict[Role, list[dict[str, Any]]] = {"viewer": viewing, "operator": [*viewing, *operating]}

@@ -94,10 +94,7 @@ class Console:
 
 
 class ConsoleGateway(Gateway):
-    """Passes the events of the robot `name` to the console.
-
-    `command_line` returns the command line of a command for this robot.
-    """
+    """Passes the events of the robot `name` to the console; `command_line` builds its commands."""
 
     setpoints_refused = 0
     takes: Collection[Topic] = frozenset[Topic]({"event"})

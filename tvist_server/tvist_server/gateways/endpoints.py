@@ -26,11 +26,7 @@ def options(endpoint: str) -> str:
 
 
 def is_local(endpoint: str) -> bool:
-    """Return whether only this machine can reach an endpoint.
-
-    In doubt the answer is no: for an unknown protocol, a host name that does not resolve, or one with any
-    address that is not local.
-    """
+    """Return whether only this machine can reach an endpoint; False if in doubt, as for an unknown protocol or host."""
     if protocol(endpoint) in LOCAL_PROTOCOLS:
         return True
     if protocol(endpoint) not in IP_PROTOCOLS:

@@ -1,15 +1,11 @@
-"""Access protection of a server that other machines can reach: certificates and roles, or an explicit `--insecure`.
+"""Access protection of a server that other machines can reach: certificates and roles, or `--insecure`.
 
-`tvist keys` fills the folder given as `--security` with
+`tvist keys` fills the folder given as `--security`; on a router, roles may also be "robot" and "router":
 
     authority.pem    certificate of the authority that signs all others
     robot.pem        the robot's certificate, and
     robot.key        its private key
-    clients.toml     role by name: "anna" = "operator"; a client that is not listed has no access
-
-A router's folder is the same; its roles may also be "robot" and "router".
-
-Both sides show a certificate (mutual TLS); the common name in the client's certificate determines its role.
+    clients.toml     role by a certificate's common name: "anna" = "operator"; others have no access
 """
 
 import contextlib
@@ -50,8 +46,8 @@ def guarded(
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on and the settings that protect them.
 
-    Raise StartError if an endpoint is invalid, or unprotected and reachable from other machines, or if a
-    certificate or the list of roles is missing.
+    Raise StartError if an endpoint is invalid or unprotected although other machines can reach it, or the
+    folder incomplete.
     """
     secured, settings, roles = _protected(listen, security, insecure=insecure)
     access = open_access(robots, namespace) if roles is None else access_control(robots, roles, namespace)
@@ -109,12 +105,7 @@ def guarded_interfaces(address: str, *, insecure: bool) -> None:
 
 
 def roles_in(folder: Path) -> dict[str, Role]:
-    """Read the role of each client from `clients.toml`.
-
-    Raises:
-        StartError: The file cannot be read, or a role is invalid.
-        UserFileError: The file is not text, too large or nested too deeply.
-    """
+    """Read the role of each client from `clients.toml`; StartError or UserFileError if it is invalid."""
     path = folder / CLIENTS
     try:
         return read_start_file(path, "file of roles", dict[str, Role])
@@ -126,8 +117,7 @@ def roles_in(folder: Path) -> dict[str, Role]:
 def _secured(endpoint: str) -> str:
     """Check an endpoint for use with `--security`.
 
-    Another protocol is refused rather than converted to TLS: the server would otherwise not listen on the
-    requested endpoint, and a client of tcp/ would get neither an answer nor an explanation.
+    Another protocol is refused, since its clients would not expect TLS.
     """
     if protocol(endpoint) != "tls":
         address = endpoint.partition("/")[2] or "<address>:<port>"

@@ -63,9 +63,9 @@ class MetricsGateway(Gateway):
 
 
 class Metrics(Collector):
-    """An HTTP server for Prometheus; `collect` computes the figures on request. Port 0 takes any free port.
+    """HTTP server for Prometheus at `address` (port 0.
 
-    Raise GatewayError if the server cannot listen on `address`, or if prometheus_client is not installed.
+    Any), which computes figures on request; may raise GatewayError.
     """
 
     def __init__(self, address: str) -> None:

@@ -1,7 +1,4 @@
-"""One Zenoh session for all robots of the server.
-
-It is a router for clients, or a client of a fleet's router, or both.
-"""
+"""One Zenoh session for all robots of the server: a router for clients, a client of a fleet's router, or both."""
 
 import json
 import threading
@@ -59,32 +56,18 @@ CONNECT: Mapping[str, Any] = {
 
 
 class Network:
-    """Listens on endpoints and creates a gateway for each robot.
-
-    Args:
-        endpoints: Endpoints to listen on, such as `tcp/127.0.0.1:7447`.
-        guard: Session settings that restrict access, by path.
-        lockstep: Whether a client advances time, so that the server waits for slow clients.
-        connect: Routers to connect to; the first that answers is used.
-        security: Folder with this robot's certificate for the router.
-        namespace: Chunks that precede all keys on the network.
-        on_router: Called in Zenoh's threads: False when the connection to the router is lost, True when it is
-            back.
-
-    Raises:
-        GatewayError: The server cannot listen on an endpoint, or reaches no router within `CONNECT_S`.
-    """
+    """Listens on endpoints and creates a gateway for each robot; GatewayError if that fails or no router answers."""
 
     def __init__(
         self,
         endpoints: Sequence[str],
-        guard: Mapping[str, Any] = MappingProxyType({}),
+        guard: Mapping[str, Any] = MappingProxyType({}),  # session settings that restrict access, by path
         *,
-        lockstep: bool = True,
-        connect: Sequence[str] = (),
-        security: str | None = None,
-        namespace: str = "",
-        on_router: Callable[[bool], None] | None = None,
+        lockstep: bool = True,  # whether a client advances time: the server waits for slow clients
+        connect: Sequence[str] = (),  # routers; the first that answers is used
+        security: str | None = None,  # folder with this robot's certificate for the router
+        namespace: str = "",  # precedes all keys on the network
+        on_router: Callable[[bool], None] | None = None,  # connected or lost; Zenoh's threads
     ) -> None:
         settings = guard if lockstep else {**REALTIME, **guard}
         if namespace:
@@ -109,25 +92,17 @@ class Network:
         truth: bool,
         wanted: Callable[[bool], None] | None = None,
     ) -> ZenohGateway:
-        """Create the gateway of a robot.
+        """Create the gateway of a robot for its desk; in lockstep, the publisher waits so that no state is lost.
 
-        Args:
-            robot: Name of the robot, which is part of every key.
-            desk: Receives the messages that arrive.
-            lockstep: Whether a client advances time: no state may be lost, so the publisher waits.
-            truth: Whether to publish values that a real robot cannot measure.
-            wanted: Called from any thread with whether a client subscribes to `truth`; if given, it is
-                published only then.
+        If `truth` is False, `wanted`, if given, is called from any thread with whether a client subscribes to
+        the topic `truth`.
         """
         gateway = self._expected.pop(robot, None) or self._added(robot, desk)
         gateway.serve(desk, lockstep=lockstep, truth=truth, wanted=wanted)
         return gateway
 
     def expect(self, robots: Sequence[str], starting: Queried, *, here: bool = True) -> None:
-        """Let `starting` answer queries for robots until `gateway` gives each a desk.
-
-        If `here` is False, another session will serve them and answers as soon as it can.
-        """
+        """Let `starting` answer queries for robots until `gateway`, or another session (`here` False), serves them."""
         for robot in robots:
             self._expected[robot] = self._added(robot, starting, complete=here)
 
@@ -176,10 +151,7 @@ def _open(endpoints: Sequence[str], settings: Mapping[str, Any]) -> zenoh.Sessio
 def _connected(
     connect: Sequence[str], listen: Sequence[str], settings: Mapping[str, Any], security: str | None
 ) -> zenoh.Session:
-    """Connect to a router as a client, or as a peer if clients can also connect here.
-
-    Not as a router: each router keeps a map of all others, and a fleet has many robots.
-    """
+    """Connect to a router as a client, or as a peer with clients of its own; routers keep maps of all other routers."""
     mode = {"mode": "peer", "listen/endpoints": list(listen)} if listen else {"mode": "client"}
     try:
         return _session({**settings, **mode, **CONNECT, **_towards(connect, security)})
@@ -196,11 +168,7 @@ def _connected(
 def open_router(
     listen: Sequence[str], connect: Sequence[str], settings: Mapping[str, Any], security: str | None
 ) -> zenoh.Session:
-    """Open the session of a router, which also connects to the routers `connect` when they appear.
-
-    Raise GatewayError if it cannot listen on an endpoint, or if the certificate in the folder `security` is
-    missing.
-    """
+    """Open the session of a router, which connects to others when they appear; GatewayError if it cannot listen."""
     retry = {"connect/retry": CONNECT["connect/retry"]}
     return _open(listen, {**settings, **retry, **_towards(connect, security)})
 

@@ -20,11 +20,10 @@ CLOSE_WAIT = 0.2
 
 
 class Answers:
-    """Sends replies to queries from its own thread.
+    """Sends replies to queries from its own thread, because a client that does not read blocks it.
 
-    A reply has the quality of service that its client chose, by default BLOCK. A client that asks and does
-    not read therefore blocks the answering thread until its link is closed, after 1 s in real time and 5 s in
-    lockstep. The messages published 500 times a second must reach other clients meanwhile.
+    It blocks until its link is closed, after 1 s in real time and 5 s in lockstep: by default, replies use
+    BLOCK.
     """
 
     def __init__(self) -> None:

@@ -33,11 +33,7 @@ class Rate(NamedTuple):
 
     @classmethod
     def read(cls, text: str) -> Self:
-        """Read `10` or `10@eth1`.
-
-        Raises:
-            ValueError: It is neither, or no possible rate.
-        """
+        """Parse `10` or `10@eth1`; ValueError if it has another form or an impossible rate."""
         found = _RATE.fullmatch(text)
         if found is None or not 0.0 < float(found[1]) <= FASTEST:
             raise ValueError(
@@ -47,15 +43,9 @@ class Rate(NamedTuple):
 
 
 class Router:
-    """A running router, which connects to other routers when they appear.
+    """A running router; `rates` limit the outgoing states of each robot in `robots`, and of all others together.
 
-    `rates` limit the outgoing states of each of `robots`, and of all other robots together, per interface if
-    named.
-
-    Raises:
-        StartError: An endpoint is invalid, or unprotected and reachable from other machines, or the folder is
-            incomplete.
-        GatewayError: The router cannot listen on an endpoint.
+    May raise StartError or GatewayError.
     """
 
     def __init__(
@@ -85,10 +75,7 @@ class Router:
 
 
 def robots_of(text: str) -> list[Place]:
-    """Parse `[NAMESPACE/]NAME`, or `[NAMESPACE/]NAME*COUNT` for NAME-1 to NAME-COUNT.
-
-    Raise ProtocolError for an invalid namespace or name, ValueError for a count outside 1 to `MOST`.
-    """
+    """Parse `[NAMESPACE/]NAME`, or `[NAMESPACE/]NAME*COUNT` for NAME-1 to NAME-COUNT; may raise ValueError."""
     first, star, count = text.partition("*")
     if not star:
         return [place_of(first)]
@@ -101,8 +88,8 @@ def robots_of(text: str) -> list[Place]:
 def downsampling(rates: Sequence[Rate], robots: Sequence[Place]) -> list[dict[str, Any]]:
     """Return Zenoh's `downsampling` settings for what leaves the router.
 
-    Zenoh counts per rule, not per key: with a wildcard, one robot's states could use up the rate of all.
-    Every listed robot therefore has its own rules; the others share one. The first matching rule applies.
+    Zenoh counts per rule, not per key: under a wildcard, one robot could use up the rate of all. Listed
+    robots therefore have rules of their own, which come first.
     """
     places = [
         *(keys.within(place.namespace, f"{keys.PREFIX}/{place.robot}") for place in robots),

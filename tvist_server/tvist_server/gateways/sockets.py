@@ -110,13 +110,7 @@ class _Link(asyncio.Protocol):
 
 
 class ProgramSockets(Gateway, SocketPorts):
-    """Opens sockets to the machines that programs may connect to, and carries their bytes.
-
-    Args:
-        tell: Reports news to the controller, from any thread, without blocking.
-        warn: Warns people, likewise.
-        allowed: Machines that programs may connect to.
-    """
+    """Opens sockets to the machines that programs may connect to; `tell` and `warn` run in any thread."""
 
     takes: Collection[Topic] = ()
 
@@ -176,10 +170,7 @@ class ProgramSockets(Gateway, SocketPorts):
             self._silent.discard(news.number)
 
     def patience(self) -> float:
-        """Return how long a step may wait for a socket that a program reads [s].
-
-        A step waits once for a silent socket, and again after it has received something.
-        """
+        """Return how long a step may wait for a socket that a program reads [s]; once for each silence."""
         waits = [(socket, begun) for socket, begun in self._waits.values() if socket not in self._silent]
         if not waits or not self._moved.isdisjoint(socket for socket, _ in waits):
             self._moved.clear()

@@ -1,8 +1,8 @@
 """The Zenoh gateway: one robot's keys on the server's session.
 
-Callbacks run in Zenoh's own threads (`indirect=False`), so that one client's messages are handled in order: a
-liveliness token before the command that follows it. They pass payloads to the desk and return. One may still
-be running when the session is closed, hence the flag.
+Callbacks run in Zenoh's threads (`indirect=False`), so that one client's messages are handled in order: a
+liveliness token before the command that follows it. One may still be running when the session is closed,
+hence the flag.
 """
 
 import contextlib
@@ -24,13 +24,9 @@ EVERY_TICK: frozenset[Topic] = frozenset({"state", "truth"})
 
 
 class ZenohGateway(Gateway):
-    """One robot on Zenoh, created by `Network`: it answers queries, and serves the robot once that is ready.
+    """One robot on Zenoh; `starting` answers queries until `serve`. Close the session after this gateway.
 
-    Args:
-        session: An open session, to be closed after this gateway.
-        robot: Name of the robot, which is part of every key.
-        starting: Answers queries until `serve` is called.
-        complete: Whether queries come here even if another session answers them too.
+    If `complete` is False, queries need not come here if another session answers them.
     """
 
     def __init__(

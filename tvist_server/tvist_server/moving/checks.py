@@ -111,10 +111,7 @@ def version_trouble(version: Sequence[int]) -> str | None:
 
 
 def state_trouble(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> str | None:
-    """Return why a robot must not be moved in its present state; None if it may be.
-
-    `may_play` is True if the program that runs on it is ours.
-    """
+    """Return why a robot must not be moved now, None if it may; `may_play`: the program that runs on it is ours."""
     mode, safety, runtime = sight.modes
     if mode == RobotMode.DISCONNECTED:
         return "it is not connected: look at the network, and at the robot"
@@ -172,8 +169,8 @@ def _load_trouble(wanted: Wanted, sight: Sight) -> str | None:
 def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> str | None:
     """Return why the robot may not be mounted as its file says; None if it is.
 
-    `q` are the joint angles at rest, shape (6,) [rad]; `felt` is the mean specific force in the flange frame,
-    shape (3,) [m/s²].
+    `q`: joint angles at rest, shape (6,) [rad]; `felt`: mean specific force in the flange frame, shape (3,)
+    [m/s²].
     """
     up = Arm(description).pose(q)[0] @ felt / np.linalg.norm(felt)
     leans = float(np.arccos(np.clip(up[2], -1.0, 1.0)))

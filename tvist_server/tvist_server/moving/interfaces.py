@@ -35,11 +35,7 @@ class NoAnswerError(Exception):
 
 
 def ask(place: Place, question: bytes, answer: Callable[[bytes], T | None]) -> T:
-    """Send a question to an interface and return its answer.
-
-    `answer` parses the bytes received; it returns None if more must come. Raise NoAnswerError after
-    `PATIENCE`.
-    """
+    """Return an interface's answer, parsed by `answer` (None: more must come); NoAnswerError after `PATIENCE`."""
     heard, ends = b"", time.monotonic() + PATIENCE
     try:
         with socket.create_connection((place.host, place.port), PATIENCE) as connection:

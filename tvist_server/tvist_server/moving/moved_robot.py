@@ -38,31 +38,18 @@ MOST = 50
 
 
 class MovedRobot(RealArm):
-    """Moves one robot.
-
-    Args:
-        place: Address of the robot.
-        description: The robot file.
-        payload: Payload that the robot should have been told.
-        speed_cap: Largest speed of every joint [rad/s].
-        tool: Tool centre point that the robot should have been told; None: any.
-        start: Joint angles at which the robot should be [rad]; None: any.
-        lag: Lag of its `servoj`, to be compensated; None: unknown.
-
-    Raises:
-        PlantError: The robot must not be moved; the message gives the reason and the remedy.
-    """
+    """Moves one robot; PlantError if that must not be, with the reason and the remedy."""
 
     def __init__(
         self,
         place: Place,
         description: RobotDescription,
-        payload: Payload,
+        payload: Payload,  # payload that the robot should have been told
         *,
-        speed_cap: float,
-        tool: tuple[float, ...] | None = None,
-        start: tuple[float, ...] | None = None,
-        lag: ServoLag | None = None,
+        speed_cap: float,  # largest speed of every joint [rad/s]
+        tool: tuple[float, ...] | None = None,  # tool centre point that it should have been told; None: any
+        start: tuple[float, ...] | None = None,  # where it should be [rad]; None: anywhere
+        lag: ServoLag | None = None,  # lag of its `servoj`, to be compensated; None: unknown
     ) -> None:
         self._robot = WatchedRobot(place, description, payload, OUTPUTS, INPUTS)
         self._place = place
@@ -116,10 +103,7 @@ class MovedRobot(RealArm):
         return self._measured(last or self._robot.newest["target_q"])
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Queue a set-point and return the latest measurements.
-
-        Of periods made up for at once, only the last one sends.
-        """
+        """Queue a set-point and return the latest measurements; of owed periods, only the last one sends."""
         if self._run is not None:
             self._run.add(command, played=(self._pace.tick - self._sight.tick) % self._interval == 0)
             if not self._pace.owed:

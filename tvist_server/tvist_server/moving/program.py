@@ -1,8 +1,4 @@
-"""The program that follows set-points on a robot, and the registers through which it communicates.
-
-All registers are in the upper range, which UR leaves to RTDE clients. `follow.script` is the program, with
-`$NAME` for each number that is substituted here.
-"""
+"""The program `follow.script`, which follows set-points on a robot, and its registers, of the range for clients."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -150,9 +146,9 @@ class Window:
         self._kept.extendleft([setpoint] * (1 if self._kept else KEPT))
 
     def values(self, order: int) -> tuple[float, ...]:
-        """Return the values of an input package, in the order of `INPUTS`; zeros before the first set-point.
+        """Return an input package in the order of `INPUTS`.
 
-        `order` is the number of the run that may follow, or its negative to end it.
+        `order` is the run that may follow, or its negative to end it.
         """
         kept = self._kept or [(0.0,) * JOINTS] * KEPT
         return self.number, order, *(angle for one in kept for angle in one)

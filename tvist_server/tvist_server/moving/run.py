@@ -41,16 +41,7 @@ LOOK_EVERY = 0.2
 
 
 class Run:
-    """Runs the program once.
-
-    Args:
-        robot: The robot, which is connected.
-        place: Address of the robot.
-        number: Number of the run.
-        limits: Limits of the robot.
-        lag: Lag of its `servoj`; None: unknown.
-        check: Returns why the robot accepts no program now; called from another thread.
-    """
+    """Runs the program once, on a connected robot."""
 
     def __init__(
         self,
@@ -58,8 +49,8 @@ class Run:
         place: Place,
         number: int,
         limits: ArmLimits,
-        lag: ServoLag | None,
-        check: Callable[[], str | None],
+        lag: ServoLag | None,  # lag of its `servoj`; None: unknown
+        check: Callable[[], str | None],  # why the robot accepts no program now; any thread
     ) -> None:
         self._robot, self._number, self._window = robot, number, Window()
         self._stands, speed = robot.newest["target_q"], max(limits.velocity)
@@ -84,10 +75,7 @@ class Run:
         return self._window.newest
 
     def add(self, command: DriveCommand, *, played: bool) -> None:
-        """Take the command of a tick, or the present posture until the program follows.
-
-        `played` is True if a period of the robot ends with this tick, so that it gets a set-point.
-        """
+        """Take the command of a tick, or the present posture until the program follows; `played`: send a set-point."""
         if self.ready:
             setpoint = self._setpoints.next(command).tolist()
             if played:
@@ -154,10 +142,7 @@ class Run:
 
 
 class Upload:
-    """Sends a program from its own thread and keeps the connection open: some robots end a program without sender.
-
-    `check` returns why the robot accepts no program now, or None.
-    """
+    """Sends a program from its own thread, and stays connected, since some robots end a program without sender."""
 
     def __init__(self, place: Place, text: str, check: Callable[[], str | None]) -> None:
         self._place, self._text, self._check = place, text, check

@@ -26,19 +26,13 @@ MAX_FILES = 10
 
 
 class BlackBox(Sink):
-    """Keeps the latest messages in memory.
-
-    Args:
-        folder: Folder of the files.
-        info: Returns the robot's description; called when a file is written.
-        start: How the server was started, as in every recording.
-    """
+    """Keeps the latest messages in memory."""
 
     def __init__(
         self,
-        folder: Path,
-        info: Callable[[], Info],
-        start: Mapping[str, Any],
+        folder: Path,  # folder of the files
+        info: Callable[[], Info],  # called when a file is written
+        start: Mapping[str, Any],  # how the server was started, as in every recording
     ) -> None:
         self._folder, self._info, self._start = folder, info, start
         self._kept: deque[Kept] = deque()

@@ -38,43 +38,25 @@ LOOK = 1.0
 
 
 class Recorder(Sink):
-    """Records one robot until it is closed.
+    """Records one robot until it is closed; RecorderError if the recording cannot start.
 
     Messages come from one thread; they are not copied and must not change afterwards. Without `wait`, only
     `close` blocks. No other method raises: if the queue is full or the recording has stopped, messages are
     dropped and counted.
-
-    Args:
-        path: Path of the file; with `keep`, segments are named after it.
-        info: Description of the robot.
-        start: How the server was started: all that a replay needs besides the journal, as JSON types.
-        overwrite: Whether to replace an existing file.
-        keep: Least number of ticks that the recording keeps, in segments, of which the oldest are deleted; so
-            are all but the five latest earlier runs of the same name. None: keep all; the file must not
-            exist.
-        queue_size: Number of messages that may wait for the writer.
-        wait: Whether to wait when the queue is full: for robots whose time waits too (lockstep and free).
-        on_error: Called once, in the writer's thread, with the reason when the recording stops because the
-            disk is full or the file was deleted.
-        on_moved: Called once, in the writer's thread, with a message when the file was moved; the recording
-            continues.
-
-    Raises:
-        RecorderError: The file exists or cannot be written, or `start` cannot be encoded.
     """
 
     def __init__(
         self,
-        path: str | os.PathLike[str],
+        path: str | os.PathLike[str],  # with `keep`, segments are named after it
         info: Info,
-        start: Mapping[str, Any],
+        start: Mapping[str, Any],  # all that a replay needs besides the journal, as JSON types
         *,
-        overwrite: bool = False,
-        keep: int | None = None,
-        queue_size: int = QUEUE_SIZE,
-        wait: bool = False,
-        on_error: Callable[[str], None] | None = None,
-        on_moved: Callable[[str], None] | None = None,
+        overwrite: bool = False,  # whether to replace an existing file
+        keep: int | None = None,  # least number of ticks kept, in segments; None: all
+        queue_size: int = QUEUE_SIZE,  # number of messages that may wait for the writer
+        wait: bool = False,  # whether to wait when the queue is full (lockstep and free)
+        on_error: Callable[[str], None] | None = None,  # called once when the recording stops
+        on_moved: Callable[[str], None] | None = None,  # called once when the file was moved; likewise
     ) -> None:
         if queue_size < 1:
             raise RecorderError(f"queue_size is {queue_size}: must be at least 1")
@@ -200,10 +182,7 @@ class Recorder(Sink):
             self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")
 
     def _look(self) -> None:
-        """Report once that the file was moved.
-
-        Raise DeletedError if it was deleted, because its data is lost anyway.
-        """
+        """Report once that the file was moved; DeletedError if it was deleted, because its data is lost anyway."""
         there, expected = self._file.where(), self._file.path
         self.place = self._file.whole if there == expected else there
         if there != expected and self._on_moved is not None:
@@ -212,10 +191,7 @@ class Recorder(Sink):
             self._on_moved = None
 
     def _drain(self) -> None:
-        """Write the messages that wait now.
-
-        Later ones wait for the next call, so that the file is checked regularly.
-        """
+        """Write the messages that wait now, not later ones, so that the file is checked regularly."""
         for _ in range(len(self._queue)):
             message = self._queue.popleft()
             self._file.write(message.state if isinstance(message, Report) else message)

@@ -1,8 +1,8 @@
 """Files of a recording: one growing file, or segments of which the oldest are deleted.
 
-The segments of `run.mcap` are `run-1-part0001.mcap`, `run-1-part0002.mcap` and so on, those of the next run
-`run-2-part0001.mcap` and so on, so that a service can restart with the same options. Each segment is a
-complete file; if the process is killed, only the last one loses data.
+The segments of `run.mcap` are `run-1-part0001.mcap` and so on, those of the next run `run-2-part0001.mcap`
+and so on, so that a service can restart with the same options. Each is a complete file; only the last one can
+lose data.
 """
 
 import os
@@ -34,30 +34,17 @@ class DeletedError(Exception):
 
 
 class Segments:
-    """Writes a recording.
-
-    Args:
-        path: Path of the file; segments are named after it.
-        topic_of: Topic of each kind of message.
-        heading: Metadata at the beginning of each file.
-        dropped: Number of messages of each kind that the recorder has dropped; the recorder updates it.
-        overwrite: Whether to replace an existing file; segments never replace one.
-        keep: Least number of ticks in all segments together; None: one file with everything.
-
-    Raises:
-        FileExistsError: The file exists.
-        OSError: It cannot be written.
-    """
+    """Writes a recording; FileExistsError or OSError if it cannot."""
 
     def __init__(
         self,
-        path: Path,
+        path: Path,  # segments are named after it
         topic_of: Mapping[type[msgspec.Struct], str],
-        heading: dict[str, str],
-        dropped: Mapping[type[msgspec.Struct], int],
+        heading: dict[str, str],  # metadata at the beginning of each file
+        dropped: Mapping[type[msgspec.Struct], int],  # messages dropped by kind; the recorder updates it
         *,
-        overwrite: bool,
-        keep: int | None,
+        overwrite: bool,  # whether to replace a file; segments never do
+        keep: int | None,  # least number of ticks in all segments; None: one file
     ) -> None:
         self.path = self.whole = path
         """The growing file, and the path of the recording for readers, a pattern if there are segments."""
@@ -100,9 +87,9 @@ class Segments:
         self._counted = now
 
     def where(self) -> Path | None:
-        """Return the present path of the growing file, which may have been moved; None if it is unknown.
+        """Return the path of the growing file, which may have been moved (None.
 
-        Raise DeletedError if the file no longer has a name.
+        Unknown); DeletedError if it has none.
         """
         here = os.fstat(self._stream.fileno())
         if here.st_nlink == 0:
@@ -152,11 +139,7 @@ class Segments:
 
 
 def _new_run(path: Path) -> int:
-    """Return the number of a new run; delete empty runs and the oldest ones.
-
-    Empty runs do not count, so a start that fails displaces no earlier recording. Files that another process
-    writes stay.
-    """
+    """Return the number of a new run; delete the oldest runs and empty ones, which do not count, unless in use."""
     runs: dict[int, list[Path]] = {}
     for place in path.parent.iterdir():
         found = segment_of(place.name)

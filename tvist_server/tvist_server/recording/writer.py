@@ -28,10 +28,7 @@ killed. The library's default of a megabyte would stall for several ticks."""
 
 
 def heading(info: Info, start: Mapping[str, Any]) -> dict[str, str]:
-    """Return the metadata at the beginning of a recording; `start` tells how the server was started, as JSON types.
-
-    Raise TypeError if `start` has a value that JSON cannot represent, ValueError if a number is not finite.
-    """
+    """Return the metadata at the start of a recording; TypeError or ValueError if JSON cannot represent `start`."""
     return {
         "format": FORMAT,
         BEHAVIOUR: str(THIS_BEHAVIOUR),
@@ -41,11 +38,7 @@ def heading(info: Info, start: Mapping[str, Any]) -> dict[str, str]:
 
 
 class RecordingWriter:
-    """Writes one recording to a stream, which the caller closes.
-
-    `topic_of` has the topic of each kind of message. All methods raise OSError if the stream cannot be
-    written to.
-    """
+    """Writes one recording to a stream, which the caller closes; OSError if it cannot be written to."""
 
     def __init__(
         self, stream: IO[bytes], topic_of: Mapping[type[msgspec.Struct], str], heading: dict[str, str]

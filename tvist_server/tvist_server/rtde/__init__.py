@@ -1,5 +1,1 @@
-"""RTDE (real-time data exchange): packages, types of variables, and the client's end.
-
-A package consists of its size in bytes including the header (uint16), its type (uint8) and a payload;
-big-endian.
-"""
+"""RTDE packages: size including header (uint16), type (uint8), payload; big-endian. And the client's end."""

@@ -1,7 +1,7 @@
 """The client's end of an RTDE connection, without socket: bytes in, bytes and rows out.
 
-It negotiates protocol version 2, asks for the controller's version and a list of outputs, claims inputs if
-any are to be written, and starts. It sends no other packages, so without inputs it cannot send a command.
+It negotiates version 2, sets up outputs, claims inputs if any, and starts. Without inputs it can send no
+command.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,19 +38,13 @@ class Received(NamedTuple):
 
 
 class RtdeClient:
-    """Reads one robot's outputs and writes its inputs.
-
-    Args:
-        needed: Types and ranges of the required variables, by name.
-        optional: Types and ranges of variables that some robots lack; their rows then lack them too.
-        inputs: Types of the inputs to claim, by name; no vectors.
-    """
+    """Reads one robot's outputs and writes its inputs."""
 
     def __init__(
         self,
-        needed: Mapping[str, Field],
-        optional: Mapping[str, Field],
-        inputs: Mapping[str, Wire] = MappingProxyType({}),
+        needed: Mapping[str, Field],  # types and ranges of the required variables
+        optional: Mapping[str, Field],  # those of variables that some robots, and so their rows, lack
+        inputs: Mapping[str, Wire] = MappingProxyType({}),  # types of the inputs to claim; no vectors
     ) -> None:
         self._needed, self._types = needed, {**needed, **optional}
         self._inputs, self._claimed = inputs, 0

@@ -34,11 +34,7 @@ class TextLevel(IntEnum):
 
 
 class PackageReader:
-    """Splits a byte stream into packages, and keeps at most one incomplete package.
-
-    A package whose size field is smaller than the header has an unknown end: reading continues after its
-    three bytes.
-    """
+    """Splits a byte stream into packages; after a size smaller than the header, it continues behind the header."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
@@ -76,10 +72,7 @@ def words(kind: PackageKind, head: bytes, names: Iterable[str]) -> bytes:
 
 
 def text_message(version: int, level: TextLevel, text: str, source: str) -> bytes:
-    """Return a text message to the client; text and source are cut after 255 bytes.
-
-    In protocol version 1 the message has neither lengths nor a source.
-    """
+    """Return a text message to the client, without lengths and source in version 1; texts are cut after 255 bytes."""
     message = text.encode()[:TEXT]
     if version == 1:
         return package(PackageKind.TEXT_MESSAGE, bytes([level]) + message)

@@ -31,10 +31,7 @@ class UnreachableError(LostError):
 
 
 class Connection:
-    """One connection to the robot at `place`.
-
-    `address` is its resolved address from `resolved`; `client` defines what is read and written.
-    """
+    """One connection to the robot at `place`, whose `address` comes from `resolved`; `client` reads and writes."""
 
     def __init__(self, place: Place, address: Address, client: RtdeClient) -> None:
         self._place, self.client = place, client
@@ -50,9 +47,9 @@ class Connection:
         self._selector.register(self._socket, selectors.EVENT_WRITE)
 
     def rows(self, timeout: float) -> Sequence[Row]:
-        """Return the rows that have come, after waiting at most `timeout` [s] for the first.
+        """Return the rows that have come, after waiting at most `timeout` [s].
 
-        Raise LostError if there is no robot, or no longer one.
+        LostError if there is no robot (left).
         """
         try:
             ready = self._selector.select(max(0.0, timeout)) or self._selector.select(0.0)

@@ -46,11 +46,7 @@ SAME_CLOCK = 1.0
 
 
 def sight_of(row: Row, constants: Sequence[float], tick: int, missed: int, told: Sequence[str] = ()) -> Sight:
-    """Convert a row to our units and orders.
-
-    `constants` are the torque constants of the joints, for robots that do not report torques [N m/A]; `told`
-    are messages for users. See `Sight` for the others.
-    """
+    """Convert a row to SI units; `constants` are torque constants [N m/A], for robots that report no torques."""
     torque, slider = row.get("actual_current_as_torque"), row.get("target_speed_fraction")
     moment = np.array(row["actual_current"]) * np.array(constants) if torque is None else np.array(torque)
     angles, rates, felt = (
@@ -105,10 +101,9 @@ class Counted(NamedTuple):
 
 
 class RowCount:
-    """Numbers rows in the robot's time: control periods since its clock started.
+    """Numbers rows by control periods since the robot's clock started, `interval` periods apart.
 
-    If that clock is reset, as by a restart, the numbers continue according to the local clock. `interval` is
-    the number of control periods between two rows: 1 at 500 Hz, 4 at 125 Hz.
+    If that clock is reset, as by a restart, the numbers continue according to the local clock.
     """
 
     def __init__(self, interval: int) -> None:
@@ -121,10 +116,10 @@ class RowCount:
         """Numbers of rows taken, missing, and ignored as duplicates since the first one."""
 
     def take(self, timestamp: float, now: float, *, reconnected: bool = False) -> Counted | None:
-        """Take a row; return None if it repeats the last one.
+        """Take a row at the robot's and the local time [s]; return None if it repeats the last one.
 
-        `timestamp` is the robot's time and `now` the local time [s]. Unless the connection was lost before
-        the row (`reconnected`), raise RtdeError if the robot's time goes back or deviates from the local one.
+        Raise RtdeError if the robot's time goes back or deviates from the local one, unless the connection
+        was lost before.
         """
         own, before = round(timestamp / PERIOD), self._own
         if own == before:

@@ -1,7 +1,4 @@
-"""A real robot as a plant that gives the ticks but takes no command; `MovedRobot` writes its inputs.
-
-A lost connection is retried once a second, without delaying the tick thread.
-"""
+"""A real robot as a plant that gives the ticks but takes no command; a lost connection is retried every second."""
 
 import time
 from collections import deque
@@ -40,26 +37,15 @@ the kinematics shifts it by some millimetres."""
 
 
 class WatchedRobot(RealArm):
-    """Reads one robot, and writes the inputs that are claimed.
-
-    Args:
-        place: Address of the robot.
-        description: The robot file.
-        payload: Payload to assume if the robot does not report one.
-        outputs: Types and ranges of further required variables, by name.
-        inputs: Types of the inputs to claim, by name.
-
-    Raises:
-        PlantError: There is no robot, or it cannot be watched.
-    """
+    """Reads one robot, and writes the inputs that are claimed; PlantError if it cannot be watched."""
 
     def __init__(
         self,
         place: Place,
         description: RobotDescription,
-        payload: Payload,
-        outputs: Mapping[str, Field] = MappingProxyType({}),
-        inputs: Mapping[str, Wire] = MappingProxyType({}),
+        payload: Payload,  # if the robot does not report one
+        outputs: Mapping[str, Field] = MappingProxyType({}),  # types and ranges of further required variables
+        inputs: Mapping[str, Wire] = MappingProxyType({}),  # types of the inputs to claim
     ) -> None:
         model = description.robot.model
         if description.joints != JOINTS:
@@ -261,10 +247,7 @@ class WatchedRobot(RealArm):
         return sight
 
     def _lose(self, error: LostError | RtdeError) -> None:
-        """Close the connection and report it in a tick of its own, once for each reason.
-
-        After another loss, an unreachable robot is not reported again.
-        """
+        """Close the connection and report it in a tick of its own, once for each reason, and not if it is a retry."""
         self.close()
         now, why = time.monotonic(), str(error)
         self._retry_at = now + RETRY

@@ -17,10 +17,7 @@ Item = TypeVar("Item")
 
 
 class PortSession(ABC):
-    """One connection; its methods are called from one thread and do not block.
-
-    They do not raise, whatever bytes arrive: errors are answered in the interface's own way.
-    """
+    """One connection. Methods do not block and, whatever bytes arrive, do not raise: errors are answered."""
 
     over = False
     """Whether the connection is closed, or the client has asked to close it."""
@@ -58,10 +55,7 @@ class PortSession(ABC):
 
 
 class InTurnSession(PortSession, Generic[Item]):
-    """Handles a client's requests one at a time.
-
-    Received requests are finished even if the client disconnects; it keeps its control until then.
-    """
+    """Handles a client's requests one at a time, also those left when it disconnects; until then it keeps control."""
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
         super().__init__(robot, control, send)

@@ -47,10 +47,7 @@ MakeSession = Callable[[ConnectionControl, Send], PortSession]
 
 
 class Connection(asyncio.BufferedProtocol):
-    """One client at one interface. It counts towards the robot's limit until it is closed.
-
-    If it is lossless, samples wait for a slow client, because a client advances time.
-    """
+    """One client at one interface; if it is lossless (lockstep), samples wait for a slow client."""
 
     def __init__(
         self,
@@ -231,12 +228,10 @@ class Connection(asyncio.BufferedProtocol):
 
 
 class ConnectionLimit:
-    """Decides which clients may connect.
+    """Decides which clients may connect, so that a flood of new ones does not disturb those at work.
 
     When 90 % of the places are taken, each new client displaces the dispensable one that has been silent for
-    longest. Dispensable are dashboard clients, and RTDE clients outside the time from their start to their
-    pause. All other clients stay connected; a new client is refused only if they take all places, so a flood
-    does not disturb them.
+    longest: a dashboard client, or an RTDE client outside the time from its start to its pause.
     """
 
     def __init__(self, now: Callable[[], float], note: Callable[[str], None], most: int = MOST) -> None:
@@ -277,11 +272,7 @@ class ConnectionLimit:
 
 
 def _left_in(transport: asyncio.Transport) -> bytes:
-    """Return data that arrived on a connection that was reset before it was read.
-
-    A client that sends a script and closes at once, with unread states, resets its connection; a server that
-    writes before it reads notices the reset first.
-    """
+    """Return unread data of a connection that its client has reset, as after sending a script with states unread."""
     left = bytearray()
     with (
         socket.socket(fileno=os.dup(transport.get_extra_info("socket").fileno())) as stream,

@@ -51,22 +51,7 @@ UNREAD = 10
 
 
 class UrInterfaces(Gateway):
-    """A robot's interfaces. The constructor binds the sockets; `open` admits clients.
-
-    Args:
-        desk: The robot's desk.
-        description: Description of the robot.
-        name: Name of the robot on the network.
-        address: IP address to listen on.
-        ports: Port of each interface; an interface without a port stays closed.
-        lockstep: Whether a client advances time, so that no state may be lost.
-        gripper: Carries out a request to the cell's gripper; None: its port stays closed.
-        programs: Folder with programs that clients load by name.
-        reserved: RTDE input variables that no client may own, as if a fieldbus owned them.
-
-    Raises:
-        GatewayError: The server cannot listen on a port.
-    """
+    """A robot's UR interfaces. The constructor binds the sockets (GatewayError if it cannot); `open` admits clients."""
 
     takes: Collection[Topic] = frozenset[Topic]({"state", "event", "io"})
 
@@ -76,12 +61,12 @@ class UrInterfaces(Gateway):
         description: RobotDescription,
         name: str,
         address: str,
-        ports: Mapping[InterfaceName, int],
+        ports: Mapping[InterfaceName, int],  # an interface without a port stays closed
         *,
-        lockstep: bool = False,
-        gripper: AskGripper | None = None,
-        programs: ProgramFolder | None = None,
-        reserved: Sequence[str] = (),
+        lockstep: bool = False,  # whether a client advances time, so that no state may be lost
+        gripper: AskGripper | None = None,  # carries out a request; None: no gripper
+        programs: ProgramFolder | None = None,  # programs that clients load by name
+        reserved: Sequence[str] = (),  # RTDE inputs that no client may own, as if a fieldbus owned them
     ) -> None:
         self.setpoints_refused = 0
         self.address = address

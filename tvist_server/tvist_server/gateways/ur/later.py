@@ -1,7 +1,7 @@
 """Coroutines without an event loop: each resumes inside the call that brings its value.
 
-An asyncio task would resume one turn of the loop later, so that in lockstep an answer could follow the states
-of later ticks. It also means that sessions need no loop in tests.
+An asyncio task would resume a turn of the loop later: in lockstep, answers could follow the states of later
+ticks.
 """
 
 from collections.abc import Coroutine, Generator

@@ -1,8 +1,4 @@
-"""Control for clients without leases: a host takes control with its first command that changes something.
-
-All connections of a host share the lease, because a client opens several, for commands, for inputs and to
-listen. Control is released when the last connection that used it closes.
-"""
+"""Control for clients without leases: a host's connections share it from its first command until the last closes."""
 
 from collections.abc import Awaitable, Callable
 

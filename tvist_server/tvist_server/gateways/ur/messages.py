@@ -1,7 +1,4 @@
-"""Robot messages: packages of type 20, which report events.
-
-int32 length, uint8 20, uint64 time [µs], uint8 source, uint8 kind, body; big-endian.
-"""
+"""Robot messages: int32 length, uint8 20, uint64 time [µs], uint8 source, uint8 kind, body; big-endian."""
 
 from enum import IntEnum
 from struct import Struct

@@ -9,11 +9,7 @@ EVERY: Final = 1.0
 
 
 class Notices:
-    """Passes at most one line a second to `say`. Use it in the event loop's thread.
-
-    The first line is written at once. Of the lines within the following second, only the newest is written,
-    at its end, with the number of omitted lines.
-    """
+    """Passes at most one line a second to `say`, with the number of omitted lines; for the event loop's thread."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say

@@ -1,7 +1,4 @@
-"""Power, brakes and protective stops, as requested on the dashboard and the primary interface.
-
-Each function returns the refusal, or None if the robot is in the requested mode.
-"""
+"""Changes of power, brakes and protective stops; each function returns the refusal, or None for success."""
 
 from collections.abc import Callable
 

@@ -40,10 +40,7 @@ class Host(Protocol):
 
 
 class Programs:
-    """Loads, runs, plays, pauses and stops programs, and reports them to clients.
-
-    It learns the program's state from replies and from `io`, which arrive in the controller's order.
-    """
+    """Loads, runs, plays, pauses and stops programs, and reports them; replies and `io` tell their state."""
 
     def __init__(self, host: Host, external: ExternalControl) -> None:
         self._host, self._external = host, external

@@ -1,7 +1,4 @@
-"""UR's real-time interface, ports 30003 and 30013: all values of a tick, at every tick.
-
-A package has 1220 bytes: its length as an int32, then 152 doubles, big-endian.
-"""
+"""UR's real-time interface, ports 30003 and 30013: at every tick an int32 length and 152 doubles, big-endian."""
 
 from struct import Struct
 from typing import Final
@@ -77,11 +74,7 @@ def package(snapshot: Snapshot) -> bytes:
 
 
 class RealtimeSession(ScriptSession):
-    """One client of the real-time interface.
-
-    Its input is treated as URScript and answered on the primary interface; input on the read-only port is
-    ignored.
-    """
+    """One client of the real-time interface; its input is URScript, ignored on the read-only port."""
 
     def receive(self, data: bytes) -> None:
         if not self._read_only:

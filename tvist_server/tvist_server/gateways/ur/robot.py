@@ -13,25 +13,16 @@ NO_MODE = "NONE"
 
 
 class UrRobot:
-    """State of one robot that the clients of its interfaces share.
-
-    Args:
-        description: Description of the robot.
-        name: Name of the robot on the network.
-        tell: Sends a robot message to all clients that get them.
-        external: Completes programs with an External Control node.
-        report: Writes a line to the server's console.
-        report_refusal: Writes a line about a refusal, which lines of other kinds cannot displace.
-    """
+    """State of one robot that the clients of its interfaces share."""
 
     def __init__(
         self,
         description: RobotDescription,
         name: str,
-        tell: Callable[[bytes], None],
-        external: ExternalControl,
-        report: Callable[[str], None],
-        report_refusal: Callable[[str], None],
+        tell: Callable[[bytes], None],  # sends a robot message to all clients that get them
+        external: ExternalControl,  # completes programs with an External Control node
+        report: Callable[[str], None],  # writes a line to the server's console
+        report_refusal: Callable[[str], None],  # the same for refusals, which other lines cannot displace
     ) -> None:
         self.description, self.name = description, name
         self.tell, self.report, self.report_refusal = tell, report, report_refusal
@@ -68,11 +59,10 @@ class InputOwners:
 
 
 class PendingWrites:
-    """Values requested from the controller, so that no value is requested twice.
+    """Values requested from the controller, so that none is requested twice although clients repeat them at 500 Hz.
 
-    Clients repeat their values 500 times a second, and the robot publishes changes some ticks later. A value
-    is new if it differs from the last one requested, or if that request is answered and the robot shows
-    another value, because another client has set it since.
+    A value is new if it differs from the last one requested, or if that request is answered and the robot
+    shows another value, set by another client.
     """
 
     def __init__(self) -> None:

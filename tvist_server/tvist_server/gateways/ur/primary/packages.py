@@ -1,7 +1,6 @@
-"""Robot state: the package of type 16, 1386 bytes in thirteen parts.
+"""Robot state: the package of type 16, 1386 bytes in thirteen parts, as of a controller with software 5.
 
 int32 length, uint8 16, then the parts: uint32 length (including itself), uint8 number, body; big-endian.
-Order and lengths are those of a controller with software 5.
 """
 
 from struct import Struct
@@ -66,10 +65,7 @@ def robot_state(description: RobotDescription, snapshot: Snapshot) -> bytes:
 
 
 def robot_type(description: RobotDescription) -> int:
-    """Return UR's number of a robot type, the same with and without `e`; 0 if the robot is not UR's.
-
-    Source: `RobotType` in UR's client library, ur_client_library/ur/datatypes.h.
-    """
+    """Return UR's number of a robot type, 0 if it is not UR's; `RobotType` in ur_client_library/ur/datatypes.h."""
     return _TYPES.get(series(description.robot.model) or "", 0)
 
 

@@ -1,9 +1,4 @@
-"""Cuts script text from clients into units that can be carried out one by one.
-
-A unit is a line, or a block from `def`, `sec` or another word that opens a block to its `end`. The word opens
-the block even if its colon follows on a later line. A carriage return before a line feed is dropped; a last
-line without a line feed is incomplete.
-"""
+"""Cuts script text from clients into lines and blocks; a last line without a line feed is incomplete."""
 
 import re
 from dataclasses import dataclass

@@ -33,11 +33,7 @@ CHANGES: Final[Mapping[str, Callable[[UrRobot, ConnectionControl], Awaitable[Ref
 
 
 class ScriptSession(InTurnSession[Unit]):
-    """Carries out units of script text in order.
-
-    A few commands are the interface's own; everything else is a program for the controller. The server's
-    console also shows the result of each unit, since few clients show it.
-    """
+    """Runs a few commands of the interface, and other script text as programs; the console shows the results."""
 
     def __init__(
         self, robot: UrRobot, control: ConnectionControl, send: Send, *, read_only: bool = False
@@ -114,10 +110,7 @@ class ScriptSession(InTurnSession[Unit]):
 
 
 class PrimarySession(ScriptSession):
-    """Sends a client the robot's state and messages, and takes its commands.
-
-    The secondary interface lacks messages, as on UR's controllers: some of its clients expect only the state.
-    """
+    """Sends a client the robot's state and messages, and takes its commands; the secondary one has no messages."""
 
     def __init__(
         self,
@@ -149,10 +142,7 @@ class PrimarySession(ScriptSession):
             self._send(message)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Return the robot state ten times a second, and at once when the safety mode changes.
-
-        A client that reacts to an error code then already has the matching state.
-        """
+        """Return the robot state ten times a second, and at once when the safety mode changes, before error codes."""
         mode = snapshot.safety_mode
         if mode != self._safety_mode:
             if self._safety_mode is not None:
@@ -173,10 +163,7 @@ class PrimarySession(ScriptSession):
         return b""
 
     def event(self, event: Event) -> None:
-        """Send a protective stop as an error, and other safety stops and warnings as log lines.
-
-        `Programs` sends the messages of programs, once to all clients.
-        """
+        """Send a protective stop as an error, other safety stops and warnings as text; `Programs` reports programs."""
         stamp = messages.stamp(self._robot.latest)
         why = event.why or ""
         if event.kind == "protective_stop":

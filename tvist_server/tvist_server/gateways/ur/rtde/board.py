@@ -1,7 +1,4 @@
-"""Data packages of RTDE clients: each value is written once a tick, and each recipe gathers its bytes.
-
-Values that no recipe names are not computed.
-"""
+"""Data packages of RTDE clients: values that recipes name are computed once a tick, and gathered per recipe."""
 
 from collections.abc import Iterable
 from itertools import chain
@@ -110,11 +107,7 @@ class _Bytes:
         return self._gathered[self._spans[recipe.text]]
 
     def _places_of(self, name: str) -> list[int]:
-        """Return the places of a variable's bytes.
-
-        A short vector is filled with zeros, because clients expect six entries; see `UrPorts` for more
-        joints.
-        """
+        """Return the places of a variable's bytes; a short vector is filled with zeros to six entries."""
         (part, number), wire = PARTS[name], OUTPUTS[name]
         place, size = self._places[part], wire.size // wire.length
         entries = place.entries // part.variables
@@ -137,10 +130,7 @@ class _Place(NamedTuple):
 
 
 class _Packing:
-    """Writes parts consecutively from the index `first` on, in one call; adds the place of each to `places`.
-
-    The snapshot determines the lengths of lists.
-    """
+    """Writes parts from the index `first` on in one call, and adds their places; a snapshot gives the lengths."""
 
     def __init__(self, parts: list[Part], snapshot: Snapshot, first: int, places: dict[Part, _Place]) -> None:
         found = [(part, part.read(snapshot)) for part in parts]

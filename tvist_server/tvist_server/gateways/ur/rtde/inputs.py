@@ -77,10 +77,7 @@ wrench serves programs of the client in control, and every connection of `ur_rtd
 
 
 def matching(patterns: Iterable[str]) -> list[str]:
-    """Return the input variables that match patterns with `*`, `?` and `[0-9]`.
-
-    Raise StartError if a pattern matches none.
-    """
+    """Return the input variables that match patterns with `*`, `?` and `[0-9]`; StartError if one matches none."""
     found = {pattern: [name for name in INPUTS if fnmatchcase(name, pattern)] for pattern in patterns}
     if wrong := [pattern for pattern, names in found.items() if not names]:
         why = "must be the name of an RTDE input, such as speed_slider_mask or input_int_register_*"

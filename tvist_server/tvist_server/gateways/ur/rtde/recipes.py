@@ -44,9 +44,9 @@ class InputRecipe:
         self._all = Struct(">" + "".join(wire.value for _, wire in self._fields))
 
     def values(self, data: bytes) -> dict[str, Value]:
-        """Return the value of each variable in the payload of a data package.
+        """Return the values in a data package.
 
-        Variables that a short payload does not contain completely are omitted; extra bytes are ignored.
+        Variables that a short payload lacks are omitted, extra bytes ignored.
         """
         if len(data) >= self._all.size:
             numbers, fields = self._all.unpack_from(data), self._fields

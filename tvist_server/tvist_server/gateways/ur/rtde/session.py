@@ -1,7 +1,7 @@
 """One RTDE connection: its protocol version, its recipes, and the answers to its packages.
 
-A connection uses protocol version 1 until the client requests version 2. In version 1 the client cannot
-choose a frequency, packages of outputs carry no recipe id, and text messages carry no source.
+Version 1, in use until the client requests version 2, has no frequency, no recipe id in packages of outputs,
+and no source in text messages.
 """
 
 from collections.abc import Callable, Mapping
@@ -44,8 +44,8 @@ _TRUE, _FALSE = b"\x01", b"\x00"
 class RtdeSession(PortSession):
     """Answers the packages of one client and sends it the outputs that it has subscribed to.
 
-    `boards` make the data packages of all clients of the robot, by the number of ticks between two packages,
-    so that variables that only a slow client reads are not computed for the others.
+    `boards` make all clients' data packages, by the ticks between two, so that each computes only what its
+    clients read.
     """
 
     client_begins = True
@@ -87,7 +87,7 @@ class RtdeSession(PortSession):
     def sample(self, snapshot: Snapshot) -> bytes:
         """Return a data package if one is due, otherwise no bytes.
 
-        The first is sent with the first tick after the start, the others at the frequency of the recipe.
+        The first is due at the first tick after the start.
         """
         if not self.served or self._outputs is None:
             return b""
@@ -121,9 +121,9 @@ class RtdeSession(PortSession):
         self._send(package(PackageKind.GET_URCONTROL_VERSION, _VERSION.pack(*numbers)))
 
     def _set_up_outputs(self, payload: bytes) -> None:
-        """Replace the output recipe, and answer with its id and the types of its variables.
+        """Replace the output recipe.
 
-        If the new recipe is invalid, the id is 0 and no recipe is left. Version 1 has no id.
+        Answer with its types and, in version 2, its id (0 if it is invalid and removed).
         """
         frequency = RATE
         if self._version > 1:
@@ -139,9 +139,9 @@ class RtdeSession(PortSession):
         self._send(words(PackageKind.SETUP_OUTPUTS, head, recipe.words))
 
     def _set_up_inputs(self, payload: bytes) -> None:
-        """Add an input recipe, and answer with its id and the types of its variables.
+        """Add an input recipe.
 
-        If a variable cannot be set, or there are 255 recipes, the id is 0 and no variable changes its owner.
+        Answer with its id and types. The id is 0 if a variable cannot be set or 255 are used.
         """
         names = split(payload)
         types = [self._input_word(name) for name in names]
@@ -193,20 +193,14 @@ class RtdeSession(PortSession):
         """Ignore a text message: a UR robot would show it in the log of the teach pendant."""
 
     def _complain(self, sentence: str) -> None:
-        """Send the client a warning, once per start.
-
-        Before the start, clients would mistake it for the answer to their recipe.
-        """
+        """Send the client a warning once per start; before, clients would mistake it for the answer to a recipe."""
         if self.served and sentence not in self._said and len(self._said) < SENTENCES:
             self._said.add(sentence)
             self._send(text_message(self._version, TextLevel.WARNING, sentence, "RTDE"))
 
 
 def ticks_between(frequency: float) -> int:
-    """Return the ticks between two data packages: 500 Hz divided by the frequency [Hz], rounded down.
-
-    The frequency is clipped to 1 to 500; zero, negative numbers and NaN stand for 500.
-    """
+    """Return 500 Hz over a frequency, rounded down; the frequency is clipped to 1 to 500, invalid ones count as 500."""
     if not frequency > 0.0:
         return 1
     # 500 / (500 / 15) is 14.999999999999998, but a client that wants every 15th tick must get it.

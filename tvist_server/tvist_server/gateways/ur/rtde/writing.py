@@ -21,11 +21,7 @@ LARGEST = 1e308
 
 
 class InputWriter:
-    """Sets the inputs that one connection sends.
-
-    A variable that is missing in a package keeps its last value on this connection. Before its first value, a
-    mask is 0 and any other variable is not set.
-    """
+    """Sets the inputs of one connection; missing ones keep their last value, and a mask is 0 before its first."""
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, complain: Callable[[str], None]) -> None:
         self._robot = robot
