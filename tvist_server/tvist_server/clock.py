@@ -58,8 +58,8 @@ class Mailbox:
         try:
             do()
         except Exception:
-            log.exception("a robot ticks no more")
-            self.end("the robot ticks no more, because of an error: see the log")
+            log.exception("a robot has stopped ticking")
+            self.end("the robot has stopped ticking because of an error: see the log")
 
     def turn(self) -> None:
         """Do the waiting jobs and tick."""
@@ -122,7 +122,7 @@ class Clock(ABC):
         except BaseException:  # the thread must not end silently
             log.exception("the controller's thread ended")
             for robot in self._robots:
-                robot.end("the controller's thread ended by an error: see the log")
+                robot.end("the controller's thread has ended because of an error: see the log")
 
     @abstractmethod
     def _run(self) -> None: ...
@@ -232,7 +232,7 @@ class Realtime(Clock):
         robot.guarded(robot.jobs.do_waiting)
         if not silent and robot.interval is None:  # a watched robot reports by itself that it is lost
             robot.host.warn(
-                "the arm does not begin its next tick: time stands still, and it obeys no command"
+                "the arm does not start its next tick: time stands still, and commands have no effect"
             )
         return True
 

@@ -201,13 +201,13 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         if not real:
             given = [name for name in _REAL if getattr(self, name)]
             if given:
-                raise ValueError(f"{given[0]} is for a robot of UR's: give --plant ur://ADDRESS, too")
+                raise ValueError(f"{given[0]} needs a real UR robot: also give --plant ur://ADDRESS")
             return
         asked: dict[str, object] = {
             "adapt": self.adapt, "cell": self.cell, "state": self.state, "truth": self.truth or None,
             "robots": self.robots,
         }  # fmt: skip
-        what = "only knows what its own controller tells"
+        what = "is not simulated"
         if not self.enable_motion:
             asked |= {
                 "shaper": self.shaper, "start": self.start, "speed_cap": self.speed_cap,

@@ -120,11 +120,7 @@ class Server:
 
     def _tell_router(self, where: str, there: bool) -> None:
         """Report to clients, console and recording that the router was lost or is back."""
-        why = (
-            "is back"
-            if there
-            else "was lost, and with it the clients behind it; the robot looks for it again"
-        )
+        why = "is back" if there else "and to its clients was lost; the robot tries to reconnect"
         for robot in self.robots:
             robot.warn(f"the connection to the router at {where} {why}")
 

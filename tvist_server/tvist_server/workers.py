@@ -119,7 +119,7 @@ class Workers:
             failures = self.close()
         said = [*([why] if why is not None else []), *failures]
         if said:
-            raise WorkersError("; ".join(said) + ": the other robots were stopped, too")
+            raise WorkersError("; ".join(said) + ": the other robots were also stopped")
 
     def close(self) -> list[str]:
         """End the other processes, then the network; return the failures. A second call does nothing."""

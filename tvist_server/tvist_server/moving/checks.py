@@ -33,31 +33,30 @@ PLAUSIBLE = 2.0
 """Largest error of the measured gravity for which the accelerometer is used [m/s²]."""
 _AGAIN = "then power on here"
 _SAFETY = {
-    SafetyMode.PROTECTIVE_STOP: "it has made a protective stop: see why, and unlock it at the robot, then here",
-    SafetyMode.SAFEGUARD_STOP: f"a safeguard has stopped it: release that, stop the program at the robot, {_AGAIN}",
+    SafetyMode.PROTECTIVE_STOP: "it has made a protective stop: remove the cause, unlock it at the robot, then here",
+    SafetyMode.SAFEGUARD_STOP: f"a safeguard has stopped it: reset it, stop the program at the robot, {_AGAIN}",
     SafetyMode.SYSTEM_EMERGENCY_STOP: "the system's emergency stop was pressed: release it, switch the robot on at its "
     f"teach pendant, {_AGAIN}",
     SafetyMode.ROBOT_EMERGENCY_STOP: "its emergency stop was pressed: release it, switch the robot on at its teach "
     f"pendant, {_AGAIN}",
 }
 _ENDED = {
-    Ended.ORDERED: f"its program was told to end by somebody else: see who writes its registers, {_AGAIN}",
-    Ended.SILENCE: "no set-point reached it for 40 ms, so that it has braked: look at the network and at the load of "
-    f"this machine, {_AGAIN}",
-    Ended.AWAY: f"it stands more than .01 rad from the first set-point: {_AGAIN}, to begin where it stands",
-    Ended.TOO_FAST: f"a set-point was faster than the speed cap, so that it has braked: {_AGAIN}, and tell us how",
-    Ended.LOST: f"its program was paused or fell behind, so that it has braked: see why, {_AGAIN}",
-    Ended.STRAYED: "the arm did not follow the set-points, so that it has braked: see what held it, and whether the "
-    f"speed slider was moved while it was going, {_AGAIN}",
+    Ended.ORDERED: f"another client has ended its program: find the client that writes its registers, {_AGAIN}",
+    Ended.SILENCE: "no set-point reached it for 40 ms, so it braked: check the network and the load of this machine, "
+    f"{_AGAIN}",
+    Ended.AWAY: "it is more than 0.01 rad from the first set-point: power on here to start from its present position",
+    Ended.TOO_FAST: "a set-point exceeded the speed cap, so it braked: power on here, and report how this happened",
+    Ended.LOST: f"its program was paused or fell behind, so it braked: find the cause, {_AGAIN}",
+    Ended.STRAYED: "the arm did not follow the set-points, so it braked: look for an obstacle, do not move the speed "
+    f"slider during a motion, {_AGAIN}",
 }
 _MOVABLE = {SafetyMode.NORMAL, SafetyMode.REDUCED}
 _PAUSED = {RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING}
 REPLACED = (
-    f"another program has replaced the one that follows set-points: end it, and see who has sent it, {_AGAIN}"
+    f"another program has replaced the one that follows set-points: end it, find out who sent it, {_AGAIN}"
 )
 FELL_SILENT = Halt(
-    "it says nothing any more, so that its own program has stopped it: look at the network and at the robot, "
-    f"{_AGAIN}",
+    f"it says nothing any more, so its own program has stopped it: check the network and the robot, {_AGAIN}",
     SafetyMode.UNDEFINED,
 )
 
@@ -107,14 +106,14 @@ def version_trouble(version: Sequence[int]) -> str | None:
     if least is not None and minor >= least:
         return None
     own = f"{major}.{minor}"
-    return f"its software {own} may not run our program: update it to 5.9 or later, on a CB3 robot to 3.14 or later"
+    return f"its software {own} may not run tvist's program: update it to 5.9 or later, on a CB3 robot to 3.14 or later"
 
 
 def state_trouble(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> str | None:
     """Return why a robot must not be moved now, None if it may; `may_play`: the program that runs on it is ours."""
     mode, safety, runtime = sight.modes
     if mode == RobotMode.DISCONNECTED:
-        return "it is not connected: look at the network, and at the robot"
+        return "it is not connected: check the network and the robot"
     if safety != SafetyMode.NORMAL:
         return f"its safety mode is {_name(SafetyMode, safety)}: clear that at the robot, until it is NORMAL"
     if mode != RobotMode.RUNNING:
@@ -127,12 +126,12 @@ def state_trouble(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> st
 def _posture_trouble(wanted: Wanted, sight: Sight) -> str | None:
     target, measured = sight.target[0], sight.measured.q
     if np.abs(sight.target[1]).max() > STILL:
-        return "it moves: wait until it stands"
+        return "it moves: wait until it is at rest"
     if (joint := _apart(target, measured)) is not None:
         by = abs(target[joint] - measured[joint])
         return (
-            f"joint {joint} is {by:.3f} rad from where its controller has it, more than {NEAR:g}: see what holds it, "
-            "or switch its power off and on"
+            f"joint {joint} is {by:.3f} rad from where its controller has it, more than {NEAR:g}: remove what "
+            "holds it, or switch its power off and on"
         )
     if wanted.q is not None and (joint := _apart(np.array(wanted.q), target)) is not None:
         return (
@@ -177,8 +176,8 @@ def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> 
     if leans <= LEANING:
         return None
     return (
-        f"its accelerometer feels gravity {np.degrees(leans):.0f}° away from where an upright base has it: the robot "
-        "file is for an upright robot, and this one hangs, leans, or is another model"
+        f"its accelerometer measures gravity {np.degrees(leans):.0f}° from its direction for an upright base: the "
+        "robot file is for an upright robot, but this one hangs, leans, or is another model"
     )
 
 

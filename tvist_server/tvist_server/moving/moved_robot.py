@@ -65,10 +65,10 @@ class MovedRobot(RealArm):
         if tells_gravity(felt):
             self._refuse_if(mounting_trouble(description, self._sight.measured.q, felt))
         else:
-            self._told.append("its accelerometer does not tell gravity: nobody has checked how it is mounted")
+            self._told.append("its accelerometer does not measure gravity: its mounting was not checked")
         self._wanted = self._wanted._replace(q=None)  # `start` only matters before the first motion
         if own is None:
-            self._told.append("its primary interface tells no limits: those of the robot file hold alone")
+            self._told.append("its primary interface reports no limits: only those of the robot file apply")
         if not answers:
             self._told.append("it has no dashboard: model and remote control were not checked")
         self._pace, self._number = Pace(), time.monotonic_ns() // 1000 % NUMBERS

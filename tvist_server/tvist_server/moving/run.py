@@ -110,9 +110,7 @@ class Run:
             if self.halt is None and self._upload.trouble is not None:
                 self.halt = Halt(self._upload.trouble, sight.modes[1])
             elif self.halt is None and time.monotonic() - self._begun > BEGINS:
-                why = (
-                    f"our program has not begun within {BEGINS:g} s: look at its teach pendant for a message"
-                )
+                why = f"the program has not started within {BEGINS:g} s: look for a message on its teach pendant"
                 self.halt = Halt(f"{why}, then power on here", sight.modes[1])
             return None
         self._still = self._still + 1 if state == State.FOLLOWING and played == self._played else 0

@@ -167,15 +167,15 @@ class WatchedRobot(RealArm):
         )
         if self._interval > 1:
             self._notes.append(
-                "125 rows a second show vibration up to 62.5 Hz: take what is above that from a sensor of your own"
+                "125 rows a second show vibration up to 62.5 Hz: use an external sensor for higher frequencies"
             )
         if not has_real_payload(rows[-1]):
             told = list(rows[-1]["payload_inertia"])
             self._notes.append(
-                f"no body has the payload inertia {told} that it was told: it counts as 0; correct it at the robot"
+                f"no body can have its payload inertia {told}: 0 is used instead; correct it at the robot"
             )
         if lacking:
-            self._notes.append(f"its software does not tell {', '.join(lacking)}")
+            self._notes.append(f"its software does not report {', '.join(lacking)}")
 
     def _connect(self) -> None:
         self._connection, self._checked = self._new_connection(), False
@@ -203,7 +203,9 @@ class WatchedRobot(RealArm):
     def _check(self, row: Row) -> None:
         """Raise LostError if the tool is not where the robot file has it; without a tool in the row, only note that."""
         if "tcp_offset" not in row:
-            self._notes.append(f"whether it is a {self._model} is unknown, since it does not tell its tool")
+            self._notes.append(
+                f"whether it is a {self._model} is unknown, because it does not report its tool"
+            )
             return
         tool = self._arm.with_tool(row["tcp_offset"])
         here, there = tool.pose(np.array(row["actual_q"]))[1], np.array(row["actual_TCP_pose"][:3])
@@ -234,8 +236,8 @@ class WatchedRobot(RealArm):
         if self._untold and now - self._told_at >= TELL_EVERY:
             due = self._count.rows + self._count.missing
             self._notes.append(
-                f"{self._untold} rows of the robot are missing, {self._count.missing} of {due} since the start: look "
-                "at the network and at the load of this machine"
+                f"{self._untold} rows of the robot are missing, {self._count.missing} of {due} since the start: "
+                "check the network and the load of this machine"
             )
             self._told_at, self._untold = now, 0
         self._sights.append((self._sight(row, counted.tick), row))
@@ -257,7 +259,7 @@ class WatchedRobot(RealArm):
         self._lost = (since if before else now), why
         latest, row = self._sights[-1] if self._sights else (self._last, self.newest)
         modes = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
-        told = (*self._notes, f"{why}; the state stands still, and a connection is tried every second")
+        told = (*self._notes, f"{why}; the state stands still, and a connection is attempted every second")
         self._notes = []
         self._sights.append((replace(latest, tick=self._count.silence(), modes=modes, told=told), row))
 
