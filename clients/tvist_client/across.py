@@ -80,19 +80,10 @@ class Newest(NamedTuple):
 
 
 class ManyStates(Across):
-    """States of all robots that a key selects. Use it as an asynchronous context.
+    """Newest state of each robot that a key selects, decoded by `look`. Use it as an asynchronous context.
 
-    Only the newest state of each robot is kept; `look` decodes it.
-
-    Args:
-        selector: Key with wildcards that ends in `/state`: `tvist/*/state`, or `**/tvist/*/state` for all
-            namespaces.
-        endpoint: Endpoint of a router, or of one server.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace that precedes the key.
-
-    Raises:
-        MisuseError: The selector does not end in `/state`, or is not a key.
+    `selector` is a key with wildcards that ends in `/state`, such as `tvist/*/state`, or `**/tvist/*/state` for all
+    namespaces; MisuseError if it is not. `namespace` precedes it.
     """
 
     def __init__(

@@ -1,7 +1,4 @@
-"""Arguments of a message: the types that users pass, and their conversion to the types of the message's fields.
-
-Both follow from the fields. The robot checks ranges, because it knows more of them.
-"""
+"""Converts users' arguments to the fields of messages, according to the fields' types; the robot checks ranges."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping

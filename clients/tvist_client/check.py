@@ -91,10 +91,9 @@ def check(
 ) -> CheckReport:
     """Connect to a robot, receive a state, have a command refused, and ask whether the robot may be moved.
 
-    Nothing is changed. `alive` only checks that the server answers and, in real time, ticks, so that an
-    orchestrator does not kill a stopped robot that is about to be unlocked. While no robot answers, or it is
-    starting, the check is repeated for `wait` seconds, and `tell` gets each result. If `name` is None, it is
-    `ur5e` if present, else the first robot.
+    Nothing is changed. `alive` only checks that the server answers and, in real time, ticks: an orchestrator must not
+    kill a stopped robot. While no robot answers, or it is starting, repeat this for `wait` seconds and `tell` each
+    result. Without a name, the robot is `ur5e` if present, else the first one.
     """
     deadline = time.monotonic() + wait
     while True:

@@ -68,31 +68,19 @@ class Described:
 
 
 class Sent(Described):
-    """A method that sends one command.
-
-    Args:
-        kind: The command. Fields without a default are positional arguments; the others are keyword
-            arguments.
-        carry_out: Sends the command. Its further arguments are also arguments of the method; its docstring
-            describes the result.
-        positional: Number of positional arguments, if some of them have a default.
-        returns: Type of the result, if `carry_out` does not annotate it.
-    """
+    """A method that sends one command; fields without a default are positional arguments."""
 
     def __init__(
         self,
         kind: type[Struct],
-        carry_out: Callable[..., Awaitable[Any]],
-        positional: int | None = None,
-        returns: Any = None,
+        carry_out: Callable[..., Awaitable[Any]],  # sends it; its further arguments are the method's, too
+        positional: int | None = None,  # number of positional arguments
+        returns: Any = None,  # type of the result, if `carry_out` does not annotate it
     ) -> None:
         self._kind, self._carry_out, self._positional, self._returns = kind, carry_out, positional, returns
 
     def __call__(self, owner: Any, *values: Any, **named: Any) -> Coroutine[Any, Any, Any]:
-        """Return a coroutine that sends the command; Python's warnings show the name of this method.
-
-        Raise TypeError if the arguments are not those of the method.
-        """
+        """Return a coroutine that sends the command, with this method's name for Python's warnings; may raise TypeError."""
         try:
             given = self.__signature__.bind(owner, *values, **named).arguments
         except TypeError as error:

@@ -1,7 +1,4 @@
-"""Commands of an arm under control, and questions to a robot.
-
-`commands.pyi`, written by `make schemas`, has their arguments.
-"""
+"""Commands of an arm under control, and questions to a robot; `make schemas` writes their arguments to a stub."""
 
 from tvist_client.command import Leased, asking, beginning, dating, guiding, moving, sending, stopping
 from tvist_protocol import commands, forces, io, kinematics, motions, programs, simulation

@@ -270,10 +270,7 @@ class Connection(Questions):
 async def step(
     robot: Connection, token: str, ticks: int, setpoints: Sequence[StepSetpoint] | None = None
 ) -> int:
-    """Send one `simulation.step`, wait for the state of its last tick, and return that tick.
-
-    If this client holds the clock, the clock's token replaces the lease's.
-    """
+    """Send one `simulation.step`, with the clock's token if this client holds the clock; return its last tick."""
     robot.watch()
     ticks = whole(ticks, "ticks", 1, LONGEST_STEP)
     clock = robot.clock_token or token

@@ -1,7 +1,4 @@
-"""The robots of a network, found by their liveliness tokens: description, condition, and how to stop all of them.
-
-One session without a namespace sees all namespaces. It gets one telemetry message a second from each robot.
-"""
+"""The robots of a network, found by their liveliness tokens over one session without a namespace."""
 
 import asyncio
 from collections.abc import Collection
@@ -80,13 +77,7 @@ class StopReport(msgspec.Struct, frozen=True):
 class Fleet(Across):
     """Robots on a network, over one session. Use it as an asynchronous context.
 
-    Args:
-        endpoint: Endpoint of a router, or of one server.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace that the robots are in or below; empty: all namespaces.
-
-    Raises:
-        ProtocolError: The namespace is invalid.
+    `endpoint` is that of a router or server. The robots are in or below `namespace`; ProtocolError if it is invalid.
     """
 
     def __init__(

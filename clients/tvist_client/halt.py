@@ -39,10 +39,7 @@ def halt(
     security: Folder | None = None,
     namespace: str = "",
 ) -> HaltReport:
-    """Send `stop` without control, and wait until the arm is at rest; in lockstep, a client has to step time.
-
-    If `name` is None, it is the only robot at the endpoint, or `ur5e`.
-    """
+    """Send `stop` without control and wait for rest; without a name, to the only robot at the endpoint, or `ur5e`."""
     return asyncio.run(_halt(endpoint, name, security, namespace))
 
 

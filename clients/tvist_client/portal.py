@@ -26,9 +26,8 @@ class Portal:
     def call(self, function: Callable[[], Awaitable[T]]) -> T:
         """Run a function on the loop and wait for its result in this thread; Ctrl-C cancels it.
 
-        An error of the client or protocol is raised without its traceback through the loop and its cause,
-        which would distract from the message. Raise NotConnectedError if the portal is closed, MisuseError in
-        a callback, which would wait for itself.
+        An error of the client or protocol is raised without its traceback through the loop, which would distract.
+        Raise NotConnectedError if the portal is closed, MisuseError in a callback, which would wait for itself.
         """
         if self.closed:
             raise NotConnectedError("the connection is closed: open another one")

@@ -164,10 +164,7 @@ class Robot(Connection):
     async def _granted(
         self, take: TakeControl | TakeClock, release: type[ReleaseControl | ReleaseClock]
     ) -> AsyncIterator[tuple[str, float | None]]:
-        """Hold a right for the duration of a block; yield its token and its duration without renewal [s].
-
-        The client is announced first, so that the right ends if it disconnects.
-        """
+        """Hold a right for the duration of a block; yield its token and its duration without renewal [s]."""
         await self._transport.announce(take.client)
         try:
             accepted = await self.request(take)

@@ -15,10 +15,7 @@ from tvist_protocol.stream import Event
 
 
 class Servo:
-    """The stream that `Arm.servo` yields.
-
-    It numbers set-points from 0 and checks them, because a robot does not answer.
-    """
+    """The stream that `Arm.servo` yields; it numbers and checks set-points, because a robot does not answer them."""
 
     period: float
     """Time between two set-points [s]."""

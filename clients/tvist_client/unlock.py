@@ -54,17 +54,13 @@ def unlock(
 ) -> UnlockReport:
     """Take control, release what a client can release, and check that the robot does not stop again.
 
-    A robot that is ready is not changed. In lockstep, time advances by some hundred ticks. If `name` is None,
-    it is the only robot at the endpoint, or `ur5e`.
+    In lockstep, time advances by some hundred ticks. Without a name, it is the only robot at the endpoint, or `ur5e`.
     """
     return asyncio.run(_unlock(endpoint, name, security, namespace, power_on=power_on))
 
 
 async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[str]:
-    """Restart the safety system, unlock a protective stop and power on the arm, as far as needed and possible.
-
-    Return what was done, as `UnlockReport.done`; `readiness.look` tells whether the robot is then ready.
-    """
+    """Restart the safety system, unlock a protective stop and power on the arm, as far as needed; return what was done."""
     done: list[str] = []
     found = await look(robot)
     if found.safety_mode in _WHAT_IT_FOUND:

@@ -1,7 +1,4 @@
-"""Derives classes without `await` from those with it: a call waits in the caller's thread, in a portal.
-
-Results whose class has a counterpart without `await` are converted to it.
-"""
+"""Derives classes without `await` from those with it: calls, and their results, wait in the caller's thread."""
 
 import inspect
 from collections.abc import AsyncIterator, Iterator

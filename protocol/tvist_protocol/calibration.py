@@ -181,11 +181,7 @@ class CalibrationError(ValueError):
 
 
 def calibration_of(content: Mapping[str, Any]) -> Calibration:
-    """Return the calibration in a map, such as that of a `set_estimator`.
-
-    Raises:
-        ProtocolError: A key is unknown, missing or out of range; `where` names it within `calibration`.
-    """
+    """Return the calibration in a map; ProtocolError, with `where` within `calibration`, if it is invalid."""
     try:
         return checked(content, Calibration)
     except ProtocolError as fault:
@@ -196,11 +192,7 @@ def calibration_of(content: Mapping[str, Any]) -> Calibration:
 
 
 def calibration_from_json(text: bytes) -> Calibration:
-    """Return the calibration in the content of a file.
-
-    Raises:
-        CalibrationError: The content is not JSON, or a key is unknown, missing or out of range.
-    """
+    """Return the calibration in the content of a file; CalibrationError if it is invalid."""
     try:
         return checked(parse_json(text), Calibration)
     except ProtocolError as error:

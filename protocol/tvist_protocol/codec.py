@@ -1,8 +1,4 @@
-"""Encodes messages as MessagePack maps, and decodes and validates them.
-
-For any bytes, decoding either returns a valid message or raises `ProtocolError`; `refusal` turns the error
-into the server's answer.
-"""
+"""Encodes, decodes and validates messages; whatever the bytes, decoding returns a message or raises ProtocolError."""
 
 from collections.abc import Mapping
 from typing import Any, Generic, TypeVar, Union, get_args
@@ -124,11 +120,7 @@ def refusal(error: ProtocolError) -> Refused:
 
 
 def decode_envelope(data: bytes) -> Envelope:
-    """Return type and token of a message, whose other fields are not validated.
-
-    Raises:
-        ProtocolError: The message is not a map, or type or token is not a string.
-    """
+    """Return type and token of a message without validating other fields; ProtocolError if these are invalid."""
     try:
         return _ENVELOPE.decode(data)
     except msgspec.ValidationError as error:
@@ -149,11 +141,7 @@ def decode_command(data: bytes) -> Command:
 
 
 def _refuse_long_fault(data: bytes) -> None:
-    """Refuse an invalid long calibration from its bytes.
-
-    Explaining an error of the whole message requires building its map, which may take a hundred times as
-    long.
-    """
+    """Refuse an invalid long calibration from its bytes; building a map of it may take a hundred times as long."""
     decode_envelope(data)  # refuses bytes that are no MessagePack map
     try:
         _CALIBRATED.decode(data)

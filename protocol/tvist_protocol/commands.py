@@ -1,7 +1,4 @@
-"""Messages from clients: commands and set-points.
-
-Constructors do not validate; `tvist_protocol.codec.check` does, and the server checks every message.
-"""
+"""Messages from clients: commands and set-points. Constructors do not validate; `tvist_protocol.codec.check` does."""
 
 from math import isfinite
 from typing import Any, Literal
@@ -165,10 +162,7 @@ class SetEstimator(Leased, frozen=True, kw_only=True, tag="set_estimator", gc=Tr
     """Name of a calibration in `info`, or its content as a map; a path is not accepted."""
 
     def __post_init__(self) -> None:
-        """Refuse with ProtocolError what JSON cannot represent and more than `CALIBRATION_DEPTH` levels.
-
-        The server checks the meaning.
-        """
+        """Refuse with ProtocolError what JSON cannot represent and more than `CALIBRATION_DEPTH` levels."""
         if isinstance(self.calibration, dict):
             _check_plain(self.calibration, "calibration", CALIBRATION_DEPTH)
 

@@ -1,9 +1,4 @@
-"""Explains errors in messages and files, for programs and for people.
-
-msgspec reports a fault as one text, which is converted to code, field, message and limit. A faulty message is
-decoded again, untyped, to name the value; but not a long one, since 256 kB of empty maps would take a hundred
-ticks.
-"""
+"""Converts msgspec's errors to code, field, message and limit; a short faulty message is decoded again for this."""
 
 import math
 import re
@@ -54,10 +49,7 @@ class _Fault:
 
 
 def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -> ProtocolError:
-    """Return the error of a message that is valid MessagePack but not one of the expected messages.
-
-    If it is longer than `EXPLAINED_BYTES`, only its type is named.
-    """
+    """Return the error of a message of another type, naming its values up to `EXPLAINED_BYTES`, then only its type."""
     message = _untyped(data, Any if len(data) <= EXPLAINED_BYTES else _Head)
     name = message.get("type") if isinstance(message, dict) else None
     return _explain(error, message, types.get(name) if isinstance(name, str) else None, "the message", types)

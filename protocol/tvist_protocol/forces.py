@@ -23,8 +23,8 @@ FrameType = Literal[1, 2, 3]
 class ForceMode(Leased, frozen=True, kw_only=True, tag="force_mode"):
     """Control forces along and about the compliant axes, until another command ends this.
 
-    In the other axes the arm holds its position, or moves by `servo_j`, `speed_j` and `speed_l`. The command
-    may be repeated with other fields; it is answered by `accepted` with the number of the motion.
+    In the other axes the arm holds its position, or moves by `servo_j`, `speed_j` and `speed_l`. The command may be
+    repeated with other fields; it is answered by `accepted` with the number of the motion.
     """
 
     compliant: Choices

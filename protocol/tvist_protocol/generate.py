@@ -1,8 +1,6 @@
-"""`python -m tvist_protocol.generate`: writes everything that is made from the message types.
+"""`python -m tvist_protocol.generate`: writes what is made from the message types: pages, schemas, golden bytes.
 
-These are the pages `messages.md` and `protocol.md` in `docs/reference/generated/`, and in `protocol/` the
-`schemas/` and the MessagePack of each golden message, which the `msgpack` package encodes: golden bytes must
-not come from the codec that they test.
+The `msgpack` package encodes golden bytes, because they must not come from the codec that they test.
 """
 
 import json

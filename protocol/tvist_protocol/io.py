@@ -1,7 +1,4 @@
-"""State of a robot's terminals and registers, and the commands that change it.
-
-Names and the order of bits are those of RTDE.
-"""
+"""State of terminals and registers, and the commands that change it; names and bit order are those of RTDE."""
 
 from typing import Annotated, Literal
 

@@ -1,7 +1,4 @@
-"""Journal of all inputs of a controller, tick by tick; together with the initial setup, it determines the run.
-
-A journal is never sent over the network; recordings contain it along with the robot's messages.
-"""
+"""Journal of all inputs of a controller; with the initial setup it determines a run. Recordings contain it."""
 
 from typing import Annotated, Any, Literal
 

@@ -1,8 +1,4 @@
-"""Keys of a robot on the network, as strings.
-
-Each chunk is checked when a key is built, so that no built key contains a wildcard. Received keys may contain
-one: a server compares them with its own.
-"""
+"""Keys of a robot on the network; built keys contain no wildcard, but received ones may."""
 
 import re
 from typing import Literal
@@ -35,21 +31,12 @@ _SESSION = re.compile(SESSION_PATTERN)
 
 
 def check_robot_name(name: str) -> str:
-    """Return a robot's name if it is valid in a key.
-
-    Raises:
-        ProtocolError: The name is not `[a-z0-9][a-z0-9_-]{0,63}`; code `out_of_range`, where `robot`.
-    """
+    """Return a robot's name; ProtocolError (`out_of_range`, `robot`) if it is not `[a-z0-9][a-z0-9_-]{0,63}`."""
     return _checked("robot", name, _ROBOT)
 
 
 def check_namespace(name: str) -> str:
-    """Return a namespace if it is valid in front of a key.
-
-    Raises:
-        ProtocolError: It is not 1 to 8 chunks like a robot's name, separated by `/`; code `out_of_range`,
-            where `namespace`.
-    """
+    """Return a namespace; ProtocolError if it is not 1 to 8 chunks like a robot's name, separated by `/`."""
     return _checked("namespace", name, _NAMESPACE)
 
 
@@ -68,12 +55,7 @@ def place(key: str) -> tuple[str, str] | None:
 
 
 def check_client_name(name: str) -> str:
-    """Return a client's name if it is valid in a key.
-
-    Raises:
-        ProtocolError: The name is not 1 to 64 printable ASCII characters without `/ * ? # $`, the first not
-            `@`; code `out_of_range`, where `client`.
-    """
+    """Return a client's name; ProtocolError if it is not 1 to 64 printable ASCII characters as `PATTERN_MEANINGS` says."""
     return _checked("client", name, _CLIENT)
 
 
@@ -83,16 +65,7 @@ def key(robot: str, leaf: Leaf) -> str:
 
 
 def client(robot: str, name: str, session: str = "") -> str:
-    """Return the key of a client's liveliness token.
-
-    Args:
-        robot: The robot's name.
-        name: The client's name.
-        session: Zenoh's id of its session, which distinguishes clients of the same name; empty: omitted.
-
-    Raises:
-        ProtocolError: A name or the id is invalid; code `out_of_range`.
-    """
+    """Return the key of a client's liveliness token; `session`, Zenoh's id, distinguishes clients of the same name."""
     own = f"{key(robot, 'client')}/{check_client_name(name)}"
     return f"{own}/{_checked('session', session, _SESSION)}" if session else own
 

@@ -1,7 +1,4 @@
-"""What a robot learns from its motions.
-
-The journal contains the lessons, so that a replay need not learn them again.
-"""
+"""What a robot learns from its motions; the journal contains the lessons for replays."""
 
 from msgspec import Struct
 

@@ -13,10 +13,10 @@ _STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]|\[(\.\.\.)\]")
 
 
 class Place:
-    """The place that a path leads to in the content of a message, which should have the type `kind` (None: unknown).
+    """The place that a path leads to in a message's content, which should have the type `kind` (None: unknown).
 
-    msgspec writes paths as `.payload.com[2]`, and `[...]` for an entry of a map, whose key is found by
-    checking each entry.
+    msgspec writes paths as `.payload.com[2]`, and `[...]` for an entry of a map; its key is found by checking each
+    entry.
     """
 
     def __init__(self, content: Any, kind: object, path: str) -> None:
@@ -47,10 +47,7 @@ class Place:
 
     @property
     def struct(self) -> type[msgspec.Struct] | None:
-        """The struct expected there; None if another type is.
-
-        In a union of structs, it is the one that the value's `type` names, or else the first.
-        """
+        """The struct expected there, in a union that of the value's `type`, else the first; None if another type is."""
         found = list(_structs(self.kind))
         tag = self.value.get("type") if isinstance(self.value, dict) else None
         return next((kind for kind in found if kind.__struct_config__.tag == tag), next(iter(found), None))

@@ -1,12 +1,11 @@
 """Messages in a recording: JSON, in a form that viewers of recordings can open.
 
-A recording is an MCAP file with channels `state`, `event`, `truth`, `io` and `journal`, whose topics are the
-robot's keys. Its times are ticks of 2 ms as nanoseconds since tick 0, never the wall clock. Metadata `tvist`
-has the format, `info`, and `start` (how the server was started); metadata `tvist.end`, written at the end,
-the messages dropped on each channel.
+A recording is an MCAP file with channels `state`, `event`, `truth`, `io` and `journal`, whose topics are the robot's
+keys. Its times are ticks of 2 ms as nanoseconds since tick 0, never the wall clock. Metadata `tvist` has the format,
+`info`, and `start` (how the server was started); metadata `tvist.end` the messages dropped on each channel.
 
-Viewers require one plain type per field and do not support null. A field that is null is therefore omitted,
-and null in a list or a field stands for a number that is not finite, which JSON cannot express.
+Viewers require one plain type per field, without null. A null field is therefore omitted, and null in a list or a
+field stands for a number that is not finite, which JSON cannot express.
 """
 
 import math
@@ -56,10 +55,7 @@ _ENCODER = msgspec.json.Encoder()
 
 
 def segment_name(name: str, run: int, number: int | None) -> str:
-    """Return the name of segment `number` of a recording's run, both from 1: `run-2-part0001.mcap` for `run.mcap`.
-
-    None as `number` gives a pattern that matches all segments.
-    """
+    """Return a segment's name, `run-2-part0001.mcap` for `run.mcap`; None as `number` gives a pattern of all."""
     path = PurePath(name)
     if number is None:
         return f"{escape(path.stem)}-{run}-part*{escape(path.suffix)}"
@@ -88,10 +84,7 @@ def topics(robot: str) -> dict[type[msgspec.Struct], str]:
 
 
 def to_json(message: Recorded) -> bytes:
-    """Encode a message for a recording, so that every finite float can be restored bit for bit.
-
-    Raise TypeError if a field has a type that JSON does not have, such as a numpy number.
-    """
+    """Encode a message so that every finite float can be restored bit for bit; TypeError if JSON lacks a type."""
     content: dict[str, Any] = {"type": tag(type(message))}
     for name in message.__struct_fields__:
         value = getattr(message, name)
@@ -136,11 +129,7 @@ class JsonReader(Generic[_Some]):
 
 
 def viewer_schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
-    """Return the JSON Schema of a recorded message, limited to what viewers support.
-
-    They require a single `type` other than null for every field, `properties` for every object, and no
-    references.
-    """
+    """Return the JSON Schema of a recorded message for viewers: one `type` per field, no null, no references."""
     schema = json_schema(kind)
     shared = schema.pop("$defs", {})
     parts: Mapping[str, dict[str, Any]] = schema["properties"]

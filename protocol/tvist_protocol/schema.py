@@ -22,10 +22,7 @@ def json_schema(message: type[msgspec.Struct]) -> dict[str, Any]:
 def components(
     messages: tuple[type[msgspec.Struct], ...], reference: str
 ) -> tuple[tuple[dict[str, Any], ...], dict[str, Any]]:
-    """Return references to messages, and the JSON Schemas of the messages and of what they share, by name.
-
-    `reference` is the text of a reference, with `{name}` in it.
-    """
+    """Return references to messages (`reference` has `{name}` in it), and the JSON Schemas of all structs by name."""
     roots, parts = msgspec.json.schema_components(messages, ref_template=reference)
     described = {kind.__name__: field_docs(kind) for kind in _structs(messages)}
     for name, schema in parts.items():

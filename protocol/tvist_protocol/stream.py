@@ -1,7 +1,6 @@
 """Messages that a robot publishes by itself. A client must ignore fields that it does not know.
 
-Arrays are lists, the cheapest to create from numerical arrays 500 times a second. They are unbounded, because
-they come from the robot. Fields have their RTDE names if RTDE has them.
+Arrays are lists, the cheapest to create 500 times a second. Fields have their RTDE names if RTDE has them.
 """
 
 from typing import Literal

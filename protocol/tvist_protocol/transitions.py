@@ -1,8 +1,4 @@
-"""Activities of a robot and the transitions between them, as one table.
-
-The server uses the table, and the generated reference shows it as a diagram. A trigger is a command or one of
-`HAPPENINGS`; without a row for a state it is refused, or cannot happen, in that state.
-"""
+"""Activities of a robot and transitions between them, as one table; a trigger is a command or a happening."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -184,11 +180,7 @@ def after(activity: Activity, trigger: str) -> Activity | None:
 
 
 def diagram(states: type[StrEnum]) -> str:
-    """Return the part of the table for these states as a Mermaid state diagram.
-
-    Transitions back to the same state are omitted; those common to all motions that can be stopped are drawn
-    once.
-    """
+    """Return the table's part for these states as a Mermaid diagram, with transitions common to all motions drawn once."""
     arrows: dict[tuple[str, str], list[str]] = {}
     for row in TRANSITIONS:
         sources = [source for source in row.sources if isinstance(source, states)]

@@ -1,7 +1,7 @@
 """Types of the values in messages: SI units, radians, every number bounded.
 
-The bounds only exclude NaN, infinity and errors by orders of magnitude; the arm's limits are in `info`, and
-the server checks them. The text in an annotation names the entries of a tuple.
+The bounds only exclude NaN, infinity and errors by orders of magnitude; the server checks the arm's limits. The text
+in an annotation names the entries of a tuple.
 """
 
 from typing import Annotated, Literal

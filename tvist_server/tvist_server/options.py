@@ -112,7 +112,7 @@ class ServeOptions(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     of complete files, FILE-1-part0001.mcap, FILE-1-part0002.mcap and so on, and FILE-2-part0001.mcap and so on after
     the next start; those of the five latest earlier runs are kept."""
     dump: str | None = None
-    """Folder for a recording of the last second before a failure of the simulated arm [the system's temporary folder]."""
+    """Folder for a recording of the last second before the simulated arm fails [the system's temporary folder]."""
     truth: bool = False
     """Always publish what a real robot cannot measure, such as the arm's deflection, on tvist/NAME/truth and in the
     recording."""

@@ -19,7 +19,7 @@ class Transport(ABC):
 
         Args:
             data: Encoded command.
-            timeout_s: How long the robot may take [s].
+            timeout_s: Longest wait for the answer [s].
 
         Raises:
             NotConnectedError: The robot does not answer, or disconnected meanwhile.

@@ -29,10 +29,7 @@ Folder = str | os.PathLike[str]
 
 
 def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
-    """Return the settings of a Zenoh session with the certificate in a client's folder, by path.
-
-    Empty without a folder.
-    """
+    """Return the settings of a Zenoh session with the certificate in a client's folder; empty without a folder."""
     encrypted = endpoint.startswith("tls/")
     if security is None:
         if encrypted:
@@ -61,8 +58,8 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
 def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") -> str | None:
     """Return why no session could be opened, found by a separate handshake, because Zenoh does not report it.
 
-    This blocks for at most three times `PROBE_S`. It returns None for other causes, such as that no server
-    listens. `whose` names in messages what listens there.
+    This blocks for at most three times `PROBE_S`; None: another cause, such as that no server listens. `whose` is for
+    messages.
     """
     protocol, _, address = re.split("[?#]", endpoint)[0].partition("/")
     if protocol not in {"tcp", "tls"}:
@@ -91,10 +88,7 @@ def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") ->
 
 
 def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | None]:
-    """Return whether the peer uses TLS, and the error that ended the handshake.
-
-    Raise ssl.SSLError if the folder's files are damaged, OSError if nothing listens or answers there.
-    """
+    """Return whether the peer uses TLS, and the error that ended the handshake; may raise ssl.SSLError or OSError."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     if security is None:  # nothing is sent, so any peer is acceptable
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE

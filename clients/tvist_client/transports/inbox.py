@@ -14,11 +14,7 @@ MAX_WAITING = 10_000
 
 
 class Inbox:
-    """Passes messages to callbacks on the loop, in the order of their arrival.
-
-    All topics share one queue, because events of a tick must precede its state. The loop is woken once for
-    all waiting messages.
-    """
+    """Passes messages to callbacks on the loop in one queue, because events of a tick must precede its state."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.dropped = 0
@@ -28,10 +24,7 @@ class Inbox:
         self._woken = False
 
     def put(self, callback: Callback, data: bytes, *, droppable: bool) -> None:
-        """Add a message, from any thread.
-
-        If there is no room, it is dropped if it is droppable (states, not events).
-        """
+        """Add a message, from any thread; without room, drop it if it is droppable (states, not events)."""
         if droppable and len(self._waiting) >= MAX_WAITING:
             if not self.dropped:
                 log.warning("the event loop has been busy for too long: messages are being dropped")

@@ -18,10 +18,7 @@ class InProcessRobot(Protocol):
         """Take an encoded set-point."""
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[], None]:
-        """Call a function for each message of a topic, first the present `state` or `io`.
-
-        The returned function ends this.
-        """
+        """Call a function for each message of a topic, first the present `state` or `io`, until the result is called."""
 
     def info(self) -> bytes:
         """Return the encoded `info`."""

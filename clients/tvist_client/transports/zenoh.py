@@ -1,7 +1,7 @@
 """A robot on the network, over Zenoh.
 
-Callbacks run in Zenoh's own threads (`indirect=False`), so that messages keep their order across topics and
-no Python thread has to be joined. They only convert payloads to bytes; the event loop does the rest.
+Callbacks run in Zenoh's own threads (`indirect=False`), so that messages keep their order across topics and no Python
+thread has to be joined. They only convert payloads to bytes.
 """
 
 import asyncio
@@ -163,8 +163,8 @@ class ZenohTransport(Transport):
     async def _get(self, key: str, data: bytes | None, timeout_s: float) -> bytes:
         """Query one key and return the first answer.
 
-        If a query reaches no queryable, or its link breaks, Zenoh ends it at once and silently. If it is
-        received but not answered, Zenoh ends it at its timeout with an error.
+        Zenoh ends a query that reaches no queryable silently at once, and an unanswered one with an error at its
+        timeout.
         """
         if self._closed:
             raise self._gone()
