@@ -53,7 +53,6 @@ class Across(ABC):
         self._loop: asyncio.AbstractEventLoop
 
     async def __aenter__(self) -> Self:
-        """Connect and subscribe."""
         self._loop = asyncio.get_running_loop()
         self._session = await asyncio.to_thread(open_session, self._endpoint, self._security)
         await self._subscribe()

@@ -153,7 +153,6 @@ def _structs(hint: Any) -> tuple[type[Struct], ...]:
 
 @cache
 def _constants(kind: type[Struct]) -> dict[str, Any]:
-    """Return the fields that have but one value."""
     return {field.name: only for field in fields(kind) if (only := _constant(field.type)) is not None}
 
 

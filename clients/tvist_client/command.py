@@ -80,7 +80,7 @@ class Sent(Described):
         self._kind, self._carry_out, self._positional, self._returns = kind, carry_out, positional, returns
 
     def __call__(self, owner: Any, *values: Any, **named: Any) -> Coroutine[Any, Any, Any]:
-        """Return a coroutine that sends the command, with this method's name for Python's warnings; may raise TypeError."""
+        """Return a coroutine that sends the command, named after this method for Python's warnings."""
         try:
             given = self.__signature__.bind(owner, *values, **named).arguments
         except TypeError as error:
@@ -97,7 +97,6 @@ class Sent(Described):
 
     @cached_property
     def _extra(self) -> dict[str, Parameter]:
-        """The parameters of the method that are not fields of the message."""
         return dict(list(inspect.signature(self._carry_out).parameters.items())[2:])
 
     @cached_property

@@ -89,7 +89,6 @@ class Fleet(Across):
         """Robots whose liveliness tokens are present."""
 
     async def _subscribe(self) -> None:
-        """Subscribe to tokens and telemetry, and let the tokens arrive."""
         self._session.liveliness().declare_subscriber(
             keys.within(self._within, keys.ANYWHERE_ALIVE),
             Callback(self._on_token, indirect=False),

@@ -51,7 +51,6 @@ class Motion:
         return self
 
     def __await__(self) -> Generator[Any, None, Self]:
-        """Make `await motion` equivalent to `await motion.wait()`."""
         return self.wait().__await__()
 
     async def wait_event(self) -> None:

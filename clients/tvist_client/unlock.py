@@ -60,7 +60,7 @@ def unlock(
 
 
 async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[str]:
-    """Restart the safety system, unlock a protective stop and power on the arm, as far as needed; return what was done."""
+    """Restart the safety system, unlock a protective stop and power on the arm if needed; return what was done."""
     done: list[str] = []
     found = await look(robot)
     if found.safety_mode in _WHAT_IT_FOUND:

@@ -169,7 +169,6 @@ class Opened(Waiting):
 
 
 def _result(kind: Any) -> Any:
-    """Return the type without `await` of a result."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is AsyncIterator:
         return AbstractContextManager[_result(parts[0])]  # type: ignore[misc]

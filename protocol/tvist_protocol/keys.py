@@ -55,7 +55,7 @@ def place(key: str) -> tuple[str, str] | None:
 
 
 def check_client_name(name: str) -> str:
-    """Return a client's name; ProtocolError if it is not 1 to 64 printable ASCII characters as `PATTERN_MEANINGS` says."""
+    """Return a client's name; ProtocolError if it does not match `CLIENT_NAME_PATTERN`."""
     return _checked("client", name, _CLIENT)
 
 

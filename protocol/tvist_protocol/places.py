@@ -76,7 +76,6 @@ def _choices(kind: object) -> Iterator[object]:
 
 
 def _structs(kind: object) -> Iterator[type[msgspec.Struct]]:
-    """Yield the members of a union that are structs."""
     for member in _choices(kind):
         if isinstance(member, type) and issubclass(member, msgspec.Struct):
             yield member

@@ -111,7 +111,6 @@ def _default(field: str, part: Schema, schema: Schema) -> str:
 
 
 def _values(part: Schema) -> str:
-    """Describe which values a type allows."""
     match part:
         case {"anyOf": choices}:
             words = " or ".join(map(_values, choices))

@@ -180,7 +180,7 @@ def after(activity: Activity, trigger: str) -> Activity | None:
 
 
 def diagram(states: type[StrEnum]) -> str:
-    """Return the table's part for these states as a Mermaid diagram, with transitions common to all motions drawn once."""
+    """Return the table's part for these states as a Mermaid diagram; transitions of all motions are drawn once."""
     arrows: dict[tuple[str, str], list[str]] = {}
     for row in TRANSITIONS:
         sources = [source for source in row.sources if isinstance(source, states)]

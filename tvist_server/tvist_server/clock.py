@@ -237,7 +237,6 @@ class Realtime(Clock):
         return True
 
     def _ask(self) -> None:
-        """Set timer slack and priority of the calling thread."""
         _wake_sharply()
         if self._priority and take_priority():
             self.granted.append(f"real-time priority {PRIORITY}")

@@ -304,5 +304,4 @@ def from_mapping(content: object, source: str) -> ServeConfig:
 
 
 def _either(given: T | None, default: T) -> T:
-    """Return the given value, or the default if it is None."""
     return default if given is None else given

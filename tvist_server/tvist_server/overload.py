@@ -15,7 +15,6 @@ class Overload:
     def __init__(self, period: float) -> None:
         self.due_per_second = 1.0 / period
         self.due = self.missed = 0
-        """Ticks since the start."""
         self.overloaded = False
         self._due = self._missed = 0  # when the present second started
         self._since = 0, 0  # when the present overload started

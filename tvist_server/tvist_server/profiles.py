@@ -20,7 +20,6 @@ class Profile(Struct, frozen=True, kw_only=True):
     ur_start: bool = False
     """Whether an arm with UR's geometry starts in URSim's posture instead of `Q1`."""
     shaper: str = "zv"
-    """Initial shaper."""
     quiet: bool = False
     """Whether sensors are free of noise."""
     floor: bool = True
@@ -34,7 +33,6 @@ class Profile(Struct, frozen=True, kw_only=True):
 
 
 PLAIN = Profile()
-"""Defaults without a profile."""
 PROFILES: Mapping[ProfileName, Profile] = {
     "ursim": Profile(payload=0.0, ur_start=True, shaper="none", quiet=True, floor=False, compensate_sag=True),
     "real": Profile(ur_start=True),

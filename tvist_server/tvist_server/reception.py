@@ -38,9 +38,7 @@ class Reception(Desk):
         self._lock = threading.Lock()
         self._presence = Presence()
         self.commands_refused = 0
-        """Number of rejected commands."""
         self.setpoints_refused = 0
-        """Number of rejected set-points."""
 
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; the reply comes from another thread, or at once if the command is rejected."""

@@ -89,7 +89,6 @@ class ServedRobot:
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
-        """Gateway for the sockets of programs."""
         self._studies = Studies() if self._realtime and setup.adapt else None
         if self._studies is None:
             experience = experience_of(setup)
@@ -268,7 +267,6 @@ class ServedRobot:
             self.recorder.discard()
 
     def _hear(self, news: SocketNews) -> None:
-        """Report to the controller what happened to a program's socket."""
 
         def hear() -> None:
             self.sockets.note(news)

@@ -119,7 +119,6 @@ class Server:
             interfaces.adopt(host, token)
 
     def _tell_router(self, where: str, there: bool) -> None:
-        """Report to clients, console and recording that the router was lost or is back."""
         why = "is back" if there else "and to its clients was lost; the robot tries to reconnect"
         for robot in self.robots:
             robot.warn(f"the connection to the router at {where} {why}")

@@ -41,14 +41,11 @@ class WorkersError(Exception):
 
 @dataclass
 class _Worker:
-    """One of the other processes, as the first one sees it."""
-
     who: str
     """Description of the process and its robots."""
     process: multiprocessing.process.BaseProcess
     pipe: Connection
     told: Ended | None = None
-    """Its report at the end."""
 
 
 class Workers:
@@ -66,7 +63,6 @@ class Workers:
         self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
         """Address and ports of each robot's UR interfaces; empty if they are closed."""
         self.recordings: list[Recording] = []
-        """The recordings, after `run`."""
         self._folder = OwnFolder()
         self._front: list[_Worker] = []
         """The process that clients connect to."""
@@ -209,7 +205,6 @@ class Workers:
     # ------------------------------------------------------------------ life and end
 
     def _news(self, worker: _Worker) -> News | None:
-        """Return a process's message; None if it has died."""
         try:
             news: News = worker.pipe.recv()
         except (EOFError, OSError):
@@ -220,7 +215,6 @@ class Workers:
         return news
 
     def _why(self, worker: _Worker, news: News | None) -> str:
-        """Return why a process no longer serves its robots."""
         if isinstance(news, Refused):
             return news.why
         if isinstance(news, Ended) and news.failure is not None:

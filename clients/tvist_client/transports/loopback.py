@@ -18,7 +18,7 @@ class InProcessRobot(Protocol):
         """Take an encoded set-point."""
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[], None]:
-        """Call a function for each message of a topic, first the present `state` or `io`, until the result is called."""
+        """Call a function for each message of a topic, first the present one; calling the result ends this."""
 
     def info(self) -> bytes:
         """Return the encoded `info`."""

@@ -232,7 +232,6 @@ class ZenohTransport(Transport):
             _settle(answer, error)
 
     async def _find(self) -> None:
-        """Wait until the robot's liveliness token appears."""
         robots: list[str] = []
         for seconds in (FIND_S, LATE_S - FIND_S):
             with suppress(TimeoutError):

@@ -113,7 +113,6 @@ def with_robots_behind(
 
 
 def _turned(rule: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return the rule for the other end of the link."""
     flow = "egress" if rule["flows"] == ["ingress"] else "ingress"
     return {**rule, "id": f"{rule['id']} of {name}", "flows": [flow]}
 
@@ -156,7 +155,6 @@ def _operating(robots: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def _at(namespace: str, robot: str) -> str:
-    """Return the prefix of a robot's keys."""
     return keys.within(namespace, f"{keys.PREFIX}/{keys.check_robot_name(robot)}")
 
 

@@ -82,7 +82,6 @@ class Gateway(ABC):
     """Topics that currently have a reader; messages that no gateway takes are not made. Read from any thread."""
 
     def report(self, report: Report) -> None:
-        """Publish the state of a tick; see `publish`."""
         self.publish("state", report.state, report.encoded)
 
     @abstractmethod

@@ -61,7 +61,6 @@ class Console:
         self._thread = threading.Thread(target=self._write, name="tvist-console", daemon=True)
 
     def start(self) -> None:
-        """Start writing; earlier lines wait in the queue."""
         self._thread.start()
 
     def say(self, line: str, *, stop: bool) -> None:

@@ -21,7 +21,6 @@ class DistantMetrics(MetricsGateway):
         session.declare_subscriber(keys.key(robot, "telemetry"), Callback(self._on_telemetry, indirect=False))
 
     def _arrived(self) -> State | None:
-        """Return the newest state received since the last call."""
         sample = self._states.try_recv()
         return None if sample is None else decode(State, sample.payload.to_bytes())
 

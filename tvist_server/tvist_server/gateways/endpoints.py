@@ -38,7 +38,6 @@ def is_local(endpoint: str) -> bool:
 
 
 def _addresses(host: str) -> list[ipaddress.IPv4Address | ipaddress.IPv6Address]:
-    """Return all addresses of a host; empty if there are none."""
     if not host:
         return []
     try:

@@ -34,9 +34,7 @@ class MetricsGateway(Gateway):
         self.labels = (namespace, robot)
         self._newest = newest
         self.state: State | None = None
-        """Newest state."""
         self.telemetry: Telemetry | None = None
-        """Newest telemetry."""
         self.events: Counter[str] = Counter()
         """Number of events by kind."""
         self.warnings: Counter[str] = Counter()
@@ -49,7 +47,6 @@ class MetricsGateway(Gateway):
             self.count(message)
 
     def count(self, event: Event) -> None:
-        """Count an event."""
         self.events[event.kind] += 1
         if event.kind == "warning":
             self.warnings[event.code or ""] += 1
@@ -93,11 +90,9 @@ class Metrics(Collector):
         return gateway
 
     def add(self, gateway: MetricsGateway) -> None:
-        """Publish the figures of one more robot."""
         self._robots.append(gateway)
 
     def close(self) -> None:
-        """Stop serving the page."""
         with contextlib.suppress(OSError):
             self._server.shutdown()
             self._server.server_close()

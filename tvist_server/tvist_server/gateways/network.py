@@ -75,7 +75,6 @@ class Network:
         self.session = (
             _connected(connect, endpoints, settings, security) if connect else _open(endpoints, settings)
         )
-        """The session, in the namespace."""
         self._gateways: list[ZenohGateway] = []
         self._expected: dict[str, ZenohGateway] = {}
         self._closed = False

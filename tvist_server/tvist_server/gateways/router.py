@@ -70,7 +70,6 @@ class Router:
         self._session = open_router(endpoints, connect, settings, security)
 
     def close(self) -> None:
-        """Close the router, which disconnects all robots and clients."""
         close_session(self._session)
 
 

@@ -72,7 +72,6 @@ class _Link(asyncio.Protocol):
         self.end("closed")
 
     def look(self) -> None:
-        """Pause or resume the sender."""
         transport = self._transport
         if transport is None or transport.is_closing():
             return
@@ -186,7 +185,6 @@ class ProgramSockets(Gateway, SocketPorts):
         )
 
     def _soon(self, action: Callable[[], object]) -> None:
-        """Run an action in the network's thread."""
         if self._loop is not None:
             with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
                 self._loop.call_soon_threadsafe(action)
@@ -205,14 +203,12 @@ class ProgramSockets(Gateway, SocketPorts):
             action()
 
     async def shut(self) -> None:
-        """Close all sockets, and ignore further orders."""
         self._loop = None
         for link in tuple(self._links.values()):
             link.end()
         await asyncio.sleep(0)  # lets the connections end
 
     def close(self) -> None:
-        """Open no more sockets. A second call does nothing."""
         self._loop = self._early = None
 
     def _begin(self, order: Open, link: _Link) -> None:

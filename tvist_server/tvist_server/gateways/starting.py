@@ -20,7 +20,6 @@ class Starting(Queried):
         self._how_far = ""
 
     def note(self, done: int, total: int) -> None:
-        """Note the number of compiled kernels."""
         self._how_far = f"{done} of {total} kernels are compiled; "
 
     def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  whatever it is

@@ -47,7 +47,6 @@ class ZenohGateway(Gateway):
         ]
 
     def withdraw(self) -> None:
-        """Leave the queries to another session."""
         for queryable in self._queryables:
             queryable.undeclare()  # type: ignore[no-untyped-call]
 
@@ -76,11 +75,9 @@ class ZenohGateway(Gateway):
         self._alive = session.liveliness().declare_token(keys.key(robot, "alive"))
 
     def report(self, report: Report) -> None:
-        """Publish a tick's encoded state."""
         self._put("state", report.encoded)
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  it is already encoded
-        """Publish an encoded message, unless its topic is not served."""
         self._put(topic, payload)
 
     def _put(self, topic: Topic, payload: bytes) -> None:

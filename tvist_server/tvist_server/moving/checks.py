@@ -16,7 +16,6 @@ from tvist_server.ur_model import series
 
 MODEL, REMOTE = "get robot model", "is in remote control"
 QUESTIONS = MODEL, REMOTE
-"""Questions for the dashboard."""
 LEAST_MINOR = {3: 14, 5: 9}
 """Oldest supported minor version of the robot's software by major version; later major versions are all supported."""
 NEAR = 0.01
@@ -65,7 +64,6 @@ class Wanted(NamedTuple):
     """What tvist was told about the robot."""
 
     description: RobotDescription
-    """The robot file."""
     payload: Payload
     """Payload that the robot should have been told."""
     tool: tuple[float, ...] | None = None

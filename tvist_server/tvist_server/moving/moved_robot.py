@@ -137,7 +137,6 @@ class MovedRobot(RealArm):
         return self._pace.next(time.monotonic())
 
     def _take(self, sight: Sight) -> bool:
-        """Take a row; return whether it starts a period."""
         self._sight = sight
         self._told += sight.told
         if not self._robot.connected:
@@ -161,7 +160,6 @@ class MovedRobot(RealArm):
         return self._pace.row(sight.tick, time.monotonic())
 
     def _trouble(self) -> str | None:
-        """Return why the robot does not accept the program now."""
         return state_trouble(self._wanted, self._sight, may_play=self._left_paused)
 
     # ------------------------------------------------------------------ its program

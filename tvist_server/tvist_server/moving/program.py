@@ -59,7 +59,6 @@ class State(IntEnum):
 
     NONE = 0
     WAITING = 1
-    """Waits for the first set-point."""
     FOLLOWING = 2
     BRAKING = 3
     ENDED = 4

@@ -30,11 +30,9 @@ class Received(NamedTuple):
     """Result of bytes from the robot."""
 
     send: bytes
-    """Bytes to send."""
     rows: Sequence[Row]
     """Complete rows, in order."""
     texts: Sequence[str]
-    """Messages of the controller for people."""
 
 
 class RtdeClient:
@@ -56,7 +54,6 @@ class RtdeClient:
         self.version: tuple[int, ...] = ()
         """Software version of the controller: major, minor, bugfix, build; empty before its answer."""
         self.started = False
-        """Whether the robot sends rows."""
 
     @property
     def lacking(self) -> list[str]:
@@ -84,7 +81,6 @@ class RtdeClient:
         return package(PackageKind.DATA, self._written.pack(self._claimed, *numbers))
 
     def _answered(self, kind: int, payload: bytes) -> bytes:
-        """Take the answer to a package; return the next package."""
         match kind:
             case PackageKind.REQUEST_PROTOCOL_VERSION if payload[:1] == b"\x01":
                 return package(PackageKind.GET_URCONTROL_VERSION)
@@ -128,7 +124,6 @@ class RtdeClient:
         return package(PackageKind.START)
 
     def _take_claim(self, payload: bytes) -> None:
-        """Check that this client owns all inputs."""
         found = _types(payload, len(self._inputs), "inputs")
         by_word: dict[str, list[str]] = {}
         for name, word in zip(self._inputs, found, strict=True):

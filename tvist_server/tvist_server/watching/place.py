@@ -5,7 +5,6 @@ from urllib.parse import urlsplit
 
 SCHEME = "ur://"
 PORT = 30004
-"""Port of RTDE."""
 
 
 class Place(NamedTuple):

@@ -61,7 +61,6 @@ class InTurnSession(PortSession, Generic[Item]):
         super().__init__(robot, control, send)
         self._items = deque[Item]()
         self._busy = False
-        """Whether an item is being processed."""
 
     @property
     def waiting(self) -> int:
@@ -109,7 +108,6 @@ class Lines:
     def __init__(self, longest: int) -> None:
         self._longest = longest
         self.rest = bytearray()
-        """Start of an incomplete line."""
 
     def feed(self, data: bytes) -> list[bytes]:
         """Take a piece and return the lines that it completes, without their line feeds."""

@@ -95,11 +95,9 @@ class Connection(asyncio.BufferedProtocol):
         self._guarded(self.session.opened)
 
     def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002  the size is fixed
-        """Return the buffer for the next piece."""
         return self._piece
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Pass received data to the session."""
         session = self.session
         self.heard = asyncio.get_running_loop().time()
         if session is not None:
@@ -108,17 +106,14 @@ class Connection(asyncio.BufferedProtocol):
             self._listen()
 
     def pause_writing(self) -> None:
-        """Pause reading from a client that has stopped reading."""
         self._behind = True
         self._listen()
 
     def resume_writing(self) -> None:
-        """Resume reading from the client."""
         self._behind = False
         self._listen()
 
     def _hear(self, answer: Callable[[], None]) -> None:
-        """Handle an answer of the controller."""
         self._guarded(answer)
         self._listen()
 
@@ -135,7 +130,6 @@ class Connection(asyncio.BufferedProtocol):
             transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Clean up after either side has closed the connection."""
         session, transport = self.session, self._transport
         if isinstance(exc, ConnectionError) and session is not None and transport is not None:
             left = _left_in(transport)
@@ -196,14 +190,12 @@ class Connection(asyncio.BufferedProtocol):
                 self.disconnect()
 
     def event(self, event: Event) -> None:
-        """Pass an event to the session."""
         session = self.session
         if session is not None:
             self._guarded(lambda: session.event(event))
 
     @property
     def dispensable(self) -> bool:
-        """Whether the client may be disconnected to make room."""
         session = self.session
         return session is not None and session.client_begins and not session.served
 
@@ -213,7 +205,6 @@ class Connection(asyncio.BufferedProtocol):
             self._transport.abort()
 
     def close(self) -> None:
-        """Close the connection after sending what remains."""
         if self._transport is not None:
             self._transport.close()
 

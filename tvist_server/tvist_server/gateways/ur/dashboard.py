@@ -24,7 +24,6 @@ ECHO: Final = 200
 UNNAMED: Final = "<unnamed>"
 """Reported name of the program while none is loaded."""
 INSTALLATION: Final = "default.installation"
-"""Name of the only installation."""
 MODES: Final = ("MANUAL", "AUTOMATIC")
 TOO_SOON: Final = (
     "Cannot unlock protective stop until 5s after occurrence. "
@@ -275,7 +274,6 @@ class DashboardSession(InTurnSession[str]):
         self._say(GREETING)
 
     def receive(self, data: bytes) -> None:
-        """Carry out the complete commands."""
         for line in self._lines.feed(data):
             if not self.over:
                 text = line.decode(errors="replace").strip()
@@ -305,7 +303,6 @@ class DashboardSession(InTurnSession[str]):
         return b""
 
     def closed(self) -> None:
-        """Cancel the remaining commands."""
         self._end()
         super().closed()
         if self._rests is not None:

@@ -30,7 +30,6 @@ class GripperSession(PortSession):
         self._requests = Requests()
 
     def receive(self, data: bytes) -> None:
-        """Pass on the complete requests."""
         for request in self._requests.cut(data):
             self.waiting += 1
             self._ask(request, lambda answer: self._soon(lambda: self._answered(answer)))

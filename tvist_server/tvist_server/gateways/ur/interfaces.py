@@ -110,12 +110,10 @@ class UrInterfaces(Gateway):
 
     @property
     def ports(self) -> dict[InterfaceName, int]:
-        """Actual port of each interface."""
         return {interface: bound.getsockname()[1] for interface, bound in self._sockets.items()}
 
     @property
     def clients(self) -> int:
-        """Number of open connections."""
         return len(self._connections)
 
     async def _first_tick(self) -> None:
@@ -181,7 +179,6 @@ class UrInterfaces(Gateway):
             self._soon(self._look)
 
     async def shut(self) -> None:
-        """Admit no more clients, and disconnect the present ones."""
         for task in self._tasks:
             task.cancel()
         for server in self._servers:
@@ -196,7 +193,6 @@ class UrInterfaces(Gateway):
         self._coming_and_going.flush()
 
     def close(self) -> None:
-        """Stop listening. A second call does nothing."""
         self._loop = None
         self._close_sockets()
 
@@ -303,7 +299,6 @@ class UrInterfaces(Gateway):
         return later
 
     def _fetch(self, host: str) -> Later[str | None]:
-        """Request a machine's part of a program."""
         later = Later[str | None]()
 
         async def fetching() -> None:
@@ -313,7 +308,6 @@ class UrInterfaces(Gateway):
         return later
 
     def _run(self, work: Coroutine[object, object, None]) -> None:
-        """Run a task until `shut`."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

@@ -45,7 +45,6 @@ class InterpreterSession(InTurnSession[tuple[str, bool]]):
         self._lines = Lines(LONGEST + 1)
 
     def receive(self, data: bytes) -> None:
-        """Queue the complete lines."""
         for line in self._lines.feed(data):
             too_long = len(line) > LONGEST
             text = (line[:ECHO] if too_long else line).decode(errors="replace").strip()

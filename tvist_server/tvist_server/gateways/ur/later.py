@@ -19,14 +19,12 @@ class Later(Generic[T]):
         self._waiting: list[Coroutine[Later[Any], None, object]] = []
 
     def come(self, value: T) -> None:
-        """Set the value and resume; a second value changes nothing."""
         if not self._values:
             self._values.append(value)
             for coroutine in self._waiting:
                 begin(coroutine)
 
     def wait(self, coroutine: "Coroutine[Later[Any], None, object]") -> None:
-        """Resume a coroutine when the value is set."""
         self._waiting.append(coroutine)
 
     def __await__(self) -> "Generator[Later[Any], None, T]":

@@ -72,13 +72,11 @@ class HostLease:
         self._users.add(holder)
 
     def keep_alive(self) -> None:
-        """Renew the lease, if there is one."""
         if self._token != _NO_TOKEN:
             self.ask(KeepAlive(token=self._token))
 
     @property
     def held_by_other(self) -> bool:
-        """Whether another client has control."""
         return self._desk.holder() not in {None, self.client}
 
     def _take(self) -> Later[Reply]:
@@ -123,7 +121,6 @@ class ConnectionControl:
         return self._heard(self._lease.change(self, command))
 
     def ask(self, command: Command) -> Later[Reply]:
-        """Send a command that needs no control."""
         return self._heard(self._lease.ask(command))
 
     def _heard(self, reply: Awaitable[Reply]) -> Later[Reply]:

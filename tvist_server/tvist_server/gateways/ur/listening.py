@@ -36,7 +36,6 @@ def listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
 
 
 def _probe(bound: socket.socket) -> None:
-    """Probe silent peers as `PROBES` says, where the system allows it."""
     if sys.platform == "linux":
         options = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
         for option, value in zip(options, PROBES, strict=True):

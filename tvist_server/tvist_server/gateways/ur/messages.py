@@ -14,7 +14,6 @@ LONGEST: Final = 1000
 
 PROTECTIVE_STOP: Final = 209
 READ_ONLY: Final = 210
-"""Codes of error messages."""
 
 _HEADER = Struct(">iBQBB")
 _ERROR = Struct(">iiiII")
@@ -107,5 +106,4 @@ def _message(time: int, kind: MessageKind, body: bytes) -> bytes:
 
 
 def _text(what: str, most: int = LONGEST) -> bytes:
-    """Encode as UTF-8, cut between two characters."""
     return what.encode(errors="replace")[:most].decode(errors="ignore").encode()

@@ -50,7 +50,6 @@ class Programs:
         self.interpreter = Interpreter()
         """Statements of the interpreter mode, including those accepted since the last `io`."""
         self._label: ProgramLabel | None = None
-        """Label last sent to clients."""
         self._control: ConnectionControl | None = None
         """Access of the client that plays the program. It lasts as long as the program, even if the client
         disconnects."""
@@ -69,12 +68,10 @@ class Programs:
 
     @property
     def saved(self) -> bool:
-        """Whether the loaded program is a file."""
         return self.path is not None and self.path.endswith(_SAVED)
 
     @property
     def playing(self) -> bool:
-        """Whether a program runs and is not paused."""
         return self.state == "PLAYING"
 
     # ------------------------------------------------------------------ requests, each for a client
@@ -167,7 +164,6 @@ class Programs:
         self.interpreter = io.interpreter or Interpreter()
 
     def event(self, event: Event) -> None:
-        """Report an event that concerns a program to the clients."""
         stamp, program = messages.stamp(self._host.latest), event.program or ""
         match event.kind:
             case "program_started" | "program_stopped" if event.secondary:
@@ -238,7 +234,6 @@ def _path_of(name: str) -> str:
 
 
 def _title(name: str) -> str:
-    """Return a program's name for key messages."""
     for ending in _SAVED:
         name = name.removesuffix(ending)
     return name

@@ -81,5 +81,4 @@ class RealtimeSession(ScriptSession):
             super().receive(data)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Return the package of the tick."""
         return package(snapshot)

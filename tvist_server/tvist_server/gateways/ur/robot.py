@@ -45,7 +45,6 @@ class InputOwners:
         """Values written by any connection."""
 
     def is_free(self, name: str, connection: object) -> bool:
-        """Return whether no other connection owns the variable."""
         return self._owners.get(name, connection) is connection
 
     def take(self, names: Sequence[str], connection: object) -> None:
@@ -54,7 +53,6 @@ class InputOwners:
             self._owners[name] = connection
 
     def release(self, connection: object) -> None:
-        """Release all variables of a connection."""
         self._owners = {name: owner for name, owner in self._owners.items() if owner is not connection}
 
 
@@ -76,12 +74,10 @@ class PendingWrites:
         return value != present or self._asked.get(key, value) != value
 
     def ask(self, values: dict[Hashable, object]) -> None:
-        """Note that these values were requested."""
         self._asked |= values
         self._waiting |= values
 
     def answered(self, values: dict[Hashable, object]) -> None:
-        """Note that the controller has accepted or refused these values."""
         for key, value in values.items():
             if self._waiting.get(key) == value:
                 del self._waiting[key]

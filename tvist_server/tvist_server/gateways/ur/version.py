@@ -2,4 +2,3 @@
 
 MAJOR, MINOR, BUGFIX, BUILD = 5, 22, 0, 1
 DATE = "01-01-2025, 00:00:00"
-"""Build date."""

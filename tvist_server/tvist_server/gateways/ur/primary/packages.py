@@ -15,7 +15,6 @@ from tvist_server.ur_ports import MOST_JOINTS
 
 ROBOT_STATE: Final = 16
 NOMINAL: Final = 0xFFFFFFFF
-"""Checksum of uncalibrated kinematics."""
 SUBTYPE: Final = 3
 """Robot subtype of an e-Series arm."""
 BOARD_TEMPERATURE: Final = 25.0

@@ -73,7 +73,6 @@ class Intake:
         self._unit = bytearray()
         """Lines of an incomplete unit, as bytes: one string per line would take twenty times the memory."""
         self._depth = 0
-        """Number of open blocks."""
         self._start: tuple[int, int] | None = None
         """Line and column of the unit's first code."""
         self._skipping = False

@@ -44,19 +44,16 @@ class ScriptSession(InTurnSession[Unit]):
         self._intake = Intake()
 
     def receive(self, data: bytes) -> None:
-        """Take a piece of a script."""
         for unit in self._intake.feed(data):
             self._add(unit, stop=not self._read_only and len(unit.text) < SHORT and unit.words == STOP)
 
     def closed(self) -> None:
-        """Report an incomplete unit."""
         unfinished = self._intake.unfinished
         if unfinished is not None:
             self._report(unfinished, "was not run: the connection ended before its last line feed")
         super().closed()
 
     def _tell(self, message: bytes) -> None:
-        """Send a robot message to the clients that it is for."""
         self._robot.tell(message)
 
     async def _do(self, unit: Unit) -> None:
@@ -90,7 +87,6 @@ class ScriptSession(InTurnSession[Unit]):
                 self._tell_refused(unit, unit.title, refused)
 
     def _tell_refused(self, unit: Unit, what: str, refused: Refused) -> None:
-        """Report the reason of a refusal to the client and on the console."""
         if refused.code in {"no_control", "stale_token"}:
             self._tell_read_only()
         else:
@@ -123,7 +119,6 @@ class PrimarySession(ScriptSession):
     ) -> None:
         super().__init__(robot, control, send, read_only=read_only)
         self.informed = informed
-        """Whether the client gets messages."""
         self._errors: list[bytes] = []
         """Error codes of this tick, which are sent after its state."""
         self._due = 0

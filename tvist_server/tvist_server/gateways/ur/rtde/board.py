@@ -23,7 +23,6 @@ class Board:
         self._bytes: _Bytes | None = None
         """Bytes of the last tick; None if the recipes have changed since."""
         self._snapshot: Snapshot | None = None
-        """Snapshot of the last tick."""
         self._packages: dict[tuple[bytes, str], bytes] = {}
         """Packages of the last tick, by head and names."""
 
@@ -33,7 +32,6 @@ class Board:
         self._bytes = self._snapshot = None
 
     def end(self, client: object) -> None:
-        """Note that a client stops reading."""
         if self._recipes.pop(client, None) is not None:
             self._bytes = self._snapshot = None
 
@@ -53,7 +51,6 @@ class Board:
         return package
 
     def _at(self, snapshot: Snapshot) -> "_Bytes":
-        """Return the bytes of a tick."""
         if self._bytes is None:
             self._bytes = _Bytes(self._recipes.values(), snapshot)
         if snapshot is not self._snapshot:
@@ -103,7 +100,6 @@ class _Bytes:
         self._gathered = self._numbers.take(self._index, mode="clip").tobytes()
 
     def of(self, recipe: OutputRecipe) -> bytes:
-        """Return the bytes of the variables of a recipe."""
         return self._gathered[self._spans[recipe.text]]
 
     def _places_of(self, name: str) -> list[int]:
@@ -119,12 +115,8 @@ class _Bytes:
 
 
 class _Place(NamedTuple):
-    """Place of a part in the buffer."""
-
     first: int
-    """Index of its first byte."""
     entries: int
-    """Number of its entries."""
     of_machine: bool
     """Whether its bytes are in the machine's order."""
 
@@ -147,6 +139,5 @@ class _Packing:
         self._pack_into = Struct(layout).pack_into
 
     def write(self, snapshot: Snapshot, buffer: bytearray) -> None:
-        """Write the values of a tick."""
         numbers = chain.from_iterable([read(snapshot) for read in self._lists])
         self._pack_into(buffer, self._first, *numbers, *[read(snapshot) for read in self._others])

@@ -8,7 +8,6 @@ from tvist_server.rtde.codec import HEADER, LARGEST
 from tvist_server.rtde.wire import Wire
 
 Value = int | float | tuple[float, ...]
-"""Value of an input variable."""
 
 
 def split(names: bytes) -> tuple[str, ...]:
@@ -26,7 +25,6 @@ class OutputRecipe:
         self.names = names
         """The variables' names as the client wrote them."""
         self.text = ",".join(names)
-        """The same as one text."""
         self.size = 0
         """Size of all of them [bytes]."""
         self.valid = bool(names) and "NOT_FOUND" not in self.words

@@ -100,7 +100,6 @@ class RtdeSession(PortSession):
         return self._board.package(self._outputs, snapshot, self._head)
 
     def closed(self) -> None:
-        """Release the connection's input variables and its recipe."""
         self._robot.inputs.release(self)
         self._board.end(self)
         super().closed()
@@ -108,7 +107,6 @@ class RtdeSession(PortSession):
     # ------------------------------------------------------------------ answers
 
     def _request_version(self, payload: bytes) -> None:
-        """Switch to version 1 or 2; refuse any other."""
         wanted = _UINT16.unpack_from(payload)[0] if len(payload) >= _UINT16.size else 0
         accepted = wanted in {1, 2}
         if accepted:
@@ -171,7 +169,6 @@ class RtdeSession(PortSession):
             self._complain(f"there is no input recipe {number}")
 
     def _start(self, _payload: bytes) -> None:
-        """Start sending outputs; refused without a valid output recipe."""
         self.served, self._next = self._outputs is not None, None
         self._read()
         self._said.clear()

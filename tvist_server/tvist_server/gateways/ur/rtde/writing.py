@@ -68,7 +68,6 @@ class InputWriter:
     # ------------------------------------------------------------------ registers
 
     def _set_registers(self, values: dict[str, Value]) -> None:
-        """Write registers, which needs no control."""
         io = self._io
         watched = () if io is None else io.watched  # the program's watchdogs count every write
         news: dict[Hashable, object] = {
@@ -187,7 +186,6 @@ class InputWriter:
         begin(self._answered(values, self._control.change(command)))
 
     async def _answered(self, values: dict[Hashable, object], reply: Awaitable[Reply]) -> None:
-        """Handle the reply to a command that sets these values."""
         answer = await reply
         self._pending.answered(values)
         if isinstance(answer, Refused):
@@ -195,7 +193,6 @@ class InputWriter:
 
 
 def _present(io: Io, name: str) -> Number:
-    """Return the present value of an input register in the robot's `io`."""
     bank, first, wire = REGISTERS[name]
     registers: list[int] | list[float] = getattr(io, f"{bank}_register")
     if wire is Wire.BOOL:
