@@ -128,8 +128,7 @@ class Connection(Questions):
     async def state(self) -> State:
         """Return the present state: in real time the next one to arrive, otherwise the last one.
 
-        Before the first tick, the state describes the arm at rest. In lockstep the first call may take a
-        second.
+        Before the first tick, the state describes the arm at rest. In lockstep the first call may take a second.
 
         Raises:
             AnswerTimeoutError: No state arrived within `STATE_S`.

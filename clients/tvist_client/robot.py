@@ -39,8 +39,7 @@ class Stepper(Leased):
             ticks: Number of control periods, 1 to 100000.
 
         Returns:
-            The last tick that passed, earlier than requested if the clock was lost meanwhile; its state has
-            arrived.
+            The last tick that passed, earlier than requested if the clock was lost meanwhile; its state has arrived.
 
         Raises:
             RefusedError: The clock was lost; the message contains the present holder's name.
@@ -143,8 +142,7 @@ class Robot(Connection):
     async def clock_control(self, client: str) -> AsyncIterator[Stepper]:
         """Hold the clock for the duration of a block, so that time passes only by this client's steps.
 
-        This works in lockstep and free. It is independent of control, which another client may have at the
-        same time.
+        This works in lockstep and free. It is independent of control, which another client may have at the same time.
 
         Args:
             client: Name of this client, shown to others; the clock is released when it disconnects.

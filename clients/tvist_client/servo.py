@@ -52,8 +52,7 @@ class Servo:
             Its number; `state.setpoint_sequence` shows when it was accepted.
 
         Raises:
-            ArgumentError: The number of angles is wrong, or an angle is not finite or outside its joint's
-                range.
+            ArgumentError: The number of angles is wrong, or an angle is not finite or outside its joint's range.
             StreamStoppedError: The robot has ended the stream.
             MisuseError: The block of `Arm.servo` has been left.
         """

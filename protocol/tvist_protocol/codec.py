@@ -101,8 +101,7 @@ def check(message: _SomeMessage) -> _SomeMessage:
     """Validate a message constructed locally, as the server will; constructors validate nothing.
 
     Returns:
-        The message as the server will decode it: integers in number fields become floats, lists become
-        tuples.
+        The message as the server will decode it: integers in number fields become floats, lists become tuples.
 
     Raises:
         ProtocolError: A value is invalid for every robot.

@@ -65,8 +65,7 @@ class ZeroFtsensor(Leased, frozen=True, kw_only=True, tag="zero_ftsensor"):
 class SetExternalWrench(Leased, frozen=True, kw_only=True, tag="set_external_wrench"):
     """Provide the measurement of an external force sensor, used once a program has called `ft_rtde_input_enable`.
 
-    Force mode does not start before the first value, and ends if none comes for 100 ms, unless a client steps
-    time.
+    Force mode does not start before the first value, and ends if none comes for 100 ms, unless a client steps time.
     """
 
     wrench: Wrench

@@ -12,8 +12,7 @@ _PREFIX = "tvist-own-"
 class OwnFolder:
     """A folder that only this user can enter, until `close`; locked while this process or a fork of it lives.
 
-    Unlocked folders of this user are left over from killed processes and are removed first. May raise
-    OSError.
+    Unlocked folders of this user are left over from killed processes and are removed first. May raise OSError.
     """
 
     def __init__(self) -> None:

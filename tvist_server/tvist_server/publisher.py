@@ -1,7 +1,6 @@
 """Passes one robot's states, events and figures to the gateways, in the controller's thread.
 
-In real time no gateway blocks; in lockstep gateways wait for clients between two ticks, since no state may be
-lost.
+In real time no gateway blocks; in lockstep gateways wait for clients between two ticks, since no state may be lost.
 """
 
 import logging

@@ -52,8 +52,7 @@ class Recording(NamedTuple):
 class Server:
     """One or more robots on the network.
 
-    Raise StartError for an invalid configuration, RecorderError or GatewayError if a recording or an endpoint
-    fails.
+    Raise StartError for an invalid configuration, RecorderError or GatewayError if a recording or an endpoint fails.
     """
 
     def __init__(

@@ -97,8 +97,7 @@ def meet_clients(
 ) -> None:
     """Run the process that clients connect to: a router, which also answers for robots that are starting.
 
-    It reports `Made`, receives progress, reports `Ready` once it reaches all robots, and `Ended` when told to
-    end.
+    It reports `Made`, receives progress, reports `Ready` once it reaches all robots, and `Ended` when told to end.
     """
     place, starting = config.namespace or "", Starting()
     try:
@@ -146,9 +145,8 @@ def meet_clients(
 def work(config: ServeConfig, share: Share, first: First) -> None:
     """Serve robots until the first process ends it or dies.
 
-    Told to begin, it makes its robots and reports `Made`; told to go on, it starts them and reports `Ready`;
-    told to end, it reports `Ended`. It ignores signals, which a terminal sends to all processes: the first
-    one handles them.
+    Told to begin, it makes its robots and reports `Made`; told to go on, it starts them and reports `Ready`; told to
+    end, it reports `Ended`. It ignores signals, which a terminal sends to all processes: the first one handles them.
     """
     ending = Ending()
     ending.close()  # ignores signals

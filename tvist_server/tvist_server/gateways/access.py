@@ -1,9 +1,8 @@
 """Rights of clients on the network, as rules for Zenoh's access control.
 
-Zenoh silently denies everything that no rule allows. A rule for `tvist/ur5e/state` does not allow `tvist/**`.
-Flows are the server's: `ingress` is what a client sends, `egress` what it receives. Declarations need
-permission on egress: without it, a client knows of no subscriber or queryable and sends neither puts nor
-queries.
+Zenoh silently denies everything that no rule allows. A rule for `tvist/ur5e/state` does not allow `tvist/**`. Flows
+are the server's: `ingress` is what a client sends, `egress` what it receives. Declarations need permission on egress:
+without it, a client knows of no subscriber or queryable and sends neither puts nor queries.
 """
 
 from collections.abc import Mapping, Sequence

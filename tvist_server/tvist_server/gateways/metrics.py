@@ -1,7 +1,6 @@
 """Prometheus figures of the robots over HTTP, read-only.
 
-`python -m tvist_server.gateways.metrics > docs/reference/generated/metrics.md` writes the page that lists
-them.
+`python -m tvist_server.gateways.metrics > docs/reference/generated/metrics.md` writes the page that lists them.
 """
 
 import contextlib

@@ -22,8 +22,7 @@ CLOSE_WAIT = 0.2
 class Answers:
     """Sends replies to queries from its own thread, because a client that does not read blocks it.
 
-    It blocks until its link is closed, after 1 s in real time and 5 s in lockstep: by default, replies use
-    BLOCK.
+    It blocks until its link is closed, after 1 s in real time and 5 s in lockstep: by default, replies use BLOCK.
     """
 
     def __init__(self) -> None:

@@ -1,8 +1,7 @@
 """The Zenoh gateway: one robot's keys on the server's session.
 
-Callbacks run in Zenoh's threads (`indirect=False`), so that one client's messages are handled in order: a
-liveliness token before the command that follows it. One may still be running when the session is closed,
-hence the flag.
+Callbacks run in Zenoh's threads (`indirect=False`), so that one client's messages are handled in order: a liveliness
+token before the command that follows it. One may still be running when the session is closed, hence the flag.
 """
 
 import contextlib

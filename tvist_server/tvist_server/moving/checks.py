@@ -166,8 +166,7 @@ def _load_trouble(wanted: Wanted, sight: Sight) -> str | None:
 def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> str | None:
     """Return why the robot may not be mounted as its file says; None if it is.
 
-    `q`: joint angles at rest, shape (6,) [rad]; `felt`: mean specific force in the flange frame, shape (3,)
-    [m/s²].
+    `q`: joint angles at rest, shape (6,) [rad]; `felt`: mean specific force in the flange frame, shape (3,) [m/s²].
     """
     up = Arm(description).pose(q)[0] @ felt / np.linalg.norm(felt)
     leans = float(np.arccos(np.clip(up[2], -1.0, 1.0)))

@@ -38,11 +38,10 @@ class ServoLag:
 class Setpoints:
     """Turns drive commands into set-points, one for each control period, which compensate the lag of `servoj`.
 
-    The arm is at the reference if p = q + T q̇ + q̈/k. All three are taken midway between two commands, where
-    p is held: q as their mean, q̇ and q̈ as difference quotients of q and q̇. Nothing is measured, so no
-    noise is amplified, and at rest p equals q to the last bit. A set-point is cut to the joints' range
-    `reach` [rad] and to the largest speed `fastest` [rad/s]; later ones make up for the cut. Without a lag, p
-    is q.
+    The arm is at the reference if p = q + T q̇ + q̈/k. All three are taken midway between two commands, where p is
+    held: q as their mean, q̇ and q̈ as difference quotients of q and q̇. Nothing is measured, so no noise is
+    amplified, and at rest p equals q to the last bit. A set-point is cut to the joints' range `reach` [rad] and to
+    the largest speed `fastest` [rad/s]; later ones make up for the cut. Without a lag, p is q.
     """
 
     def __init__(self, q: Floats, lag: ServoLag | None, *, fastest: float, reach: Floats) -> None:

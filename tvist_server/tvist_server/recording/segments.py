@@ -1,8 +1,7 @@
 """Files of a recording: one growing file, or segments of which the oldest are deleted.
 
-The segments of `run.mcap` are `run-1-part0001.mcap` and so on, those of the next run `run-2-part0001.mcap`
-and so on, so that a service can restart with the same options. Each is a complete file; only the last one can
-lose data.
+The segments of `run.mcap` are `run-1-part0001.mcap` and so on, those of the next run `run-2-part0001.mcap` and so on,
+so that a service can restart with the same options. Each is a complete file; only the last one can lose data.
 """
 
 import os

@@ -1,7 +1,6 @@
 """The client's end of an RTDE connection, without socket: bytes in, bytes and rows out.
 
-It negotiates version 2, sets up outputs, claims inputs if any, and starts. Without inputs it can send no
-command.
+It negotiates version 2, sets up outputs, claims inputs if any, and starts. Without inputs it can send no command.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,6 @@
 """Coroutines without an event loop: each resumes inside the call that brings its value.
 
-An asyncio task would resume a turn of the loop later: in lockstep, answers could follow the states of later
-ticks.
+An asyncio task would resume a turn of the loop later: in lockstep, answers could follow the states of later ticks.
 """
 
 from collections.abc import Coroutine, Generator
