@@ -258,7 +258,7 @@ class _Check:
 
 
 def _remedy(last: Telemetry | None, due: float) -> str:
-    """Return where states are lost, if the telemetry tells the robot's own rate."""
+    """Return the remedy for a low rate of states, which the robot or the network causes."""
     if last is not None and last.ticks_per_second >= ON_TIME * due:
         return (
             f": the robot itself makes {last.ticks_per_second:.0f} ticks/s; next, look at the network and at the "

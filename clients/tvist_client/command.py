@@ -25,7 +25,7 @@ TICK = 0.002
 Answer = Accepted | Done | Posture | ToolPose
 """Replies to a command that was not refused."""
 _ANSWER = re.compile(r"; (it is )?answered (as|by) [^.]*")
-"""Part of a message's description that tells its answer, which the method returns."""
+"""Part of a message's description about its answer, which is the method's result."""
 
 
 class Commanded(Protocol):

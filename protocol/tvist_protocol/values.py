@@ -68,9 +68,9 @@ DampingRatio = Annotated[float, Meta(ge=0, lt=1)]
 """[-]"""
 ModeCount = Annotated[int, Meta(ge=1, le=8)]
 Frequencies = Annotated[tuple[Frequency, ...], Meta(min_length=1, max_length=8)]
-"""One a mode [Hz]"""
+"""One per mode [Hz]"""
 DampingRatios = Annotated[tuple[DampingRatio, ...], Meta(min_length=1, max_length=8)]
-"""One a mode [-]"""
+"""One per mode [-]"""
 
 Mass = Annotated[float, Meta(ge=0, le=100)]
 """[kg]"""

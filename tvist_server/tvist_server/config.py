@@ -131,7 +131,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
 
     @property
     def place(self) -> str:
-        """The place at which clients reach the robots, in words."""
+        """Where clients reach the robots, for messages."""
         places = [f"on {', '.join(self.endpoints)}"] if self.endpoints else []
         places += [f"through the router at {', '.join(self.connect)}"] if self.connect else []
         return " and ".join(places) + (f" in namespace {self.namespace}" if self.namespace else "")

@@ -254,7 +254,7 @@ def _begin(
 
 
 def _rehearse(setup: Setup) -> None:
-    """Compile and load what a robot needs, for forked processes to share; a plug-in arm is made only where served."""
+    """Compile and load what a robot needs, for the forked processes to share; a plug-in arm is not made here."""
     setup = replace(setup, plant=None)
     warm_up()
     planner = Planner(setup)

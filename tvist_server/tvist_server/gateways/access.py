@@ -20,7 +20,7 @@ MESSAGES = (
     "put", "delete", "declare_subscriber", "query", "declare_queryable", "reply", "liveliness_token",
     "declare_liveliness_subscriber", "liveliness_query",
 )  # fmt: skip
-"""Everything that Zenoh's access control knows."""
+"""All message types of Zenoh's access control."""
 
 
 def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: str = "") -> dict[str, Any]:

@@ -35,8 +35,8 @@ REALTIME: Mapping[str, Any] = {
     # and a client on a slow link would get states and answers that are half a minute old.
     "transport/link/tcp/so_sndbuf": 131_072,
     "transport/link/tls/so_sndbuf": 131_072,
-    # In real time, answers are the only messages that wait for room, and all other answers wait behind them. A client
-    # that keeps asking but has stopped reading is disconnected after this time [us] instead of 5 s.
+    # In real time only answers wait for room, and each delays all later ones. A client that keeps asking but does
+    # not read is disconnected after this time [µs] instead of 5 s.
     "transport/link/tx/queue/congestion_control/block/wait_before_close": 1_000_000,
     # The tick thread publishes and must not wait for room; by default it would for a millisecond.
     "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 0,

@@ -55,8 +55,8 @@ class Recorder(Sink):
         keep: int | None = None,  # least number of ticks kept, in segments; None: all
         queue_size: int = QUEUE_SIZE,  # number of messages that may wait for the writer
         wait: bool = False,  # whether to wait when the queue is full (lockstep and free)
-        on_error: Callable[[str], None] | None = None,  # called once when the recording stops
-        on_moved: Callable[[str], None] | None = None,  # called once when the file was moved; likewise
+        on_error: Callable[[str], None] | None = None,  # called once in the writer's thread if it stops
+        on_moved: Callable[[str], None] | None = None,  # called once when the file was moved
     ) -> None:
         if queue_size < 1:
             raise RecorderError(f"queue_size is {queue_size}: must be at least 1")

@@ -55,7 +55,7 @@ class PortSession(ABC):
 
 
 class InTurnSession(PortSession, Generic[Item]):
-    """Handles a client's requests one at a time, also those left when it disconnects; until then it keeps control."""
+    """Handles a client's requests one at a time; it finishes them, with control, even if the client disconnects."""
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
         super().__init__(robot, control, send)

@@ -30,7 +30,7 @@ NO_PROGRAM, TOO_MANY, SYNTAX, COMPILATION, TOO_LONG = (
     "Compile error",
     "Statement is too long",
 )
-"""First words of a `discard` that tell clients the reason; all but the last are UR's."""
+"""Reasons of a `discard`, by which clients recognize it; all but the last are UR's."""
 
 
 class InterpreterSession(InTurnSession[tuple[str, bool]]):

@@ -40,7 +40,7 @@ class Host(Protocol):
 
 
 class Programs:
-    """Loads, runs, plays, pauses and stops programs, and reports them; replies and `io` tell their state."""
+    """Loads, runs, plays, pauses and stops programs, and reports them; their state comes from replies and `io`."""
 
     def __init__(self, host: Host, external: ExternalControl) -> None:
         self._host, self._external = host, external

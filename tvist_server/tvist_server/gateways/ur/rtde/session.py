@@ -44,8 +44,8 @@ _TRUE, _FALSE = b"\x01", b"\x00"
 class RtdeSession(PortSession):
     """Answers the packages of one client and sends it the outputs that it has subscribed to.
 
-    `boards` make all clients' data packages, by the ticks between two, so that each computes only what its
-    clients read.
+    `boards` has a board for each number of ticks between two packages, so that variables of slow clients are not
+    computed for the others.
     """
 
     client_begins = True

@@ -47,7 +47,7 @@ class InputWriter:
         io = self._io
         if (
             isinstance(wrench, tuple) and io is not None and io.program_state != "STOPPED"
-        ):  # otherwise nobody reads it
+        ):  # otherwise no program reads it
             a, b, c, d, e, f = (float(number) for number in wrench)
             self._change({}, lambda token: SetExternalWrench(token=token, wrench=(a, b, c, d, e, f)))
         if "speed_slider_mask" in values or "speed_slider_fraction" in values:
