@@ -221,8 +221,7 @@ class _Check:
         return f"{said}{self.missed}"
 
     async def refusal(self, robot: Robot) -> str:
-        # Move to the present posture, so that even a server that obeyed would move nothing. Before the first
-        # tick nothing moves anyway.
+        # A move to the present posture moves nothing, even if it is obeyed; nor does any before the first tick.
         info = await robot.info()
         ticks = await robot.clock() == "realtime" or info.tick > 0
         here = tuple((await robot.state()).target_q) if ticks else (0.0,) * len(info.joints)

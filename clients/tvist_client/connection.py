@@ -60,8 +60,6 @@ class Connection(Questions):
         self._events.listen(self.motions.on_event)
         transport.on_lost(self._on_lost)
 
-    # ------------------------------------------------------------------ messages
-
     def states(self, buffer: int = BUFFER) -> Stream[State]:
         """Iterate over every state from now on, one per tick; if the reader is slow, the oldest are dropped.
 
@@ -102,8 +100,6 @@ class Connection(Questions):
         """
         self._ios.subscribe()
         return self._ios.latest or await self._ios.next(lambda _: True, STATE_S)
-
-    # ------------------------------------------------------------------ description and commands
 
     async def info(self) -> Info:
         """Request the robot's description and settings.
@@ -175,8 +171,6 @@ class Connection(Questions):
     async def stop(self) -> None:
         """Bring the arm to rest now; no control is needed."""
         await self.request(Stop())
-
-    # ------------------------------------------------------------------ time
 
     @property
     def clock_token(self) -> str | None:

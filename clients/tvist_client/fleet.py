@@ -116,7 +116,7 @@ class Fleet(Across):
         answers = await asyncio.gather(*(self._ask(place, "command", data) for place in wanted))
         return [_stopped(place, answer) for place, answer in zip(wanted, answers, strict=True)]
 
-    # ------------------------------------------------------------------ what arrives, in Zenoh's threads
+    # The following methods run in Zenoh's threads.
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         place = keys.place(str(sample.key_expr))
@@ -134,8 +134,6 @@ class Fleet(Across):
             self._told[place] = (self._loop.time(), decode(Telemetry, data))
         except ProtocolError:  # from another version; its silence is reported
             return
-
-    # ------------------------------------------------------------------ one robot
 
     async def _ask(self, place: Place, leaf: keys.Leaf, data: bytes | None) -> bytes | NotConnectedError:
         """Return a robot's answer, or why there is none: an error would delay the other robots."""

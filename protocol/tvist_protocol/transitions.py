@@ -111,8 +111,7 @@ _ROBOT_MODES = {
     _A.IDLE: RobotMode.IDLE,
 }
 for _activity in Activity:
-    # Stored as attributes of the members, because looking up another member takes ten times as long, every
-    # tick.
+    # Attributes, because looking up another member at every tick takes ten times as long.
     _activity.robot_mode = _ROBOT_MODES.get(_activity, RobotMode.RUNNING)
     _activity.moving = _activity in _MOVING
     _activity.protective = _activity in {_A.PROTECTIVE_STOPPING, _A.PROTECTIVE_STOP}

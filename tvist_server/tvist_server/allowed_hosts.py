@@ -25,7 +25,7 @@ class AllowedHosts:
         self._networks = [network for text in given if (network := _network(text)) is not None]
 
     def allows(self, name: str, address: str, origin: str | None) -> bool:
-        """Return whether a program from `origin` (None: unknown) may connect to `address`, which `name` resolved to.
+        """Return whether a program from `origin` (None: unknown) may connect to `address`, found for `name`.
 
         The loopback interface is open only to programs from this machine, or if it is listed itself.
         """

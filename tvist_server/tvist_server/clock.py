@@ -74,10 +74,7 @@ class Mailbox:
             self.host.leave_arm()
 
     def attend(self, stepper: str | None) -> bool:
-        """Do other clients' jobs between the ticks of a client's step, and wait for data that a program waits for.
-
-        Return whether the step may continue.
-        """
+        """Do other clients' jobs between a step's ticks, also to wait for data; return whether to go on."""
         self.jobs.do_others(stepper)
         while not self.ending and (left := self._patience()) > 0.0:
             self.jobs.do_next_other(stepper, left)

@@ -135,8 +135,7 @@ class ServedRobot:
     def repeat(self) -> None:
         """Publish the state again for new clients, unless time has passed; in the controller's thread."""
         report = self.controller.report
-        # A robot that is stepped publishes newer states itself; its clients would mistake an old one for a
-        # tick.
+        # A robot that is stepped publishes newer states; its clients would mistake an old one for a tick.
         if report.tick == self._looked_at:
             self.publisher.repeat(report, self.controller.io())
         self._looked_at = report.tick
@@ -155,8 +154,6 @@ class ServedRobot:
                 answer(self._host.carry_out(completed, attend=attend))
 
         self.driven.post(carry_out, client)
-
-    # ------------------------------------------------------------------ figures and shutdown
 
     @property
     def newest(self) -> State | None:

@@ -133,8 +133,7 @@ class Server:
 
     def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
         name, desk, lockstep = robot.setup.name, robot.reception, config.clock != "realtime"
-        # `truth` is offered on request only if all clients are on this machine; over a network it needs the
-        # option `truth`.
+        # Without the option `truth`, that topic is offered only if all clients are on this machine.
         local = not config.connect and all(map(is_local, config.endpoints))
         wanted = robot.want_truth if local else None
         gateways: list[Gateway] = [
@@ -152,15 +151,12 @@ class Server:
             gateways.append(ConsoleGateway(self._console, name, partial(config.command_line, name=name)))
         return gateways
 
-    # ------------------------------------------------------------------ life
-
     def start(self) -> None:
         """Start the clocks and answer clients."""
         # The objects created before live until the end: the garbage collector need not visit them again.
         gc.collect()
         gc.freeze()
-        # Another thread may hold the interpreter's lock when the tick thread wakes up, which requests it
-        # after this time. Python's default, 5 ms, is longer than a tick.
+        # Time after which the tick thread demands the interpreter's lock; the default, 5 ms, exceeds a tick.
         sys.setswitchinterval(1e-4)
         self._console.start()
         for robot in self.robots:

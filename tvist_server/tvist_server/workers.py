@@ -85,10 +85,7 @@ class Workers:
             raise
 
     def run(self, ready: Callable[[], None], ending: Ending) -> None:
-        """Serve until a signal comes.
-
-        WorkersError if a process died or a robot stopped, after all others have ended.
-        """
+        """Serve until a signal comes; WorkersError if a process or robot stops, after the others have ended."""
         heard, wake = multiprocessing.Pipe(duplex=False)
         ending.hear(lambda: wake.send(None))
         why: str | None = None
@@ -128,8 +125,6 @@ class Workers:
             group.clear()
         self._folder.close()
         return failures
-
-    # ------------------------------------------------------------------ start
 
     def _fork(self) -> None:
         for needed, name in (
@@ -201,8 +196,6 @@ class Workers:
         if isinstance(news, Refused) and news.misuse:
             raise StartError(news.why)
         raise WorkersError(self._why(worker, news))
-
-    # ------------------------------------------------------------------ life and end
 
     def _news(self, worker: _Worker) -> News | None:
         try:

@@ -31,8 +31,7 @@ class Inbox:
             self.dropped += 1
             return
         self._waiting.append((callback, data))
-        # Two threads may both wake the loop, which does no harm. At least one does, because the flag is
-        # cleared before the queue is emptied.
+        # Two threads may both wake the loop. At least one does: the flag is cleared before the queue is emptied.
         if not self._woken:
             self._woken = True
             wake(self._loop, self._deliver)

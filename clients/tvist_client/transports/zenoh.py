@@ -96,8 +96,7 @@ class ZenohTransport(Transport):
         try:
             return await self._get(keys.key(self._robot, "command"), data, timeout_s)
         except NotConnectedError:
-            # Access control drops what is not allowed. If the robot was present all the time and still
-            # answers, it has denied the command.
+            # If the robot was present all the time and still answers, access control has dropped the command.
             if self._endpoint.startswith("tls/") and self._alive.is_set():
                 await self.info()
                 if self._losses == losses:

@@ -146,8 +146,7 @@ def _operating(robots: Sequence[str]) -> list[dict[str, Any]]:
         _rule("answer command", "egress", ["declare_queryable", "reply"], command),
         _rule("set-points", "ingress", ["put"], setpoint),
         _rule("take set-points", "egress", ["declare_subscriber"], setpoint),
-        # A lease ends when its client's token disappears, so a viewer with that token could end an operator's
-        # lease.
+        # A lease ends when its client's token disappears: a viewer with that token could end an operator's.
         _rule("be there", "ingress", ["liveliness_token"], clients),
         _rule("look for clients", "egress", ["declare_liveliness_subscriber", "liveliness_query"], clients),
     ]

@@ -44,11 +44,7 @@ def guarded(
     insecure: bool,
     namespace: str = "",
 ) -> tuple[list[str], dict[str, Any]]:
-    """Return the endpoints to listen on and the settings that protect them.
-
-    Raise StartError if an endpoint is invalid or unprotected although other machines can reach it, or the
-    folder incomplete.
-    """
+    """Return the endpoints to listen on and the settings that protect them; StartError if one is unprotected."""
     secured, settings, roles = _protected(listen, security, insecure=insecure)
     access = open_access(robots, namespace) if roles is None else access_control(robots, roles, namespace)
     return secured, {**settings, "access_control": access}
@@ -115,10 +111,7 @@ def roles_in(folder: Path) -> dict[str, Role]:
 
 
 def _secured(endpoint: str) -> str:
-    """Check an endpoint for use with `--security`.
-
-    Another protocol is refused, since its clients would not expect TLS.
-    """
+    """Check an endpoint for use with `--security`; clients of another protocol would not expect TLS."""
     if protocol(endpoint) != "tls":
         address = endpoint.partition("/")[2] or "<address>:<port>"
         raise StartError(

@@ -59,10 +59,7 @@ class MetricsGateway(Gateway):
 
 
 class Metrics(Collector):
-    """HTTP server for Prometheus at `address` (port 0.
-
-    Any), which computes figures on request; may raise GatewayError.
-    """
+    """HTTP server for Prometheus, which computes figures on request; GatewayError if it cannot listen at `address`."""
 
     def __init__(self, address: str) -> None:
         host, port = place(address)

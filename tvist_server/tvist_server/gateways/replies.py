@@ -50,7 +50,6 @@ class Answers:
 
 
 def _send(query: zenoh.Query, key: str, reply: Reply | Callable[[], bytes]) -> None:
-    # If the client has left or the session is closed, the answer is not needed. Leaving this block ends the
-    # query.
+    # Leaving this block ends the query; if the client has left, the answer is not needed.
     with contextlib.suppress(zenoh.ZError), query:
         query.reply(key, reply() if callable(reply) else encode(reply), encoding=ENCODING)

@@ -130,7 +130,7 @@ class ProgramSockets(Gateway, SocketPorts):
         self._silent: set[int] = set()
         """Sockets that a step has waited for in vain."""
 
-    # ------------------------------------------------------------------ in the controller's thread
+    # The following methods run in the controller's thread.
 
     def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketNews]:
         """Carry out orders; the results are reported later."""
@@ -191,7 +191,7 @@ class ProgramSockets(Gateway, SocketPorts):
         elif self._early is not None:
             self._early.append(action)
 
-    # ------------------------------------------------------------------ in the network's thread
+    # The following methods run in the network's thread.
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
         """Ignore the messages of the robot."""

@@ -91,7 +91,7 @@ class ZenohGateway(Gateway):
             self._answers.close()
             self._closed = True
 
-    # ------------------------------------------------------------------ what arrives, in Zenoh's threads
+    # The following methods run in Zenoh's threads.
 
     def _listen(self, topic: Topic, tell: Callable[[bool], None]) -> None:
         """Call `tell` with whether a topic has subscribers, now if it has any and at every change."""

@@ -82,8 +82,6 @@ class MovedRobot(RealArm):
         if trouble is not None:
             raise PlantError(f"the robot at {self._place} is not moved: {trouble}")
 
-    # ------------------------------------------------------------------ a plant
-
     @property
     def payload(self) -> Payload:  # type: ignore[override]
         """Payload that the robot was told."""
@@ -161,8 +159,6 @@ class MovedRobot(RealArm):
 
     def _trouble(self) -> str | None:
         return state_trouble(self._wanted, self._sight, may_play=self._left_paused)
-
-    # ------------------------------------------------------------------ its program
 
     @property
     def condition(self) -> Condition:

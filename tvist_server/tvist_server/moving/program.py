@@ -145,9 +145,6 @@ class Window:
         self._kept.extendleft([setpoint] * (1 if self._kept else KEPT))
 
     def values(self, order: int) -> tuple[float, ...]:
-        """Return an input package in the order of `INPUTS`.
-
-        `order` is the run that may follow, or its negative to end it.
-        """
+        """Return an input package; `order` is the run that may follow, or its negative to end it."""
         kept = self._kept or [(0.0,) * JOINTS] * KEPT
         return self.number, order, *(angle for one in kept for angle in one)

@@ -86,10 +86,7 @@ class Segments:
         self._counted = now
 
     def where(self) -> Path | None:
-        """Return the path of the growing file, which may have been moved (None.
-
-        Unknown); DeletedError if it has none.
-        """
+        """Return the growing file's path, which may have moved; None if unknown, DeletedError if it has none."""
         here = os.fstat(self._stream.fileno())
         if here.st_nlink == 0:
             raise DeletedError

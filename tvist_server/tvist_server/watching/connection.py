@@ -47,10 +47,7 @@ class Connection:
         self._selector.register(self._socket, selectors.EVENT_WRITE)
 
     def rows(self, timeout: float) -> Sequence[Row]:
-        """Return the rows that have come, after waiting at most `timeout` [s].
-
-        LostError if there is no robot (left).
-        """
+        """Return the rows that have come, waiting at most `timeout` [s]; LostError without a robot."""
         try:
             ready = self._selector.select(max(0.0, timeout)) or self._selector.select(0.0)
             if ready and not self._connected:

@@ -131,8 +131,6 @@ class WatchedRobot(RealArm):
             self._connection.close()
             self._connection = None
 
-    # ------------------------------------------------------------------ rows
-
     def _look(self) -> None:
         """Read rows before the server ticks to determine the robot's model and row rate."""
         self._connect()

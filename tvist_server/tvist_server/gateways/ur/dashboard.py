@@ -55,9 +55,6 @@ class Command:
     """Whether the command takes an argument."""
 
 
-# ---------------------------------------------------------------------- power and safety
-
-
 def _changing(
     change: Callable[[UrRobot, ConnectionControl], Awaitable[Refused | None]],
     done: str,
@@ -90,9 +87,6 @@ def _safety_status(request: Request) -> str:
 
 def _safety(number: int | None) -> str:
     return SafetyMode.UNDEFINED.name if number is None else SafetyMode(number).name
-
-
-# ---------------------------------------------------------------------- programs
 
 
 async def _load(request: Request) -> str:
@@ -149,9 +143,6 @@ def _is_program_saved(request: Request) -> str:
     return f"{_bool(programs.saved)} {programs.name or UNNAMED}"
 
 
-# ---------------------------------------------------------------------- the person at the robot
-
-
 def _popup(request: Request) -> str:
     stamp = messages.stamp(request.robot.latest)
     request.robot.tell(messages.popup(stamp, "Message", request.argument))
@@ -182,9 +173,6 @@ def _clear_operational_mode(request: Request) -> str | None:
         return None
     request.robot.operational_mode = NO_MODE
     return f"No longer controlling the operational mode. Current operational mode: {NO_MODE}"
-
-
-# ---------------------------------------------------------------------- information
 
 
 def _model(request: Request) -> str:

@@ -196,7 +196,7 @@ class UrInterfaces(Gateway):
         self._loop = None
         self._close_sockets()
 
-    # ------------------------------------------------------------------ in the interfaces' thread
+    # The following methods run in the interfaces' thread.
 
     def _look(self) -> None:
         """Handle the queued messages; later ones wake this thread again, so that clients get their turn."""
@@ -219,8 +219,7 @@ class UrInterfaces(Gateway):
             return
         if self._connections:
             snapshot = self._read(report)
-            # All samples are made before the first is sent, so that the reader's process wakes up once for
-            # all of them.
+            # All samples are made before the first is sent, so that the readers' process wakes up only once.
             for connection, data in [(one, one.sample(snapshot)) for one in tuple(self._connections)]:
                 if data:
                     connection.put(data)

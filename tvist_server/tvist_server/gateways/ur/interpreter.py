@@ -34,10 +34,10 @@ NO_PROGRAM, TOO_MANY, SYNTAX, COMPILATION, TOO_LONG = (
 
 
 class InterpreterSession(InTurnSession[tuple[str, bool]]):
-    """One client of the interpreter mode.
+    """One client of the interpreter mode; a blank line is ignored.
 
-    A line of statements is answered by `ack: NUMBER: line` or `discard: REASON: line`, a question by `state:
-    NUMBER: question`. Blank lines are ignored.
+    A line of statements is answered by `ack: NUMBER: line` or `discard: REASON: line`, a question by
+    `state: NUMBER: question`.
     """
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:

@@ -74,8 +74,6 @@ class Programs:
     def playing(self) -> bool:
         return self.state == "PLAYING"
 
-    # ------------------------------------------------------------------ requests, each for a client
-
     async def load(self, path: str, control: ConnectionControl) -> Refused | None:
         """Load a program by its path, whose folders are ignored, and stop the running one."""
         name, self._asked = PurePosixPath(path).name, None
@@ -149,8 +147,6 @@ class Programs:
         """Close a program's popup without control; return whether that was accepted."""
         return not isinstance(await control.ask(ProgramClosePopup()), Refused)
 
-    # ------------------------------------------------------------------ what the robot tells
-
     def io(self, io: Io) -> None:
         """Take over the program's state from the controller."""
         if io.program is not None and io.program != self.name:
@@ -195,8 +191,6 @@ class Programs:
             line, column = map(int, place.groups())
             stamp = messages.stamp(self._host.latest)
             self._host.tell(messages.runtime_exception(stamp, line, column, refused.why))
-
-    # ------------------------------------------------------------------ state and control
 
     def _changed(self, state: ProgramState, reply: Reply) -> bool:
         done = not isinstance(reply, Refused)

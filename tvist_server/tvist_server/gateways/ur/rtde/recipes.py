@@ -42,10 +42,7 @@ class InputRecipe:
         self._all = Struct(">" + "".join(wire.value for _, wire in self._fields))
 
     def values(self, data: bytes) -> dict[str, Value]:
-        """Return the values in a data package.
-
-        Variables that a short payload lacks are omitted, extra bytes ignored.
-        """
+        """Return the values in a data package, without variables that a short payload lacks."""
         if len(data) >= self._all.size:
             numbers, fields = self._all.unpack_from(data), self._fields
         else:

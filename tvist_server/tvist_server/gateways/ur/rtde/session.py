@@ -85,10 +85,7 @@ class RtdeSession(PortSession):
                 handler(payload)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Return a data package if one is due, otherwise no bytes.
-
-        The first is due at the first tick after the start.
-        """
+        """Return a data package if one is due, otherwise no bytes; the first is due right after the start."""
         if not self.served or self._outputs is None:
             return b""
         tick, every = snapshot.state.tick, self._every
@@ -104,8 +101,6 @@ class RtdeSession(PortSession):
         self._board.end(self)
         super().closed()
 
-    # ------------------------------------------------------------------ answers
-
     def _request_version(self, payload: bytes) -> None:
         wanted = _UINT16.unpack_from(payload)[0] if len(payload) >= _UINT16.size else 0
         accepted = wanted in {1, 2}
@@ -119,10 +114,7 @@ class RtdeSession(PortSession):
         self._send(package(PackageKind.GET_URCONTROL_VERSION, _VERSION.pack(*numbers)))
 
     def _set_up_outputs(self, payload: bytes) -> None:
-        """Replace the output recipe.
-
-        Answer with its types and, in version 2, its id (0 if it is invalid and removed).
-        """
+        """Replace the output recipe; answer with types and, in version 2, an id: 0 if the recipe is invalid."""
         frequency = RATE
         if self._version > 1:
             if len(payload) >= _DOUBLE.size:
@@ -137,10 +129,7 @@ class RtdeSession(PortSession):
         self._send(words(PackageKind.SETUP_OUTPUTS, head, recipe.words))
 
     def _set_up_inputs(self, payload: bytes) -> None:
-        """Add an input recipe.
-
-        Answer with its id and types. The id is 0 if a variable cannot be set or 255 are used.
-        """
+        """Add an input recipe; answer with an id and types. The id is 0 if a variable or the recipe is refused."""
         names = split(payload)
         types = [self._input_word(name) for name in names]
         valid = bool(names) and len(self._inputs) < RECIPES and not {"NOT_FOUND", "IN_USE"} & set(types)

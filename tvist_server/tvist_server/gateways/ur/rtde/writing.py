@@ -65,8 +65,6 @@ class InputWriter:
         assert not isinstance(value, tuple)
         return value
 
-    # ------------------------------------------------------------------ registers
-
     def _set_registers(self, values: dict[str, Value]) -> None:
         io = self._io
         watched = () if io is None else io.watched  # the program's watchdogs count every write
@@ -97,8 +95,6 @@ class InputWriter:
         command = SetRegisters(bank=head.bank, first=head.first, values=head.values, also=tuple(rest))
         self._pending.ask(news)
         begin(self._answered(news, self._control.ask(command)))
-
-    # ------------------------------------------------------------------ what needs control
 
     def _set_speed(self) -> None:
         fraction = self._number("speed_slider_fraction")
