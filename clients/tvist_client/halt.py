@@ -22,8 +22,7 @@ class HaltReport(msgspec.Struct, frozen=True):
     robot: str
     """Name of the robot."""
     stopped: list[str] | None
-    """What was stopped, in order, such as "motion 3"; empty if nothing was under way; null in lockstep, where
-    the stop starts with the next step."""
+    """What was stopped, in order, such as "motion 3"; empty if nothing; null in lockstep, where the next step stops."""
     control: str | None
     """Client that has control and can move the robot again; null if none has."""
     runtime_state: str | None

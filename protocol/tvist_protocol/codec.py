@@ -25,8 +25,7 @@ from tvist_protocol.values import Name
 Message = Command | Setpoint | Reply | State | Event | Truth | Telemetry | Io | Info
 
 MAX_BYTES = 256 * 1024
-"""Largest size of a message [bytes]; a larger one is refused without being decoded. The longest commands are
-a step of 1000 set-points of 7 joints, 1000·(18 + 67) bytes, and a calibration sent as a map."""
+"""Largest message that is decoded [bytes]; the longest are steps of 1000 set-points (85 kB) and calibrations."""
 
 _Some = TypeVar("_Some")
 _SomeMessage = TypeVar("_SomeMessage", bound=Message)

@@ -102,8 +102,7 @@ class MoveJ(Leased, frozen=True, kw_only=True, tag="move_j"):
     jerk: Jerk = 100.0
     """Largest jerk of any joint [rad/s³]."""
     duration: Duration | None = None
-    """Duration of the motion before shaping [s], instead of `velocity`, `acceleration` and `jerk`; if it is
-    too short for the arm, the motion takes longer."""
+    """Duration before shaping [s], in place of `velocity`, `acceleration`, `jerk`; longer if the arm cannot do it."""
 
 
 class ServoStart(Leased, frozen=True, kw_only=True, tag="servo_start"):

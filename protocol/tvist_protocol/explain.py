@@ -14,8 +14,7 @@ from tvist_protocol.places import ABSENT, Place
 from tvist_protocol.values import PATTERN_MEANINGS
 
 FAULTS = (ValueError, TypeError, OverflowError, RecursionError, MemoryError)
-"""Errors of msgspec: its own and UTF-8 errors (ValueErrors), keys that cannot be hashed, numbers beyond 64
-bits, nesting beyond the stack, lengths beyond memory."""
+"""Errors of msgspec: its own, UTF-8, unhashable keys, numbers beyond 64 bits, deep nesting, huge lengths."""
 
 EXPLAINED_BYTES = 4096
 """Longest message whose values are named [bytes]."""

@@ -32,8 +32,7 @@ class ForceMode(Leased, frozen=True, kw_only=True, tag="force_mode"):
     wrench: Wrench
     """Force [N] and torque [N m] that the arm exerts on its environment in the compliant axes."""
     limits: Limits = (0.1, 0.1, 0.1, 0.5, 0.5, 0.5)
-    """Speed limit of each compliant axis [m/s, rad/s]; for each other axis the largest deviation [m, rad],
-    beyond which the robot makes a protective stop."""
+    """Speed limits of compliant axes [m/s, rad/s]; largest deviations of others [m, rad], else a protective stop."""
     frame: Pose | None = None
     """The frame, as a pose in the base frame; null: the base frame."""
     frame_type: FrameType = 2
@@ -69,5 +68,4 @@ class SetExternalWrench(Leased, frozen=True, kw_only=True, tag="set_external_wre
     """
 
     wrench: Wrench
-    """Force [N] and torque [N m] along the axes of the flange frame, including the weight of what the sensor
-    carries."""
+    """Force [N] and torque [N m] along the flange frame's axes, including the weight of what the sensor carries."""

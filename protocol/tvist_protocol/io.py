@@ -11,8 +11,7 @@ from tvist_protocol.values import Fraction, Payload, Token
 BITS, NUMBERS = 128, 48
 """Number of registers in a bank of bits, and in a bank of integers or doubles."""
 Bank = Literal["input_bit", "input_int", "input_double", "output_bit", "output_int", "output_double"]
-"""Banks of registers. Clients write input registers, which the robot's programs read; programs write output registers,
-which clients read."""
+"""Banks of registers: clients write input registers, which programs read; programs write output registers."""
 
 
 class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
@@ -61,8 +60,7 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     interpreter: Interpreter | None = None
     """Statements that clients have added to the program; null before the first program that accepts some."""
     watched: list[str] = []
-    """RTDE names of the input registers that the program watches: it counts how often they are written, even
-    with the same value."""
+    """RTDE names of input registers whose writes the program counts, even writes of the same value."""
     tool_output_voltage: int = 0
     """Supply voltage of the tool [V]."""
     tool_analog_input_types: int = 3
@@ -76,8 +74,7 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     tcp_force_zero: list[float] | None = None
     """Force and torque that count as zero: of a sensor in its frame, else at the tool in the base frame [N, N m]."""
     assumed_payload: Payload | None = None
-    """Payload that the robot has identified and uses instead of the declared one; null while it uses the
-    declared one."""
+    """Payload that the robot has identified and uses instead of the declared one; null: the declared one is used."""
     actual_TCP_force: list[float] | None = None
     """Force and torque at the tool centre point that explain the torques measured in the previous tick, in the base
     frame [N, N m]; zero while the arm is braked. Sent once a second; null in messages sent because of a change."""

@@ -40,8 +40,7 @@ class MoveL(Leased, frozen=True, kw_only=True, tag="move_l"):
     jerk: ToolJerk = 60.0
     """Largest jerk of the tool [m/s³]."""
     duration: Duration | None = None
-    """Duration of the motion before shaping [s], instead of `velocity`, `acceleration` and `jerk`; if it is
-    too short for the arm, the motion takes longer."""
+    """Duration before shaping [s], in place of `velocity`, `acceleration`, `jerk`; longer if the arm cannot do it."""
 
 
 class MoveC(Leased, frozen=True, kw_only=True, tag="move_c"):
@@ -86,11 +85,9 @@ class JointSegment(PathSegment, frozen=True, kw_only=True, tag="joint"):
     acceleration: Acceleration = 2.0
     """Largest acceleration of any joint [rad/s²]."""
     duration: Duration | None = None
-    """Duration of this part [s], instead of `velocity` and `acceleration`; if it is too short for the arm,
-    the part takes longer."""
+    """Duration of this part [s], in place of `velocity` and `acceleration`; longer if the arm cannot do it."""
     blend: Blend = 0.0
-    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
-    it has no effect at the end of the path."""
+    """Distance from this part's end within which the path may leave it for the next [m]; unused in the last part."""
 
 
 class LineSegment(PathSegment, frozen=True, kw_only=True, tag="line"):
@@ -103,11 +100,9 @@ class LineSegment(PathSegment, frozen=True, kw_only=True, tag="line"):
     acceleration: ToolAcceleration = 1.2
     """Largest acceleration of the tool, also in the blend at its end [m/s²]."""
     duration: Duration | None = None
-    """Duration of this part [s], instead of `velocity` and `acceleration`; if it is too short for the arm,
-    the part takes longer."""
+    """Duration of this part [s], in place of `velocity` and `acceleration`; longer if the arm cannot do it."""
     blend: Blend = 0.0
-    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
-    it has no effect at the end of the path."""
+    """Distance from this part's end within which the path may leave it for the next [m]; unused in the last part."""
 
 
 class ProcessSegment(PathSegment, frozen=True, kw_only=True, tag="process"):
@@ -120,8 +115,7 @@ class ProcessSegment(PathSegment, frozen=True, kw_only=True, tag="process"):
     acceleration: ToolAcceleration = 1.2
     """Largest acceleration of the tool along the path [m/s²]."""
     blend: Blend = 0.0
-    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
-    it has no effect at the end of the path."""
+    """Distance from this part's end within which the path may leave it for the next [m]; unused in the last part."""
 
 
 class ArcSegment(PathSegment, frozen=True, kw_only=True, tag="arc"):
@@ -138,8 +132,7 @@ class ArcSegment(PathSegment, frozen=True, kw_only=True, tag="arc"):
     acceleration: ToolAcceleration = 1.2
     """Largest acceleration of the tool along the path [m/s²]."""
     blend: Blend = 0.0
-    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
-    it has no effect at the end of the path."""
+    """Distance from this part's end within which the path may leave it for the next [m]; unused in the last part."""
 
 
 Segment = JointSegment | LineSegment | ProcessSegment | ArcSegment

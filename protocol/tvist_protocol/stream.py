@@ -101,8 +101,7 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     motor_limited: bool = False
     """Whether the torque limits reduce the lead of the motors that the arm's elasticity requires."""
     flange_wrench: list[float] | None = None
-    """Force [N] and torque about its origin [N m] that the sensor in the flange measures, in its frame; null:
-    no sensor."""
+    """Force [N] and torque about the origin [N m] measured by the flange sensor, in its frame; null: no sensor."""
 
 
 class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc=False):
@@ -119,8 +118,7 @@ class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc
     why: str | None = None
     """Reason, for people."""
     category: int | None = None
-    """Category of a stop according to IEC 60204-1: 0 closes the brakes at once, 1 removes power at rest, 2
-    keeps power."""
+    """Stop category (IEC 60204-1): 0 closes the brakes at once, 1 removes power at rest, 2 keeps power."""
     duration: float | None = None
     """Time until the shaped reference of a stop is at rest; null if it is too far ahead to predict [s]."""
     way: float | None = None
@@ -171,8 +169,7 @@ class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc
     static_link_deflection: list[float] = []
     """Part of `link_deflection` that remains at rest in this pose; empty if unknown [rad]."""
     body_poses: list[float] = []
-    """Poses of the moving bodies in the arm's world, in the base frame, consecutively: x y z [m] and rotation
-    vector [rad]; empty without a world."""
+    """Base-frame poses of moving bodies, consecutively: x y z [m], rotation vector [rad]; empty without a world."""
     contact_force: list[float] = []
     """Total contact force on the arm, its tool or its fingers, in the base frame; empty without a world [N]."""
 

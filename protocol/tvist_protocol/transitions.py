@@ -22,8 +22,7 @@ class Activity(StrEnum):
     STREAMING = "STREAMING"
     """The arm follows a stream of set-points."""
     GUIDED = "GUIDED"
-    """The arm follows `servo_j`, `speed_j` or `speed_l`, each replacing its predecessor, or is compliant in
-    `force_mode` or `freedrive`."""
+    """The arm follows `servo_j`, `speed_j` or `speed_l`, or is compliant in `force_mode` or `freedrive`."""
     ENDING = "ENDING"
     """A stream has ended, and the arm comes to rest through the filter."""
     STOPPING = "STOPPING"

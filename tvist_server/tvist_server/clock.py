@@ -22,8 +22,7 @@ log = logging.getLogger(__name__)
 LONGEST_SLEEP = 0.1
 """Longest sleep of the tick thread before it checks whether it should end [s]."""
 LONGEST_TICK = 1.5
-"""Longest wait for a tick in progress at shutdown [s]: a plug-in arm, or in lockstep a client that stopped
-reading, may block it for ever."""
+"""Longest wait for a tick at shutdown [s]: a plug-in arm, or in lockstep a client, may block it for ever."""
 REPEAT_EVERY = 1.0
 """Time without a step after which a robot in lockstep republishes its last state [s]."""
 SET_TIMER_SLACK = 29

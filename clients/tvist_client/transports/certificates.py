@@ -19,11 +19,9 @@ from tvist_client.errors import NotConnectedError
 
 AUTHORITY, CERTIFICATE, KEY = "authority.pem", "client.pem", "client.key"
 OPEN_MS = 15_000
-"""Longest time to open a session [ms]. A server accepts no client for 100 ms after each failed handshake, so
-a hundred abandoned connections make the next client wait for 10 s."""
+"""Longest time to open a session [ms], because a hundred connections abandoned at once delay the next one by 10 s."""
 PROBE_S = 4.0
-"""Longest wait in a probe of a failed connection [s]: twice what a robot without certificates waits for the
-rest of a supposed message."""
+"""Longest wait in a probe [s]: twice what a robot without certificates waits for the rest of a supposed message."""
 
 Folder = str | os.PathLike[str]
 

@@ -24,8 +24,7 @@ DECELERATION = 5.0
 BRAKES = 0.125
 """Braking time at the speed cap, if that needs a larger deceleration [s]."""
 SETTLES = 25
-"""Number of rows of the waiting program before the first set-point. Rows delayed by the program's start have
-arrived by then; otherwise it would end because numbers come faster than it counts."""
+"""Number of rows of the waiting program before the first set-point; rows delayed by its start have come by then."""
 GRACE = 5
 """Number of rows after the program's end in which the modes may still explain it."""
 STANDS = 10

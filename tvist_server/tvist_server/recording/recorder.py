@@ -28,11 +28,9 @@ from tvist_server.recording.writer import heading
 log = logging.getLogger(__name__)
 
 QUEUE_SIZE = 8192
-"""Number of messages that may wait: about 30 MB, and five seconds at 1500 messages a second (state, truth and
-a set-point every tick), the time that a file system may need to commit."""
+"""Number of messages that may wait: 30 MB, five seconds at 1500 messages/s, as a file system's commit may take."""
 PAUSE = 0.02
-"""Time between two checks of the queue [s]. The tick does not wake the writer, because that would cost it a
-system call, and the interpreter's lock in the middle of its work."""
+"""Time between two checks of the queue [s]; waking the writer would cost the tick a system call and the lock."""
 LOOK = 1.0
 """Time between two checks whether the file was moved or deleted [s]."""
 

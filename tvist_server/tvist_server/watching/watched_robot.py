@@ -32,8 +32,7 @@ RETRY = 1.0
 TELL_EVERY = 1.0
 """Shortest time between two reports about missing rows [s]."""
 OTHER = 0.03
-"""Smallest distance of the tool from the robot file's pose that indicates another model [m]; a calibration of
-the kinematics shifts it by some millimetres."""
+"""Least tool distance from the robot file's pose that means another model [m]; calibration shifts it by mm."""
 
 
 class WatchedRobot(RealArm):

@@ -51,8 +51,7 @@ class Programs:
         """Statements of the interpreter mode, including those accepted since the last `io`."""
         self._label: ProgramLabel | None = None
         self._control: ConnectionControl | None = None
-        """Access of the client that plays the program. It lasts as long as the program, even if the client
-        disconnects."""
+        """Access of the client that plays the program, kept as long as the program, even if it disconnects."""
         self._beginning: list[ConnectionControl] = []
         """Accesses of clients whose secondary programs are accepted but not started."""
         self._beside: list[ConnectionControl] = []
