@@ -1,4 +1,4 @@
-"""Entry point of the `tvist` program and its list of commands; each command is imported when it is called."""
+"""Entry point of `tvist` and its list of commands; each command is imported only when it is called."""
 
 import gc
 import os
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import cyclopts
 
 BEGAN = time.monotonic()
-"""When this program began, before it imported what takes long."""
+"""Start of this program, before the slow imports."""
 ABOUT = "A robot controller for a flexible arm in simulation, with time-varying input shaping."
 LOG = {
     "record": "Record a served robot as MCAP.",
@@ -63,22 +63,19 @@ GROUPS = {
 }
 """The commands with their one-line help, in groups, in the order in which a new user meets them."""
 OF_GROUPS = {"log": LOG}
-"""Commands that have commands of their own."""
+"""Commands that have subcommands."""
 COMMANDS = {name: what for group in GROUPS.values() for name, what in group.items()}
 
 
 def program() -> None:
-    """Be the program `tvist`: see `main`."""
+    """Run `tvist` as a program: see `main`."""
     # Processes of ours import nothing from the folder that one happens to work in, which may be somebody else's.
     os.environ["PYTHONSAFEPATH"] = "1"
     main()
 
 
 def main() -> None:
-    """Do what the command line says.
-
-    Control+C or another signal ends it at any time, with exit code 130 and without a traceback.
-    """
+    """Run the command line; Control+C or another signal ends it with exit code 130 and without a traceback."""
     try:
         _run()
     except KeyboardInterrupt:
@@ -87,18 +84,17 @@ def main() -> None:
 
 
 def _default(value: object) -> str | None:
-    """The default as a help text shows it: none for a switch that is off, or for what is empty."""
+    """Return the default as a help text shows it: None for a switch that is off, or an empty value."""
     if value in (None, False, "", ()):
         return None
     return "on" if value is True else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def application(called: Sequence[str] = ()) -> "cyclopts.App":
-    """Return the program's commands and options, as the parser knows them.
+    """Return the parser for all commands and options.
 
-    Args:
-        called: The words of the command that was called, if any: its own help is its docstring, while the list of all
-            commands has their short ones.
+    Of the command `called`, given as its words, the help is its docstring; the others have their one-line
+    help.
     """
     from importlib.metadata import version
 
@@ -128,7 +124,7 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
 
 
 def _overview() -> str:
-    """Return the help of the program, made without the parser, which takes longer to import."""
+    """Return the help of the program without the parser, which takes longer to import."""
     indent, columns = " " * (max(map(len, COMMANDS)) + 4), min(shutil.get_terminal_size().columns, 120)
     lines = ["Usage: tvist COMMAND", "", *textwrap.wrap(ABOUT, columns), ""]
     options = {
@@ -146,7 +142,7 @@ def _overview() -> str:
 
 @cache
 def examples() -> dict[str, str]:
-    """Return a command line for each command that does something by itself, by its words such as `log analyze`."""
+    """Return an example command line for each command that can run by itself, keyed by words such as `log analyze`."""
     return tomllib.loads(Path(__file__).with_name("examples.toml").read_text(encoding="utf-8"))
 
 
@@ -155,7 +151,7 @@ def _example(command: str) -> str | None:
 
 
 def _known(chain: Sequence[str]) -> Mapping[str, str]:
-    """Return the commands among which one was sought."""
+    """Return the commands among which an unknown one was sought."""
     return OF_GROUPS.get(chain[0], COMMANDS) if chain else COMMANDS
 
 

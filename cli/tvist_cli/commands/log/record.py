@@ -18,15 +18,15 @@ def record(
 ) -> None:
     """Record what a served robot publishes as MCAP until Control+C: states, events, truth, inputs and outputs.
 
-    Commands are known only to the server and are not recorded: `tvist log replay` needs a file from `tvist serve
-    --record`.
+    Commands are not recorded, since only the server knows them: `tvist log replay` needs a file from `tvist
+    serve --record`.
 
     Args:
-        file: MCAP file to write.
+        file: Write to this MCAP file.
         at: Where the robot is.
         seconds: Stop this many seconds after the first state.
-        keep: Keep the last 90s, 10min or 2h, and at most a quarter more, and forget what was before [keep all]. FILE
-            then names several files, as with tvist serve --keep.
+        keep: Keep only the last 90s, 10min or 2h, and at most a quarter more [all]. FILE then names several
+            files, as with tvist serve --keep.
         json: Print one JSON object at the end.
     """
     if seconds is not None and seconds <= 0.0:
