@@ -59,7 +59,7 @@ def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Comman
 
 
 def configuration(given: Mapping[str, Any], file: str | None, **defaults: object) -> "ServeConfig":
-    """Merge command line, file and `defaults`, in this order of precedence; raise Failure (code 2) if a value is invalid."""
+    """Merge command line, file and `defaults`, in this order of precedence; raise Failure if a value is invalid."""
     from tvist_server.config import from_mapping
 
     source = "configuration" if file is None else f"configuration {file}"

@@ -89,7 +89,7 @@ def _check(options: StudyOptions) -> None:
 def _asked(
     preset: Preset, name: str, options: StudyOptions, other: str = "", moves: Sequence[Move] = ()
 ) -> Asked:
-    """Load what the options request; for another robot, the same shapers with its own calibration and the given moves."""
+    """Load what the options request; for an `other` robot, with its own calibration and the given moves."""
     whole = load(other or options.robot)
     masses = _masses(options.payload, whole)
     wanted = "none" if options.clean else options.disturbances

@@ -1,6 +1,7 @@
-"""A recording with what viewers need to draw its arm: the same messages, three channels more, and a layout beside it.
+"""Export a recording for viewers: the same messages, three more channels, and a layout.
 
-The server records none of this: all of it follows from its messages, so no tick pays for it, and recordings stay small.
+The server does not record these channels, because they follow from its messages: ticks stay fast and
+recordings small.
 """
 
 import json
@@ -31,23 +32,23 @@ from tvist_protocol.recorded import END_METADATA, TICK_NS, topics
 from tvist_protocol.stream import State
 
 PICTURE_TICKS = 10
-"""Ticks between two messages about the frames: 50 a second show a vibration of 10 Hz, and viewers interpolate."""
+"""Ticks between two frames messages: 50 a second show a vibration of 10 Hz, and viewers interpolate."""
 DIGITS = 9
-"""Decimals of places [m] and quaternions, which shorten the file by a third."""
+"""Decimals of positions [m] and quaternions; rounding makes the file a third smaller."""
 LIGHT, DARK = (0.85, 0.87, 0.89), (0.36, 0.40, 0.44)
 """Colours of the arm's links, and of its base and payload: red, green, blue."""
 SCHEMAS = {"frames": "foxglove.FrameTransforms", "arm": "foxglove.SceneUpdate", "curves": "tvist.curves"}
-"""Schema of each channel, by the end of its topic. Viewers know those of Foxglove by name."""
+"""Schema of each channel, by the end of its topic; viewers know those of Foxglove by name."""
 
 _Entry = tuple[int, str, Schema | None, Any]
-"""Time [ns], topic, its schema, and the message: as it was recorded, or its content."""
+"""Time [ns], topic, schema, and the message: as recorded, or its content."""
 
 
 def export(content: RecordingFile, path: Path) -> list[str]:
-    """Write a recording with channels for viewers, and a layout for it, replacing both files.
+    """Write a recording with channels for viewers, and a layout, replacing both files; return notes on what is missing.
 
-    The channels are `frames` (`foxglove.FrameTransforms`, 50 a second), `arm` (`foxglove.SceneUpdate`, once) and
-    `curves` (every tick), each behind `tvist/<robot>/`. All else is as it was.
+    The channels are `frames` (`foxglove.FrameTransforms`, 50 a second), `arm` (`foxglove.SceneUpdate`, once)
+    and `curves` (every tick), each behind `tvist/<robot>/`.
     """
     arm, above = arm_of(content), topics(content.robot)[State].removesuffix("state")
     (stood, stiff), (drawn, lacking) = _stood(content, arm), _curves(content.recording)
@@ -103,7 +104,7 @@ def _write(entries: Iterator[_Entry], stream: IO[bytes]) -> None:
 
 
 def _recorded(content: RecordingFile, above: str) -> Iterator[_Entry]:
-    """Yield what a recording holds, up to a damage, but the channels of an export."""
+    """Yield the records of a recording up to the first damage, without the channels of an earlier export."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, tuple[str, Schema | None]] = {}
     told = {END_METADATA}
@@ -159,9 +160,9 @@ def _entity(arm: Arm, body: Body) -> dict[str, Any]:
 
 
 def _stood(content: RecordingFile, arm: Arm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
-    """Return ticks, joint angles and bends of the first row of each ten ticks, and what is missing, in sentences.
+    """Return ticks, joint angles and bends of the first row in each ten ticks, and notes on what is missing.
 
-    They are true where the truth was recorded, else measured, without bent links.
+    They are from the truth if it was recorded, else measured, without bending.
     """
     recording = content.recording
     rows = np.flatnonzero(np.diff(recording["tick"] // PICTURE_TICKS, prepend=-1.0))
@@ -205,9 +206,9 @@ def _transforms(
 
 
 def _curves(recording: Recording) -> tuple[Iterator[tuple[int, dict[str, float]]], list[str]]:
-    """Return |α| [m/s²], and the largest acceleration of a joint before and after the shaper [rad/s²], at every tick.
+    """Yield |α| [m/s²] and the largest joint acceleration before and after the shaper [rad/s²] at every tick.
 
-    And what is missing in them, in sentences.
+    Also return notes on missing curves.
     """
     before, after = (np.abs(recording[f"{name}_qdd"]).max(axis=1) for name in ("unshaped", "target"))
     found, notes = {"after_shaper": after}, []
