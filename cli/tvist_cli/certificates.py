@@ -66,7 +66,7 @@ class CertificateAuthority(Pair):
     def make(cls) -> Self:
         """Create a new authority."""
         key = ec.generate_private_key(ec.SECP256R1())
-        # A name of its own: a client that holds certificates of two authorities can tell them apart.
+        # A unique name, so that a client with certificates of two authorities can tell them apart.
         name = f"tvist authority {x509.random_serial_number():x}"[:40]
         builder = (
             _builder(name, key, days=AUTHORITY_DAYS)

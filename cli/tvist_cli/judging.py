@@ -35,7 +35,7 @@ def _recording(run: "Run") -> "Recording":
     truths = sorted(run.truths, key=lambda truth: truth.tick)
     if len(truths) < MOST * len(run.states):
         return recording_of_messages(run.states, run.events)
-    # At both ends a state may have come without its truth.
+    # At both ends, the truth of a state may be missing.
     states = [state for state in run.states if truths[0].tick <= state.tick <= truths[-1].tick]
     between = [truth for first, second in pairwise(truths) for truth in _between(first, second)]
     return recording_of_messages(

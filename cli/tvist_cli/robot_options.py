@@ -51,7 +51,7 @@ def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Comman
         signature = inspect.signature(command)
         *own, _ = signature.parameters.values()
         options = [_option(field) for field in fields(ServeOptions) if not only or field.name in only]
-        # The parser reads the options of a function from here.
+        # The parser reads a function's options from its signature.
         command.__signature__ = signature.replace(parameters=own + options)  # type: ignore[attr-defined]
         return command
 
@@ -86,7 +86,7 @@ def _option(field: FieldInfo) -> inspect.Parameter:
         case types.VarTupleType() | types.StructType():
             read = list[str]
     name = "ur-port" if field.name == "ur_ports" else field.name.replace("_", "-")
-    # What a profile may switch on can be switched off.
+    # Options that a profile may switch on need a form that switches them off.
     negative = f"--no-{name}" if read is bool and kind is not may_be else ()
     about = Parameter(name=f"--{name}", negative=negative, help=_help(field), group=_BOX_OF[field.name])
     annotation = Annotated[read | None, _OFFERED.get(field.name, Parameter()), about]

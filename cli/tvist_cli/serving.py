@@ -30,7 +30,7 @@ def serve_robots(config: ServeConfig) -> None:
         if config.workers > 1:
             _several(config, ending)
             return
-        # Now there is something to clean up, which an exception sees to.
+        # From here on, a signal must raise an exception, so that the server is closed.
         with told(GatewayError, RecorderError), ending.at_once():
             server = Server(config, prepare=compile_if_new)
 

@@ -305,7 +305,7 @@ def _robot(path: Path, spec: Spec, place: int, named: str | NamedRobot) -> Swept
 
 
 def _recipe(path: Path, spec: Spec, shaper: str, calibration: str | None, arm: RobotDescription) -> Recipe:
-    # The workers of a cluster have other working folders.
+    # A relative path would fail on the workers of a cluster, which have other working folders.
     name, own = loaded(str((path.parent / shaper).resolve()) if is_file(shaper) else shaper)
     known = _calibration(calibration, own[0] if own else name, spec.modes, arm, modal=False)
     recipe = Recipe(name, known, modes=spec.modes, own=own)

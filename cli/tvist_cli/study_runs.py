@@ -97,7 +97,7 @@ def _cluster(scheduler: str) -> Iterator[Executor]:
     """Connect to a Dask scheduler."""
     from distributed import Client
 
-    # What is done again when a worker dies is no reason for a warning.
+    # Dask warns about tasks that it repeats after the death of a worker; users need not know.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = Client(scheduler, timeout=PATIENCE, set_as_default=False)

@@ -99,7 +99,7 @@ def processes(number: int | None = None) -> Iterator[Executor]:
             process.kill()
         raise
     finally:
-        # Without waiting, the pool's thread may meet the end of this process half way.
+        # Wait, since otherwise this process might end while the pool's thread still runs.
         pool.shutdown(cancel_futures=True)
 
 

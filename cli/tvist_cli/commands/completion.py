@@ -23,5 +23,5 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
     # cyclopts' script for bash takes `bench` in `tvist study bench` for the command `bench`.
     of_group = f'[[ -z "${{cmd_path[0]}}" || " {" ".join(OF_GROUPS)} " == *" ${{cmd_path[*]}} "* ]]'
     script = script.replace('if [[ " $all', f'if {of_group} && [[ " $all')
-    # zsh reads the file as the body of a function when something is completed for the first time.
+    # On the first completion, zsh executes the file as the body of a function.
     print(script, end='\n_cyclopts_tvist "$@"\n' if shell == "zsh" else "")

@@ -94,7 +94,7 @@ def _next(folder: Path, asked: dict[str, Role]) -> list[str]:
     return [
         f"robot:  tvist serve --security {folder} --listen tls/ADDRESS:7447",
         *(f"{name}:  tvist check tls/HOST:7447 --security {folder / name}" for name in asked),
-        f"whoever has {folder / AUTHORITY_KEY} can create operators; the robot does not need it, so store it elsewhere",
+        f"anyone with {folder / AUTHORITY_KEY} can create operators; the robot does not need it: store it elsewhere",
     ]
 
 
@@ -136,7 +136,7 @@ class _KeyRing:
                     f"{name} already has the role {given}: use another name, or edit {self.folder / CLIENTS}"
                 )
             if given is None and (self.folder / name).exists():
-                # A client whose line was deleted still has its certificate: a new line would let it in again.
+                # A client whose line was deleted still has its certificate; a new line would admit it again.
                 raise Failure(
                     f"{self.folder / name} exists but {CLIENTS} does not list {name}: use another name"
                 )

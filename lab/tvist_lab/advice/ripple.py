@@ -74,7 +74,7 @@ def fitted(time: Floats, alpha: Floats, q: Floats, poles: Poles) -> Ripple | Non
     left, waves = (one - others @ (others.T @ one) for one in (left, waves))
     mode = np.resize(np.repeat(np.arange(len(poles)), len(PHASES) * 2), len(gears))
     ways = _directions(time, alpha, poles)[mode]
-    # A prior for the waves keeps what is merely not described well from being taken for them.
+    # Without a prior, the waves would absorb errors of the other terms.
     prior = np.diag(ALIKE * np.sqrt(np.mean(left**2)) / (ERROR * np.abs(np.array(poles)[mode]) ** 2))
     columns = np.vstack([*(waves * axis for axis in ways.T), prior])
     weights = np.linalg.lstsq(columns, np.append(left.T.ravel(), np.zeros(len(gears))))[0]

@@ -133,7 +133,7 @@ def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> F
     rows = -(-len(drawn) // columns)
     figure, axes = panels(rows, 0.9 + 2.1 * rows, columns=columns, share_x=False, share_y=True)
     names = list(dict.fromkeys(name for _, curves in drawn for name in curves))
-    # What is not shaped has the colour of its own, unless it is compared with its like.
+    # A single unshaped curve has the colour of unshaped motions.
     plain = [name for name in names if name in unshaped]
     alone = len(plain) == 1
     names = plain + [name for name in names if name not in plain] if alone else names

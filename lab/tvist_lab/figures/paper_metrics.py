@@ -148,7 +148,7 @@ def _draw(panel: Axes, recorded: Recorded, style: Series, label: str) -> tuple[R
     alpha = amplitude(tool_acceleration(recording))
     rows = slice(motion.start, motion.end)
     panel.plot(recording.time[rows] - start, alpha[rows], **style.line(1.1, label=label))
-    # At the end of the recorded rest nothing but the sensor's noise is left.
+    # At the end of the recorded rest, only the sensor's noise is left.
     quiet = int(np.searchsorted(recording.time, recording.time[motion.end - 1] - QUIET))
     noise = np.max(alpha[max(quiet, motion.shaped_stop + 1) : motion.end])
     if np.count_nonzero(rv.peaks > LOUD * noise) <= 1:

@@ -59,7 +59,7 @@ def motion_figure(name: str, *recorded: Recorded) -> Figure:
         rows = slice(int(ends[0]), min(int(ends[1]) + 1, motion.end))
         time = recording.time[rows] - start
         how = style.line(1.1)
-        # Dashes of equal curves would fill each other's gaps.
+        # Dashes of equal curves would fill each other's gaps and look solid.
         for number, (qdd, _) in enumerate(_alike(recording["target_qdd"][rows])):
             accelerations.plot(time, qdd, label=None if number else label, **how)
         E = 1e3 * distance(recording, motion)

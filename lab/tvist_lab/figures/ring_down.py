@@ -48,7 +48,7 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
     period = recording.period
     late, alpha = felt(recording, motion, slice(motion.start, motion.end))
     late = late - float(recording.time[motion.arm_stop(recording)])
-    # Samples at even times around the stop; missing ones are interpolated.
+    # Resample at even times around the stop, which fills in missing samples.
     ends = max(late[0], -BEFORE - BLOCK), min(late[-1], AFTER)
     time: Floats = period * np.arange(round(ends[0] / period), round(ends[1] / period) + 1)
     alpha = np.column_stack([np.interp(time, late, axis) for axis in alpha.T])

@@ -67,7 +67,7 @@ def house_settings(*styles: str) -> dict[str, Any]:
                 f"style is {style!r}: must be {', '.join(STYLES)} or a file that ends in {SUFFIX}"
             )
     settings |= own
-    # Text remains readable in a narrow figure; one's own sheet may say how large it is, whatever the width.
+    # Text shrinks less than a narrow figure, to stay readable; a user's sheet may fix its size.
     narrow = np.interp(settings["figure.figsize"][0], (COLUMN, WIDTH), (SMALLER, 1.0))
     for name in SIZES:
         settings[name] *= 1.0 if "font.size" in own else float(narrow)

@@ -143,7 +143,7 @@ def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
         exceeds = group[0].peak > 1.0
         panel.plot(*place, **(OF_UNSHAPED if exceeds else OF_SHAPED).points(4.5))
         words = ", ".join(shaper.name for shaper in group)
-        # Names stand where there is room: above what exceeds limits, below what is long, else beside.
+        # Put names where there is room: above shapers that exceed limits, below long ones, else beside.
         offset, ha, va = (6, 4 if words.endswith("_exact") and len(group) == 1 else 0), "left", "center"
         if exceeds:
             offset, ha, va = (4, 4), "right", "bottom"

@@ -52,7 +52,7 @@ def export(content: RecordingFile, path: Path) -> list[str]:
     """
     arm, above = arm_of(content), topics(content.robot)[State].removesuffix("state")
     (stood, stiff), (drawn, lacking) = _stood(content, arm), _curves(content.recording)
-    # A viewer that has just opened the file shows what stands at its first time.
+    # A viewer first shows the messages at the file's first time, so the arm must be there.
     ticks = [
         int(content.recording["tick"][0]),
         *(one[0].tick for one in (content.journal, content.events) if one),

@@ -119,7 +119,7 @@ async def identify_payload(
             f"at rest the arm seems to carry {mass:.2f} kg, in motion {in_motion:.2f} kg: it touches something, or the "
             "torques are not those of its motors"
         )
-    # A heavier payload could not be declared, so a mass that is indistinguishable from the rated one is set to it.
+    # A payload above the rating cannot be declared; a mass that is not significantly above is set to the rating.
     rated = info.limits.payload
     if rated < mass < rated + CERTAIN * float(deviations[0]):
         mass = rated

@@ -167,7 +167,7 @@ def fit_twin(
     prior = np.diag(parameters.deviation**-2.0)
     whole = sum((slope.T @ slope for slope in slopes), np.zeros_like(prior)) / excess + prior
     progress("predicting motions that the fit has not seen")
-    # Without a motion, its pull on the parameters is gone: one step of Gauss and Newton.
+    # Approximate the fit without a motion by one Gauss-Newton step that removes its contribution.
     moved = [
         np.linalg.solve(whole - slope.T @ slope / excess, slope.T @ one / excess)
         for slope, one in zip(slopes, left, strict=True)

@@ -70,7 +70,7 @@ class ChangeDetector:
             farthest = FARTHEST * np.sqrt(own + variance)
             moved = float(np.average(np.clip(latest - mean, -farthest, farthest), weights=1.0 / own))
             error_of_it = float(np.sqrt(1.0 / np.sum(1.0 / own) + variance))
-            # Of few measurements the scatter is not known well, so that more of them are far off.
+            # With few measurements the scatter is uncertain, so require a larger change.
             sure = SURE * math.sqrt(1.0 + BELIEVED / (BELIEVED + past))
             if abs(moved) > max(max(sure, surest) * error_of_it, self._least):
                 off = (latest - mean) * np.sign(moved)

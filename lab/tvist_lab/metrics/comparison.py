@@ -112,7 +112,7 @@ def _pairs(first: Sequence[Way], second: Sequence[Way]) -> list[tuple[int, int]]
     same = np.array([[a.corresponds(b) for b in second] for a in first], dtype=bool).reshape(
         len(first), len(second)
     )
-    # longest[i, j]: number of pairs among the motions from i and from j on.
+    # longest[i, j]: most pairs among the motions from index i in the first and from j in the second.
     longest = np.zeros((len(first) + 1, len(second) + 1), dtype=int)
     for i in reversed(range(len(first))):
         for j in reversed(range(len(second))):

@@ -168,7 +168,7 @@ def _measured_motions(recording: Recording, name: str) -> list[MotionRows]:
     for (first, last), following in zip_longest(spans, spans[1:]):
         end = len(recording)
         if following is not None:
-            # A start that is found late must not count as vibration of the motion before.
+            # A start that is detected late must not count as vibration of the earlier motion.
             end = int(np.searchsorted(recording.time, recording.time[following[0]] - EARLY))
         found.append(MotionRows(first, last, last, max(end, last + 1)))
     return found

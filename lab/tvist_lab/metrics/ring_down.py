@@ -243,7 +243,7 @@ class Ring:
         added = 2 + 2 * self.alpha.shape[1]
         before, after = (float(np.sum(self.unexplained(p) ** 2)) + 1e-300 for p in (fewer, more))
         wanted = added * math.log(samples) if self.evidence is None else self.evidence
-        # What is left of coloured noise looks like a mode where its spectrum is high.
+        # Coloured noise looks like a mode at the frequency where its spectrum is high.
         noise = float(self._coloured(self.unexplained(more), more[-2:-1])[0])
         return bool(samples * math.log(before / after) > wanted * noise)
 

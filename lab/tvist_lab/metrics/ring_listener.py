@@ -111,7 +111,7 @@ def _certain(likelihoods: Iterable[Floats]) -> list[tuple[float, float]]:
         mean = float(np.average(SCALES, weights=weights))
         spread = float(np.average((SCALES - mean) ** 2, weights=weights))
         error = math.sqrt(spread + (SCALES[1] - SCALES[0]) ** 2 / 12.0)
-        # A maximum at an end belongs to something else that rings, or to one mode taken for another.
+        # A maximum at an end means that something else rings, or that modes were confused.
         if error < VAGUE and 0 < np.argmax(likely) < len(SCALES) - 1:
             found.append((mean, error))
     return found

@@ -85,7 +85,7 @@ def _measured(time: Floats, alpha: Floats, period: float) -> FreeVibration | Non
     if abs(float(spearmanr(range(count), frequencies).statistic)) < RISING:
         return None
     inside = (EDGE * min(frequencies), max(frequencies) / EDGE)
-    # The autocorrelation of what a flat spectrum excites decays as the free vibration does.
+    # If the excitation has a flat spectrum, the autocorrelation decays like the free vibration.
     decay = np.column_stack([correlate(axis, axis, "full", "fft")[len(axis) - 1 :] for axis in alpha.T])
     decay = decay[: len(decay) // 4]
     found = _fitted("sweep", float(time[0]), decay, period * np.arange(len(decay), dtype=np.float64), period)

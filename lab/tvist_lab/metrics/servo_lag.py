@@ -68,7 +68,7 @@ def _felt_lag(recording: Recording, start: int, stop: int) -> float | None:
     velocity = np.gradient(moved, own, axis=0)
     acceleration = np.gradient(velocity, own, axis=0)
     felt = recording[SENSOR][shown]
-    # Gravity turns slowly in the frame of the tool.
+    # Slow terms stand for gravity, which turns slowly in the tool's frame.
     slow = np.vander((time[shown] - own[0]) / (own[-1] - own[0]), 4)
     felt = felt - slow @ np.linalg.lstsq(slow, felt)[0]
 

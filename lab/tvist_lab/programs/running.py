@@ -120,7 +120,7 @@ class ProgramServer:
         self.server = Server(config, observe, prepare=prepare)
         (self._robot,) = self.server.robots
         try:
-            # Clients of UR's interfaces on this machine have a hand in the program, as beside one of their own.
+            # Local clients of UR's interfaces share control of the program, as if one of them had started it.
             client = f"ur-{HERE}" if config.ur else CLIENT
             self._token = _start(self._robot.request, text, inputs, client)
             self.server.share_control(HERE, self._token)
@@ -141,7 +141,7 @@ class ProgramServer:
             attend(self.watch)
             if loop.time() - renewed > LEASE / 10.0:
                 renewed = loop.time()
-                # If control is lost, the program ends with it, whatever the reply is.
+                # The reply does not matter: if control is lost, the program ends anyway.
                 self._robot.reception.command(KeepAlive(token=self._token), lambda _: None)
         await serving
         if self.server.failure is not None:

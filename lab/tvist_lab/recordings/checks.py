@@ -92,6 +92,6 @@ def check_recording(path: Path, recording: Recording, places: Places | None = No
     periods = step / np.diff(tick)
     if (back := np.flatnonzero(step <= 0.0)).size:
         raise LogError(f"{path}, tick {tick[back[0] + 1]:.0f}: {TIME} does not go on")
-    # The clock of another controller may go on beside its ticks.
+    # The clock of another controller may not be in step with its ticks.
     for period in (np.median(periods), recording.period, *([] if recording.foreign else [np.max(periods)])):
         check_period(path, float(period))

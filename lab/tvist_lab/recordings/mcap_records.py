@@ -51,7 +51,7 @@ class _Records(StreamReader):
         if opcode in (Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX):
             self._stream.read(length)
             return None
-        # The lengths of its parts then end with the record, whatever they claim.
+        # Read the record from a buffer, so that damaged lengths inside it cannot exceed the record.
         whole, self._stream = self._stream, ReadDataStream(BytesIO(self._stream.read(length)))
         try:
             return super()._read_record(opcode, length)

@@ -184,7 +184,7 @@ def recording_of_blocks(
     in_order = tuple(sorted(events, key=lambda event: int(event.tick)))
     if getattr(info, "watched", None) is None:
         return Recording(columns, in_order, info)
-    # A lost connection repeats the last measurements, and what our line would do is nothing that the robot did.
+    # While disconnected, measurements only repeat; our line's columns do not describe a watched robot.
     there = columns["robot_mode"] != RobotMode.DISCONNECTED
     kept = {name: column[there] for name, column in columns.items() if not name.startswith(OF_OUR_LINE)}
     return Recording(kept, in_order, info, foreign=True)

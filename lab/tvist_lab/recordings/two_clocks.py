@@ -106,7 +106,7 @@ def _places(first: Felt, other: Felt) -> Iterator[tuple[float, float]]:
 
 def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | None:
     """Fit everything from a starting point by Gauss-Newton; None if that leaves the common time."""
-    # The first one's change counts: joint angles neither ring nor have much noise.
+    # Use the derivative of the first signal: joint angles have little ringing and noise.
     rate = np.gradient(first.vector, 1.0 / RATE, axis=0)
     t, rotation, weight = first.time - first.time[0], None, np.ones(len(first.time))
     for _ in range(ITERATIONS):

@@ -34,7 +34,7 @@ def _for_workspace(
 
 
 def _held(row: Row, recipe: Recipe, description: RobotDescription, _: tuple[float, float]) -> Method:
-    # The longest mean delay over the workspace, for all masses that are declared.
+    # Use the longest mean delay over the workspace, for all declared masses.
     most = MOST_DECLARED * description.limits.payload
     delay = longest_mean_delay(recipe, description, (0.0, most), row.modes)
     return ConstantMeanDelay(recipe, delay, row.modes, row.name, row.label)

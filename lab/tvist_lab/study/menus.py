@@ -73,7 +73,7 @@ ROWS = (
     Row("elastic-auto", "auto, smoothing, elastic feed-forward", ("bench", "robustness")),
     Row("product", "constant mean delay, product of three ZV", ("bench",), "held", modes=3),
     Row(UNSHAPED, "waiting, unshaped"),
-    # These are variants of the shapers above, which no menu needs beside them.
+    # Variants of the shapers above, which need no place in a menu.
     *(Row(name, f"TVIST-{name.upper()}, lowest mode")
       for name in ("um_zv", "um_zvd", "ei_exact", "si", "zvdd", "ei2_exact", "zvddd", "ei3_exact")),
 )  # fmt: skip

@@ -161,7 +161,7 @@ class Constant(Stepping):
             f_d, zeta = (values.tolist() for values in modes)
         else:
             f_d, zeta = [designed[0]], [designed[1]]
-        # Sufficient even if the estimate is too low.
+        # Make the buffer long enough even if the estimated frequency is too low.
         longest = max(1.0, 1.01 * sum(made.duration_periods / f for f in f_d))
         return _from_rest(
             TvistFilter(made, Fixed(f_d, zeta), joints=description.joints, max_delay=longest), task

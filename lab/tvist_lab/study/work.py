@@ -56,8 +56,8 @@ class Bench:
             case.description, case.declared, case.reference(), case.limits, job.as_served, case.stream
         )
         """Task of the first method."""
-        # A robot has one calibration: the friction in it is fed forward whatever shapes, and unshaped as well. A method
-        # that is made for more has it in `Shaped.law`.
+        # The friction in the robot's calibration is fed forward for every method, shaped or not; a method with
+        # another friction sets `Shaped.law`.
         recipes = (getattr(method, "recipe", None) for method in job.methods)
         law = next((recipe.friction(case.description) for recipe in recipes if recipe is not None), None)
         self._line = ControlLine(

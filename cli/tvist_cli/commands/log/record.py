@@ -54,7 +54,7 @@ def record(
                 robot.on_io(recorder.io)
                 say(f"recording {info.name} into {file}; press Control+C to stop")
                 end = asyncio.ensure_future(ended.wait())
-                # The requested time begins with the first state, which may come a second later in lockstep.
+                # The requested time starts with the first state, which may come a second later in lockstep.
                 first = asyncio.ensure_future(robot.state())
                 await asyncio.wait((end, first), return_when=asyncio.FIRST_COMPLETED)
                 if first.done():

@@ -55,7 +55,7 @@ def read_csv(path: Path) -> Table:
             f"{cells[torn[0]]} cells instead of {width}"
         )
     elif len(body) > 1 and not raw.endswith(b"\n"):
-        # Nobody knows whether the last number is complete.
+        # The last number may be incomplete.
         whole[-1] = False
         notes.append(f"line {body[-1][0]} has no end and was left out")
     kept = [body[at] for at in np.flatnonzero(whole)]

@@ -83,7 +83,7 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
     residual = _mean([one.result.residual_vibration_m_s2 for one in judged])
     before = _mean([one.result.residual_vibration_m_s2 for one in unshaped])
     peak, peak_before = _mean([one.peak for one in judged]), _mean([one.peak for one in unshaped])
-    # The unshaped references of a motion start alike, so the later stop of the shaped one is its delay.
+    # All references of a motion start at the same tick, so a later stop is the delay.
     started = [one.result.stop_s - one.result.start_s for one in judged]
     started_before = [one.result.stop_s - one.result.start_s for one in unshaped]
     return {
