@@ -145,7 +145,6 @@ def report(
 
 
 def _lag(servo: ServoResponse | None, *, positions: bool) -> None:
-    """Print the lag of a robot that takes only positions."""
     if servo is not None:
         low, high = (servo.lag * (1.0 + side * 1.96 * servo.errors[0]) for side in (-1.0, 1.0))
         out.print(
@@ -228,7 +227,6 @@ def report_payload(found: PayloadFound, *, declared: bool, json: bool) -> None:
 
 
 def _springs(parameters: Sequence[ModalParameter]) -> None:
-    """Print springs and drives, and which of them the ring-downs do not determine."""
     own = [parameter for parameter in parameters if parameter.quantity in QUANTITIES]
     table(
         "springs and drives",

@@ -93,8 +93,7 @@ def _default(value: object) -> str | None:
 def application(called: Sequence[str] = ()) -> "cyclopts.App":
     """Return the parser for all commands and options.
 
-    Of the command `called`, given as its words, the help is its docstring; the others have their one-line
-    help.
+    Of the command `called`, given as its words, the help is its docstring; the others have their one-line help.
     """
     from importlib.metadata import version
 

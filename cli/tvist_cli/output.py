@@ -115,10 +115,8 @@ def progress(
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], on: Console = out) -> None:
-    """Print a table with text aligned left and numbers right.
-
-    If it is wider than the screen, it is printed in parts, one below the other, each with the first column.
-    """
+    """Print a table with text aligned left and numbers right."""
+    # A table wider than the screen is printed in parts, one below the other, each with the first column.
     from rich.table import Table
 
     on.print(Text(title, style="bold"))

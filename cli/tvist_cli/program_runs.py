@@ -255,7 +255,6 @@ def _ended(watch: ProgramWatch, errors: list[str]) -> list[Shortcoming]:
 
 
 def _failure(file: Path, watch: ProgramWatch, errors: list[str]) -> Failure | None:
-    """Return why the run itself failed; None if it did not."""
     after = f"after {watch.seconds:.3f} s of robot time"
     match watch.reason:
         case "finished":

@@ -133,7 +133,6 @@ def _check_written(junit: Path | None, baseline: Path | None) -> None:
 
 
 def _baseline(path: Path, files: Sequence[Path], *, lockstep: bool) -> Mapping[str, Run]:
-    """Read the baseline; return its runs by program name."""
     if not lockstep:
         raise Failure(
             "--baseline needs --lockstep, in which equal programs run alike to the last bit", code=2

@@ -62,7 +62,6 @@ def compile_all(processes: int | None = None) -> None:
 
 
 def _several(config: ServeConfig, ending: Ending) -> None:
-    """Serve the robots in several processes."""
     with told(WorkersError, GatewayError):
         with ending.at_once():
             workers = Workers(config, compile_if_new)
@@ -119,9 +118,7 @@ def say_recorded(recordings: Sequence[Recording]) -> list[str]:
 
 
 def leave(server: Server, code: int) -> None:
-    """End the process with an exit code if the network would keep it; everything else is closed by then.
-
-    Zenoh would wait ten seconds for a client that has stopped reading.
-    """
+    """End the process with an exit code if the network would keep it; everything else is closed by then."""
+    # Zenoh would wait ten seconds for a client that has stopped reading.
     if not server.left:
         os._exit(code)

@@ -191,7 +191,6 @@ def _calibrations(methods: Sequence[Method]) -> list[Calibration]:
 
 
 def _masses(payload: Sequence[float] | None, description: RobotDescription) -> tuple[float, float]:
-    """Return the smallest and the largest mass [kg]."""
     given = [0.0, description.limits.payload] if payload is None else list(payload)
     low, high = given[0], given[-1]
     if len(given) > 2 or not 0.0 <= low <= high <= 100.0:
@@ -239,7 +238,6 @@ def _notes(
     *,
     streams: bool,
 ) -> list[str]:
-    """Return notes on the moves for the reader."""
     found = []
     if share is None and not streams:
         found += [

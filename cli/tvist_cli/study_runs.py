@@ -94,7 +94,6 @@ def _executor(
 
 @contextmanager
 def _cluster(scheduler: str) -> Iterator[Executor]:
-    """Connect to a Dask scheduler."""
     from distributed import Client
 
     # Dask warns about tasks that it repeats after the death of a worker; users need not know.
@@ -121,7 +120,6 @@ def _cluster(scheduler: str) -> Iterator[Executor]:
 def _ran(
     study: Study, folder: Path | None, executor: Callable[[], AbstractContextManager[Executor]] | None
 ) -> Result:
-    """Run what is missing of a study."""
     began = time.monotonic()
     kept = (
         "nothing was kept" if folder is None else f"they are kept in {folder}, and the same command continues"

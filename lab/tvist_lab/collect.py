@@ -18,10 +18,8 @@ class Collected:
     truths: list[Truth] = field(default_factory=list)
 
     def recording(self) -> Recording:
-        """Return the messages as columns, from the first to the last tick for which all have arrived.
-
-        On a network the truth of a tick may come before or after its state.
-        """
+        """Return the messages as columns, from the first to the last tick for which all have arrived."""
+        # On a network the truth of a tick may come before or after its state.
         from tvist_lab.recordings.messages import recording_of_messages
 
         states = self.states

@@ -10,10 +10,8 @@ ALLOWED = 0.05
 
 
 def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
-    """Return the residual vibration over the unshaped one, for shares by which the assumed frequency is too high.
-
-    The damping ratio is both the assumed and the true one.
-    """
+    """Return the residual vibration over the unshaped one, for shares by which the assumed frequency is too high."""
+    # `zeta` is both the assumed and the true damping ratio.
     return np.asarray(residual(1.0 / (1.0 + errors), zeta, shaper.impulses(1.0, zeta)))
 
 
@@ -34,12 +32,10 @@ def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> floa
 
 
 def robust_over(name: str, f_d: tuple[float, float], zeta: tuple[float, float]) -> tuple[float, float]:
-    """Return frequency [Hz] and damping ratio of a fixed shaper for the given ranges of a workspace.
-
-    It is the shortest one that leaves at most 5 % anywhere; if none does, the one with the smallest worst
-    case. The damping ratio is assumed to fall linearly from its highest value at the lowest frequency to its
-    lowest at the highest.
-    """
+    """Return frequency [Hz] and damping ratio of a fixed shaper for the given ranges of a workspace."""
+    # Choose the shortest design that leaves at most 5 % anywhere; if none does, the one with the smallest worst
+    # case. The damping ratio is assumed to fall linearly from its highest value at the lowest frequency to
+    # its lowest at the highest.
     frequencies = np.linspace(*f_d, 60)
     damping = _damping(frequencies, f_d, zeta)
     designs = np.linspace(*f_d, 90)

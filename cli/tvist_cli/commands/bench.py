@@ -20,8 +20,7 @@ def bench(*, seconds: float = 10.0, shaper: Annotated[str, SHAPERS] = "zv", json
     attached to a single served robot; for several robots, a client on another core reads every state.
 
     Args:
-        seconds: Measure each served robot for this many seconds; 0 serves none and measures only the
-            computation.
+        seconds: Measure each served robot for this many seconds; 0 serves none and measures only the computation.
         shaper: Give the robots this shaper.
         json: Print one JSON object.
     """

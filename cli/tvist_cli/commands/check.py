@@ -20,10 +20,9 @@ def check(
 ) -> None:
     """Check that a served robot answers and is ready to move, without changing anything.
 
-    If no name is given and there are several robots but no ur5e, the command checks the first and lists them
-    all. Exit code 0: the robot answers, ticks on time, refuses commands from clients without control, has
-    power, and its safety system allows motion. Exit code 1: one of these does not hold; the message gives the
-    reason and the next step.
+    If no name is given and there are several robots but no ur5e, the command checks the first and lists them all. Exit
+    code 0: the robot answers, ticks on time, refuses commands from clients without control, has power, and its safety
+    system allows motion. Exit code 1: one of these does not hold; the message gives the reason and the next step.
 
     Args:
         at: Where the robot is.

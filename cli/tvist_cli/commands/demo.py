@@ -45,9 +45,8 @@ def demo(
     beside those of the simulation.
 
     Args:
-        output: Write the recording and figures 12 to 16 to this folder [tvist-demo]. With --runs, write
-            figures 1 to 4, 7, 8, 12 to 16 and the spectrogram of a ring-down [none]; figures of motions show
-            the first arm.
+        output: Write the recording and figures 12 to 16 to this folder [tvist-demo]. With --runs, write figures 1 to
+            4, 7, 8, 12 to 16 and the spectrogram of a ring-down [none]; figures of motions show the first arm.
         seed: Set the seed of sensor noise and gear errors; with --runs, of the first repetition.
         tables: Print the paper's tables beside those of this run as well.
         view: Show the motions afterwards on a web page, with the arm's bending drawn 100 times larger.

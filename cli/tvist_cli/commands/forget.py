@@ -15,9 +15,8 @@ def forget(
 ) -> None:
     """Take control of a served robot and discard what it has learnt about its payload.
 
-    A robot served with --adapt payload then moves as if it carried the declared payload, until its motions
-    show otherwise again. If another client has control, the command fails with exit code 1 and changes
-    nothing.
+    A robot served with --adapt payload then moves as if it carried the declared payload, until its motions show
+    otherwise again. If another client has control, the command fails with exit code 1 and changes nothing.
 
     Args:
         at: Where the robot is.

@@ -56,8 +56,7 @@ def identify(
         sources: Use this robot or these files: the endpoint of a served robot, ur://ADDRESS[:PORT], or
             recordings and logs of one robot.
         at: Where a served robot is.
-        output: Write the result to this file [calibration.json; with --twin robot.toml, if there is none
-            yet].
+        output: Write the result to this file [calibration.json; with --twin robot.toml, if there is none yet].
         robot: Start from this robot file, or the name of one that comes with the package [ur5e in this
             process and for ur://, else the model that the robot or the logs name].
         payload: Assume a disc of this mass in kg [as declared by the robot or the logs]; with 0,5 a simulated
@@ -72,9 +71,8 @@ def identify(
             with different loads are good.
         check: Predict the motions of this log with the twin and leave them out of the fit, repeatable [each
             motion of the logs is left out in turn].
-        figures: Write figures to this folder: measured against predicted by fits without that ring-down and,
-            in this process, maps of the lowest mode's frequency and damping over the workspace, identified
-            against true.
+        figures: Write figures to this folder: measured against predicted by fits without that ring-down and, in this
+            process, maps of the lowest mode's frequency and damping over the workspace, identified against true.
         look: How to write the figures.
         json: Print one JSON object.
     """

@@ -51,8 +51,7 @@ def keys(
     Args:
         folder: Create the files in this folder.
         robot: Set the robot's name; required the first time.
-        host: Add a host name or IP address under which clients reach the robot, repeatable; required the
-            first time.
+        host: Add a host name or IP address under which clients reach the robot, repeatable; required the first time.
         operator: Add a client of this name that may move the robot, repeatable.
         viewer: Add a client of this name that may only watch the robot, repeatable.
         member: Add a robot, or a namespace of robots, that connects to the router of this folder, repeatable.
@@ -90,7 +89,6 @@ def keys(
 
 
 def _next(folder: Path, asked: dict[str, Role]) -> list[str]:
-    """Return the next steps: how to use the new files."""
     return [
         f"robot:  tvist serve --security {folder} --listen tls/ADDRESS:7447",
         *(f"{name}:  tvist check tls/HOST:7447 --security {folder / name}" for name in asked),

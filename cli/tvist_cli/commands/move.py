@@ -44,8 +44,7 @@ def move(
         at: Where the robot is.
         degrees: Read the target's angles in degrees; the limits stay in rad.
         velocity: Limit the velocity of every joint in rad/s [1.5], or of the tool in m/s with --line [0.25].
-        acceleration: Limit the acceleration of every joint in rad/s² [2], or of the tool in m/s² with --line
-            [1.2].
+        acceleration: Limit the acceleration of every joint in rad/s² [2], or of the tool in m/s² with --line [1.2].
         jerk: Limit the jerk of every joint in rad/s³ [100], or of the tool in m/s³ with --line [60].
         duration: Make the motion take this time in s before shaping, instead of setting the three limits; it
             takes longer if the arm cannot do that.

@@ -48,8 +48,7 @@ def shapers(
         shaper: Add the shaper FILE.py:NAME to the list, repeatable; the file is executed.
         sensitivity: Compute instead the residual vibration of these shapers, names or FILE.py:NAME, if they
             assume a wrong frequency [zv zvd ei].
-        errors: With --sensitivity, set the lowest and highest percentage by which the assumed frequency is
-            too high.
+        errors: With --sensitivity, set the lowest and highest percentage by which the assumed frequency is too high.
         output: With --sensitivity, write the curves to this JSON file.
         figures: Write figures to this folder: residual vibration for a wrong frequency, and settling time
             against delay; with --sensitivity, the curves.

@@ -31,8 +31,7 @@ def stop(
 
     Args:
         robot: Stop the robot of this name, as with --name, or NAMESPACE/NAME.
-        everyone: Stop all robots that the router or server reaches; with --namespace, those in it or below
-            it.
+        everyone: Stop all robots that the router or server reaches; with --namespace, those in it or below it.
         at: Where the robot is.
         json: Print one JSON object.
     """

@@ -24,18 +24,16 @@ def study(
 ) -> None:
     """Simulate moves with several shapers as fast as possible, and compare the vibration after each.
 
-    moves compares shapers and simpler methods on any moves, each unshaped and shaped: waiting, a slower
-    motion of the same duration, ZV frozen at the target, and fixed MZV, EI2 and EI3 designed for the whole
-    workspace.
+    moves compares shapers and simpler methods on any moves, each unshaped and shaped: waiting, a slower motion of the
+    same duration, ZV frozen at the target, and fixed MZV, EI2 and EI3 designed for the whole workspace.
 
     match compares two shapers plant by plant and reports where one is better. The difference of their
     reductions has a 95 % interval: exact for the median (sign test), a bootstrap over pairs for the 5th
     percentile. One is better on a plant if the interval of the median lies on one side of zero; so of twenty
     plants without a difference, about one is reported as different.
 
-    robustness compares shapers on arms whose springs are all up to 30 % stiffer or softer than calibrated,
-    with a declared mass up to 20 % above or below the carried one, and on plants. Fewer than 20 moves have no
-    5th percentile.
+    robustness compares shapers on arms whose springs are all up to 30 % stiffer or softer than calibrated, with a
+    declared mass up to 20 % above or below the carried one, and on plants. Fewer than 20 moves have no 5th percentile.
 
     bench ranks shapers by how soon fifteen different arms come to rest, and by the vibration until then. The
     controller assumes 100, 110 and 90 % of each payload. All arms but two differ from its model. A shaper

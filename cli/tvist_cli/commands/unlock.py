@@ -14,10 +14,9 @@ def unlock(
 ) -> None:
     """Take control of a served robot and clear what keeps it from moving.
 
-    The command restarts a safety system that found a violation or failed, unlocks a protective stop, and
-    checks for 0.3 s of simulation time that the robot stays ready. A client cannot release a safeguard stop
-    or an emergency stop. Exit code 0: the robot is ready to move. Exit code 1: it is not; the message gives
-    the reason and the next step.
+    The command restarts a safety system that found a violation or failed, unlocks a protective stop, and checks for
+    0.3 s of simulation time that the robot stays ready. A client cannot release a safeguard stop or an emergency stop.
+    Exit code 0: the robot is ready to move. Exit code 1: it is not; the message gives the reason and the next step.
 
     Args:
         at: Where the robot is.

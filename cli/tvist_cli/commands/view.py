@@ -39,8 +39,7 @@ def view(
         at: Where the robot is, or the MCAP file.
         beside: Show the motion of a recording without and with a shaper at the same time.
         compare: Simulate two or three shapers and show them side by side: --compare none auto.
-        robot: With --compare, simulate this robot: a name that comes with the package, or the path of a robot
-            file.
+        robot: With --compare, simulate this robot: a name that comes with the package, or the path of a robot file.
         magnify: Draw bending larger by this factor at first, 1 to 300.
         html: Write the comparison or the recording to this HTML file, which needs no server, instead of
             showing a page.

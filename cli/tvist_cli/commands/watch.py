@@ -86,7 +86,6 @@ def _only_robot(at: Connection) -> Connection | None:
 
 
 async def _watch_robot(at: Connection, *, json: bool) -> None:
-    """Show a robot until cancelled."""
     with waiting(f"waiting for {at.name} at {at.endpoint}"):
         found = await at.robot()
     async with found as robot:

@@ -118,11 +118,9 @@ def _sorted_out(
 
 
 def recommended(found: Sequence[Option], still: float) -> Option | None:
-    """Choose among shapers that keep the limits; `still` is the settling time without a shaper [s].
-
-    Among those that settle about as early as the earliest and leave about as little as the best, take the one
-    that depends least on the modes, then the shortest.
-    """
+    """Choose among shapers that keep the limits; `still` is the settling time without a shaper [s]."""
+    # Among those that settle about as early as the earliest and leave about as little as the best, take the
+    # one that depends least on the modes, then the shortest.
     fair = [one for one in found if one.keeps_limits and one.left_percent < 100.0 - CLOSE]
     if not fair:
         return None

@@ -123,11 +123,9 @@ def _against(modes: Modes) -> str:
 
 
 def command(advice: Advice, logs: Sequence[Measured]) -> list[str]:
-    """Return the lines that apply an advice; none if there is nothing to apply.
-
-    A robot of this controller gets the shaper over the network; the reference of another robot goes through
-    the library.
-    """
+    """Return the lines that apply an advice; none if there is nothing to apply."""
+    # A robot of this controller gets the shaper over the network; the reference of another robot goes through
+    # the library.
     best = advice.best
     if best is None:
         return []

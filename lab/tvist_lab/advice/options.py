@@ -234,11 +234,9 @@ def _held_out(stops: Sequence[Stop], count: int) -> tuple[dict[Stop, Modes], fro
 
 
 def best_modes(stops: Sequence[Stop], count: int) -> Modes:
-    """Find the modes for which ZV shapers would leave least after some stops, in the order of frequency.
-
-    They suit shaping better than fitted modes: if an arm has more modes than a shaper, the best aim lies
-    between them.
-    """
+    """Find the modes for which ZV shapers would leave least after some stops, in the order of frequency."""
+    # These modes suit shaping better than fitted ones: if an arm has more modes than a shaper, the best aim lies
+    # between them.
     loudest = sorted(stops, key=lambda one: -one.unshaped.rms)[:ENOUGH]
     before = sum(one.unshaped.rms**2 for one in loudest)
 

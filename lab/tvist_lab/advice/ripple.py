@@ -1,9 +1,8 @@
 """Vibration excited by an arm's gears, which no shaper of the reference removes.
 
-A strain wave gear has a kinematic error with two waves per turn of its motor. While the arm brakes, their
-frequency falls through that of each mode. The vibration they excite depends on the path of the joints in
-time: it is fitted to a recorded stop and computed anew for the shaped motion; only the rest of the vibration
-is shaped.
+A strain wave gear has a kinematic error with two waves per turn of its motor. While the arm brakes, their frequency
+falls through that of each mode. The vibration they excite depends on the path of the joints in time: it is fitted to a
+recorded stop and computed anew for the shaped motion; only the rest of the vibration is shaped.
 """
 
 from collections.abc import Iterator, Sequence
@@ -44,8 +43,7 @@ class Ripple(NamedTuple):
     def along(self, q: Floats, ends: Floats, period: float) -> Floats:
         """Return the acceleration that the gears excite along a path of the joints [m/s²].
 
-        `q` [rad] has shape (T, n); `ends`, shape (2, n), are the smallest and largest angles of the recorded
-        path.
+        `q` [rad] has shape (T, n); `ends`, shape (2, n), are the smallest and largest angles of the recorded path.
         """
         return np.asarray(np.column_stack(list(_excited(q, ends, self.poles, period))) @ self.weights)
 

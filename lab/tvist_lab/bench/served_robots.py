@@ -140,11 +140,9 @@ def _percentiles(seconds: Iterable[float]) -> dict[str, float]:
 
 
 def over_all(heard: Sequence[Telemetry]) -> dict[str, float]:
-    """Return the lateness of all ticks covered by several telemetry messages [µs].
-
-    The maximum is exact; the 99th percentile is an upper bound that at most one tick in a hundred can have
-    exceeded, since each message gives the maximum, 99th percentile and median of one second.
-    """
+    """Return the lateness of all ticks covered by several telemetry messages [µs]."""
+    # The maximum is exact; the 99th percentile is an upper bound that at most one tick in a hundred can have
+    # exceeded, since each message gives the maximum, 99th percentile and median of one second.
     if not heard:
         nothing = float("nan")
         return {"late_p50_us": nothing, "late_p99_us": nothing, "late_max_us": nothing}

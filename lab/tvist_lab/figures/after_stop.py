@@ -52,8 +52,7 @@ BEFORE, AFTER = 100.0, 600.0
 def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure:
     """Draw |α| around the end of one motion without and with shaping; time 0 is the unshaped reference's stop.
 
-    Raises RecordingError without a true acceleration, NotMeasurableError if nothing was recorded after a
-    stop.
+    Raises RecordingError without a true acceleration, NotMeasurableError if nothing was recorded after a stop.
     """
     recording, motion = unshaped
     length = float(recording.time[motion.reference_stop] - recording.time[motion.start])

@@ -52,11 +52,9 @@ def identified_figure(name: str, measured: Floats, fitted: Floats) -> Figure:
 
 
 def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
-    """Draw maps of "f_d_hz" or "zeta": identified, true, and the error; `words` complete the heading.
-
-    White areas are left out because the arm would touch itself or the floor there. In a narrow figure the
-    maps are stacked.
-    """
+    """Draw maps of "f_d_hz" or "zeta": identified, true, and the error; `words` complete the heading."""
+    # White areas are left out because the arm would touch itself or the floor there. In a narrow figure the
+    # maps are stacked.
     symbol, meaning, unit = LABELS[key]
     if beside := rcParams["figure.figsize"][0] > NARROW:
         figure, axes = panels(1, 3.0, columns=3, share_x=False, share_y=True)
@@ -115,5 +113,4 @@ def _map(
 
 
 def _levels(low: float, high: float) -> Floats:
-    """Return round levels that include a range."""
     return np.asarray(MaxNLocator(LEVELS).tick_values(low, max(high, low + 1e-3 * abs(low) + 1e-6)))

@@ -106,7 +106,6 @@ def _mark(panel: Axes, curve: Floats, found: Settling, top: float) -> None:
 
 
 def _span(panel: Axes, ends: Sequence[float], height: float, words: str) -> None:
-    """Draw an arrow over a span of time, with words above it."""
     panel.annotate("", (ends[0], height), (ends[1], height), arrowprops=ARROW, zorder=5)
     note(panel, words, (0.5 * (ends[0] + ends[1]), height), (0, 3), ha="center", va="bottom")
 
@@ -114,8 +113,7 @@ def _span(panel: Axes, ends: Sequence[float], height: float, words: str) -> None
 def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
     """Draw |α| around the stop of each motion, unshaped and shaped, with the decay fitted from t_b.
 
-    Time 0 is the start of the reference. Raises NotMeasurableError if less than 0.3 s were recorded after a
-    stop.
+    Time 0 is the start of the reference. Raises NotMeasurableError if less than 0.3 s were recorded after a stop.
     """
     figure, axes = panels(len(motions), 0.6 + 2.0 * len(motions), share_x=False)
     for panel, (name, both) in zip(axes, motions.items(), strict=True):

@@ -25,11 +25,9 @@ NOTICEABLE = 1.01
 
 
 def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
-    """Draw the medians of each ranked shaper over arms, moves and payload errors, and the Pareto front as a line.
-
-    A triangle marks a shaper that exceeds a limit of the motion by more than 1 %, with its largest peak over
-    the limit.
-    """
+    """Draw the medians of each ranked shaper over arms, moves and payload errors, and the Pareto front as a line."""
+    # A triangle marks a shaper that exceeds a limit of the motion by more than 1 %, with its largest peak
+    # over the limit.
     figure, (panel,) = panels(1, 4.6)
     panel.set_yscale("log")
     placed: list[tuple[float, float, bool]] = []
@@ -74,10 +72,8 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
 
 
 def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
-    """Draw median and 90th percentile of the settling time against each shaper's delay.
-
-    On the diagonal, the arm is at rest as soon as its shaped reference stops.
-    """
+    """Draw median and 90th percentile of the settling time against each shaper's delay."""
+    # On the diagonal, the arm is at rest as soon as its shaped reference stops.
     figure, (panel,) = panels(1, 4.2)
     known = [row for row in rows if row["time_until_still_ms_median"] is not None]
     for place, row in enumerate(sorted(known, key=lambda row: float(row["declared_delay_ms_median"]))):

@@ -40,9 +40,8 @@ LINES = 4096
 def ring_down_figure(name: str, recorded: Recorded) -> Figure:
     """Draw the tool's acceleration after a stop, the mode fitted to it, its spectrum and its spectrogram.
 
-    Top: the axis that vibrates most, with the envelope of the fit. Middle: spectrum of all axes after the
-    stop. Bottom: levels relative to the largest. Raises NotMeasurableError without accelerometer or enough
-    rest.
+    Top: the axis that vibrates most, with the envelope of the fit. Middle: spectrum of all axes after the stop.
+    Bottom: levels relative to the largest. Raises NotMeasurableError without accelerometer or enough rest.
     """
     recording, motion = recorded
     period = recording.period
@@ -107,7 +106,6 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
 
 
 def _draw_levels(panel: Axes, time: Floats, alpha: Floats, fit: RingDown) -> None:
-    """Draw the spectrogram of all axes together."""
     period = float(time[1] - time[0])
     size = min(round(BLOCK / period), len(alpha))
     overlap, padded = size - max(size // 50, 1), max(512, 8 * size)

@@ -35,11 +35,9 @@ FLOOR = 1e-4
 def study_figure(
     summary: Sequence[dict[str, Any]], by: Sequence[str], show: Sequence[str], *, few: bool
 ) -> Figure:
-    """Draw medians with a band from the 5th to the 95th percentile; with few rows, from minimum to maximum.
-
-    If the first axis is numeric, they are lines with bands, else dots with bars. Names show the other axes
-    and the method.
-    """
+    """Draw medians with a band from the 5th to the 95th percentile; with few rows, from minimum to maximum."""
+    # If the first axis is numeric, draw lines with bands, else dots with bars. Names show the other axes
+    # and the method.
     places = list(dict.fromkeys(entry[by[0]] if by else "" for entry in summary))
     lines: dict[str, list[dict[str, Any]]] = {}
     for entry in summary:

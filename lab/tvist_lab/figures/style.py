@@ -1,8 +1,7 @@
 """Building blocks of figures: panels, series that colour-blind readers can tell apart, legends and notes.
 
-Draw a figure within `with house_style():`, whose style sheet sets sizes and colours. Each colour has its own
-dashes and marker. Dashed lines lie over solid ones, so that both show where they coincide; no data is
-transparent.
+Draw a figure within `with house_style():`, whose style sheet sets sizes and colours. Each colour has its own dashes
+and marker. Dashed lines lie over solid ones, so that both show where they coincide; no data is transparent.
 """
 
 from collections.abc import Mapping, Sequence
@@ -105,9 +104,8 @@ def panels(
 ) -> tuple[Figure, list[Axes]]:
     """Create a figure as wide as the style sheet says; return it and its panels row by row.
 
-    `height` is in inches in the default style (larger type makes it higher); with `share_x` the panels of a
-    column share the lowest axis, with `share_y` those of a row the leftmost; `ratios` are the heights of the
-    rows.
+    `height` is in inches in the default style (larger type makes it higher); with `share_x` the panels of a column
+    share the lowest axis, with `share_y` those of a row the leftmost; `ratios` are the heights of the rows.
     """
     size = rcParams["figure.figsize"][0], height * _scale("font.size") ** 0.5
     figure = Figure(figsize=size, layout="constrained")

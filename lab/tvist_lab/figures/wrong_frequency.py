@@ -80,10 +80,8 @@ def sensitivity_figure(shapers: Sequence[Shaper], zeta: float, errors: Floats) -
 
 
 def settling_against_delay_figure(shapers: Iterable[Shaper], f_d: float, zeta: float) -> Figure:
-    """Draw the settling time of a mode with each shaper against its delay, for frequency errors.
-
-    Shapers that do not support this damping are left out.
-    """
+    """Draw the settling time of a mode with each shaper against its delay, for frequency errors."""
+    # Shapers that do not support this damping are left out.
     shown = [shaper for shaper in shapers if zeta < shaper.zeta_max]
     delay = np.array([1e3 * shaper.impulses(f_d, zeta).duration for shaper in shown])
     times = np.array([[1e3 * settling_time(one, f_d, zeta, error) for one in shown] for error in ERRORS])
@@ -106,10 +104,8 @@ def settling_against_delay_figure(shapers: Iterable[Shaper], f_d: float, zeta: f
 
 
 def catalogue_figure(shapers: Iterable[Shaper], zeta: float = 0.0) -> Figure:
-    """Draw each shaper's residual vibration over the true frequency, and its band width against its duration.
-
-    Shapers that do not support this damping, or do not shape, are left out.
-    """
+    """Draw each shaper's residual vibration over the true frequency, and its band width against its duration."""
+    # Shapers that do not support this damping, or do not shape, are left out.
     shown = {shaper.name: shaper for shaper in shapers if zeta < shaper.zeta_max and shaper.duration_periods}
     placed = {name for names in FAMILIES.values() for name in names}
     families = FAMILIES | {"Others": tuple(name for name in shown if name not in placed)}

@@ -1,7 +1,6 @@
 """Export a recording for viewers: the same messages, three more channels, and a layout.
 
-The server does not record these channels, because they follow from its messages: ticks stay fast and
-recordings small.
+The server does not record these channels, because they follow from its messages: ticks stay fast and recordings small.
 """
 
 import json
@@ -160,10 +159,8 @@ def _entity(arm: Arm, body: Body) -> dict[str, Any]:
 
 
 def _stood(content: RecordingFile, arm: Arm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
-    """Return ticks, joint angles and bends of the first row in each ten ticks, and notes on what is missing.
-
-    They are from the truth if it was recorded, else measured, without bending.
-    """
+    """Return ticks, joint angles and bends of the first row in each ten ticks, and notes on what is missing."""
+    # Values are true if the truth was recorded, else measured, without bending.
     recording = content.recording
     rows = np.flatnonzero(np.diff(recording["tick"] // PICTURE_TICKS, prepend=-1.0))
     ticks, q = recording["tick"][rows], recording["actual_q"][rows]
@@ -206,10 +203,7 @@ def _transforms(
 
 
 def _curves(recording: Recording) -> tuple[Iterator[tuple[int, dict[str, float]]], list[str]]:
-    """Yield |α| [m/s²] and the largest joint acceleration before and after the shaper [rad/s²] at every tick.
-
-    Also return notes on missing curves.
-    """
+    """Return |α| [m/s²] and the largest joint acceleration around the shaper [rad/s²] at every tick, and notes."""
     before, after = (np.abs(recording[f"{name}_qdd"]).max(axis=1) for name in ("unshaped", "target"))
     found, notes = {"after_shaper": after}, []
     if np.any(recording["shaper_delay"] > 0.0) and np.any(after) and np.array_equal(before, after):

@@ -25,11 +25,9 @@ FOLDS = 10
 
 
 def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
-    """Find ring-downs that no springs and drives can explain together with the others.
-
-    A wrong ring-down also spoils the fit of the others. Among the worst explained ones, the one whose
-    omission gives the best fit is therefore left out, until the rest agree.
-    """
+    """Find ring-downs that no springs and drives can explain together with the others."""
+    # A wrong ring-down also spoils the fit of the others. Among the worst explained ones, the one whose
+    # omission gives the best fit is therefore left out, until the rest agree.
     fit = fit_modal(arm, ringings)
     rest = list(range(len(ringings)))
     guilty: list[int] = []

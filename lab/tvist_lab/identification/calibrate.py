@@ -202,10 +202,8 @@ def calibrate(
 def agreeing(
     description: RobotDescription, logs: Sequence[Log], progress: Progress
 ) -> tuple[list[Stop], ArmModes, list[Ringing]]:
-    """Return all stops, the arm with their payloads, and at most `MOST` ring-downs that agree.
-
-    The ring-downs have the gear hysteresis that explains all of them best.
-    """
+    """Return all stops, the arm with their payloads, and at most `MOST` ring-downs that agree."""
+    # The ring-downs have the gear hysteresis that explains all of them best.
     check_logs(description, logs)
     progress("looking for stops")
     stops, payloads = stops_of(logs)

@@ -64,11 +64,9 @@ class Forecast:
     """Factors on the errors of f_d and ζ, at least 1, found from ring-downs left out of fits [-]."""
 
     def at(self, q: Floats, payload: int, modes: int = 1) -> Known:
-        """Return the lowest modes at a configuration with one of the payloads.
-
-        An error of the masses shifts the modes, but it also shifted the fitted parameters, which mostly
-        compensates.
-        """
+        """Return the lowest modes at a configuration with one of the payloads."""
+        # An error of the masses shifts the modes, but it also shifted the fitted parameters, which mostly
+        # compensates.
         arm, here = self.arm, self.fit.logarithms
         mass = arm.mass(q, payload)
         modes = min(modes, MODES)

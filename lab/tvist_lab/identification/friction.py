@@ -125,11 +125,9 @@ def friction(logarithms: Floats, speed: Floats) -> Floats:
 
 
 def fit_friction(unknown: Sequence[Unknown], speed: Floats, torque: Floats) -> tuple[ModalParameter, ...]:
-    """Fit the friction of one joint to speeds [rad/s] and torques [N m] of shape (k,).
-
-    Ripple of the gears makes noise that grows with speed, so each block has its own weight; it is correlated
-    from block to block, which widens the intervals.
-    """
+    """Fit the friction of one joint to speeds [rad/s] and torques [N m] of shape (k,)."""
+    # Ripple of the gears makes noise that grows with speed, so each block has its own weight; it is
+    # correlated from block to block, which widens the intervals.
     guess = np.log([one.guess for one in unknown])
     deviation = np.array([one.deviation for one in unknown])
     low = np.full(len(guess), -np.inf)

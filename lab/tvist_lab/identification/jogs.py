@@ -155,9 +155,8 @@ async def plan_jogs(
 ) -> JogPlan:
     """Choose the most informative jogs, with free ways from the present configuration.
 
-    `payloads` are those a simulated arm carries in turn; by default it is the declared one. `positions`: the
-    robot takes only positions. Raises IdentificationError if ring-downs or ways are too few or the file does
-    not fit.
+    `payloads` are those a simulated arm carries in turn; by default it is the declared one. `positions`: the robot
+    takes only positions. Raises IdentificationError if ring-downs or ways are too few or the file does not fit.
     """
     info, state = await robot.info(), await robot.state()
     if info.model != description.robot.model:
@@ -237,10 +236,8 @@ def slower(limits: MotionLimits, quickness: float) -> MotionLimits:
 
 
 def _quickness(dynamics: InverseDynamics, start: Floats, end: Floats, torque: Floats) -> float:
-    """Return the largest quickness of a jog, up to 1, at which the arm rings within its torque limits.
-
-    A saturated drive would spoil the ring-down.
-    """
+    """Return the largest quickness of a jog, up to 1, at which the arm rings within its torque limits."""
+    # A saturated drive would spoil the ring-down.
     line = JointLine(start, end)
     room = acceleration_on_way(dynamics, line, start, end - start, LIMITS.velocity, torque)
     return min(1.0, float(np.sqrt(room / (1.0 + REBOUND) / LIMITS.acceleration)))
@@ -258,10 +255,9 @@ def is_free(collisions: CollisionModel, *postures: Floats) -> bool:
 
 
 async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) -> Measured:
-    """Sweep slowly for friction, and make the jogs, each just strong enough for a clear ring-down.
-
-    A robot that takes only positions turns its last joint instead, to find its lag; its torques are unknown.
-    """
+    """Sweep slowly for friction, and make the jogs, each just strong enough for a clear ring-down."""
+    # A robot that takes only positions turns its last joint instead, to find its lag; its torques are
+    # unknown.
     info, began = await robot.info(), (await robot.state()).tick
     await control.set_shaper("none")
     found = Measured((), seed=plan.seed)

@@ -174,11 +174,9 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
 
 
 def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
-    """Return the best fit from several starting points.
-
-    Parameters can compensate each other, so several sets may explain the ring-downs equally well. All of them
-    add to the deviations, weighted by likelihood: a parameter in which they differ is uncertain.
-    """
+    """Return the best fit from several starting points."""
+    # Parameters can compensate each other, so several sets may explain the ring-downs equally well. All of
+    # them add to the deviations, weighted by likelihood: a parameter in which they differ is uncertain.
     rng = np.random.default_rng(0)
     starts = [arm.guess, *(arm.guess + rng.normal(0.0, SPREAD, (STARTS - 1, len(arm.guess))))]
     fits = [fit_modal(arm, ringings, start) for start in starts]
@@ -197,11 +195,9 @@ def softened(arm: ArmModes, ringings: Sequence[Ringing]) -> list[Ringing]:
 
 
 def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floats:
-    """Return the shift of the parameters' logarithms by the deviation of each mass, shape (P, masses).
-
-    Masses are not fitted, since they are known better than a fit could find them. The shift is of first
-    order.
-    """
+    """Return the shift of the parameters' logarithms by the deviation of each mass, shape (P, masses)."""
+    # Masses are not fitted, since they are known better than a fit could find them. The shift is of first
+    # order.
     signals = [_Signal(arm, r) for r in ringings]
     changes = np.vstack([sensitivity(arm, signal, fit.logarithms) for signal in signals])
     heavier = np.vstack(

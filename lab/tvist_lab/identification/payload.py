@@ -168,11 +168,9 @@ class _Regressor:
         return self.dynamic(q, np.zeros_like(q), np.zeros_like(q))
 
     def dynamic(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """Return Y(q, q̇, q̈) without the payload's inertia about the flange, shape (n, 4).
-
-        That inertia is equal for point masses 1 m to either side, so half their difference contains the
-        moment alone.
-        """
+        """Return Y(q, q̇, q̈) without the payload's inertia about the flange, shape (n, 4)."""
+        # The payload's inertia is equal for point masses 1 m to either side, so half their difference contains the
+        # moment alone.
         none = self.torque(q, qd, qdd)
         mass, *sides = (np.array(pin.rnea(m, m.createData(), q, qd, qdd)) for m in self._models)
         halves = (0.5 * (there - back) for there, back in zip(sides[::2], sides[1::2], strict=True))
@@ -213,10 +211,8 @@ class _Regressor:
         return np.asarray(np.sqrt(np.sum(np.square(moved), axis=0)))
 
     def move(self, recording: Recording) -> tuple[float, float]:
-        """Estimate the mass and its standard deviation from a motion [kg].
-
-        The first moment and each joint's friction and rotor inertia are estimated as well.
-        """
+        """Estimate the mass and its standard deviation from a motion [kg]."""
+        # The first moment and each joint's friction and rotor inertia are estimated as well.
         q, qd, qdd = (recording[f"target_{name}"] for name in ("q", "qd", "qdd"))
         moment = recording["actual_moment"]
         moving = np.flatnonzero(np.abs(qd).max(axis=1) > 1e-3)

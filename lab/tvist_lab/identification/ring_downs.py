@@ -195,12 +195,10 @@ def fresh(recording: Recording) -> NDArray[np.intp]:
 
 
 def noise_of(recording: Recording, motion: MotionRows) -> float:
-    """Return the noise of the accelerometer, rms per axis [m/s²].
-
-    It is the smaller of two measures: the spread before the motion, if the arm was at rest, and the third
-    differences of the whole motion, which hardly contain vibration at a tenth of the sampling rate. Repeated
-    rows are ignored.
-    """
+    """Return the noise of the accelerometer, rms per axis [m/s²]."""
+    # Take the smaller of two measures: the spread before the motion, if the arm was at rest, and the third
+    # differences of the whole motion, which hardly contain vibration at a tenth of the sampling rate.
+    # Repeated rows are ignored.
     first = int(np.searchsorted(recording.time, recording.time[motion.start] - BEFORE))
     before = _finite(recording[SENSOR][first : motion.start])
     seen = fresh(recording)

@@ -223,10 +223,8 @@ def _begin(parameters: TwinParameters, modal: Sequence[ModalParameter]) -> Float
 
 
 def _descend(fit: _Fit, values: Floats, progress: Progress) -> tuple[Floats, list[Floats], list[Floats]]:
-    """Fit the numbers; also return the differences of each motion and their derivatives, shape (samples, P).
-
-    Derivatives take far longer than differences, so each set of them serves for several steps.
-    """
+    """Fit the numbers; also return the differences of each motion and their derivatives, shape (samples, P)."""
+    # Derivatives take far longer than differences, so each set of them serves for several steps.
     deviation = fit.parameters.deviation
     limit = FURTHEST * deviation
 

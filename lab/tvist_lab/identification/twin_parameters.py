@@ -101,11 +101,9 @@ class TwinParameters:
         return Payload(mass=mass, com=(x, y, z), inertia=inertia)
 
     def robot(self, values: Floats, payload: int = 0) -> RobotDescription:
-        """Return the robot file, with the payload of this index.
-
-        The wind-up feed-forward keeps its size for the original gears, so that a controller with the fitted
-        gears leads its drives by as much as the robot's controller did.
-        """
+        """Return the robot file, with the payload of this index."""
+        # The wind-up feed-forward keeps its size for the original gears, so that a controller with the fitted
+        # gears leads its drives by as much as the robot's controller did.
         factors: dict[tuple[str, str], Floats] = {}
         size = max(self.description.joints, len(self.description.link_flexibility.links), 1)
         for entry, value in zip(self.entries, values, strict=True):

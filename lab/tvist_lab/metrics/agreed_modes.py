@@ -1,8 +1,7 @@
 """Find modes on which fits of a ring-down from several moments and with several numbers of modes agree.
 
-A real arm is still driven for a while after its target has stopped: its joints overshoot and swing back,
-which a single fit takes for a mode. It also rings in several similar modes, and f_d rises by some percent as
-they decay.
+A real arm is still driven for a while after its target has stopped: its joints overshoot and swing back, which a
+single fit takes for a mode. It also rings in several similar modes, and f_d rises by some percent as they decay.
 """
 
 import math
@@ -103,11 +102,9 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
 
 
 def _fits(ring: Ring) -> Iterator[_Fit]:
-    """Yield the fit with as many modes as pay off, and the one with one more.
-
-    A loud mode that changes while it decays would be fitted best as two at the same place, one heavily damped
-    for its start and one lightly for its end. Modes that are near each other are therefore merged.
-    """
+    """Yield the fit with as many modes as pay off, and the one with one more."""
+    # A loud mode that changes while it decays would be fitted best as two at the same place, one heavily
+    # damped for its start and one lightly for its end. Modes that are near each other are therefore merged.
     fits = []
     for f_d, zeta in _poles(ring):
         inside = (f_d > 3.05) & (f_d < 0.98 * ring.highest) & (np.abs(zeta) < 0.9 * DAMPING[1])

@@ -46,9 +46,8 @@ UNKNOWN = 0.4
 def changes(measured: Measured) -> list[str]:
     """Return sentences on what has changed about the arm, in the order of the motions.
 
-    In a recording of this controller, the arm is compared with its model, see `FitMonitor`. In a log of
-    another robot, masses are unknown: the strongest mode after each stop is compared with earlier ones in the
-    same pose.
+    In a recording of this controller, the arm is compared with its model, see `FitMonitor`. In a log of another robot,
+    masses are unknown: the strongest mode after each stop is compared with earlier ones in the same pose.
     """
     if not measured.motions:
         return []
@@ -112,10 +111,9 @@ def _by_pose(
 class FitMonitor:
     """Measures after each stop whether the arm has changed; see `ChangeDetector`.
 
-    Each quantity is compared with its own past, so that wrong torque constants or springs do not matter: the
-    mass that the drives feel beyond the declared one; the logarithm of each gear's deflection per torque at
-    rest, if encoders are on the link side; and the logarithm of the factor on the robot file's modes, see
-    `RingListener`.
+    Each quantity is compared with its own past, so that wrong torque constants or springs do not matter: the mass that
+    the drives feel beyond the declared one; the logarithm of each gear's deflection per torque at rest, if encoders
+    are on the link side; and the logarithm of the factor on the robot file's modes, see `RingListener`.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:

@@ -69,10 +69,8 @@ def percent(change: float | None) -> str:
 
 
 def grouped_notes(results: Sequence[MotionResult]) -> list[str]:
-    """Return one line for each kind of note, with its motions and figures.
-
-    Notes that differ only in their numbers are of one kind; the first one represents all.
-    """
+    """Return one line for each kind of note, with its motions and figures."""
+    # Notes that differ only in their numbers are of one kind; the first one represents all.
     kinds: dict[str, dict[str, set[int]]] = {}
     first: dict[str, str] = {}
     for index, result in enumerate(results, 1):

@@ -29,10 +29,8 @@ Kinematics = Callable[[Floats], tuple[Floats, Floats]]
 
 
 def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[float, float]:
-    """Return the largest |α| and envelope after the unshaped stop plus the declared delay [m/s²].
-
-    In a log of another controller, the arm's own stop plus 10 ms counts.
-    """
+    """Return the largest |α| and envelope after the unshaped stop plus the declared delay [m/s²]."""
+    # In a log of another controller, the arm's own stop plus 10 ms counts.
     _, alpha = felt(recording, motion, _after_declared_stop(recording, motion), smooth=True)
     if len(alpha) < 2:
         raise NotMeasurableError("nothing was recorded after the stop")
@@ -40,10 +38,8 @@ def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[floa
 
 
 def still_after(recording: Recording, motion: MotionRows, threshold: float = STILL) -> float:
-    """Return the last time |α| exceeds a threshold [m/s²], from the start of the unshaped reference [s].
-
-    It uses the truth channel if there is one, otherwise the sensor below 60 Hz.
-    """
+    """Return the last time |α| exceeds a threshold [m/s²], from the start of the unshaped reference [s]."""
+    # Use the truth channel if there is one, otherwise the sensor below 60 Hz.
     time, alpha_xyz = felt(recording, motion, slice(motion.start, motion.end), smooth=True)
     alpha = amplitude(alpha_xyz)
     if recording.foreign and (noise := _noise(time, alpha_xyz)) * NOISE_PEAK > threshold:

@@ -74,10 +74,8 @@ class Comparison:
 
 
 def compare(first: Measured, second: Measured) -> Comparison:
-    """Pair as many motions of two recordings as possible, in order.
-
-    Motions correspond if they start and end at the same joint angles within 0.02 rad.
-    """
+    """Pair as many motions of two recordings as possible, in order."""
+    # Motions correspond if they start and end at the same joint angles within 0.02 rad.
     ways = [[Way.of(one.recording, motion) for motion in one.motions] for one in (first, second)]
     pairs = _pairs(*ways)
     compared = tuple(ComparedMotion(a + 1, b + 1, first.results[a], second.results[b]) for a, b in pairs)
@@ -146,11 +144,10 @@ class Pair:
 
 
 def pairs(measured: Measured) -> list[Pair]:
-    """Pair each unshaped motion with the same one by each shaper, in the order in which they were made.
-
-    Motions are the same if their references before shaping start and end at the same joint angles within 0.02
-    rad, and last equally long within 2 %. Events tell whether a motion was shaped, else its delay does.
-    """
+    """Pair each unshaped motion with the same one by each shaper, in the order in which they were made."""
+    # Motions are the same if their references before shaping start and end at the same joint angles within
+    # 0.02 rad, and last equally long within 2 %. Events tell whether a motion was shaped, else its delay
+    # does.
     recording, found = measured.recording, measured.motions
     if REFERENCE not in recording:
         return []
@@ -187,8 +184,7 @@ def _peak(measured: Measured, place: int) -> float | None:
 def shaper_of(recording: Recording, motion: MotionRows, delay: float | None) -> str | None:
     """Return the name of a motion's shaper, empty if unknown; None if there was none.
 
-    `delay` is the time by which the target ends after its reference [ms]; None if the log has no such
-    reference.
+    `delay` is the time by which the target ends after its reference [ms]; None if the log has no such reference.
     """
     tick = recording["tick"][motion.start] if "tick" in recording else np.inf
     told = [one.why for one in recording.events if one.kind == "shaper_changed" and one.tick <= tick + 1]

@@ -33,10 +33,9 @@ TAPER = 0.03
 def measured_spans(recording: Recording, name: str = "actual_q") -> list[tuple[int, int]]:
     """Return first and last row of each motion of joint angles that are never quite at rest, in order.
 
-    A joint moves while its speed exceeds 0.01 rad/s, six times the encoders' noise, and 2 % of the fastest
-    speed within half a second, which excludes swinging back. Each motion must reach twice that speed. Both
-    ends are then shifted outwards by the time in which a steadily changing speed reaches this threshold, at
-    most 30 ms.
+    A joint moves while its speed exceeds 0.01 rad/s, six times the encoders' noise, and 2 % of the fastest speed
+    within half a second, which excludes swinging back. Each motion must reach twice that speed. Both ends are then
+    shifted outwards by the time in which a steadily changing speed reaches this threshold, at most 30 ms.
     """
     seen = np.flatnonzero(np.isfinite(recording[name]).all(axis=1))
     if len(seen) < FEWEST:

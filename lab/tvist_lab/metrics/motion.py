@@ -75,11 +75,9 @@ class MotionRows:
         return float(recording.time[self.reference_stop] - recording.time[self.start])
 
     def shaped_duration(self, recording: Recording) -> float:
-        """Return the duration of the shaped reference [s].
-
-        A shaper's first impulse has no delay, so both references start together; the tick between shaper and
-        publication is subtracted.
-        """
+        """Return the duration of the shaped reference [s]."""
+        # A shaper's first impulse has no delay, so both references start together; the tick between shaper
+        # and publication is subtracted.
         published = recording.time[self.shaped_stop] - recording.time[self.start]
         return float(published - DIFFERENTIATOR_TICKS * recording.period)
 
@@ -91,11 +89,10 @@ class MotionRows:
 def motions(recording: Recording) -> list[MotionRows]:
     """Find the motions of a recording, in order.
 
-    They come from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, else from
-    the reference. In a log without reference they come from the target's speed, the target or the measured
-    angles, since many robots publish the measured angles as target while at rest. Motions without movement
-    are left out, and in logs of other controllers those below 5 mrad where noise might look like a motion.
-    None spans a long gap of the log.
+    They come from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, else from the
+    reference. In a log without reference they come from the target's speed, the target or the measured angles, since
+    many robots publish the measured angles as target while at rest. Motions without movement are left out, and in logs
+    of other controllers those below 5 mrad where noise might look like a motion. None spans a long gap of the log.
     """
     tick, (first, *others) = recording["tick"], parts(recording.time)
     if not others:

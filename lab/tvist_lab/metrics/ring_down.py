@@ -114,13 +114,11 @@ def fit_ring_down(
         offset: Whether to include a constant, for example if gravity is not known exactly.
         skip: Time after the stop that is ignored [s].
         window: Duration of the fit [s]; None to choose it automatically.
-        share: Select the lowest mode with at least this share of the largest amplitude [-]; 1 for the
-            strongest.
+        share: Select the lowest mode with at least this share of the largest amplitude [-]; 1 for the strongest.
         evidence: Smallest n ln(SSE before/SSE after) for another mode [-]; None for the Bayesian information
             criterion, which grows with the number of samples.
 
-    Returns:
-        The selected mode. `ok` is false, with a `reason`, if no mode is measurable.
+    Returns: The selected mode. `ok` is false, with a `reason`, if no mode is measurable.
     """
     first = round(skip / period)
     if time is None:
@@ -184,10 +182,8 @@ class Ring:
         return np.asarray((self.alpha - orthonormal @ (orthonormal.T @ self.alpha)).ravel())
 
     def fit(self, modes: int) -> RingDown:
-        """Fit one mode, then further ones while they improve the fit.
-
-        A further mode must lie inside the search range: at its end it would represent something else.
-        """
+        """Fit one mode, then further ones while they improve the fit."""
+        # A further mode must lie inside the search range: at its end it would represent something else.
         parameters = self._add_mode(np.empty(0))
         for _ in range(1, modes):
             more = self._add_mode(parameters)

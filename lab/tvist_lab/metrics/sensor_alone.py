@@ -107,7 +107,6 @@ def _fitted(kind: str, start: float, alpha: Floats, late: Floats, period: float)
 
 
 def _strongest(alpha: Floats, period: float) -> float:
-    """Return the frequency at which an acceleration has the most energy [Hz]."""
     size = 4 * len(alpha)
     power = np.sum(np.abs(np.fft.rfft(alpha - alpha.mean(axis=0), size, axis=0)) ** 2, axis=1)
     return float(np.fft.rfftfreq(size, period)[np.argmax(power)])

@@ -24,9 +24,8 @@ FEWEST = 8
 def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
     """Return the time by which `actual_q` follows `target_q` in a motion [s], never below zero; None if it does not.
 
-    It is the shift of the target from row `start` to `stop` with least squared distance to the measured
-    angles, to a tenth of a sample; without them, the shift with which the target's accelerations best explain
-    the tool's.
+    It is the shift of the target from row `start` to `stop` with least squared distance to the measured angles, to a
+    tenth of a sample; without them, the shift with which the target's accelerations best explain the tool's.
     """
     if "target_q" not in recording:
         return None

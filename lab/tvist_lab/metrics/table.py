@@ -199,10 +199,9 @@ def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
 
 
 def table_2(runs: Mapping[str, Runs]) -> Table:
-    """Return means over the runs, and the impact of shaping, 100 (mean shaped / mean unshaped - 1) [%].
-
-    Runs in which a metric was not measurable are left out of its mean; values that are not defined are None.
-    """
+    """Return means over the runs, and the impact of shaping, 100 (mean shaped / mean unshaped - 1) [%]."""
+    # Runs in which a metric was not measurable are left out of its mean; values that are not defined are
+    # None.
     table: Table = {}
     for name, repeated in runs.items():
         unshaped, shaped = _means(repeated.unshaped), _means(repeated.shaped)
@@ -226,7 +225,6 @@ def table_notes(runs: Mapping[str, Runs]) -> list[str]:
 
 
 def _means(results: Sequence[MotionResult]) -> Row:
-    """Return the mean of each column over the runs in which it was measurable."""
     row: Row = {}
     for column in COLUMNS:
         values = [value for result in results if (value := getattr(result, column)) is not None]

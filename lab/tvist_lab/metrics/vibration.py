@@ -40,11 +40,9 @@ def tool_acceleration(recording: Recording, *, truth: bool = False, rows: slice 
 
 
 def best_tool_acceleration(recording: Recording, rows: slice = ALL) -> Floats:
-    """Return α from the truth channel if recorded, else from the sensor below 60 Hz [m/s²], shape (T, 3).
-
-    White noise of 0.03 m/s² per axis alone exceeds 0.1 m/s² in one tick of a hundred, so the raw sensor
-    cannot show the last time above a threshold.
-    """
+    """Return α from the truth channel if recorded, else from the sensor below 60 Hz [m/s²], shape (T, 3)."""
+    # White noise of 0.03 m/s² per axis alone exceeds 0.1 m/s² in one tick of a hundred, so the raw sensor
+    # cannot show the last time above a threshold.
     if TRUTH in recording:
         return tool_acceleration(recording, truth=True, rows=rows)
     return low_pass(tool_acceleration(recording), recording.period)[rows]

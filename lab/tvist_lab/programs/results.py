@@ -109,11 +109,9 @@ def _fastest(fastest: Fastest, unit: str) -> dict[str, Any]:
 
 
 def junit(results: Sequence[Mapping[str, Any]]) -> bytes:
-    """Convert what --json prints of programs to JUnit XML: a test suite with a case for each.
-
-    A case has the robot's time, measurements as properties, a sentence for each failure, the program's
-    messages in `system-out` and warnings in `system-err`.
-    """
+    """Convert what --json prints of programs to JUnit XML: a test suite with a case for each."""
+    # A case has the robot's time, measurements as properties, a sentence for each failure, the program's
+    # messages in `system-out` and warnings in `system-err`.
     failed = sum(not result["ok"] for result in results)
     counts = {
         "tests": str(len(results)),

@@ -96,8 +96,7 @@ class ProgramServer:
     """A robot served in real time that starts with a program, and ends with it.
 
     Arguments are those of `run_in_lockstep`, the shutdown by signals, and the preparation of `Server`. Raises
-    StartError, RecorderError, InputError or RefusedError likewise, and GatewayError if the server cannot
-    listen.
+    StartError, RecorderError, InputError or RefusedError likewise, and GatewayError if the server cannot listen.
     """
 
     watch: ProgramWatch

@@ -121,8 +121,7 @@ class Place:
 class ProgramWatch(Sink):
     """Observes a program from its start until it has ended and the arm is at rest.
 
-    The tool's acceleration is the simulation's true one, without sensor noise; arms that are not simulated
-    have none.
+    The tool's acceleration is the simulation's true one, without sensor noise; arms that are not simulated have none.
 
     Args:
         controller: The robot; the first program that it starts is observed.

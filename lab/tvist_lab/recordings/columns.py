@@ -122,11 +122,9 @@ def _vendor_of(header: Sequence[str]) -> tuple[str, str] | None:
 
 
 def _given(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Parse names and units from a text such as `time=t:ms,q=joint_{}:deg,accelerometer=a{}:g`, or `time=1,q=2-7`.
-
-    A short name or RTDE's is followed by the header's name, with `{}` for the number or letter x, y, z of an
-    entry, or by a position counted from 1, and by a colon and the unit if it is not SI.
-    """
+    """Parse names and units from a text such as `time=t:ms,q=joint_{}:deg,accelerometer=a{}:g`, or `time=1,q=2-7`."""
+    # A short name or RTDE's is followed by the header's name, with `{}` for the number or letter x, y, z of
+    # an entry, or by a position counted from 1, and by a colon and the unit if it is not SI.
     names, units = [""] * len(header), dict[str, str]()
     for item in columns.split(","):
         key, _, value = (part.strip() for part in item.partition("="))
@@ -169,11 +167,9 @@ def _places(path: Path, key: str, pattern: str, header: Sequence[str]) -> list[i
 
 
 def in_si(names: Sequence[str], values: Floats, given: Mapping[str, str]) -> tuple[Floats, tuple[str, ...]]:
-    """Convert numbers to SI; return notes about units that were inferred from the numbers.
-
-    Inferred are: times in ms, µs or ns, from their step; joint angles in degrees, if most joints exceed 7;
-    and an accelerometer in g, if it reads about 1 at rest.
-    """
+    """Convert numbers to SI; return notes about units that were inferred from the numbers."""
+    # Infer: times in ms, µs or ns, from their step; joint angles in degrees, if most joints exceed 7;
+    # and an accelerometer in g, if it reads about 1 at rest.
     places: dict[str, list[int]] = {}
     for at, name in enumerate(names):
         places.setdefault(re.sub(r"_\d+$", "", name), []).append(at)

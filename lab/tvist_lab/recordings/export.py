@@ -37,9 +37,8 @@ def written_by(path: Path, kind: str) -> list[Path]:
 def export(recording: Recording, path: Path, kind: str) -> None:
     """Write a recording to a file and replace it if it exists; raise ExportError if that fails.
 
-    Scalars keep their names; vectors become columns NAME_0, NAME_1, …, like those of UR's record.py.
-    `timestamp` comes first. Units, events and info are JSON, in the metadata of Parquet or in a file beside a
-    CSV.
+    Scalars keep their names; vectors become columns NAME_0, NAME_1, …, like those of UR's record.py. `timestamp` comes
+    first. Units, events and info are JSON, in the metadata of Parquet or in a file beside a CSV.
     """
     try:
         with whole_file(path) as stream:

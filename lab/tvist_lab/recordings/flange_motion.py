@@ -54,9 +54,8 @@ def by_sensor(time: Floats, vector: Floats, *, force: bool) -> Felt:
 def at_flange(robot: RobotDescription, time: Floats, q: Floats, *, force: bool) -> Felt:
     """Return what a sensor at the flange would measure, by forward kinematics.
 
-    ω = Rᵀ J_ω q̇, and f = Rᵀ (p̈ + g z) with an upright base. A sensor at r from the flange measures f + α x
-    r + ω x (ω x r). `time` [s] has shape (T,), `q` [rad] (T, n); for the rotation only the directions of the
-    joints matter.
+    ω = Rᵀ J_ω q̇, and f = Rᵀ (p̈ + g z) with an upright base. A sensor at r from the flange measures f + α x r + ω x
+    (ω x r). `time` [s] has shape (T,), `q` [rad] (T, n); for the rotation only the directions of the joints matter.
     """
     grid, angles, known = _resampled(*_measured(time, q))
     step = grid[1] - grid[0]

@@ -245,7 +245,6 @@ class _Content:
                     raise self._error(f"has format {content.get('format')}; {FORMAT} can be read")
 
     def _decode(self) -> None:
-        """Decode the waiting messages."""
         waiting, self.waiting = self.waiting, []
         try:
             self._keep(waiting)

@@ -166,10 +166,8 @@ def _numeric(message: Any) -> list[str]:
 def recording_of_blocks(
     states: Block, truths: Block | None, io: Block | None, events: Iterable[Any], info: Any
 ) -> Recording:
-    """Make a recording from all messages of each kind; a repeated tick counts once, with its last message.
-
-    Inputs and outputs keep their values until their next message.
-    """
+    """Make a recording from all messages of each kind; a repeated tick counts once, with its last message."""
+    # Inputs and outputs keep their values until their next message.
     rows = _rows(states["tick"])
     columns = {name: _at(states[name], rows) for name in STATE_COLUMNS}
     if truths is not None:
@@ -191,10 +189,9 @@ def recording_of_blocks(
 
 
 def _held(io: Block, ticks: Floats) -> dict[str, Floats]:
-    """Return inputs and outputs at each tick, NaN before the first message; without register banks that stay 0.
-
-    The force at the tool is left out: it is measured once a second and does not hold until the next message.
-    """
+    """Return inputs and outputs at each tick, NaN before the first message; without register banks that stay 0."""
+    # The force at the tool is left out: it is measured once a second and does not hold until the next
+    # message.
     rows = _rows(io["tick"])
     place = np.searchsorted(io["tick"][rows], ticks, side="right") - 1
     return {

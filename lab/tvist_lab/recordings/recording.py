@@ -79,7 +79,6 @@ class Recording:
         return name in self.columns
 
     def __getitem__(self, name: str) -> Floats:
-        """Return the values of a column, shape (T,) or (T, k)."""
         try:
             return self.columns[name]
         except KeyError:

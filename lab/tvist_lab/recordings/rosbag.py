@@ -58,11 +58,9 @@ class _Topic:
 
 
 def read_rosbag(path: Path) -> Table:
-    """Read a rosbag2 recording: `JointState`, `Imu`, `JointTrajectoryControllerState` and the TCP's `PoseStamped`.
-
-    Of each type, the topic with the most messages is used. Times are from the headers; rows are those of the
-    accelerometer, with interpolated joint angles.
-    """
+    """Read a rosbag2 recording: `JointState`, `Imu`, `JointTrajectoryControllerState` and the TCP's `PoseStamped`."""
+    # Of each type, the topic with the most messages is used. Times are from the headers; rows are those of
+    # the accelerometer, with interpolated joint angles.
     topics, damage = _topics(path)
     notes = [damage] if damage else []
     chosen: dict[str, _Topic] = {}
@@ -169,7 +167,6 @@ def _take(path: Path, topic: _Topic, record: Message) -> None:
 
 
 def _row(topic: _Topic, message: Any) -> dict[str, list[float]]:
-    """Return the numbers of a message by column."""
     match topic.kind:
         case "JointState":
             found = {"actual_q": message.position, "actual_qd": message.velocity}

@@ -153,10 +153,8 @@ def _turns(u: Floats) -> Floats:
 
 
 def _solved(X: Floats, y: Floats, weight: Floats) -> tuple[Floats, Floats]:
-    """Solve weighted least squares; return parameters, and residuals of shape (T, 3).
-
-    If everything turns about one axis, the rotation about it is not observable and stays.
-    """
+    """Solve weighted least squares; return parameters, and residuals of shape (T, 3)."""
+    # If everything turns about one axis, the rotation about it is not observable and stays.
     G, g = (np.einsum("tik,t,ti...->k...", X, weight, one, optimize=True) for one in (X, y))
     p: Floats = _inverse(G, G) @ g
     return p, y - X @ p
@@ -173,9 +171,8 @@ def _inverse(G: Floats, whole: Floats) -> Floats:
 def _intervals(X: Floats, left: Floats, weight: Floats, since: Floats) -> tuple[float, float]:
     """Return half the 95 % intervals of the offset, at its wider end, and of the drift.
 
-    Residuals are correlated in time, and few fast motions have most weight: the fit is repeated, to first
-    order, without each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the blocks
-    with motion).
+    Residuals are correlated in time, and few fast motions have most weight: the fit is repeated, to first order,
+    without each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the blocks with motion).
     """
     first = np.unique(np.searchsorted(since, np.arange(since[0], since[-1], BLOCK)))
     pulls = np.add.reduceat(np.einsum("tik,t,ti->tk", X, weight, left), first)

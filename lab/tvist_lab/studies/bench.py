@@ -127,11 +127,9 @@ def _beside_waiting(rows: pl.DataFrame) -> pl.DataFrame:
 
 
 def _cases(asked: Asked, methods: Sequence[Method], arms: Sequence[Variant]) -> list[Case]:
-    """Return the cases of one controller.
-
-    If the calibration contains friction, it is fed forward to all methods of a case; methods without a
-    calibration therefore have separate cases.
-    """
+    """Return the cases of one controller."""
+    # If the calibration contains friction, it is fed forward to all methods of a case; methods without a
+    # calibration therefore have separate cases.
     parts = [tuple(one for one in methods if hasattr(one, "recipe") is has) for has in (True, False)]
     return [
         Case(

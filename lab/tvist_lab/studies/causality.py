@@ -33,9 +33,8 @@ def inspect(method: Method, description: RobotDescription, moves: Sequence[Move]
 def check_causal(method: Method, task: Task) -> None:
     """Run a shaper on a reference, on others with the same start, and on the first again.
 
-    Raises ShaperFaultError if outputs depend on the future, or on earlier runs. A method that gets a move's
-    target in advance gets the same one with every reference: it may know the end, but no more of the way than
-    others.
+    Raises ShaperFaultError if outputs depend on the future, or on earlier runs. A method that gets a move's target in
+    advance gets the same one with every reference: it may know the end, but no more of the way than others.
     """
     if not isinstance(method, Stepping):
         return  # it plans the motion, whose end it may know

@@ -44,9 +44,8 @@ def run(
 ) -> Ran:
     """Run missing and failed jobs, and write all rows to `folder`, if given.
 
-    `executor` starts what runs the jobs, by default processes of this machine if there are enough jobs.
-    Raises StoreError if the folder is in use, unwritable, or of another study; OSError if the executor cannot
-    run.
+    `executor` starts what runs the jobs, by default processes of this machine if there are enough jobs. Raises
+    StoreError if the folder is in use, unwritable, or of another study; OSError if the executor cannot run.
     """
     jobs = study.jobs
     with ExitStack() as stack:

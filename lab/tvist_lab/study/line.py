@@ -139,9 +139,8 @@ class Following:
     def simulate(self, plant: SimulatedArm, seed: int) -> Recording:
         """Let a plant follow the reference, with a seed for sensor noise and gear errors.
 
-        The recording starts one tick before the motion. Targets are those that the drives receive, so that
-        ticks of a differentiating feed-forward count as delay. Raises ValueError if the plant does not
-        provide the truth.
+        The recording starts one tick before the motion. Targets are those that the drives receive, so that ticks of a
+        differentiating feed-forward count as delay. Raises ValueError if the plant does not provide the truth.
         """
         response = respond(plant, self._driven, seed)
         pose = np.zeros((len(response.specific_force), 6))

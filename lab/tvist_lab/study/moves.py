@@ -115,10 +115,9 @@ def draw_moves(
 ) -> Drawn:
     """Draw random moves in the workspace, free of collision from start to target.
 
-    `masses` are the smallest and largest carried mass [kg]; `stroke` the smallest and largest length, as a
-    share of the way to an independent configuration [-]; with `wrists`, the two outer wrist joints turn as
-    well; `progress` is called after each move. Raises MovesError if hardly any draw is free, or the arm has
-    no wrist.
+    `masses` are the smallest and largest carried mass [kg]; `stroke` the smallest and largest length, as a share of
+    the way to an independent configuration [-]; with `wrists`, the two outer wrist joints turn as well; `progress` is
+    called after each move. Raises MovesError if hardly any draw is free, or the arm has no wrist.
     """
     if wrists and description.joints <= len(WORKSPACE.low):
         raise MovesError(
@@ -212,7 +211,6 @@ def _draws(
     masses: tuple[float, float],
     stroke: tuple[float, float],
 ) -> Iterator[Move]:
-    """Yield candidates without end."""
     used = min(len(region.low), joints)
     low, high = (np.array(side)[:used] for side in (region.low, region.high))
     while True:

@@ -92,11 +92,9 @@ class Running:
 
 
 def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped:
-    """Apply a shaper to a reference, at rest at both ends, until the output rests at the target.
-
-    If it is watched, it must end, keep its declared delay and hide no tail, else ShaperFaultError is raised;
-    its processor time is measured.
-    """
+    """Apply a shaper to a reference, at rest at both ends, until the output rests at the target."""
+    # If it is watched, the shaper must end, keep its declared delay and hide no tail, else ShaperFaultError is
+    # raised; its processor time is measured.
     target, stop = reference[-1], len(reference) - 1
     q, cost = _through(stepper, reference, timed=watched)
     declared = [stepper.delay]

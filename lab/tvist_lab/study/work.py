@@ -133,7 +133,6 @@ def measure_each(job: Job) -> tuple[Row, ...]:
 
 
 def _rows(bench: Bench, method: Method) -> list[Row]:
-    """Make and measure the motions of a method."""
     job = bench.job
     found: list[Row] = []
     for arm, motion in bench.make(method):

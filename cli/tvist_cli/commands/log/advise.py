@@ -16,9 +16,8 @@ def advise(
 ) -> None:
     """Find in a robot's logs what rings after its motions, predict what each shaper would leave, and recommend one.
 
-    The prediction convolves the recorded acceleration with each shaper. Motions that were made with a shaper
-    are treated separately if the log shows it. Record each motion two or three times, with a second of rest
-    after each.
+    The prediction convolves the recorded acceleration with each shaper. Motions that were made with a shaper are
+    treated separately if the log shows it. Record each motion two or three times, with a second of rest after each.
 
     Args:
         files: Read these recordings or logs of one robot, in any format that tvist log analyze reads.

@@ -37,12 +37,10 @@ def analyze(
     Frequency and damping have 95 % intervals. A line below the table explains each dash. If the payload, the
     gears or the ringing changed during the log, a line gives the first motion with the new value.
 
-    If the log is of an accelerometer alone, it has no motions: its ring-downs, or a frequency sweep, are
-    measured.
+    If the log is of an accelerometer alone, it has no motions: its ring-downs, or a frequency sweep, are measured.
 
-    Two files with the same motions, such as unshaped and shaped, are compared. Motions correspond if they
-    start and end at the same joint angles within 0.02 rad. Motions that only one file contains are listed but
-    not compared.
+    Two files with the same motions, such as unshaped and shaped, are compared. Motions correspond if they start and
+    end at the same joint angles within 0.02 rad. Motions that only one file contains are listed but not compared.
 
     Args:
         files: Read this recording of `tvist serve --record`, `tvist log record` or `tvist log export`, or
@@ -188,7 +186,6 @@ def _lack(from_tick: int | None) -> str:
 
 
 def _compare(a: Path, b: Path, logs: LogOptions, *, json: bool) -> None:
-    """Print what changed between two recordings or logs, motion by motion."""
     from tvist_lab.metrics import Measured
     from tvist_lab.metrics import compare as compared
     from tvist_lab.recordings import RecordingError

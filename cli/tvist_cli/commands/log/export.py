@@ -24,8 +24,7 @@ def export(
             info are included; for CSV they go into FILE.csv-metadata.json. With foxglove, the recording gets
             channels for the 3D panel of Foxglove and Lichtblick, and a layout for both is written beside it.
         output: Write to this file and replace it if it exists [FILE with another ending, such as run.csv or
-            run.foxglove.mcap for run.mcap, if there is none yet; with several segments, the first one's
-            name].
+            run.foxglove.mcap for run.mcap, if there is none yet; with several segments, the first one's name].
         logs: How to read logs.
         json: Print one JSON object.
     """

@@ -23,11 +23,9 @@ _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 
 @reader(TEXT)
 def read_csv(path: Path) -> Table:
-    """Read cells separated by spaces, commas, semicolons or tabs, with or without a header.
-
-    Lines with too few or too many cells are left out, and a note names the first. Numbers may have decimal
-    commas if cells have another separator.
-    """
+    """Read cells separated by spaces, commas, semicolons or tabs, with or without a header."""
+    # Lines with too few or too many cells are left out, and a note names the first. Numbers may have decimal
+    # commas if cells have another separator.
     raw = content(path).removeprefix(b"\xef\xbb\xbf")
     all_lines = raw.splitlines()
     top, names, separator = _header(path, all_lines)

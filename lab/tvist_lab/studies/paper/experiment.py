@@ -75,10 +75,8 @@ def fixed(shaper: str, f_d: float, zeta: float) -> Method:
 
 
 def equal_duration(delay: float) -> Method:
-    """Return a motion without shaper and model that takes as long as a shaped one with this delay [s].
-
-    A double S that reaches its limits lasts way/v + v/a + a/j, so an increase of a/j lengthens it equally.
-    """
+    """Return a motion without shaper and model that takes as long as a shaped one with this delay [s]."""
+    # A double S that reaches its limits lasts way/v + v/a + a/j, so an increase of a/j lengthens it equally.
     jerk = ACCELERATION / (ACCELERATION / JERK + delay)
     return Method("equal_duration_double_s", "longer double S", jerk=jerk)
 
