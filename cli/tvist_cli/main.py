@@ -30,7 +30,6 @@ LOG = {
     "export": "Write a recording as CSV or Parquet, or for Foxglove.",
     "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
 }
-"""The commands of `tvist log`."""
 GROUPS = {
     "Robots": {
         "serve": "Run a robot on the network.",

@@ -1,7 +1,4 @@
-"""Shell completion for the values of options: names that come with the package, and files.
-
-A command annotates such an option, `Annotated[str, ROBOTS]`; at TAB the shell asks the program.
-"""
+"""Shell completion for the values of options, which are annotated like `Annotated[str, ROBOTS]`."""
 
 from collections.abc import Iterable
 from glob import escape, glob

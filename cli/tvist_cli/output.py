@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from tvist_lab.report import Page
 
 GAP = " │ "
-"""Separator between the columns of a table."""
 WIDTH = 120
 """Number of columns when the output is not a terminal."""
 

@@ -33,7 +33,6 @@ SHOWN_EVERY = 0.1
 _CLEAR = "\r\x1b[K"
 """Moves to the start of the terminal's line and clears it."""
 STDIN = "-"
-"""File name that stands for the standard input."""
 
 
 def named(file: Path) -> str:

@@ -17,7 +17,6 @@ STANDARD = ("zv", "zvd", "ei")
 TABLED = (-0.2, -0.1, 0.0, 0.1, 0.2)
 """Frequency errors in the table [-]."""
 POINTS = 401
-"""Number of points of a curve."""
 
 
 def print_sensitivity(

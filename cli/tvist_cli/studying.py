@@ -40,12 +40,9 @@ class Places:
     """Files and folders for a command's result, each None if not requested."""
 
     output: Path | None = None
-    """JSON file."""
     figures: Path | None = None
-    """Folder of the figures."""
     look: FigureOptions = AS_USUAL
     report: Path | None = None
-    """Web page."""
 
     def check(self, *others: Path | None) -> None:
         """Refuse files that cannot be written, before anything is computed; `others` are further files."""

@@ -32,7 +32,6 @@ class Shows:
     title: str
     tracks: "list[Track]"
     result: dict[str, Any] | None = None
-    """Result of comparing two tracks."""
 
     @property
     def lasts(self) -> float:

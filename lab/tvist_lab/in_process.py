@@ -1,7 +1,4 @@
-"""Run a robot in this process as fast as it computes, with the usual client.
-
-Several such robots that make the same motions with several shapers can be compared tick by tick.
-"""
+"""Run a robot in this process as fast as it computes, with the usual client."""
 
 import math
 from collections.abc import AsyncIterator, Sequence

@@ -48,7 +48,6 @@ class Replay:
     first_difference: str | None = None
     """First difference from the original; None if there is none."""
     notes: list[str] = field(default_factory=list)
-    """Remarks for the user."""
 
 
 def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> Replay:

@@ -93,7 +93,6 @@ class Playback:
             raise RecordingError(f"{content.path} does not describe its robot, so no client could read it")
         self.name = keys.check_robot_name(name or content.robot)
         self.states = 0
-        """Number of states published."""
         self._content, self._speed, self._loop = content, speed, loop
         endpoints, guard = guarded(listen, [self.name], security=security, insecure=insecure)
         self._desk = PlaybackDesk(content.info, self.name)

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 PORT = 8080
 """Port of the page that --view opens."""
 FOLDER = Path("tvist-demo")
-"""Folder for the recording and the figures."""
 ANSWERED = "Q1-Q3"
 """Motion of the overview figure: the arm's frequency doubles along it, and the ringing is easy to see."""
 

@@ -63,7 +63,7 @@ class Advice:
     options: Sequence[Option]
     """All shapers, by settling time."""
     best: Option | None
-    """The recommended shaper; None if none helps."""
+    """Best shaper; None if none helps."""
     smoothed_percent: float | None = None
     """Vibration left by a running mean as long as the best shaper, median [%]."""
     slowed_percent: float | None = None

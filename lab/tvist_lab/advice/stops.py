@@ -53,7 +53,6 @@ class Stop:
     """The end of a motion with the rest after it."""
 
     file: int
-    """Index of its file."""
     number: int
     """Number of the motion in its file, from 1."""
     measured: Measured

@@ -33,7 +33,6 @@ class Machine(Struct, frozen=True):
     cores: int
     """Number of cores available to this process."""
     system: str
-    """Operating system with its release."""
     python: str
     libraries: dict[str, str]
     load: float

@@ -1,7 +1,4 @@
-"""Figures of an advice: the worst stop with and without the shaper, and vibration left against added time.
-
-Their text is large, since they are often viewed on a phone.
-"""
+"""Figures of an advice: the worst stop with and without the shaper, and vibration left against added time."""
 
 from typing import Any
 
@@ -27,7 +24,7 @@ from tvist_lab.metrics import amplitude
 from tvist_lab.metrics.common_clock import STILL
 
 LARGE = 1.65
-"""Factor on the usual size of text [-]."""
+"""Factor on the usual size of text [-]: these figures are often viewed on a phone."""
 SHOWN = (-100.0, 1000.0)
 """Time shown before and after the stop [ms]."""
 NAMED = 4

@@ -112,11 +112,9 @@ class Shown(NamedTuple):
     """A panel of `compared_figure`."""
 
     name: str
-    """Name of the motion, for the heading."""
     curves: Mapping[str, Recorded]
     """Recorded motion of each curve, by the curve's name."""
     said: str = ""
-    """Text in the panel."""
 
 
 def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> Figure:

@@ -31,7 +31,6 @@ ACCELERATION = 2.0
 RISE = 0.15
 """Time in which the reference of figure 3 reaches its target [s]."""
 BUFFERED = 22
-"""Number of samples in the buffer of figure 8."""
 
 
 def figure_3() -> Figure:

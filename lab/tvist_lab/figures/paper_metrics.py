@@ -32,7 +32,6 @@ from tvist_lab.recordings import Floats
 BEFORE, AFTER = 60.0, 150.0
 """Time shown in figure 15 before the unshaped reference's stop and after the last mark [ms]."""
 STOPS = {"$t_b$, $t_b^*$": "stop of the reference and of the shaped one"}
-"""Meaning of two symbols."""
 SYMBOLS = {
     "$E$": "distance of the tool from where it comes to rest",
     **STOPS,
@@ -42,7 +41,6 @@ SYMBOLS = {
     r"$t_\mathrm{stb}$": "stabilisation time",
     r"$e_\mathrm{os}$": "overshoot",
 }
-"""Meaning of the symbols in figure 15."""
 LEAD, TAIL = 0.1, 0.4
 """Time shown in figure 16 before the unshaped reference's stop and after the shaped one's [s]."""
 QUIET = 0.2
@@ -50,9 +48,7 @@ QUIET = 0.2
 LOUD = 1.2
 """Ratio to the largest noise above which a peak belongs to a vibration [-]; a decay needs two such peaks."""
 DASHES = (0, (4, 2))
-"""Dash pattern of a fitted curve."""
 ARROW = {"arrowstyle": "<->", "color": INK, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
-"""An arrow with two heads, over a span."""
 BOTH = {"Unshaped": (OF_UNSHAPED, "$t_b$"), "Shaped": (OF_SHAPED, "$t_b^*$")}
 """Style of each recording, and the symbol of its stop."""
 

@@ -31,7 +31,6 @@ SYMBOLS = {
     r"$\ddot q^*$": "acceleration of the shaped reference",
     "$E$": "distance of the tool from where it comes to rest",
 } | OF_ALPHA
-"""Meaning of the symbols on the axes."""
 MODE = {
     "estimated_f_d": ("$f_d$", "damped frequency", "Hz", (5.0, 16.0), 5.0),
     "estimated_zeta": (r"$\zeta$", "damping ratio", "–", (0.1, 0.4), 0.1),
@@ -39,7 +38,6 @@ MODE = {
 """Columns of the shaper's mode: symbol, meaning, unit, smallest range of the axis, distance of its ticks."""
 
 Recorded = tuple[Recording, MotionRows]
-"""A recording and one of its motions."""
 
 
 def motion_figure(name: str, *recorded: Recorded) -> Figure:

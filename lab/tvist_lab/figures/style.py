@@ -33,7 +33,6 @@ LIMIT = (0, (4, 3))
 ALPHA = r"$|\alpha|$ (m/s²)"
 """Axis label for the tool's acceleration."""
 OF_ALPHA = {r"$|\alpha|$": "acceleration of the tool, without gravity"}
-"""Meaning of its symbol."""
 USUAL = {"lines.linewidth": 1.4, "lines.markersize": 4.0, "font.size": 8.0}
 """Sizes of the default style, to which those in this package are relative [pt]."""
 NEAR = 0.035
@@ -44,9 +43,7 @@ class Series(NamedTuple):
     """Style of one curve among several."""
 
     cycled: str
-    """Colour, as a place in the style sheet's cycle."""
     dashes: Any
-    """Line style of matplotlib."""
     marker: str
 
     @property
@@ -76,9 +73,7 @@ SERIES = (
     Series("C6", (0, (2, 2)), "X"),
     Series("C7", (0, (8, 2, 3, 2)), "*"),
 )
-"""Styles of curves in the order of use."""
 OF_SHAPED, OF_UNSHAPED, OF_THIRD = SERIES[:3]
-"""Styles of shaped, unshaped and a third series."""
 
 
 def _scale(name: str) -> float:

@@ -1,7 +1,4 @@
-"""Export a recording for viewers: the same messages, three more channels, and a layout.
-
-The server does not record these channels, because they follow from its messages: ticks stay fast and recordings small.
-"""
+"""Export a recording for viewers: the recorded messages, three channels computed from them, and a layout."""
 
 import json
 from collections.abc import Iterator

@@ -79,7 +79,6 @@ class Jog:
     """A short move after which the arm rings, and free ways to its start."""
 
     payload: int
-    """Index of the carried payload."""
     way: tuple[Floats, ...]
     """Postures to pass one after the other, ending at the jog's start, each of shape (n,) [rad]."""
     q: Floats
@@ -99,7 +98,6 @@ class JogPlan:
     ways: MotionLimits
     """Limits of all other moves."""
     seed: int
-    """Seed of the choice."""
     changed: bool
     """Whether the payload of a simulated arm changes between jogs."""
     turned: Floats | None
@@ -129,9 +127,7 @@ class Measured:
     """Data of jogs or logs for an identification."""
 
     logs: tuple[Log, ...]
-    """Recordings with stops."""
     friction: tuple[ModalParameter, ...] = ()
-    """Friction of the joints, if it was measured."""
     no_friction: str = "it is measured in a slow sweep of a served robot"
     """Why friction was not measured; empty if it was."""
     seed: int | None = None

@@ -41,7 +41,6 @@ class Observed:
     log: str
     motion: int
     payload: int
-    """Index of the payload."""
     start: Floats
     """Joint angles at rest before it, shape (n,) [rad]."""
     reference: Floats

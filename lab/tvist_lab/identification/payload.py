@@ -44,7 +44,6 @@ SWING = 0.5
 BLOCK = 10
 """Number of ticks over which a motion's torques are averaged."""
 LEAST = 3
-"""Smallest number of poses."""
 LEAST_ERROR = 0.01
 """Smallest assumed error of a torque, relative to the joint's friction [-]."""
 ROTOR = 3.0
@@ -73,7 +72,6 @@ class PayloadFound:
     """Standard deviation of that mass [kg]."""
     declared: Payload
     poses: int
-    """Number of poses in which the arm rested."""
 
 
 async def identify_payload(

@@ -14,7 +14,6 @@ from tvist_protocol.calibration import PolynomialModel, Spread
 from tvist_shaping import terms
 
 FOLDS = 10
-"""Number of parts for cross-validation."""
 DEGREES = (4, 3, 2)
 """Degree of the polynomials in one, two or three joints; with fewer joints, each term has more data."""
 ROUGH = 10.0

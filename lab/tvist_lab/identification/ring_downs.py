@@ -1,8 +1,4 @@
-"""Find usable ring-downs after stops in recordings and logs of other robots.
-
-A ring-down starts when the arm is no longer driven and ends when it moves again. It is usable if nothing
-shaped the motion and the vibration exceeds the noise.
-"""
+"""Find usable ring-downs after stops, in which the arm is not driven, nothing shaped, and vibration above noise."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -55,7 +51,6 @@ class Ringing:
     q: Floats
     """Configuration, shape (n,) [rad]."""
     payload: int
-    """Index of the carried payload."""
     force: Floats
     """Specific force from shortly after the stop, shape (T, 3) [m/s²]."""
     noise: float
@@ -121,7 +116,6 @@ class Stop:
     motion: int
     """Number of the motion in the log, from 1."""
     ringing: Ringing | None
-    """The ring-down; None if it is not usable."""
     reason: str = ""
     """Why it is not usable, worded alike for stops of the same kind."""
 

@@ -30,7 +30,6 @@ MASS = 0.1
 CENTRE = 0.03
 """Standard deviation of each coordinate of its centre of mass [m]."""
 DIGITS = 9
-"""Number of significant digits of a fitted value."""
 TOLD = 0.5
 """A parameter counts as fitted if the logs reduce its deviation below this share [-]."""
 

@@ -25,7 +25,6 @@ class WorkspaceMap:
     joints: tuple[int, int]
     """Indices of the joints along the grid's rows and columns."""
     names: tuple[str, str]
-    """Names of these joints."""
     angles: tuple[Floats, Floats]
     """Angles of these joints [rad], shapes (R,) and (C,)."""
     rest: tuple[float, ...]

@@ -12,7 +12,6 @@ WINDOWS = (2, 3, 5, 8)
 LEAST = 3
 """Number of earlier measurements that a comparison needs."""
 KEPT = 40
-"""Largest number of measurements that are kept."""
 SURE = 3.7
 """Standard deviations beyond which a change is reported if the scatter is known well: more than normal
 measurements need (1 in 5,000), since those of real motions have heavier tails."""
@@ -31,9 +30,7 @@ class Change:
     """A change of the measured quantity."""
 
     before: float
-    """Mean before the change."""
     after: float
-    """Mean since the change."""
     error: float
     """Standard error of the difference."""
     lasting: int

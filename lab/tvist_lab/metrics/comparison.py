@@ -30,13 +30,13 @@ class ComparedMotion:
     """One motion that both recordings contain."""
 
     a: int
-    """Its number in the first recording, from 1."""
+    """Number in the first recording, from 1."""
     b: int
-    """Its number in the second recording, from 1."""
+    """Number in the second recording, from 1."""
     first: MotionResult
-    """Its figures in the first recording."""
+    """Figures in the first recording."""
     second: MotionResult
-    """Its figures in the second recording."""
+    """Figures in the second recording."""
 
     @property
     def impact_percent(self) -> Mapping[str, float | None]:

@@ -49,7 +49,6 @@ class MotionRows:
     id: Any = None
     """Number of the motion, if events contain it."""
     stopped: bool = False
-    """Whether it was stopped before its target."""
     lag: float | None = None
     """Time by which the arm of another controller follows its target [s]; None if unknown."""
 

@@ -75,9 +75,7 @@ class RingDown(Mode):
     window: float
     """Duration of the fit [s]."""
     modes: int
-    """Number of modes fitted together."""
     ok: bool
-    """Whether the mode is measurable."""
     reason: str = ""
     """Why it is not measurable."""
     found: tuple[Mode, ...] = ()

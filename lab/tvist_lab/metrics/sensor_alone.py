@@ -36,7 +36,6 @@ class FreeVibration:
     """The strongest mode of one ring-down or sweep."""
 
     kind: str
-    """`ring-down` or `sweep`."""
     start_s: float
     """Time at which it starts [s]."""
     f_d_hz: float

@@ -18,7 +18,6 @@ SMOOTHED = 40.0
 EXPLAINED = 0.5
 """Largest share of the accelerometer signal that may remain unexplained [-]."""
 FEWEST = 8
-"""Smallest number of samples of a motion."""
 
 
 def servo_lag(recording: Recording, start: int, stop: int) -> float | None:

@@ -246,7 +246,6 @@ class Measured:
     recording: Recording
     motions: Sequence[MotionRows]
     results: Sequence[MotionResult]
-    """Metrics of each motion."""
 
     @classmethod
     def of(cls, recording: Recording) -> "Measured":

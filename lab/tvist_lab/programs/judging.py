@@ -111,7 +111,6 @@ ROUNDING = {"_s": 0.5 * PERIOD, "seconds": 0.5 * PERIOD}
 SHARES = {"_m_s2": 1e-3, "_rad_s": 1e-4, "_m_s": 1e-4}
 """Relative differences of accelerations and speeds that are ignored, since another processor rounds differently."""
 OF_MOVES = ("seconds", "stopped", "rested_s", "peak_after_stop_m_s2")
-"""Keys of a move to compare."""
 
 
 class BaselineError(ValueError):

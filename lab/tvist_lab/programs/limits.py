@@ -7,7 +7,6 @@ from dataclasses import dataclass
 UNITS = {"max_shake": "m/s²", "max_seconds": "s", "max_joint_speed": "rad/s", "max_tool_speed": "m/s",
          "max_force": "N"}  # fmt: skip
 EXPECTED = re.compile(r"\s*(?P<body>.+?) in (?P<area>.+)")
-"""Form of `expect`."""
 
 
 @dataclass(frozen=True, kw_only=True)

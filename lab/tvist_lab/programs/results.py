@@ -21,7 +21,6 @@ class Shortcoming:
     kind: str
     """How the run ended, a limit such as `max_shake`, `expect`, `baseline`, or `recording`."""
     text: str
-    """Description as a sentence."""
     line: int | None = None
     """Line of the program to which it belongs, if any."""
 

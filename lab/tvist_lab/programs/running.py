@@ -25,14 +25,12 @@ from tvist_server.recording.recorder import Recorder
 from tvist_server.server import Server
 
 CLIENT: Final = "tvist run"
-"""Client name with which a run has control."""
 LEASE: Final = 3600.0
 """Time without renewal after which a run loses control [s]."""
 HERE: Final = "127.0.0.1"
 ATTEND_TICKS, ATTEND_S = 50, 0.05
 """Ticks in lockstep, or time in real time [s], between two calls of `attend`."""
 LEAST, MOST = -(2**31), 2**31 - 1
-"""Range of an integer register."""
 _INPUT = re.compile(r"(?P<name>digital_input|input_(?P<kind>bit|int|double)_register)_(?P<number>\d{1,3})")
 _BITS = {"0": False, "false": False, "off": False, "1": True, "true": True, "on": True}
 

@@ -37,7 +37,6 @@ Reason = Literal[
     "server_failure",
     "signal",
 ]
-"""How a run ended."""
 
 
 @dataclass
@@ -50,9 +49,7 @@ class Said:
     line: int = 0
     """Line that was being executed; 0 if none."""
     title: str | None = None
-    """Title of a popup."""
     level: Literal["message", "warning", "error"] | None = None
-    """Severity of a popup."""
 
 
 @dataclass
@@ -151,11 +148,9 @@ class ProgramWatch(Sink):
         self.error: Place | None = None
         """Position of the error that ended the program."""
         self.said: list[Said] = []
-        """All messages."""
         self.news: deque[Said] = deque()
         """New messages, for another thread to take."""
         self.moves: list[Move] = []
-        """Motions of the program."""
         self.fastest_joint, self.fastest_tool = Fastest(), Fastest()
         """Largest speeds of a joint and of the tool centre point, as measured."""
         self.hardest = Fastest()

@@ -25,14 +25,12 @@ SI = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180.0, "m/s2": 1.0, "mm/s2": 1e-3,
     "g": 9.80665, "mg": 9.80665e-3, "rad/s": 1.0, "deg/s": np.pi / 180.0,
 }  # fmt: skip
-"""Units and their sizes in SI."""
 WIDEST = 7.0
 """Largest angle that the middle one of an arm's joints reaches [rad]; more must be degrees."""
 GRAVITY_IN_G = (0.8, 1.2)
 """Range of the median length of an accelerometer's vector in units of gravity."""
 
 TIMES = (TIME, "time", "t")
-"""Names of the time column."""
 REALTIME = {
     "q_target": "target_q",
     "qd_target": "target_qd",

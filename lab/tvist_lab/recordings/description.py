@@ -24,7 +24,6 @@ _UNIT = re.compile(r"\s*\[([^\]]*)\]")
 KEY = "tvist"
 """Name of the description in a file with named parts."""
 FORMAT = 1
-"""Version of the description."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,6 @@ class ColumnMeaning:
     units: tuple[str, ...] = ()
     """Its SI unit, or one for each half of a vector of six; "-" for a ratio; empty without a unit."""
     whole: bool = False
-    """Whether its values are whole numbers."""
 
     def unit(self) -> str:
         """Return the unit or units as text, such as `m, rad` for a pose."""
@@ -89,7 +87,6 @@ class ColumnDescription(msgspec.Struct, frozen=True):
     width: Annotated[int, msgspec.Meta(ge=0, le=100_000)] | None
     """Number of entries in a row; null for a number."""
     unit: str
-    """Unit or units (SI)."""
     meaning: str
 
 
@@ -98,7 +95,6 @@ class Description(msgspec.Struct, frozen=True):
 
     format: int
     columns: dict[str, ColumnDescription]
-    """Columns in order."""
     events: list[Event] = []
     """Events in the order of their ticks."""
     info: Info | None = None

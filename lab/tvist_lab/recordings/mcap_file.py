@@ -46,7 +46,6 @@ class RecordingFile:
     path: Path
     """File, folder or pattern that names the recording."""
     files: tuple[Path, ...]
-    """Its files in order."""
     robot: str
     info: Info | None
     """Description of the robot when the recording started; None in a file of another program."""
@@ -57,7 +56,6 @@ class RecordingFile:
     counts: Mapping[str, int]
     """Number of messages `state`, `truth` and `io`; at least one state."""
     events: tuple[Event, ...]
-    """Recorded events."""
     journal: tuple[Entry, ...]
     """Inputs of the controller."""
     recording: Recording
@@ -173,7 +171,6 @@ class _Content:
     robot: str | None = None
     damage: str | None = None
     channels: dict[int, str] = field(default_factory=dict)
-    """Kind of the messages of each channel."""
     waiting: list[tuple[str, bytes]] = field(default_factory=list)
     """Messages that are not yet decoded, in order."""
 

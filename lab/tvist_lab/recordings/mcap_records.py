@@ -23,7 +23,6 @@ from tvist_lab.recordings.recording import RecordingError
 from tvist_protocol.recorded import segment_name, segment_of
 
 MAGIC = b"\x89MCAP0\r\n"
-"""First bytes of every MCAP file."""
 RECORD_LIMIT = 2**28
 """Longest accepted record and unpacked chunk [bytes], so that a damaged length cannot exhaust the memory."""
 DENSEST, LEAST = 500, 1 << 16
@@ -39,7 +38,6 @@ _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 """Start of a message: its channel, number and two times."""
 TOPIC = re.compile(r"tvist/(?P<robot>[^/]+)/(?P<kind>\w+)")
-"""Topic of a robot's channel."""
 WILD = "*?["
 """Characters that make a name a pattern."""
 

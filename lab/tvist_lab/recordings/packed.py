@@ -6,7 +6,6 @@ from pathlib import Path
 from tvist_lab.recordings.checks import LogError
 
 GZIP = b"\x1f\x8b"
-"""First bytes of a gzip file."""
 DENSEST = 100
 """Largest ratio of the content to the size of its file; logs reach 30, a malicious file 1000."""
 LEAST = 1 << 20

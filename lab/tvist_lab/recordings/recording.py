@@ -52,7 +52,6 @@ class Recording:
     events: tuple[Any, ...] = ()
     """Events in the order of their ticks; each has `tick`, `kind`, `id`, `code`, `why`."""
     info: Any = None
-    """The robot's `info` message, if there is one."""
     notes: tuple[str, ...] = ()
     """Notes on what was repaired or left out when a file was read."""
     foreign: bool = False

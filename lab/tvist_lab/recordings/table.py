@@ -75,7 +75,6 @@ class Table:
     there: str = ""
     """What the file has instead of columns, for an error message."""
     description: Description | None = None
-    """Description written by `tvist log export`."""
 
 
 Reader = Callable[[Path], Table | Recording]

@@ -16,7 +16,6 @@ WORST = "The tool's acceleration after the stop that rings most: recorded, and p
 COSTS = (
     "Each shaper that keeps the arm's limits: what it leaves of the vibration, against the time that it adds."
 )
-"""Captions of the figures."""
 SHOWN = 16
 """Number of shapers in the table."""
 WORDS = {

@@ -43,11 +43,9 @@ class Section:
 
     heading: str
     text: Sequence[str] = ()
-    """Paragraphs."""
     tables: Sequence[PageTable] = ()
     pictures: Sequence[Picture] = ()
     points: Sequence[str] = ()
-    """Items of a list."""
     facts: Mapping[str, str] = field(default_factory=dict)
     """Terms with their meanings or values."""
     explains: bool = False

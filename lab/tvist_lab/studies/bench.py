@@ -34,7 +34,6 @@ STICKING = (
     Variant("stiction", "motors that stick near standstill, as the controller knows"),
     Variant("more_stiction", "motors that stick more than the controller knows", partial(rubbed, HEAVIER)),
 )
-"""Arms with sticking motors."""
 PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
 """Errors of the declared mass [-]."""
 CORNERS = 5

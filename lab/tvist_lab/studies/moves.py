@@ -55,7 +55,6 @@ EACH = (
     Column("delay\nms", "delay_ms", 0), Column("still\nms", "still_after_unshaped_stop_ms", 0),
     Column("largest q̈\nof its limit", "peak_acceleration_ratio", 3),
 )  # fmt: skip
-"""Columns of single moves."""
 SUMMED = (
     COUNTED.sum().alias("counted"), sure("reduction_percent", 5, "p5"),
     *(share("shaped_peak_m_s2", of, name, among=COUNTED) for name, of in (("p95", 0.95), ("max", 1.0))),

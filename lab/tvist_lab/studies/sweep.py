@@ -70,7 +70,6 @@ class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     shapers: Annotated[tuple[Name, ...], Meta(min_length=1)]
     """Names of shapers, or FILE.py:NAME."""
     moves: Annotated[int, Meta(ge=1, le=100_000)]
-    """Number of random moves of each robot."""
     payloads: Annotated[tuple[Mass | Name, ...], Meta(min_length=1)]
     """Masses of the disc on the flange [kg], or "uniform" for one drawn for each move up to the arm's rating."""
     errors: Annotated[tuple[Mistakes, ...], Meta(min_length=1)] = (Mistakes(),)
@@ -82,7 +81,6 @@ class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     modes: Annotated[int, Meta(ge=1, le=6)] = 1
     """Number of modes that each shaper of the catalogue suppresses."""
     limits: Literal["gentle", "industrial"] = "gentle"
-    """Limits of the moves."""
     stroke: tuple[Annotated[float, Meta(ge=0.001, le=1)], Annotated[float, Meta(ge=0.001, le=1)]] = (0.3, 1.0)
     """Smallest and largest length of a move, as a share of the way between two configurations [-]."""
     wrists: bool = False
@@ -90,7 +88,6 @@ class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     streams: bool = False
     """Whether to follow streams of set-points that are stopped, instead of making moves."""
     disturbances: tuple[Disturbance, ...] = ("friction", "gear", "noise")
-    """Disturbances of the arms."""
 
     @property
     def rows(self) -> int:
@@ -149,7 +146,6 @@ class SweptRobot:
     """A robot with the recipes of its shapers."""
 
     name: str
-    """Name of the robot in the sweep's file."""
     description: RobotDescription
     """The arm with the sweep's disturbances, which is also the controller's model of it."""
     recipes: tuple[Recipe, ...]

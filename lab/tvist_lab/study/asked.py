@@ -71,7 +71,6 @@ class Preset:
 
     study: Callable[[Asked], Study]
     always: tuple[str, ...] = ()
-    """Methods that always come first."""
     shapers: tuple[str, ...] = ()
     """Default shapers."""
     menu: Menu | None = None
@@ -81,4 +80,3 @@ class Preset:
     modal: bool = True
     """Whether each calibration needs a modal model."""
     least: int = 1
-    """Smallest number of moves."""

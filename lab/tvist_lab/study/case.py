@@ -36,7 +36,6 @@ class Case:
     seed: int = 0
     """Seed of gear errors, and of the arm's deviations."""
     arms: tuple[Variant, ...] = (AS_DESCRIBED,)
-    """The arms that make it."""
     limits: MotionLimits = PAPER
     """Limits of every joint."""
     payload_error: float = 0.0

@@ -29,7 +29,6 @@ class Ran:
     """A study that was run."""
 
     rows: pl.DataFrame
-    """All rows."""
     resumed: int
     """Number of jobs that were done before."""
     tasks: int

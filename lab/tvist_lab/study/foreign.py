@@ -56,7 +56,6 @@ class FromFile(Stepping):
 
     path: str
     recipe: Recipe
-    """Source of its estimates."""
     name: str
     label: str
 

@@ -27,7 +27,6 @@ LEAST = 20
 """Smallest number of moves for a verdict and for a 5th percentile, which is otherwise little more than the
 worst move."""
 RESAMPLED = 2000
-"""Number of bootstrap samples for an interval."""
 
 
 def said(seed: int) -> str:

@@ -1,7 +1,4 @@
-"""All methods of studies by name, and the menus that show them; `catalogue` creates them.
-
-A shaper of the shaping library needs no row: without one, it is in all menus of shapers.
-"""
+"""All methods of studies and the menus that show them; a library shaper without a row is in all shaper menus."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -27,7 +24,6 @@ class Row:
     label: str
     """Name for display."""
     menus: tuple[Menu, ...] = ()
-    """Menus that show it."""
     kind: Kind = "filter"
     of: str = ""
     """Shaper from which it is made, or method whose duration it has; empty for its own name."""

@@ -32,7 +32,6 @@ class Task:
     reference: Floats
     """Reference, shape (T, n) [rad]."""
     limits: MotionLimits = PAPER
-    """Limits of the motion."""
     as_served: bool = False
     """Whether to plan moves for the filter and accept the result, as a robot does; otherwise the filter gets
     the reference itself, and is checked for tails."""
@@ -46,7 +45,6 @@ class Method(ABC):
     """A way to make a motion; it can be sent to another process."""
 
     name: str
-    """Name in JSON."""
     label: str
     """Name for display."""
 
@@ -131,11 +129,9 @@ class Constant(Stepping):
     """A shaper of the catalogue with constant modes: those of the move's target, or of a whole range."""
 
     recipe: Recipe
-    """Source of the estimates."""
     name: str
     label: str
     shaper: str
-    """Shaper of the catalogue."""
     modes: int = 1
     """Number of lowest modes at the move's target, each with its own shaper."""
     f_d: float | None = None
@@ -173,11 +169,9 @@ class ConstantMeanDelay(Stepping):
     """The modes' ZV shapers in series, delayed to a constant mean delay."""
 
     recipe: Recipe
-    """Source of the estimates."""
     mean_delay: float
     """The constant mean delay [s]."""
     modes: int
-    """Number of modes."""
     name: str
     label: str
 
@@ -230,7 +224,6 @@ class PeriodOfJerk(Planned):
     """A double S whose jerk lasts a period of the lowest mode at the target, which is then not excited."""
 
     recipe: Recipe
-    """Source of the estimate."""
     name: str
     label: str
 

@@ -31,7 +31,6 @@ TRIES = 1000
 RETARGETED = (0.2, 0.8)
 """Shortest and longest time after which a stream turns to another target [s]."""
 TURNS = 4
-"""Number of targets of a stream."""
 WITH_WRISTS = Region(low=(*WORKSPACE.low, -np.pi, -np.pi), high=(*WORKSPACE.high, np.pi, np.pi))
 """The workspace with any angles of the wrist's two outer joints."""
 

@@ -1,7 +1,4 @@
-"""The folder of a study: its identity, the parts done, and at the end all rows in one file.
-
-Each file is renamed when it is complete, so that every file can be read at any time, even after a crash.
-"""
+"""The folder of a study; each file is renamed when complete, so that all can be read even after a crash."""
 
 import fcntl
 import io
@@ -22,7 +19,6 @@ MANIFEST = "study.json"
 PARTS = "parts"
 """Folder for the parts of an unfinished study."""
 ROWS = "rows.parquet"
-"""File with all rows of a finished study."""
 
 
 class StoreError(OSError):

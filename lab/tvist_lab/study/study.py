@@ -35,7 +35,6 @@ COUNTS = {
 }
 """Counts in each group of rows."""
 DIGITS = 3
-"""Decimals of the shown measures."""
 
 Figures = Mapping[str, tuple[Figure, str]]
 """Figures and captions, by file name without suffix."""
@@ -76,7 +75,6 @@ class Result:
     study: "Study"
     rows: pl.DataFrame
     values: dict[str, Any]
-    """Content of --json."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +95,6 @@ class Study:
     show: tuple[str, ...] = ("reduction_percent", "delay_ms")
     """Measures in the figure, and in the table if there are no columns."""
     columns: tuple[Column, ...] = ()
-    """Columns of the table."""
     few: tuple[Column, ...] = ()
     """Columns if too few rows count for a median."""
     more: tuple[pl.Expr, ...] = ()
@@ -115,7 +112,6 @@ class Study:
     as_served: bool = True
     """Whether moves are planned for the shaper as by a robot, instead of using the same reference."""
     notes: str = ""
-    """Notes for the reader."""
     facts: Mapping[str, Any] = field(default_factory=dict)
     """Properties of the cases, for --json."""
     identity: Mapping[str, Any] = field(default_factory=dict)

@@ -20,7 +20,6 @@ from tvist_plant.plant import PERIOD, SimulatedArm
 from tvist_plant.user_file import named
 
 MEASURED, TOO_WEAK, FAILED = "measured", "too weak", "failed"
-"""Status of a row."""
 
 Row = Mapping[str, Any]
 """A row: values by column name."""
@@ -33,7 +32,6 @@ class Job:
     case: Case
     methods: tuple[Method, ...]
     measures: tuple[str, ...] = OF_PEAKS
-    """Names of the measures."""
     as_served: bool = True
     """See `Task.as_served`."""
 

@@ -12,12 +12,10 @@ SIZE = (
     Column("model", "model"), Column("joints", lambda one: len(one["joints"])), Column("length m", "length_m", 2),
     Column("payload kg", lambda one: f"{one['payload_kg']:g}"),
 )  # fmt: skip
-"""Columns that describe an arm."""
 REDUCED = (
     Column("less % median", "reduction_percent.median", 1), Column("p5", "reduction_percent.p5", 1),
     Column("delay ms", "delay_ms", 0),
 )  # fmt: skip
-"""Columns with the effect of auto."""
 
 
 def _origin_of_drives(one: Entry) -> str:

@@ -6,7 +6,6 @@ from tvist_lab.change import Change
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL
 
 POSES = {"Q1": "stretched out", "Q2": "stretched out to the side", "Q3": "folded"}
-"""The paper's poses in words."""
 
 
 def answer(report: dict[str, Any], motion: str) -> list[str]:

@@ -1,7 +1,4 @@
-"""The paper's experiment: three motions by several methods, with repetitions, as a client of any robot.
-
-The methods are unshaped, the paper's, and baselines.
-"""
+"""The paper's experiment: three motions unshaped, by the paper's method and by baselines, on any robot."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -35,7 +32,6 @@ class Method:
     """A method for making a motion: a shaper, and the modes that it is designed for."""
 
     name: str
-    """Name in tables and JSON."""
     label: str
     """Name for display."""
     shaper: str = "none"
@@ -66,7 +62,6 @@ UNSHAPED = Method("unshaped", "unshaped")
 SHAPED = Method("shaped", "TVIST-ZV", "zv")
 """TVIST with the calibration's polynomials."""
 FROZEN_AT_END = Method("zv_frozen_at_end", "ZV for the end pose", "zv", frozen=True)
-"""ZV with the modes of the end pose."""
 
 
 def fixed(shaper: str, f_d: float, zeta: float) -> Method:
@@ -102,7 +97,6 @@ class Experiment:
     judged: dict[tuple[str, str], list[JudgedRun]] = field(default_factory=dict)
     """Results of all runs, by motion and method."""
     labels: dict[str, str] = field(default_factory=dict)
-    """Name for display of each method."""
     first: dict[tuple[str, str], Recording] = field(default_factory=dict)
     """Recording of the first run, by motion and method, for the figures."""
 

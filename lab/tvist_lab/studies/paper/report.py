@@ -42,7 +42,6 @@ ADJUSTED = {
 """Figures to which each arm's parameters were fitted or tuned, by model; all others are predicted."""
 
 FIGURES = ("delay ms", "stabilisation ms", "cycle ms", "overshoot m", "RV m/s²")
-"""Headings of the figures of Table 2."""
 IMPACTS = ("stabilisation", "cycle", "overshoot", "residual_vibration")
 """Changes by shaping, in the order of these figures."""
 METHODS = (
@@ -50,7 +49,6 @@ METHODS = (
     Column("peak m/s²", "peak_m_s2", 3), Column("less peak %", "peak_reduction_percent", 1),
     Column("still after ms", "still_after_ms", 0), Column("peak q̈ / limit", "peak_acceleration_ratio", 3),
 )  # fmt: skip
-"""Columns of a table of methods."""
 
 
 def as_dict(done: Experiment) -> dict[str, Any]:
