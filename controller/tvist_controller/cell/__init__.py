@@ -1,5 +1,4 @@
-"""What stands around a robot: wires between its terminals, its tools, a gripper, and parts that it grips.
+"""The cell around a robot: wires, tools, gripper and parts, simulated like the plant.
 
-It is a part of the simulation, like the plant: it sees outputs and the arm's place in every tick, and gives inputs and
-what the arm carries.
+In every tick it reads outputs and the arm's pose, and sets inputs and the carried payload.
 """

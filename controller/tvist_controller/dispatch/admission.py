@@ -1,7 +1,7 @@
-"""Checks that a message must pass before the controller gets it: it is valid, and its sender may send it.
+"""Checks of messages before the controller: valid content, and a sender with the right to send it.
 
-Nothing here changes any state, so messages can be admitted in any thread. A message that is admitted long before it
-is carried out has to be checked again, since the lease may have changed.
+They change no state, so any thread can admit messages. The lease must be checked again when a message is
+carried out.
 """
 
 import contextlib
@@ -31,27 +31,27 @@ from tvist_protocol.simulation import SimulationStep
 
 STEP = tag(SimulationStep)
 LONG = frozenset(tag(row.message) for row in COMMANDS.values() if row.long)
-"""Types of commands that may be longer than `EXPLAINED_BYTES`."""
+"""Types of commands that may exceed `EXPLAINED_BYTES`."""
 
 
 class Admitted(NamedTuple):
-    """A command that has passed the checks."""
+    """A command that passed the checks."""
 
     command: Command
     content: dict[str, Any]
-    """Content as Python's built-in types, for the journal."""
+    """Content as built-in types, for the journal."""
     session: str | None = None
-    """Session of the client that the command gives control or the clock to, if `client_gone` will report its end."""
+    """Session of a client that gets control or the clock, if `client_gone` will report its end."""
     client: str | None = None
-    """Client that sent it, from its token or the name in the command; None if it has neither."""
+    """Sending client, from its token or the command; None if unknown."""
     origin: str | None = None
-    """IP address of the machine that sent it; None if the network does not tell."""
+    """IP address of the sender; None if unknown."""
 
 
 def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:
-    """Decode a command, and check that its sender may send it.
+    """Decode a command and check its sender's rights.
 
-    Of a long command only the type and token are decoded until its sender is known to have control or the clock.
+    A long command is decoded only after its token has been found to be that of control or the clock.
     """
     try:
         if len(data) > EXPLAINED_BYTES:
@@ -64,7 +64,7 @@ def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admit
 
 
 def admit_command(command: Command, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:
-    """Check that the sender of a command may send it."""
+    """Check the rights of a command's sender."""
     try:
         client = _authorize(command, lease, clock)
     except NoControlError as error:
@@ -73,9 +73,9 @@ def admit_command(command: Command, lease: Lease | None, clock: Lease | None = N
 
 
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
-    """Decode a set-point; return None if its sender is not known to have control, to spare the controller's thread.
+    """Decode a set-point; return None unless its sender may have control, to spare the controller's thread.
 
-    Whose it is decides the lease at the moment at which it is carried out.
+    The lease at the moment of execution decides.
     """
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None
@@ -91,7 +91,7 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
 
 
 def _authorize(command: Command, lease: Lease | None, clock: Lease | None) -> str | None:
-    """Check that a command's sender may send it; return the sender's name, if the command contains it."""
+    """Check the rights of a command's sender; return its name, if known."""
     match command:
         case TakeControl():
             check_free(lease, command.client)

@@ -1,4 +1,4 @@
-"""Forecast of the control line's motion, and the quickest way to end it."""
+"""Prediction of the control line's motion, and the quickest way to end it."""
 
 import math
 from contextlib import suppress
@@ -16,7 +16,7 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
 LONG = 0.2
-"""Time for which a motion along a curve may run out before a stop is sought that plays it more slowly [s]."""
+"""Duration above which slower playback along a curve is tried as a stop [s]."""
 EVEN = 1e-12
 """Differences between steps below this are rounding errors [rad]."""
 
@@ -26,7 +26,7 @@ def _anywhere(_: JointStop) -> bool:
 
 
 class Stopper:
-    """Forecasts the motion of a control line, and stops it."""
+    """Predicts and stops the motion of a control line."""
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
@@ -35,11 +35,10 @@ class Stopper:
         self._wanted = math.inf
 
     def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
-        """Simulate what follows without a command, or after a change to a filter or a trajectory.
+        """Simulate what follows without a command, optionally with another filter or trajectory.
 
-        The shaped references, shape (k, n) [rad], begin with the last two that were played, and end at rest.
-        The result is None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on. Stops
-        bypass every filter.
+        Returns the last two shaped references played and those until rest, shape (k, n) [rad]; None after
+        more than `MAX_AHEAD` ticks or if the trajectory is stuck. Stops bypass filters.
         """
         ahead = LineSimulation(*self._cycle.fork(tvist, trajectory))
         with suppress(StuckError):
@@ -47,11 +46,11 @@ class Stopper:
         return np.array(ahead.references) if ahead.rests else None
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
-        """Come to rest as quickly as permitted, by default with the deceleration that torque permits.
+        """Come to rest as quickly as permitted, by default at the deceleration that torque permits.
 
-        A motion stays on its path, is at no time ahead of the uninterrupted motion, and comes to rest no later than
-        it. If no stop within the torque limits does that, the motion runs out through the filter. A stream, whose
-        path is its client's, stops clear of all bodies. A stop in progress that is as quick continues: None.
+        A motion stays on its path, is never ahead of the uninterrupted motion, and rests no later. If no stop
+        within the torque limits does that, it runs out through the filter. A stream, whose path the client
+        defines, stops clear of all bodies. Returns None if a stop in progress is as quick and continues.
         """
         cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
         if cycle.mode in {LineMode.STOPPING, LineMode.RUNNING_OUT} and wanted <= self._wanted:
@@ -67,12 +66,12 @@ class Stopper:
         return plan
 
     def brake(self, trajectory: Trajectory) -> None:
-        """Follow the arm while its brakes bring it to rest; no stop replaces this."""
+        """Follow the arm while its brakes stop it; no other stop replaces this."""
         self._cycle.begin(trajectory, LineMode.STOPPING)
         self._wanted = math.inf  # as if the hardest stop had been asked for
 
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
-        """Return the quickest permitted stop from the present state, without starting it; see `stop`."""
+        """Return the quickest permitted stop from the present state without starting it; see `stop`."""
         forecast = self._cycle.trajectory.forecast
         return self._by_joints(deceleration) if forecast is None else self._on_path(forecast, deceleration)
 
@@ -132,7 +131,7 @@ class Stopper:
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
 
     def _shaped(self, forecast: Forecast) -> Forecast:
-        """Return the forecast of a motion after the filter."""
+        """Return the forecast of a motion behind the filter."""
         cycle = self._cycle
         if cycle.mode is LineMode.STOPPING:
             return forecast
