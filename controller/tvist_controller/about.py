@@ -25,7 +25,6 @@ POSTURES = 500
 """Number of random postures searched for the stretched-out one, which needs most holding torque."""
 VERSION = version("tvist")
 FIELDS = {tag(kind): list(kind.__struct_fields__) for kind in COMMANDS}
-"""Fields of each command type."""
 
 
 def info_of(controller: Controller) -> Info:
@@ -108,10 +107,9 @@ def geometry_of(description: RobotDescription, things: Things | None = None) -> 
 
 
 def stopping(description: RobotDescription) -> tuple[Stopping, ...]:
-    """Return the stops without payload and with the rated one, for the joint that takes longest.
+    """Return the stops without payload and with the rated one, of the joint that takes longest.
 
-    One joint turns, in either direction, with the arm stretched out. This takes as long as twenty ticks, once
-    per description.
+    One joint turns, either way, with the arm stretched out. This takes as long as twenty ticks, once per description.
     """
     return _found(msgspec.json.encode(description))
 

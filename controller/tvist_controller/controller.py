@@ -89,11 +89,7 @@ class Controller(Robot):
         session: str | None = None,
         origin: str | None = None,
     ) -> Reply | None:
-        """Carry out a command of a client or program; return None for the reply `Done`.
-
-        Raise RefusalError if it cannot be carried out and changed nothing, NoControlError if its sender may
-        not send it.
-        """
+        """Carry out a command; return None for the reply `Done`; raise RefusalError or NoControlError."""
         if self.watching is not None and type(command) not in HARMLESS:
             raise RefusalError("wrong_mode", "", REFUSED)
         if self.supervision is not None:
@@ -110,10 +106,7 @@ class Controller(Robot):
     def receive_setpoint(
         self, setpoint: c.Setpoint | Unreadable | None, note: Callable[[], None] | None = None
     ) -> None:
-        """Take a set-point, or None for one that was not admitted; count and drop it if it is not accepted.
-
-        One from the client in control is first written to the journal by `note`.
-        """
+        """Take a set-point, None if not admitted; `note` journals one of the client in control first."""
         self.counters.setpoints_received += 1
         if setpoint is None or not is_holders(self.session.lease, setpoint.token):
             self.counters.setpoints_refused += 1  # neither the stream nor the journal is concerned
@@ -143,10 +136,7 @@ class Controller(Robot):
         return report.state, events
 
     def begin_tick(self) -> None:
-        """Begin a control period: handle timeouts and run programs.
-
-        A watched robot sets the tick number.
-        """
+        """Begin a control period: handle timeouts and run programs; a watched robot sets the tick number."""
         if self.watching is not None:
             tick = self.watching.look()
             self.tick_number = max(self.tick_number, 0 if tick is None else tick - 1)
@@ -176,7 +166,6 @@ class Controller(Robot):
         return self.report, events
 
     def _step(self) -> Sample:
-        """Step the arm by a tick and check the result."""
         motion, failed, self._failed = self.motion, self._failed, None
         try:
             if failed is not None:

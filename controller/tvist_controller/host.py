@@ -1,8 +1,4 @@
-"""Host of one controller: carries out and journals admitted messages, and passes output to sinks.
-
-It has no clock, thread or socket; `tick` advances time. With the clocks lockstep and free, a client does so
-through `simulation.step`.
-"""
+"""Host of one controller: carries out and journals admitted messages, passes output to sinks; no clock or socket."""
 
 from collections.abc import Callable, Sequence
 
@@ -246,7 +242,6 @@ class Host:
         return self.controller.tick_number + 1
 
     def _turned_away(self, refusal: Refused) -> Refused:
-        """Count a command rejected before it reached the controller."""
         self.controller.counters.commands += 1
         self.controller.counters.refused += 1
         return refusal

@@ -61,7 +61,6 @@ def check_speeds(qd: Sequence[float], description: RobotDescription) -> None:
 def _check_each(
     values: Sequence[float], limits: Sequence[float], code: Code, where: str, has: str, goes: str
 ) -> None:
-    """Refuse a wrong number of values, or values beyond a limit."""
     count = len(limits)
     if len(values) != count:
         raise RefusalError("out_of_range", where, f"{where} has {len(values)} {has.format(count)}", count)

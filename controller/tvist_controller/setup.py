@@ -50,8 +50,7 @@ class Setup:
     payload: Payload
     """Declared payload."""
     calibration: Calibration | None
-    """Calibration of the estimator; None before identification, with the estimator `fixed` at 10 Hz and
-    0.2."""
+    """Calibration of the estimator; None before identification, with the estimator `fixed` at 10 Hz and 0.2."""
     name: str = "ur5e"
     """Name of the robot on the network."""
     shaper: str = "zv"
@@ -243,10 +242,7 @@ def paper_payload(description: RobotDescription, mass: float | None = None) -> P
 
 
 def check_rating(declared: Payload, description: RobotDescription) -> None:
-    """Raise ValueError if the declared payload exceeds the robot's rating.
-
-    The carried payload is not checked, so that overloads can be tested.
-    """
+    """Raise ValueError if the declared payload, not the carried one, exceeds the robot's rating."""
     rated = description.limits.payload
     if declared.mass > rated:
         raise ValueError(

@@ -1,7 +1,6 @@
 """The kernels' memory of a simulated arm: one array with named views.
 
-Numba checks the type of each argument at every call; passing a dozen arrays would cost more than some
-kernels.
+Numba checks the type of each argument at every call; passing a dozen arrays would cost more than some kernels.
 """
 
 from typing import NamedTuple

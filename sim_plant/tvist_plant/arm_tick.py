@@ -57,10 +57,7 @@ def evaluate(
 
 @compiled
 def read(arm: ArmMemory, step: float, out: Floats) -> None:
-    """Read encoders and accelerometer into `out`, as `evaluate` describes.
-
-    A reading changes only after a whole step, because plain rounding would flicker between two steps.
-    """
+    """Read encoders and accelerometer into `out`; readings change by whole steps, so as not to flicker."""
     links, n, qdd = arm.qdd.shape[0], arm.joints.shape[1], arm.qdd
     y, v = arm.state[0], arm.state[1]
     for j in range(n):

@@ -43,8 +43,7 @@ _VIBRATING: Final = (
     "gear_stiffness", "gear_damping", "rotor_inertia", "velocity_gain", "position_gain", "integral_gain",
     "coulomb_friction", "friction_width",
 )  # fmt: skip
-"""Drive parameters that determine frequency and damping; feed-forward and gear error only excite
-vibration."""
+"""Drive parameters that determine frequency and damping; feed-forward and gear error only excite vibration."""
 
 
 def robots() -> tuple[str, ...]:

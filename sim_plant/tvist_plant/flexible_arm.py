@@ -34,8 +34,7 @@ acceleration is then within 0.02 m/s² of that with 64."""
 class FlexibleArm(SimulatedArm):
     """A flexible arm and its drives: a `Plant` with pushes, payload changes, a fault and vibration modes.
 
-    `imperfections` add to those of the robot file. `carries` maps each declared payload to the one truly
-    carried.
+    `imperfections` add to those of the robot file. `carries` maps each declared payload to the one truly carried.
     """
 
     def __init__(
@@ -198,10 +197,7 @@ class FlexibleArm(SimulatedArm):
         self._arm.dynamics[LAST] = self._arm.dynamics[NOW]
 
     def push(self, torque: Floats) -> None:
-        """Apply external torques to the link side of the joints until changed or reset, shape (n,) [N m].
-
-        Zeros end the push. Raise ValueError unless there are n finite numbers.
-        """
+        """Apply external link-side torques (n,) [N m] until changed or reset; raise ValueError if invalid."""
         self._outside.push(torque)
 
     def push_body(
@@ -233,7 +229,6 @@ class FlexibleArm(SimulatedArm):
         self._speed[:] = math.nan
 
     def _evaluate(self) -> Measurement:
-        """Compute the dynamics at the present state and measure."""
         out = np.empty(self._width)
         return self._measured(out, evaluate(self.memory, out))
 

@@ -1,7 +1,4 @@
-"""Wrap plants written by users: add missing methods, check results, turn exceptions into `PlantError`.
-
-An exception or a wrong measurement then stops one robot instead of the thread that ticks all robots.
-"""
+"""Wrap users' plants: add missing methods, check results, and raise only `PlantError`, which stops just one robot."""
 
 import math
 from collections.abc import Callable
@@ -37,10 +34,7 @@ def arm_of(plant: Plant) -> Plant:
 
 
 def called(plant: Plant, joints: int | None, *, untold: bool = False) -> Plant:
-    """Return a wrapper of a plant with the same abilities that raises only `PlantError`.
-
-    With joints None, nothing is caught or checked; `untold` hides what a real arm could not report.
-    """
+    """Return a wrapper that raises only `PlantError` (passes all if joints is None); `untold` hides the truth."""
     members: dict[str, Any] = {
         name: _method(name)
         for name in _METHODS

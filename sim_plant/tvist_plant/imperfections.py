@@ -1,7 +1,6 @@
 """Optional deviations of an arm from its description.
 
-Friction of a motor turning at v decreases with speed (Stribeck; Canudas de Wit et al. 1995, without
-bristles):
+Friction of a motor turning at v decreases with speed (Stribeck; Canudas de Wit et al. 1995, without bristles):
 
     F(v) = [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w)
 
@@ -12,16 +11,16 @@ A gear twisted by δ transmits the torque
     K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968);
     0 up to |δ| = b                       with backlash: the laws above then hold for the twist beyond b.
 
-Near standstill, stiction holds a motor by a torque d in addition to F(v). It grows with the angle θ like a
-spring until it breaks away (Dahl 1968; Stribeck 1902):
+Near standstill, stiction holds a motor by a torque d in addition to F(v). It grows with the angle θ like a spring until
+it breaks away (Dahl 1968; Stribeck 1902):
 
     dd/dθ = σ K (1 - d sgn(θ̇)/most),    most = (F_s + μ_s |τ_g|) exp(-(θ̇/v_s)²)
 
 τ_g is the gear's torque, K its stiffness; this F_s and v_s are those of `stiction`.
 
-A gear's damper also acts within its backlash, as oil and teeth do. A yielding base stands on springs about
-the world's x and y axes and carries a ring with mass under the arm. A tilted arm leans in the world without
-its controller's knowledge; the truth is given in the upright world.
+A gear's damper also acts within its backlash, as oil and teeth do. A yielding base stands on springs about the world's
+x and y axes and carries a ring with mass under the arm. A tilted arm leans in the world without its controller's
+knowledge; the truth is given in the upright world.
 """
 
 import math
@@ -56,7 +55,6 @@ class YieldingBase:
     """Radius of the ring, for its inertia [m]."""
 
     def __post_init__(self) -> None:
-        """Check the values."""
         for name in ("stiffness", "mass", "radius"):
             _check(f"base.{name}", getattr(self, name), 0.0, math.inf, above=True)
         _check("base.damping_time", self.damping_time, 0.0, math.inf)
@@ -98,7 +96,6 @@ class Imperfections:
     """Angle by which the arm leans about the world's x axis, at most 30 degrees either way [rad]."""
 
     def __post_init__(self) -> None:
-        """Check the values."""
         _check("breakaway", self.breakaway, 1.0, math.inf)
         _check("stribeck_speed", self.stribeck_speed, 0.0, math.inf, above=True)
         _check("rotor", self.rotor, 0.0, math.inf, above=True)
@@ -197,10 +194,7 @@ class GearLaw:
 def imperfect_model(
     description: RobotDescription, payload: Payload, imperfections: Imperfections
 ) -> FlexibleModel:
-    """Model an arm whose links may twist and whose base may yield or lean.
-
-    Raise ValueError if links are to twist but none bends.
-    """
+    """Model an arm whose links may twist and base may yield or lean; raise ValueError if none can twist."""
     if imperfections.torsion is not None and not description.link_flexibility.links:
         raise ValueError(
             f"torsion is {imperfections.torsion:g} N m/rad, but no link of the {description.robot.model} bends: "

@@ -1,17 +1,15 @@
 """One control period of arm and drives: the linearly implicit midpoint rule.
 
-During a period M(q) keeps its midpoint value and the bias b(q, q̇) changes linearly; both are extrapolated
-from the last two ticks. Springs, dampers and drive gains are implicit, so one Cholesky factor serves all
-substeps of the period:
+During a period M(q) keeps its midpoint value and the bias b(q, q̇) changes linearly; both are extrapolated from the
+last two ticks. Springs, dampers and drive gains are implicit, so one Cholesky factor serves all substeps of the period:
 
     S = M_b + h/2 D + h²/4 (K + h/2 G_i)
 
-with the substep h, M_b = diag(M(q), B) and the integral gains G_i. Each substep solves for the mean
-acceleration and moves y by the mean velocity. The method is of second order, and stable for the fast poles of
-light lumps between stiff springs (about -5e4 1/s), for which explicit methods need steps below 0.04 ms.
+with the substep h, M_b = diag(M(q), B) and the integral gains G_i. Each substep solves for the mean acceleration and
+moves y by the mean velocity. The method is of second order, and stable for the fast poles of light lumps between stiff
+springs (about -5e4 1/s), for which explicit methods need steps below 0.04 ms.
 
-Each motor is coupled to its joint's link only. The motors are therefore eliminated first, and only the links'
-matrix
+Each motor is coupled to its joint's link only. The motors are therefore eliminated first, and only the links' matrix
 
     S_ll - Σ_j c_j² / S_mm,j at the joint's link,    c_j = -(h/2 D_g + h²/4 K_g)
 

@@ -62,7 +62,6 @@ class JointParameters(NamedTuple):
 
 
 ROWS = len(JointParameters._fields)
-"""Number of parameters of a joint."""
 
 
 @compiled
@@ -81,11 +80,7 @@ def of_joint(parameters: Floats, j: int) -> JointParameters:
 def packed(
     joints: Integers, linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: Floats
 ) -> Floats:
-    """Return one array with a row per field of `JointParameters`, shape (23, n).
-
-    `joints` are indices among the links, `gear_phase` the phase of each gear's error [rad], both of shape
-    (n,).
-    """
+    """Return one array with a row per field of `JointParameters`, shape (23, n); phase in [rad]."""
     rows = {
         "rotor_inertia": linear.rotor_inertia,
         "velocity_gain": linear.velocity_gain,

@@ -1,8 +1,4 @@
-"""External forces on an arm: torques on joints, wrenches on bodies.
-
-A wrench w = (f, m) on a body enters the equations of motion as Jᵀ w, where J is the Jacobian of its point of
-application. The sum over all wrenches adds to the joint torques and is subtracted from the bias b(q, q̇).
-"""
+"""External forces on an arm: torques on joints, and wrenches w on bodies, which enter the equations as Jᵀ w."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -119,8 +119,7 @@ class Sight:
     measured: Measurement
     """The robot's measurements."""
     target: Floats
-    """The robot's target position [rad], velocity [rad/s], acceleration [rad/s²] and torque [N m], shape (4,
-    n)."""
+    """The robot's target position [rad], velocity [rad/s], acceleration [rad/s²] and torque [N m], shape (4, n)."""
     modes: tuple[int, int, int]
     """Robot mode, safety mode and runtime state (RTDE numbers)."""
     speed: float
@@ -150,8 +149,7 @@ class Shape:
     kind: str
     """`plane`, `sphere`, `capsule`, `ellipsoid`, `cylinder` or `box`."""
     size: tuple[float, ...]
-    """Size as in MuJoCo: radius and half length along z, or half lengths; 0 for an infinite side of a plane
-    [m]."""
+    """Size as in MuJoCo: radius and half length along z, or half lengths; 0 for an infinite side of a plane [m]."""
     pose: tuple[float, ...]
     """Pose in the body's frame: x y z [m] and rotation vector [rad]."""
     body: int | None
@@ -201,10 +199,9 @@ class Hand:
 class Plant(ABC):
     """An arm with its drives, simulated or real, as a controller uses it.
 
-    A controller owns its plant: no other code steps or resets it. On start the controller resets a
-    `SimulatedArm`, or starts at the position of a `RealArm`. It then calls `step` once per control period
-    (`PERIOD`), with or without power. All other methods have a default; `can` tells whether a plant overrides
-    it.
+    A controller owns its plant: no other code steps or resets it. On start the controller resets a `SimulatedArm`, or
+    starts at the position of a `RealArm`. It then calls `step` once per control period (`PERIOD`), with or without
+    power. All other methods have a default; `can` tells whether a plant overrides it.
 
     An implementation guarantees:
 
@@ -222,16 +219,14 @@ class Plant(ABC):
         """Move the arm by one control period.
 
         Args:
-            command: Set-points for the end of the period; the drives interpolate linearly from the previous
-                ones.
+            command: Set-points for the end of the period; the drives interpolate linearly from the previous ones.
 
         Returns:
             Measurements at the end of the period.
 
         Raises:
-            PlantError: A simulated state is no longer finite, or a real arm does not answer. A simulated arm
-                then enters a protective stop; a real one stays without power until the safety system is
-                restarted.
+            PlantError: A simulated state is no longer finite, or a real arm does not answer. A simulated arm then
+                enters a protective stop; a real one stays without power until the safety system is restarted.
         """
 
     def can(self, method: Callable[..., Any]) -> bool:
@@ -397,10 +392,7 @@ class SimulatedArm(Plant):
 
 
 class RealArm(Plant):
-    """A plant that cannot be placed.
-
-    Its own controller may move it (`sight`), or follow tvist's set-points (`seen`).
-    """
+    """A plant that cannot be placed; its own controller may move it (`sight`) or supervise it (`seen`)."""
 
     def measure(self) -> Measurement:
         """Return the present measurements without moving the arm.

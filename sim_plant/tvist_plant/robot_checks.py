@@ -124,7 +124,6 @@ def _limits(description: RobotDescription) -> Iterator[str]:
 
 
 def _bodies(description: RobotDescription) -> Iterator[str]:
-    """Check that every inertia is physically possible."""
     links = {f"links.inertia[{number}]": inertia for number, inertia in enumerate(description.links.inertia)}
     for key, inertia in {**links, "payload.inertia": description.payload.inertia}.items():
         if not is_real_body(inertia):

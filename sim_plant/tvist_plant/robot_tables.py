@@ -135,8 +135,7 @@ class Drives(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     gear_error_waves: Positive
     """Waves of the kinematic error per turn of the joint [-]."""
     linear_friction: bool = False
-    """Use linear friction, F_c/w times velocity, and feed all of it forward; the linear modes describe this
-    plant."""
+    """Use linear friction, F_c/w times velocity, and feed all of it forward; the linear modes describe this plant."""
 
 
 class LinkFlexibility(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):

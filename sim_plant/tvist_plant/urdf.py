@@ -21,8 +21,7 @@ from tvist_plant.user_file import LONGEST_NAME, UserFileError, is_name, read_tex
 
 TURNING: Final = ("revolute", "continuous")
 FLANGES: Final = ("tool0", "flange")
-"""Names of a link that marks the flange if it is fixed to the last joint; otherwise that joint's link is the
-flange."""
+"""Names of a link that marks the flange if it is fixed to the last joint; otherwise that joint's link is the flange."""
 CONTINUOUS: Final = 4.0 * math.pi
 """Position limit of a joint without end stops [rad]."""
 UPRIGHT: Final = 1e-6
@@ -105,7 +104,6 @@ def _check_number(element: Element, key: str, default: tuple[float, ...], here: 
 
 
 def _numbers(element: Element, key: str) -> Floats:
-    """Return the numbers of a checked attribute."""
     return np.array([float(word) for word in str(element.get(key)).split()])
 
 
@@ -143,7 +141,6 @@ def _check_tree(root: Element, links: dict[str, Element]) -> None:
 
 
 def _check_joints(joints: dict[str, Element]) -> None:
-    """Check that joints that are not fixed turn about a valid axis and have limits."""
     for name, joint in joints.items():
         here, kind, axis = f"joint {name}", str(joint.get("type")), joint.find("axis")
         if kind == "fixed":
@@ -173,7 +170,6 @@ def _model(root: Element) -> pin.Model:
 
 
 def _check_chain(model: pin.Model, chain: list[Element]) -> None:
-    """Check that the chain does not branch and that all moving links have mass."""
     carriers = [f"link {joint.find('child').get('link')}" for joint in chain]  # type: ignore[union-attr]
     for number in range(model.njoints):
         after = [model.names[one] for one in range(1, model.njoints) if model.parents[one] == number]

@@ -1,8 +1,7 @@
 """Plants by name: arms that deviate from the robot file, which their controller uses, in one way or in many.
 
-A hidden robot deviates in all its parameters, as a real one would: springs, dampers, drive gains, rotors,
-friction and carried payload. All factors are independent and uniform within 1 ± a share. Random values come
-from a seed.
+A hidden robot deviates in all parameters, as a real one would: each by an independent uniform factor within 1
+± a share.
 """
 
 from collections.abc import Callable, Mapping
@@ -118,7 +117,6 @@ def _changed(
 
 
 def _signs(*seed: int) -> Factors:
-    """Return factors of 1 plus or minus a share, with random sign."""
     random = np.random.default_rng(seed)
     return lambda share, shape: random.choice([1.0 - share, 1.0 + share], shape)
 
@@ -268,7 +266,6 @@ _ALL = (
     Variant("springs+30", "springs 30 % stiffer", partial(_sprung, 1.3)),
 )
 VARIANTS: Final = {one.name: one for one in _ALL}
-"""All plants by name."""
 
 
 def variant(name: str) -> Variant:

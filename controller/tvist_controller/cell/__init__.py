@@ -1,4 +1,1 @@
-"""The cell around a robot: wires, tools, gripper and parts, simulated like the plant.
-
-In every tick it reads outputs and the arm's pose, and sets inputs and the carried payload.
-"""
+"""The cell around a robot: wires, tools, gripper and parts, simulated in every tick like the plant."""

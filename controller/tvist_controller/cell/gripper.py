@@ -1,11 +1,10 @@
 r"""A gripper with moving fingers: a Robotiq 2F's registers and text protocol.
 
-Positions are counts as in the registers. The fingers are open at `OPEN` and closed at `CLOSED`, within the
-range 0 to 255 of requests, which are clamped.
+Positions are counts as in the registers: open at `OPEN`, closed at `CLOSED`, requests of 0 to 255 are clamped.
 
-Protocol on port 63352: `SET POS 255 GTO 1\n` is answered by `ack`, `GET POS\n` by a line. The URCap's
-functions send `GET POS` without a line feed and read a fixed number of bytes: the answer is the value alone
-with leading zeros. For the same reason `ack` has no `\n`.
+Protocol on port 63352: `SET POS 255 GTO 1\n` is answered by `ack`, `GET POS\n` by a line. The URCap's functions send
+`GET POS` without a line feed and read a fixed number of bytes: the answer is the value alone with leading zeros. For
+the same reason `ack` has no `\n`.
 """
 
 import re
@@ -46,8 +45,7 @@ _LIST_BYTES = 17
 """Length of the list of up to four grippers."""
 
 Meet = Callable[[float, float], float | None]
-"""Function that returns the opening at which fingers closing between two openings meet a part, else None
-[m]."""
+"""Function that returns the opening at which fingers closing between two openings meet a part, else None [m]."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +143,6 @@ class Gripper:
 
     @property
     def _target(self) -> float | None:
-        """Target position, None to stay [counts]."""
         written = self._written
         if written["ATR"]:
             return CLOSED if written["ARD"] else OPEN
@@ -217,11 +214,7 @@ class Requests:
         self._received = b""
 
     def cut(self, data: bytes) -> list[bytes]:
-        """Return the requests completed by new data.
-
-        A request without a line feed counts if it is all that has arrived; otherwise its line feed may
-        follow.
-        """
+        """Return the requests completed by new data; one without a line feed counts only if it arrived alone."""
         if not self._received and _BARE_GET.fullmatch(data):
             return [data]
         *lines, rest = (self._received + data).split(b"\n")

@@ -229,7 +229,6 @@ class LiveCell:
         self._held = None
 
     def _tell_missed(self, q: Floats) -> None:
-        """Warn of a narrowly missed part."""
         limits = self._cell.gripper
         away = [(*self._away(number, q), part.name) for number, part in enumerate(self._cell.parts)]
         if limits is None or self._tool is not self._cell.gripping_tool or not away or min(away)[0] > NEAR:
@@ -247,7 +246,6 @@ def _tool_body(tool: Tool) -> Payload:
 
 
 def _part_body(part: Part, place: Placement) -> Payload:
-    """Return a part as a payload, from its pose in the flange frame."""
     own = Payload(mass=part.mass, com=part.cog, inertia=part.inertia)
     return _payload(pin.SE3(place.rotation, place.position).act(payload_inertia(own)))
 

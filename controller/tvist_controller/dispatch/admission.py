@@ -1,8 +1,4 @@
-"""Checks of messages before the controller: valid content, and a sender with the right to send it.
-
-They change no state, so any thread can admit messages. The lease must be checked again when a message is
-carried out.
-"""
+"""Checks of messages in any thread: valid content, and a sender with the right to send it at this moment."""
 
 import contextlib
 from typing import Any, NamedTuple
@@ -49,10 +45,7 @@ class Admitted(NamedTuple):
 
 
 def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:
-    """Decode a command and check its sender's rights.
-
-    A long command is decoded only after its token has been found to be that of control or the clock.
-    """
+    """Decode a command and check its sender's rights; of a long command, check the token before decoding."""
     try:
         if len(data) > EXPLAINED_BYTES:
             _check_envelope(decode_envelope(data), len(data), lease, clock)
@@ -73,10 +66,7 @@ def admit_command(command: Command, lease: Lease | None, clock: Lease | None = N
 
 
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
-    """Decode a set-point; return None unless its sender may have control, to spare the controller's thread.
-
-    The lease at the moment of execution decides.
-    """
+    """Decode a set-point; return None unless its sender may have control, which the lease decides later."""
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None
     setpoint: Setpoint | Unreadable

@@ -37,11 +37,9 @@ class Assumptions:
         follows: bool,  # whether the robot follows its payload
     ) -> None:
         self.declared = payload
-        """Declared payload."""
         self.assumed = payload
         """Payload for dynamics and modes: the declared or the learnt one."""
         self.source = source
-        """Source of the filter's modes."""
         self._motion, self._cycle, self._peripherals = motion, motion.cycle, peripherals
         self._plan, self._emit = plan, emit
         self.monitor = PayloadMonitor(motion.cycle.description, body(payload), follows=follows)
@@ -118,10 +116,7 @@ class Assumptions:
         self._motion.ahead.check_payload(body(payload), tvist, () if move is None else move.coming)
 
     def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, told: bool = False) -> None:
-        """Phase in a payload for dynamics and modes; `told` states that an overload warning was sent.
-
-        `tvist` is None if its modes are not known to differ.
-        """
+        """Phase in a payload with its filter, if modes differ; `told`: an overload warning was sent."""
         self.assumed, carried = payload, body(payload)
         self._cycle.dynamics.declare(carried, ticks)
         if tvist is not None:
@@ -136,7 +131,6 @@ class Assumptions:
         return self._cycle.tvist.name == "none"
 
     def _warn_of_payload(self) -> None:
-        """Warn if a shaper uses modes of another payload."""
         assumed, word = self.assumed, "declared" if self.assumed == self.declared else "carried"
         calibration = self.source.calibration
         if not self._idle and calibration is not None and not fits(calibration, assumed, self.source.name):
@@ -150,7 +144,6 @@ class Assumptions:
             )
 
     def _warn_of_arm(self) -> None:
-        """Warn if the modes are those of another arm of this model."""
         calibration = self.source.calibration
         if calibration is not None and self.source.fits_arm is False:
             why = (

@@ -117,7 +117,6 @@ def _speed_l(robot: Robot, call: Call[m.SpeedL]) -> Reply:
 
 
 def _accelerations(command: m.SpeedL | m.StopL) -> tuple[float, float]:
-    """Return acceleration [m/s^2] and angular acceleration [rad/s^2] of the tool."""
     angular = command.angular_acceleration
     return command.acceleration, command.acceleration if angular is None else angular
 
@@ -191,4 +190,3 @@ ROWS: tuple[Row, ...] = (
         lambda robot, call: robot.force_control.external.sense(np.array(call.command.wrench, dtype=float)),
     ),
 )
-"""Table of these commands."""

@@ -44,10 +44,7 @@ class Planner:
     def plan(
         self, command: Command, now: Snapshot, *, within_tick: bool = False, checked: bool = False
     ) -> Plan:
-        """Plan a command on the present state; a refusal is also a plan.
-
-        `within_tick`: see `Planning.within_tick`; `checked`: whether its row's check has passed.
-        """
+        """Plan a command, or its refusal, on the present state; `checked`: its row's check has passed."""
         row = COMMANDS[type(command)]
         planning = row.plan
         assert planning is not None, "the command is carried out without a plan"

@@ -92,4 +92,3 @@ ROWS: tuple[Row, ...] = (
         p.ProgramSkip, lambda robot, call: robot.programs.statements.skip(call.command.what), changes_io=True
     ),
 )
-"""Table of these commands."""

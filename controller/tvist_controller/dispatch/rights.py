@@ -89,10 +89,7 @@ def check_step_token(clock: Lease | None, lease: Lease | None, token: str) -> st
 
 
 def check_step(clock: Lease | None, lease: Lease | None, step: SimulationStep) -> str:
-    """Return the client that steps; raise NoControlError if it lacks a right.
-
-    Advancing time and sending set-points are separate rights.
-    """
+    """Return the client that steps; raise NoControlError if it may not step or send its set-points."""
     client = check_step_token(clock, lease, step.token)
     if step.motion_token is not None:
         check_token(lease, step.motion_token, "motion_token")
@@ -116,10 +113,7 @@ class Standing(NamedTuple):
 
 
 class Authority:
-    """The lease of a robot, whose end stops motion, and the hold of its clock.
-
-    The instance is part of every token and differs after each restart, so that old tokens become invalid.
-    """
+    """The lease of a robot, whose end stops motion, and the hold of its clock; `instance` makes tokens unique."""
 
     def __init__(
         self,
@@ -134,15 +128,10 @@ class Authority:
         self._granted = self._granted_clocks = 0
         self._ends = math.inf
         self.lease: Lease | None = None
-        """Lease of the client in control."""
         self.clock: Lease | None = None
-        """Hold of the client with the clock."""
 
     def take(self, client: str, seconds: float, now: float, session: str | None = None) -> Lease:
-        """Give control to a client, renewing its lease, or raise NoControlError if another client has it.
-
-        The end of the session ends the lease; None if it will not be reported.
-        """
+        """Give control to a client for its session (None: unknown), or raise NoControlError if another has it."""
         check_free(self.lease, client)
         return self._grant(client, seconds, now, session)
 
@@ -243,11 +232,7 @@ class Presence:
         return session in self._sessions.get(client, ())
 
     def session_of(self, client: str) -> str | None:
-        """Return the session of a client that requests control, None without a token.
-
-        Raise NoControlError if several sessions use this name, because a command does not identify its
-        session.
-        """
+        """Return the session of a client, None without one; raise NoControlError if several sessions use the name."""
         there = self._sessions.get(client, set())
         if len(there) > 1:
             why = (

@@ -63,7 +63,6 @@ class Robot(ABC):
         collisions = CollisionModel(description, body(setup.payload))
         self.motion = motion = MotionControl(self.cycle, collisions, self.emit, mode)
         self.modes = RobotModes(motion)
-        """Robot mode, safety mode and runtime state."""
         self.session = Authority(self._interrupt, self.emit, realtime=timeouts, instance=setup.instance)
         """Rights to control the robot and to advance time."""
         self.safety = safety = SafetyControl(motion, self.emit)
@@ -77,13 +76,11 @@ class Robot(ABC):
         elif isinstance(plant, RealArm) and plant.supervised:
             self.supervision = Supervision(plant, self.peripherals, self.emit, motion, safety)
         self.forces = ToolForces(description, self.peripherals, lambda: self.report, lambda: self.declared)
-        """Forces and torques on the arm."""
         self.cell = None
         """The cell around the robot; None for none."""
         if setup.cell is not None:
             self.cell = LiveCell(setup.cell, description, plant, self.peripherals, self.emit)
         self.guidance = Guidance(motion)
-        """Guided motions."""
         self.force_control = ForceControl(self.guidance, self.forces, timeouts=timeouts)
         self.programs = ProgramPlayer(self._access(), safety)
         self.assumed = Assumptions(
@@ -99,7 +96,6 @@ class Robot(ABC):
         """Report of the last tick, or of the arm at rest if it has not ticked yet or was reset since."""
 
     def _monitors(self) -> tuple[Monitor, ...]:
-        """Return the monitors of a tick's signals, in order."""
         description = self.setup.description
         overload = Overload(description.robot.joints, description.limits.torque)
         # An arm with a controller of its own is watched by that; here its torques may be guessed from currents.
@@ -107,7 +103,6 @@ class Robot(ABC):
         return *drives, ShaperMonitor(self.cycle), self.force_control, self.assumed.monitor
 
     def _access(self) -> Access:
-        """Return the robot's interface for programs."""
         return Access(
             description=self.setup.description, motion=self.motion, guidance=self.guidance,
             peripherals=self.peripherals, emit=self.emit, send=self.carry_out, plans=self.plans,
@@ -174,7 +169,6 @@ class Robot(ABC):
         self.programs.hear(event)
 
     def _interrupt(self, why: str) -> None:
-        """End activities that need control when no client has it any more."""
         self.programs.end(why)
         self.motion.interrupt(why)
 

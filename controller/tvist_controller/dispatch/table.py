@@ -121,7 +121,6 @@ def _check_reset(command: SimulationReset, description: RobotDescription) -> Non
 
 
 def _place(robot: Robot, call: Call[SimulationReset]) -> Reply:
-    """Place the simulated arm at rest."""
     command, chosen, cycle = call.command, call.planned(), robot.cycle
     plant, motion, cell = cycle.plant, robot.motion, robot.cell
     if not isinstance(plant, SimulatedArm):
@@ -206,6 +205,5 @@ COMMANDS: dict[type[c.Command], Row] = {
         *_SIMULATION, *_QUESTIONS,
     )
 }  # fmt: skip
-"""Row of each command type."""
 HARMLESS: frozenset[type[c.Command]] = frozenset(row.message for row in (*_RIGHTS, *_FILTERS, *_QUESTIONS))
 """Commands that do not affect the arm, accepted also by a watched robot."""

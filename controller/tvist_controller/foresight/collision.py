@@ -165,7 +165,6 @@ class CollisionModel:
         """Largest distance of the arm from each joint's axis in any posture, shape (n,) [m]."""
 
     def _gaps(self, q: Floats) -> Floats:
-        """Return each pair's distance at a posture [m]."""
         found = np.empty(len(self._found))
         rooms(*self._parts, q, self._still, found)
         return found
@@ -183,7 +182,6 @@ class CollisionModel:
         self._far[number] = own + np.abs(along[link] - along[1:])
 
     def _bounded(self, pair: Floats) -> Floats:
-        """Return a pair with its bounds per joint [m/rad]."""
         row, (one, other) = pair.copy(), (int(pair[ONE]), int(pair[OTHER]))
         links = [max(int(self._bodies[number, LINK]), 0) for number in (one, other)]
         between = slice(min(links), max(links))

@@ -15,18 +15,14 @@ MAX_AHEAD = 4000
 
 
 class LineSimulation:
-    """A control line without its arm, simulated ahead; it consumes its arguments.
-
-    Stops bypass the filter (None).
-    """
+    """A control line without its arm, simulated ahead; it consumes its arguments. A stop has no filter."""
 
     def __init__(
         self, trajectory: Trajectory, line_filter: LineFilter | None, shaped: ShapedReference
     ) -> None:
         self._trajectory, self._line_filter, self._shaped = trajectory, line_filter, shaped
         self.samples: list[Floats] = [shaped.along.published.q, shaped.along.position]
-        """Samples of the shaped reference, one per entry of `references`: path parameters or joint
-        positions."""
+        """Samples of the shaped reference, one per entry of `references`: path parameters or joint positions."""
         self.references: list[Floats] = [shaped.joints.published.q, shaped.position]
         """The last two shaped references played, then the future ones per tick, each of shape (n,) [rad]."""
         self.rests = False

@@ -36,10 +36,7 @@ class RemainingMotion:
         return self._guard
 
     def guard_of_guided(self) -> StreamGuard:
-        """Return the guard of a guided motion from the present state.
-
-        Raise RefusalError, without any change, if no clear stop exists from here, as on a narrow path.
-        """
+        """Return the guard of a guided motion from the present state; raise RefusalError without a clear stop."""
         cycle, guard, stops = self._cycle, self._guide_guard, self._stopper.stops
         state = cycle.newest
         guard.begin(state)
@@ -52,10 +49,7 @@ class RemainingMotion:
         return guard
 
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
-        """Return the time until the shaped reference rests [s] and the largest remaining joint angle [rad].
-
-        They are those of a stop's plan if given, else of the present motion; None if rest is too far ahead.
-        """
+        """Return time [s] and largest joint angle [rad] until rest, by `plan` if given; None if too far ahead."""
         if plan is not None:
             return plan.duration, plan.way
         ahead = self._stopper.foresee()
@@ -71,10 +65,7 @@ class RemainingMotion:
         return self._on(self._stopper.foresee(trajectory=end))
 
     def rest_of_way(self, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> Meeting | None:
-        """Return the first meeting on the rest of the motion, else None; if the rest is unknown, in a stop.
-
-        `tvist` is a new filter, if any; `parts` are the planned parts of the motion that have not started.
-        """
+        """Return the first meeting on the rest of a motion with a new filter; if unknown, in a stop."""
         cycle = self._cycle
         coming = [part.path.whole for part in parts]
         if cycle.mode.at_rest:
@@ -92,7 +83,6 @@ class RemainingMotion:
         return None
 
     def _first(self, ways: Sequence[Way]) -> Meeting | None:
-        """Return the first meeting on consecutive paths."""
         return next((found[1] for way in ways if (found := self._collisions.on_way(way))), None)
 
     def check_payload(self, payload: Payload, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> None:

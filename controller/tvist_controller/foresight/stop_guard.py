@@ -10,17 +10,15 @@ from tvist_controller.line.limits import GENTLEST_STOP, TorqueRoom
 from tvist_controller.trajectory import JointStop, Way
 
 MARGIN = 0.8
-"""Fraction of the acceleration that torque permits at the start of a stop; the margin is for changes on the
-way [-]."""
+"""Fraction of the acceleration that torque permits at the start of a stop; the margin is for changes on the way [-]."""
 
 
 class StreamGuard(Guard):
     """Checks the stop from the state that a reference would lead to.
 
-    A reference may be played if that whole stop is clear. Otherwise the stop from the previous state is used,
-    which was checked a tick earlier, so a clear stop always exists. If bounds, which take microseconds, prove
-    a stop clear, it is computed only when needed. `reach` keeps stops within the joints' range; references of
-    streams keep it themselves.
+    A reference may be played if that whole stop is clear. Otherwise the stop from the previous state is used, which was
+    checked a tick earlier, so a clear stop always exists. If bounds, which take microseconds, prove a stop clear, it is
+    computed only when needed. `reach` keeps stops within the joints' range; references of streams keep it themselves.
     """
 
     def __init__(

@@ -31,7 +31,6 @@ class Stopper:
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
         self.stops = StopPlanner(cycle.description, cycle.dynamics, PERIOD)
-        """Planner of stops."""
         self._wanted = math.inf
 
     def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:

@@ -102,10 +102,7 @@ class StopPlanner:
         wanted: float | None,
         asked: Floats | None = None,  # largest torques of the uninterrupted motion, shape (n,) [N m]
     ) -> PathStop | None:
-        """Return the quickest stop along the path of a motion simulated ahead, else None: it must run out.
-
-        If the uninterrupted motion's torques are unknown, a stop may use only its own share.
-        """
+        """Return the quickest stop along the path of a motion simulated ahead, or None: it must then run out."""
         newest = ahead.samples[1]
         along: list[float] = []  # distance of the motion at each known tick
 
@@ -165,10 +162,7 @@ class StopPlanner:
     def by_joints(
         self, state: Target, wanted: float | None, clear: Callable[[JointStop], bool]
     ) -> JointStop | None:
-        """Return the quickest clear stop with independent joints within the torque limits, else None.
-
-        `wanted` is the requested deceleration, None for the largest possible [rad/s^2].
-        """
+        """Return the quickest clear stop of independent joints within torque limits, at `wanted` [rad/s^2]."""
         torque = StopTorque(self._dynamics, state, self._torque)
         stops = (self.stop(state, acceleration) for acceleration in self._ladder(wanted))
         within = (stop for stop in stops if (np.abs(stop.end) <= self._position).all())
@@ -205,10 +199,7 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _keeping(self, state: Target, forecast: Forecast, acceleration: float) -> MotionLimits | None:
-        """Return limits of a stop's parameter that keep all joints within an acceleration and stop jerk.
-
-        The velocity is the highest possible while the present acceleration decays.
-        """
+        """Return limits of a stop's parameter that keep all joints within an acceleration and the stops' jerk."""
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
         fastest = speed + self.period * rise + rise * rise / self.jerk
         return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest, state.q)

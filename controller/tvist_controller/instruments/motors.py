@@ -1,13 +1,12 @@
 """Currents, heat and energy of the joints' motors; the ratings are plausible guesses, not measurements.
 
-A robot file does not describe motors. Joints have two sizes, distinguished by their largest torque as in a
-UR5e: base, shoulder and elbow, and the wrists.
+A robot file does not describe motors. Joints have two sizes, distinguished by their largest torque as in a UR5e: base,
+shoulder and elbow, and the wrists.
 
-Torque constants: the currents that UR's simulator shows in its start posture (2.14, 1.49 and 0.23 A at
-shoulder, elbow and first wrist) and this model's gravity torques there (21.1, 15.0 and 1.8 N m) give 9.9,
-10.0 and 7.9 N m/A. They scale with the largest torque, so that any joint draws the UR5e's current at its
-largest torque. The other values keep a joint at rated load below 80 °C, and let it settle within some twenty
-minutes.
+Torque constants: the currents that UR's simulator shows in its start posture (2.14, 1.49 and 0.23 A at shoulder, elbow
+and first wrist) and this model's gravity torques there (21.1, 15.0 and 1.8 N m) give 9.9, 10.0 and 7.9 N m/A. They
+scale with the largest torque, so that any joint draws the UR5e's current at its largest torque. The other values keep a
+joint at rated load below 80 °C, and let it settle within some twenty minutes.
 """
 
 from dataclasses import dataclass, replace

@@ -63,8 +63,7 @@ class Peripherals:
         self.changed = True
         """Whether `io` has changed since it was last published; the publisher resets it."""
         self.wrench_zero: list[float] | None = None
-        """Force and torque subtracted as zero [N, N m]: at the tool in the base frame, or of the flange
-        sensor."""
+        """Force and torque subtracted as zero [N, N m]: at the tool in the base frame, or of the flange sensor."""
         self.payload_change: tuple[Payload, int, int] | None = None
         """Payload from which a program changes to the declared one, duration in ticks, and last tick."""
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
@@ -108,10 +107,7 @@ class Peripherals:
     # ------------------------------------------------------------------ for programs
 
     def choose(self, terminal: int, *, voltage: bool) -> None:
-        """Make an analogue input (0, 1) or output (2, 3) a voltage or a current.
-
-        An input keeps the number of its signal, an output its fraction of the range.
-        """
+        """Make an analogue input (0, 1) or output (2, 3) a voltage or a current; its number or share stays."""
         self._analog_types = self._analog_types & ~(1 << terminal) | voltage << terminal
         self.changed = True
 

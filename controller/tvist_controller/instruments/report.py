@@ -136,9 +136,9 @@ class Report(Struct, gc=False):
 
 
 class Sink:
-    """Receives messages in the controller's thread; methods must not raise, nor block except in lockstep.
+    """Receives messages in the controller's thread; by default ignores them.
 
-    By default each method ignores its message.
+    Must not raise, nor block except in lockstep.
     """
 
     wants_truth = False

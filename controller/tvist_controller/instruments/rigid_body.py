@@ -78,12 +78,11 @@ class RigidBody:
     def external(self, rows: Floats, offset: Sequence[float]) -> Floats:
         """Return external force and torque at the TCP, base frame, then joint torques [N, N m], (6 + n,).
 
-        External joint torques are those of drives that follow their target (rigid arm with the declared
-        payload, rotors and friction) minus the measured ones; the rows are those of `joint_lists`.
+        External joint torques are those of drives that follow their target (rigid arm with the declared payload, rotors
+        and friction) minus the measured ones; the rows are those of `joint_lists`.
 
-        F with Jᵀ F = τ follows by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) if
-        the manipulability w is below w₀ (Nakamura and Hanafusa, 1986). Components that affect no joint are
-        zero.
+        F with Jᵀ F = τ follows by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) if the
+        manipulability w is below w₀ (Nakamura and Hanafusa, 1986). Components that affect no joint are zero.
         """
         share = rows[SHAPED_QD] / self._width
         out = np.empty(6 + len(share))
@@ -118,7 +117,6 @@ class RigidBody:
         return [*force.tolist(), *torque.tolist()]
 
     def _load(self, payload: Payload) -> None:
-        """Attach a payload to the last link."""
         if payload is self._payload or payload == self._payload:
             return
         self._payload = payload

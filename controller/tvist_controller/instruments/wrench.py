@@ -111,8 +111,7 @@ def estimate(
 def without_weight(raw: Floats, rotation: Floats, payload: Payload) -> Floats:
     """Subtract the payload's weight from a flange sensor's wrench, in its own frame, shape (6,) [N, N m].
 
-    As on UR's e-Series, the payload's inertia is not subtracted. `rotation` leads from the flange to the base
-    frame.
+    As on UR's e-Series, the payload's inertia is not subtracted. `rotation` leads from the flange to the base frame.
     """
     weight = -payload.mass * GRAVITY * rotation[2]
     felt: Floats = raw - np.concatenate((weight, np.cross(payload.com, weight)))
@@ -122,10 +121,7 @@ def without_weight(raw: Floats, rotation: Floats, payload: Payload) -> Floats:
 def sensed_at_tool(
     raw: Floats, rotation: Floats, payload: Payload, zero: list[float] | None, offset: Sequence[float]
 ) -> Floats:
-    """Return a flange sensor's wrench at the TCP, base frame, without weight and zero (6,) [N, N m].
-
-    `offset` is the tool centre point in the flange frame [m, rad].
-    """
+    """Return a flange sensor's wrench at the TCP (`offset`), base frame, without weight and zero, (6,)."""
     felt = without_weight(raw, rotation, payload)
     force, torque = np.split(felt if zero is None else felt - zero, 2)
     return np.concatenate((rotation @ force, rotation @ (torque - np.cross(offset[:3], force))))

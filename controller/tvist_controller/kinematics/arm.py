@@ -146,10 +146,7 @@ class Arm:
     def near(
         self, goal: tuple[Floats, Floats], q: Floats, inverse: Floats | None = None, steps: int = 12
     ) -> tuple[Floats, Floats]:
-        """Return joint positions near q at which the tool has a pose, and the remaining error, see `newton`.
-
-        The pseudo-inverse is that of a nearby Jacobian; None for that at q.
-        """
+        """Return joint positions near q at a tool pose, and the remaining error; `inverse` as in `newton`."""
         rotation, position = map(
             np.ascontiguousarray, goal
         )  # of one layout, so that the kernel is compiled once

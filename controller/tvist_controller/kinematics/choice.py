@@ -24,10 +24,7 @@ OUTSIDE = 1e6
 
 @compiled
 def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
-    """Replace joint positions by the equivalent ones nearest to `near` within their range.
-
-    Return the squared distance from `near` [rad^2], and whether all joints are in range.
-    """
+    """Bring q nearest to `near` by whole turns; return squared distance [rad^2], and whether in range."""
     square, inside = 0.0, True
     for i in range(len(q)):
         q[i] = representation(q[i], near[i], arm[i, 4])
@@ -95,10 +92,7 @@ def _start_from_near(
 
 @compiled
 def closest(arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, q: Floats) -> int:
-    """Find the nearest posture in closed form; return FOUND, NO_SOLUTION or OUT_OF_RANGE, plus ON_CURVE.
-
-    Arguments as in `all_postures`. If all postures are out of a joint's range, q is the nearest of them.
-    """
+    """Find the nearest posture in closed form; return FOUND, NO_SOLUTION or OUT_OF_RANGE, plus ON_CURVE."""
     table = np.empty((9, 6))
     table[8, 0] = math.nan
     freedom = all_postures(arm, chain, rotation, position, near, table)

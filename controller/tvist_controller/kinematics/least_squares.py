@@ -64,7 +64,6 @@ def put(values: Floats, place: Floats) -> None:
 
 @inlined
 def _normal_matrix(J: Floats, added: float, A: Floats) -> None:
-    """Compute the lower half of JᵀJ + added·1."""
     n = J.shape[1]
     for i in range(n):
         for j in range(i + 1):

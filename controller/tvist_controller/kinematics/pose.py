@@ -24,8 +24,7 @@ ACCURATE = 1e-12
 def turned_by(R: Floats, vector: Floats) -> None:
     """Convert a rotation matrix to a rotation vector of at most half a turn.
 
-    Uses the unit quaternion computed from its largest entry (Shepperd, 1978), so small turns and half turns
-    are exact.
+    Uses the unit quaternion computed from its largest entry (Shepperd, 1978), so small turns and half turns are exact.
     """
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]  # 4 w v
@@ -84,10 +83,7 @@ def turned(rotation: Floats, angle: Floats) -> Floats:
 
 @compiled
 def locate(chain: Floats, q: Floats, R: Floats, o: Floats, J: Floats) -> None:
-    """Compute rotation (3, 3), position (3,) [m] and Jacobian (6, n) of a chain's end.
-
-    The Jacobian times q̇ is velocity [m/s], then angular velocity [rad/s].
-    """
+    """Compute rotation (3, 3), position (3,) [m] and Jacobian (6, n) of a chain's end; linear rows come first."""
     n = q.shape[0]
     start(R, o)
     for j in range(n):
@@ -109,10 +105,7 @@ def locate(chain: Floats, q: Floats, R: Floats, o: Floats, J: Floats) -> None:
 def pose_error(
     rotation: Floats, position: Floats, now: Floats, place: Floats, error: Floats
 ) -> tuple[float, float]:
-    """Compute translation [m] and rotation vector [rad] from pose (`now`, `place`) to another, (6,).
-
-    Return the length of the translation and the angle of the rotation.
-    """
+    """Compute translation [m] and rotation vector [rad] between two poses, (6,); return their lengths."""
     D = np.empty((3, 3))
     for i in range(3):
         error[i] = position[i] - place[i]

@@ -5,14 +5,13 @@ Two forms are solved; a and d may have any value and sign unless named:
 - Axes 2, 3 and 4 parallel (UR): α = ±90°, 0 or 180°, 0 or 180°, ±90°, ±90°, any; a₅ = 0.
 - Axes 4, 5 and 6 intersect (spherical wrist): α = ±90°, 0 or 180°, ±90°, ±90°, ±90°, any; a₄ = a₅ = d₅ = 0.
 
-Axis 1 turns a plane in which upper arm and forearm move; its fixed distance from axis 1 allows two shoulder
-positions. In the plane the triangle of upper arm and forearm has two forms, and the wrist two postures, q₅
-and -q₅: up to eight in all. All angles come from atan2, so rounding errors of the pose are not amplified,
-even near singularities.
+Axis 1 turns a plane in which upper arm and forearm move; its fixed distance from axis 1 allows two shoulder positions.
+In the plane the triangle of upper arm and forearm has two forms, and the wrist two postures, q₅ and -q₅: up to eight in
+all. All angles come from atan2, so rounding errors of the pose are not amplified, even near singularities.
 
-If axes coincide, a joint is free and the postures form a curve. Its parameter is q₁ if the wrist centre is on
-axis 1; the direction of frame 4 in the plane (UR, axes 4 and 6 parallel) or q₄ (spherical wrist) if sin q₅ =
-0; q₂ if the wrist is on axis 2.
+If axes coincide, a joint is free and the postures form a curve. Its parameter is q₁ if the wrist centre is on axis 1;
+the direction of frame 4 in the plane (UR, axes 4 and 6 parallel) or q₄ (spherical wrist) if sin q₅ = 0; q₂ if the wrist
+is on axis 2.
 """
 
 import math
@@ -47,10 +46,9 @@ Triangles = tuple[float, float, float, float]
 def arm_table(description: RobotDescription) -> Floats:
     """Return an arm's constants for the closed form of inverse kinematics, shape (n + 1, 5).
 
-    The first n rows have a, d [m], cos α, sin α (zero for an arm with placements) and the position limit
-    [rad] of each joint, which turns about z before Tz(d) Tx(a) Rx(α). The last row has the form, the
-    forearm's length l₃ [m] between the axes of elbow and wrist in the arm's plane, and its angle ψ to the x
-    axis of its DH frame [rad].
+    The first n rows have a, d [m], cos α, sin α (zero for an arm with placements) and the position limit [rad] of each
+    joint, which turns about z before Tz(d) Tx(a) Rx(α). The last row has the form, the forearm's length l₃ [m] between
+    the axes of elbow and wrist in the arm's plane, and its angle ψ to the x axis of its DH frame [rad].
     """
     table = np.zeros((description.joints + 1, 5))
     table[:-1, 4] = description.limits.position
@@ -75,7 +73,6 @@ def is_of_ur_form(description: RobotDescription) -> bool:
 
 
 def _form(dh: Floats) -> float:
-    """Return the form that `postures` solves, or ANY."""
     if len(dh) != 6:
         return ANY
     a, d, cosine, sine = dh.T

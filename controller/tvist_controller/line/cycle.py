@@ -62,11 +62,9 @@ class ControlCycle:
         self.description = description
         self._plant = arm_of(FlexibleArm(description, carried) if plant is None else plant)
         self.trajectory: Trajectory = Rest(q)
-        """Trajectory generator."""
         self.filter = LineFilter(tvist, arm_limits(description))
         """TVIST: shaper, estimator and fractional-delay filter."""
         self.shaped = ShapedReference(q, PERIOD)
-        """Shaped reference and its derivatives."""
         self.dynamics = dynamics = InverseDynamics(description, declared)
         """Torques of the rigid arm with its declared payload."""
         self.drives = drives = DriveFeedForward(
@@ -78,7 +76,6 @@ class ControlCycle:
         self.kernel_parts = dynamics.chain, dynamics.scratch, drives.rows
         """Links, scratch and joint controllers: arguments of `line_tick`."""
         self.mode = LineMode.REST
-        """Present mode of the line."""
         self.placements = 0
         """Number of times the arm was placed at rest, which interrupts its motion."""
         self.guard: Guard | None = None

@@ -60,10 +60,7 @@ class DriveFeedForward:
         self.wanted = elastic
 
     def compensate(self, law: Floats | None) -> None:
-        """Feed known friction forward from the next rest on, since its torque may differ.
-
-        Without a law, see `LAWS`, it is a fraction of the friction in the description.
-        """
+        """Feed known friction (`LAWS`), or a fraction of the description's, forward from the next rest on."""
         self._law = law
 
     def _rely_on_law(self) -> None:
@@ -97,9 +94,8 @@ class DriveFeedForward:
     ) -> DriveCommand:
         """Return the drive command for a target.
 
-        Elastic feed-forward needs a smooth reference to begin (`may_begin`) or continue (`may_go_on`). A stop
-        is smooth enough to continue; an unshaped guided motion may jump in acceleration, which motors cannot
-        lead.
+        Elastic feed-forward needs a smooth reference to begin (`may_begin`) or continue (`may_go_on`). A stop is smooth
+        enough to continue; an unshaped guided motion may jump in acceleration, which motors cannot lead.
         """
         if self._elastic is not None or self.wanted is not None:
             self._fade(may_begin if self._share == 0 else may_go_on)
@@ -118,11 +114,9 @@ class DriveFeedForward:
 
     @property
     def _full(self) -> int:
-        """Value of a complete transition."""
         return 0 if self.wanted is None else FADE
 
     def _begin(self) -> None:
-        """Start the wanted kind with a share of zero."""
         self._elastic, self._share, self._rising = self.wanted, 0, False
         if self._elastic is not None:
             self._elastic.reset(self.rows[STICTION])

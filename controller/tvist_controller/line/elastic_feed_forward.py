@@ -36,11 +36,10 @@ SETTLED = 1e-8
 class ElasticFeedForward:
     """Drive commands for an elastic arm.
 
-    With the lead w of `elastic_lead` the drives get q* + w, q̇* + ẇ, and τ* + B (q̈* + ẅ) + friction(q̇* +
-    ẇ), where τ* includes the acceleration of the bending links. Central differences give ẇ and ẅ, so commands
-    are one tick late (`delay`). ẅ contains the reference's fourth derivative. Where the reference is not
-    smooth, as at the start of a stop, ẅ is limited to the torque left by the target, and w and ẇ stay
-    continuous.
+    With the lead w of `elastic_lead` the drives get q* + w, q̇* + ẇ, and τ* + B (q̈* + ẅ) + friction(q̇* + ẇ), where τ*
+    includes the acceleration of the bending links. Central differences give ẇ and ẅ, so commands are one tick late
+    (`delay`). ẅ contains the reference's fourth derivative. Where the reference is not smooth, as at the start of a
+    stop, ẅ is limited to the torque left by the target, and w and ẇ stay continuous.
 
     Args:
         description: The robot: masses, geometry, bending links, rotors, friction and torque limits.
@@ -48,8 +47,8 @@ class ElasticFeedForward:
         damping_time: Damping divided by stiffness, shape (N,) [s].
         period: Tick [s].
         torques: Whether the lead affects torques, not only positions and velocities.
-        law: Known friction, see `LAWS`, shape (9, n), or (5, n) without stiction; None for a fraction of the
-            described Coulomb friction.
+        law: Known friction, see `LAWS`, shape (9, n), or (5, n) without stiction; None for a fraction of the described
+            Coulomb friction.
     """
 
     def __init__(
@@ -94,7 +93,6 @@ class ElasticFeedForward:
         self._bare, self._carried = lead.chain[-2, BODY:].copy(), np.zeros(0)
         self._ticks = 0
         self._sag: Floats | None = None
-        """Sag of the previous target."""
         self.motors: Floats = np.zeros((3, description.joints))
         """Velocity [rad/s], acceleration [rad/s^2] and torque [N m] of the last command, shape (3, n)."""
         self.limited = False
@@ -137,10 +135,7 @@ class ElasticFeedForward:
 
 
 def _moved(parameters: Floats, placement: pin.SE3) -> Floats:
-    """Transform inertial parameters (10,) from their frame to that in which its pose is `placement`.
-
-    Not by `pin.Inertia`, because the mass may be zero.
-    """
+    """Transform inertial parameters (10,) by a placement; unlike `pin.Inertia`, with any mass."""
     mass, p = parameters[0], placement.translation
     h = placement.rotation @ parameters[1:4]
     xx, xy, yy, xz, yz, zz = parameters[4:]

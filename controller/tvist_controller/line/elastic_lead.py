@@ -1,16 +1,15 @@
 """Lead of the motors that keeps an elastic arm on its target, and the resulting commands, compiled.
 
-A gear with load τ (without gravity) twists by τ/K_g, and a bending link by φ = -τ_f/k_b. Both lag by the
-damping time D/K, a fraction of a tick. The joints must turn by the twist, and by what returns the flange to
-its place:
+A gear with load τ (without gravity) twists by τ/K_g, and a bending link by φ = -τ_f/k_b. Both lag by the damping time
+D/K, a fraction of a tick. The joints must turn by the twist, and by what returns the flange to its place:
 
     w = τ/K_g + J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ (-J_f φ)
 
-J_j and J_f are the flange's translation Jacobians of joints and bending. λ keeps w small near singular
-postures, where small flange motions need large joint turns (Nakamura and Hanafusa, 1986).
+J_j and J_f are the flange's translation Jacobians of joints and bending. λ keeps w small near singular postures, where
+small flange motions need large joint turns (Nakamura and Hanafusa, 1986).
 
-The bending links accelerate by φ̈, and the joints that compensate them by J_j⁺ (-J_f φ̈). The load τ includes
-both; otherwise the bending modes, at 20 to 50 Hz, would stay excited.
+The bending links accelerate by φ̈, and the joints that compensate them by J_j⁺ (-J_f φ̈). The load τ includes both;
+otherwise the bending modes, at 20 to 50 Hz, would stay excited.
 """
 
 from typing import NamedTuple
@@ -59,8 +58,7 @@ class Lead(NamedTuple):
     before: Floats
     """Undamped deflections at the previous tick, shape (N,) [rad]."""
     motion: Floats
-    """Angles, velocities and accelerations of the coordinates; the first two are zero for bending, shape (3,
-    N)."""
+    """Angles, velocities and accelerations of the coordinates; the first two are zero for bending, shape (3, N)."""
     jacobian: Floats
     """Translation Jacobian of the flange, shape (3, N) [m/rad]."""
     loads: Floats
@@ -127,10 +125,7 @@ def move_back(lead: Lead, moved: Floats, back: Floats) -> None:
 
 @inlined
 def bending_accelerations(lead: Lead, period: float, found: Floats) -> None:
-    """Compute accelerations of bending links and of the joints that compensate them, shape (N,).
-
-    They are second differences, hence one tick late: a sixteenth of a period at 30 Hz.
-    """
+    """Compute accelerations of bending and compensating joints, one tick late as second differences, (N,)."""
     bent, moved, back = lead.bent, np.zeros(3), np.empty(lead.joints.shape[0])
     for k in range(lead.flexes.shape[0]):
         c = int(lead.flexes[k])
@@ -233,10 +228,7 @@ def follow(
     room: Floats,  # largest acceleration of each joint's lead, shape (n,) [rad/s^2]
     period: float,
 ) -> bool:
-    """Advance the actual lead by one tick; return whether its acceleration was limited.
-
-    After that it returns to the wanted lead like a critically damped oscillator.
-    """
+    """Advance the actual lead, critically damped after a limit; return whether acceleration was limited."""
     limited = False
     for j in range(led.shape[1]):
         now, before = led[0, j], led[1, j]

@@ -51,10 +51,7 @@ class InverseDynamics(Arm):
 
     @property
     def bodies(self) -> tuple[Floats, ...]:
-        """Possible inertial parameters of the last link: two sets during a payload change, else one.
-
-        Each has shape (10,), in pinocchio's order [kg, kg m, kg m^2].
-        """
+        """Possible inertial parameters (10,) of the last link: two sets during a payload change, else one."""
         return (self._before, self._after) if self.changing else (self._after,)
 
     def believe(self, bodies: tuple[Floats, ...]) -> None:

@@ -15,12 +15,10 @@ LAWS = 9
 """Number of parameters of known friction: F_c [N m], F_s/F_c [-], v_s [rad/s], w [rad/s], F_v [N m s/rad];
 and stiction as in `Imperfections`, zero for none: F_s [N m], μ_s [-], v_s [rad/s], σ K_g [N m/rad]."""
 ROTOR, COMPLIANCE, YIELDING, COULOMB, VISCOUS, WIDTH, PER_SECOND, WINDUP, STICTION, LAW = range(10)
-"""Rows of each joint's parameters: B [kg m^2], c_w/K_g [rad/(N m)], 1/K_g for sag compensation [rad/(N m)],
-Coulomb [N m] and viscous friction [N m s/rad], Coulomb width [rad/s], 1/h [1/s]; wind-up [rad] and stiction
-[N m] of the last tick; first row of the known friction, see `LAWS`, which replaces the other friction unless
-its w is zero."""
+"""Rows of each joint's parameters: B [kg m^2], c_w/K_g [rad/(N m)], 1/K_g for sag compensation [rad/(N m)], Coulomb [N
+m] and viscous friction [N m s/rad], Coulomb width [rad/s], 1/h [1/s]; wind-up [rad] and stiction [N m] of the last
+tick; first row of the known friction, see `LAWS`, which replaces the other friction unless its w is zero."""
 ROWS = LAW + LAWS
-"""Number of rows."""
 
 
 @compiled_for_ticks
@@ -55,12 +53,10 @@ def command_drives(
 ) -> None:
     """Compute the drive command for a target.
 
-    - Torque: τ_ff = τ* + B q̈* + friction: rigid arm, rotor inertia and a fraction of Coulomb friction. Known
-      friction
+    - Torque: τ_ff = τ* + B q̈* + friction: rigid arm, rotor inertia and a fraction of Coulomb friction. Known friction
     counts in full, at motor speed, as does stiction.
     - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g; the motor leads by a fraction c_w of it.
-    - Sag: the twist g/K_g under gravity is left, as on the paper's robot, or compensated in full. g(q*) has
-      neither
+    - Sag: the twist g/K_g under gravity is left, as on the paper's robot, or compensated in full. g(q*) has neither
     feedback nor delay, and is as smooth as q*.
     """
     law = joints[LAW:]
@@ -85,11 +81,7 @@ def command_drives(
 def joint_rows(
     description: RobotDescription, period: float, *, compensate_sag: bool = False, positions: bool = False
 ) -> Floats:
-    """Return each joint's parameters in the order of `ROTOR` etc., shape (19, n).
-
-    With `positions`, the command is the plain reference, because the arm's own controller adds wind-up and
-    sag.
-    """
+    """Return each joint's parameters, rows as `ROTOR` etc., shape (19, n); `positions` omits wind-up and sag."""
     drives = description.drives
     friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)
     rows = np.zeros((ROWS, description.joints))

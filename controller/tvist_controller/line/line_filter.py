@@ -29,10 +29,7 @@ class LineFilter:
 
     @property
     def settled(self) -> bool:
-        """Whether the future output stays constant once it equals the reference.
-
-        With negative weights, echoes may cancel each other momentarily.
-        """
+        """Whether the output stays at the reference; with negative weights echoes may cancel momentarily."""
         return self._fade is None and (self.tvist.peak == 1.0 or self.tvist.settled)
 
     @property
@@ -75,10 +72,7 @@ class LineFilter:
         return shaped
 
     def use(self, tvist: Filter) -> None:
-        """Change the filter within the limits of the motion; the new one continues on the path.
-
-        During a transition the new filter waits; only the latest waiting filter is kept.
-        """
+        """Change the filter within the limits of the motion; during a transition, the latest one waits."""
         fade = self._fade
         if fade is None or fade.share == 0.0:
             self._fade = self._fade_to(self.tvist if fade is None else fade.old, tvist)

@@ -21,14 +21,11 @@ class LineMode(Enum):
 
     def __init__(self, shaped: bool, guarded: bool, *followed_by: str) -> None:
         self.at_rest = self.name == "REST"
-        """Whether the shaped reference rests."""
         self.shaped = shaped
-        """Whether references pass the filter; otherwise they are played as they are, and the delay line is
-        dropped."""
+        """Whether references pass the filter; otherwise they are played as they are, and the delay line is dropped."""
         self.guarded = guarded
         """Whether a shaped reference is played only if a collision-free stop exists from it."""
         self.followed_by = followed_by
-        """Names of the permitted next modes."""
 
 
 def check_change(before: LineMode, after: LineMode, *, guarded: bool) -> None:

@@ -20,8 +20,7 @@ class ShapedReference:
         """Restart at rest with joint positions as samples."""
         self.joints.reset(q)
         self.references = self.joints.window
-        """The last three unshaped references, as `Differentiator.window`; during a bypass, the shaped
-        ones."""
+        """The last three unshaped references, as `Differentiator.window`; during a bypass, the shaped ones."""
         self.enter(None, q)
 
     def enter(self, posture_of: Posture | None, sample: Floats) -> None:
@@ -42,10 +41,7 @@ class ShapedReference:
         return self.joints.newest
 
     def take(self, x: Floats, x_star: Floats) -> Floats:
-        """Take the samples of this tick; return the unshaped joint positions, shape (n,) [rad].
-
-        Without a filter, both samples are the same object.
-        """
+        """Take this tick's samples, equal objects without a filter; return the unshaped joint positions."""
         q, q_star, posture_of = x, x_star, self.posture_of
         if posture_of is not None:
             q = posture_of(x)

@@ -1,7 +1,4 @@
-"""Whole motions at once: nothing on the line depends on the arm, so each block computes all ticks together.
-
-The results equal those of `ControlCycle` to the last bit.
-"""
+"""Whole motions at once, block by block, equal to `ControlCycle` to the last bit, since no block depends on the arm."""
 
 from dataclasses import dataclass
 

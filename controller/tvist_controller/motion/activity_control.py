@@ -1,8 +1,4 @@
-"""The robot's activities: numbered motions, streams of set-points, and stops.
-
-`tvist_protocol.transitions` defines the activity that each trigger leads to; this module carries transitions
-out.
-"""
+"""The robot's activities: carries out the transitions of `tvist_protocol.transitions`."""
 
 from collections import deque
 from typing import Unpack
@@ -55,7 +51,6 @@ class MotionControl:
         """Whether activity or modes may have changed since `RobotModes.update`."""
         self.activity = PUT[mode]
         self.safety = SafetySystem()
-        """The safety system."""
         self._emit = emit
         self.stopper = Stopper(cycle)
         """Prediction and stops of the control line's motion."""
@@ -64,7 +59,6 @@ class MotionControl:
         self.power = ArmPower.of(cycle.plant)
         """Power of a real arm; None for simulated arms."""
         self.motions = Motions(cycle, self.safety, emit)
-        """Numbered motions and their speed."""
         self.streams = Setpoints(cycle.description)
         """The present stream of set-points, if any."""
         self.tcp: tuple[float, ...] = (0.0,) * 6
@@ -96,10 +90,7 @@ class MotionControl:
         return self.streams.stream is not None
 
     def snapshot(self, filter_now: FilterState, script: Script | None, time: float | None) -> Snapshot:
-        """Return the state that plans depend on, from rest or, with a `time` [s], continuing the motion.
-
-        The running motion stays unchanged for that time.
-        """
+        """Return the state that plans depend on, from rest, or of a motion to be extended in `time` [s]."""
         cycle = self.cycle
         tvist = cycle.tvist
         now = Snapshot(
@@ -222,10 +213,7 @@ class MotionControl:
         self._end_stream("servo_stop")
 
     def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
-        """Stop without the filter, and report how the present motion ended.
-
-        The deceleration is a limit [rad/s^2]; None for what torque permits.
-        """
+        """Stop without the filter at up to a deceleration [rad/s^2], and report how the motion ended."""
         self.end("stop", why, code, deceleration)
 
     def interrupt(self, why: str, code: Code | None = None) -> None:
@@ -242,10 +230,7 @@ class MotionControl:
         kind: EventKind | None = None,
         category: int = 2,
     ) -> None:
-        """Carry out a trigger's transition, if any, and stop any motion.
-
-        An event of the given kind reports the stop; None for no event. Other arguments as in `stop`.
-        """
+        """Carry out a trigger's transition, if any, and stop motion; an event of `kind` reports the stop."""
         target = after(self.activity, trigger)
         if target is None:
             return

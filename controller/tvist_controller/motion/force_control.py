@@ -136,7 +136,6 @@ class ForceControl(Monitor):
         )  # fmt: skip
 
     def _felt(self) -> Floats:
-        """Return force and torque of the last tick."""
         sample = self._cycle.sample
         found = self._forces.felt(sample)
         if sample.wrench is None:

@@ -27,10 +27,8 @@ class Guidance:
 
     def __init__(self, motion: MotionControl) -> None:
         self.motion = motion
-        """The robot's motion."""
         self._cycle = motion.cycle
         self.limits = arm_limits(motion.cycle.description)
-        """Limits of every joint."""
         self.reach = np.array(motion.cycle.description.limits.position)
         """Position limit of each joint, shape (n,) [rad]."""
         self.torque = TorqueRoom(motion.cycle.description, motion.cycle.dynamics, REBOUND)
@@ -82,10 +80,7 @@ class Guidance:
         return self.follow(trigger, speed, shaped=shaped)
 
     def stop_joints(self, acceleration: float | None, trigger: str = "stop_j") -> None:
-        """Come to rest with a deceleration of the fastest joint [rad/s^2], None for what torque permits.
-
-        A guided motion brakes with all joints in phase.
-        """
+        """Come to rest, all joints in phase, at a deceleration [rad/s^2]; None for what torque permits."""
         motion = self.motion
         if motion.activity is not Activity.GUIDED or acceleration is None:
             motion.end(trigger, f"{trigger} was commanded", deceleration=acceleration)
@@ -96,11 +91,7 @@ class Guidance:
         self._halt(trigger, stop, stop.duration)
 
     def stop_tool(self, acceleration: float, angular_acceleration: float) -> None:
-        """Come to rest with a deceleration of the tool [m/s^2, rad/s^2].
-
-        A motion by `speed_l` stays straight; others use the equivalent joint deceleration at their present
-        velocities.
-        """
+        """Come to rest with a deceleration of the tool, straight if `speed_l` moves it [m/s^2, rad/s^2]."""
         cycle = self._cycle
         state, present, tool = cycle.newest, cycle.trajectory, self.motion.tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
@@ -121,7 +112,6 @@ class Guidance:
         self._halt("stop_l", stop, stop.duration)
 
     def _most(self, shaped: bool) -> MotionLimits:
-        """Return the limits of a reference."""
         return self._cycle.filter.spared(self.limits) if shaped else self.limits
 
     def check(self, trigger: str, *, shaped: bool = False) -> None:
@@ -136,7 +126,6 @@ class Guidance:
         return self.motion.activity is Activity.GUIDED and shaped == self._cycle.mode.shaped
 
     def _present(self, kind: type[G], shaped: bool) -> G | None:
-        """Return the present trajectory if it is of this kind and continues."""
         present = self.guided
         return present if self._continues(shaped) and isinstance(present, kind) else None
 
@@ -189,7 +178,6 @@ class Guidance:
             present.come_to_rest()
 
     def _start(self, shaped: bool) -> tuple[Floats, Floats, Floats]:
-        """Return position, velocity and acceleration at which a trajectory starts."""
         cycle, lead = self._cycle, self.compliant
         if self._continues(shaped) and (present := self.guided) is not None:
             return present.state

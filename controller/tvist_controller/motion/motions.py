@@ -17,8 +17,7 @@ from tvist_protocol.replies import Code
 PAUSE_SHARE = 0.95
 """Fraction of the acceleration allowed by torque that a pause uses; the filter may add a little [-]."""
 LEAST_PAUSE = 0.2
-"""Smallest fraction of a motion's acceleration that torque must allow for a pause; otherwise it runs on
-[-]."""
+"""Smallest fraction of a motion's acceleration that torque must allow for a pause; otherwise it runs on [-]."""
 
 
 class RunningMotion(Protocol):
@@ -61,10 +60,7 @@ class RunningMove:
         return 0.0 if self.coming else self._trajectory.time
 
     def extend(self, planned: PlannedMove, speed: float, slowest: float | None) -> None:
-        """Continue to further parts of the path; speeds as in `RunningMotion`.
-
-        The first part of the new plan equals the last one until now and for some ticks more.
-        """
+        """Continue to further parts of the path; the plan's first part equals the last one for some ticks."""
         longer, *coming = planned.parts
         if self.coming:
             self.coming = (*self.coming[:-1], longer, *coming)

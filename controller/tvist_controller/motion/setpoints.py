@@ -29,7 +29,6 @@ class Setpoints:
     def __init__(self, description: RobotDescription) -> None:
         self._description = description
         self.stream: SetpointStream | None = None
-        """The present stream."""
         self._heard = 0.0
         self._refused: str | None = None
         """Reason for the latest rejection, reported if no valid set-point follows."""

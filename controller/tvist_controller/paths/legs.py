@@ -47,10 +47,7 @@ class JointWay:
         return self.start + s * slope, slope, np.zeros_like(slope)
 
     def within(self, radius: float, position_at: Callable[[Floats], Floats], *, from_end: bool) -> float:
-        """Return the length from one end within which the tool stays within a radius of that end [m].
-
-        `position_at` returns the tool centre point's position at joint positions.
-        """
+        """Return the length from one end within which the tool stays within a radius of that end [m]."""
 
         def at(s: float) -> Floats:
             return position_at(self.at(self.length - s if from_end else s)[0])

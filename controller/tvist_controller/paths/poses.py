@@ -16,7 +16,6 @@ class Placement(NamedTuple):
     position: Floats
 
     def __matmul__(self, other: "Placement") -> "Placement":
-        """Transform a pose given in this frame to this frame's reference."""
         return Placement(self.rotation @ other.rotation, self.rotation @ other.position + self.position)
 
     @property

@@ -48,8 +48,6 @@ Run = list[Piece]
 
 @dataclass(frozen=True)
 class _Cut:
-    """A blend between two legs."""
-
     before: float
     """Length of the first leg replaced [m]."""
     after: float
@@ -86,10 +84,7 @@ class Route(NamedTuple):
 
 
 def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:
-    """Divide a path into runs, from its first leg's start or a point on it.
-
-    Raise WayError if the joints cannot follow it; near a singular posture, two continuations exist.
-    """
+    """Divide a path into runs, from a leg's start or a point on it; raise WayError if impossible."""
     route, last = Route([Run()], [], []), len(legs) - 1
     meets = meetings(legs)
     here = start
@@ -275,5 +270,4 @@ def _within(leg: Leg, radius: float, tracker: Tracker, *, from_end: bool) -> flo
 
 
 def _middle(knots: Knots) -> Floats:
-    """Return postures at the knots and between them, shape (k, n)."""
     return SplineCurve(knots).derivatives(np.linspace(0.0, knots.s[-1], BETWEEN * (len(knots.s) - 1) + 1))[0]

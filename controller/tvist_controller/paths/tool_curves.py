@@ -53,10 +53,7 @@ class ToolWay(ToolCurve):
 
     @abstractmethod
     def within(self, radius: float) -> float:
-        """Return the length from either end within which the tool stays within a radius of that end [m].
-
-        May exceed the curve's length; infinite if the tool centre point does not move.
-        """
+        """Return the length from either end within the radius [m]; it may exceed the curve or be infinite."""
 
 
 class ToolLine(ToolWay):
@@ -145,10 +142,7 @@ class ToolPart(ToolCurve):
 
 
 class ToolBlend(ToolCurve):
-    """Smooth path of given length between two tool states: quintic polynomials in position and turn.
-
-    The turn is relative to the corner's orientation, which is near both.
-    """
+    """Quintic path of given length between two tool states, in position and turn relative to the corner."""
 
     def __init__(self, start: ToolState, end: ToolState, corner: Floats, length: float) -> None:
         self.length, self._corner = length, corner
@@ -197,8 +191,7 @@ class ToolBlend(ToolCurve):
 def _at_corner(state: ToolState, corner: Floats) -> tuple[Floats, Floats, Floats]:
     """Return position and turn from the corner, with derivatives, each of shape (6,).
 
-    On lines and arcs the tool turns about one axis at a constant rate, so the turn from the corner has this
-    axis, too.
+    On lines and arcs the tool turns about one axis at a constant rate, so the turn from the corner has this axis, too.
     """
     turned_by, angular = turn(corner, state.pose.rotation), state.second[3:]
     if angular.any():

@@ -37,7 +37,6 @@ class PlannedFilter:
     source: ModeSource
     """Source of its modes."""
     tvist: Filter
-    """The filter."""
     elastic: ElasticFeedForward | None
     """Elastic feed-forward for the drives; None if not used."""
     law: Floats | None = None
@@ -116,10 +115,7 @@ class FilterPlanner:
         return found
 
     def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> PlannedFilter:
-        """Add known friction and the feed-forward that a filter needs, from its source or the calibration.
-
-        Raise RefusalError if the springs are unknown or the friction is invalid.
-        """
+        """Add known friction and the feed-forward that a filter needs; raise RefusalError if impossible."""
         known = source if source.knows_payload else self._modal
         try:
             calibration = None if known is None else known.calibration

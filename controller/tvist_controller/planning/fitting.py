@@ -99,9 +99,8 @@ class Fitter:
     ) -> Fitted:
         """Plan a motion, repeatedly slower while it exceeds a limit.
 
-        Near a limit, it is shaped in advance by the filter from `tvist`; None if that takes too long, which
-        keeps the filter's `surplus` free instead. `limits` are the requested ones; None if something else
-        sets the speed.
+        Near a limit, it is shaped in advance by the filter from `tvist`; None if that takes too long, which keeps the
+        filter's `surplus` free instead. `limits` are the requested ones; None if something else sets the speed.
         """
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
@@ -166,10 +165,7 @@ class Fitter:
         return Need(slower, binding, q[min(int(np.argmax(np.abs(values))), len(q) - 1)])
 
     def _dynamic(self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: Snapshot) -> Need | None:
-        """Return how much slower a motion must be for torques; gravity does not change with speed.
-
-        Where torque is mainly due to velocity, velocity is reduced, otherwise acceleration.
-        """
+        """Return how much slower a motion must be for torques, in velocity or acceleration as they depend."""
         dynamics, limits, factors = self._dynamics, self._torque, [1.0, 1.0]
         worst, need = 1.0, None
         for believed in now.bodies:
@@ -205,10 +201,7 @@ class Fitter:
 
 
 def _states(motion: PlannedMotion) -> tuple[Floats, Floats, Floats]:
-    """Return positions, velocities and accelerations of an unshaped motion, each of shape (k, n).
-
-    The law's own moments are included, because a brief acceleration may lie between evenly spaced ones.
-    """
+    """Return unshaped positions, velocities, accelerations, each (k, n), also at the law's own moments."""
     moments = motion.law.moments
     known = (moments > motion.law.begins) & (moments < motion.duration)
     return motion.states(np.union1d(motion.evenly(LOOKS), moments[known]))
@@ -256,10 +249,7 @@ def keeping_motion(
 
 
 def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
-    """Return the shaped references at full rate, shape (k, n) [rad]; None if they are too long to simulate.
-
-    Neither motion nor filter is changed.
-    """
+    """Return the shaped references at full rate, (k, n) [rad], None if too long; motion and filter stay unchanged."""
     path, mine = motion.path, tvist.fork()
     shaped = ShapedReference(path.posture(path.start), PERIOD)
     shaped.enter(path.posture_of, path.start)

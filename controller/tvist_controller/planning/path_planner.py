@@ -30,8 +30,7 @@ POSTURES = 9
 LOOKS = 1000
 """Number of places of a run searched for the one hardest for a joint."""
 SPARED = 0.99
-"""Fraction of joint limits that paths use; a shaper with varying weights may exceed its reference a little
-[-]."""
+"""Fraction of joint limits that paths use; a shaper with varying weights may exceed its reference a little [-]."""
 LEAST_WINDOW = 0.08
 """Shaper delay for which a path always has room, so that few changes of shaper slow it down [s]."""
 AGILE = MotionLimits(0.25, 1.2, 60.0)
@@ -50,11 +49,7 @@ class PathPlanner:
         self._reachable = reachable
 
     def plan(self, command: MoveL | MoveC | MovePath, now: Snapshot) -> PlannedMove | None:
-        """Plan a motion from rest, or the extension of a running one, for a checked command.
-
-        Return None if the end of the running motion is too near. Raise RefusalError if impossible or
-        colliding.
-        """
+        """Plan a motion from rest, or an extension, None if too late; raise RefusalError if impossible."""
         tracker = Tracker(self._description, now.tcp)
         legs = list(self._reachable.legs(command, tracker, now))
         count = len(command.segments) if isinstance(command, MovePath) else 1
@@ -192,7 +187,6 @@ class PathPlanner:
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:
-        """Return the longest shaper delay on a curve [s]."""
         found = []
         for s in np.linspace(float(curve.start[0]), float(curve.end[0]), POSTURES):
             tvist.reset(curve.posture(np.array([s])))
@@ -213,7 +207,7 @@ def _told(fitted: Fitted, run: Run, start: float = 0.0) -> Limited | None:
 
 
 class _TooLateError(Exception):
-    """A running motion can no longer be extended within limits."""
+    """A running motion can no longer be extended."""
 
 
 def _joined(
@@ -248,10 +242,7 @@ def _course(
 
 
 def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tuple[int, float], ...]:
-    """Return where the blend at each segment's end begins, see `PlannedMove.marks`.
-
-    The first run starts at `start` on the first part [m].
-    """
+    """Return where each segment's end blend begins, see `PlannedMove.marks`; the first run starts at `start` [m]."""
     marks = dict[int, tuple[int, float]]()
     for part, run in enumerate(runs):
         lengths = [piece.knots.s[-1] for piece in run]
@@ -271,7 +262,6 @@ def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tupl
 
 
 def _number(where: str) -> int:
-    """Return the segment number of a part of the path."""
     return int(where[len("segments[") : -1]) if where else 0
 
 

@@ -72,9 +72,8 @@ class MakesPlans(Protocol):
 class Plans:
     """Plans of one robot, made now or outside the ticks, for commands of clients and programs.
 
-    `plan` is `Planner.plan`. `snapshot` returns the present state or, with a time [s], that of a motion that
-    continues the running one after this time. `order` plans outside the ticks; without it, the tick that
-    needs a plan makes it.
+    `plan` is `Planner.plan`. `snapshot` returns the present state or, with a time [s], that of a motion that continues
+    the running one after this time. `order` plans outside the ticks; without it, the tick that needs a plan makes it.
     """
 
     def __init__(

@@ -13,11 +13,9 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.replies import Code
 
 REACHED = 0.9
-"""Fraction of the speed that counts as reached; a peak between two acceleration ramps stays a little lower
-[-]."""
+"""Fraction of the speed that counts as reached; a peak between two acceleration ramps stays a little lower [-]."""
 BLUNTED = 3.0
-"""The same as a ratio if the way is too short for the speed, since ramps take much of a few millimetres
-[-]."""
+"""The same as a ratio if the way is too short for the speed, since ramps take much of a few millimetres [-]."""
 LATE = 1.01
 """Ratio of durations up to which a motion counts as on time [-]."""
 USED_UP = 0.95
@@ -66,10 +64,7 @@ JERKS = Binding("limit_acceleration", "tool and joints stay within the limits of
 def slower_path(
     run: Run, curve: SplineCurve, law: RetimedLaw, limits: JointLimits, description: RobotDescription
 ) -> Limited | None:
-    """Return the limit that prevents the requested speed or duration of a one-segment motion.
-
-    None if it is as fast as requested, or the way is just too short. `law` keeps the joints' `limits`.
-    """
+    """Return the limit that prevents the speed or duration of a one-segment motion; None if just too short."""
     pacing, way = run[0].pacing, float(curve.end[0])
     if pacing.duration is not None:
         if law.duration <= LATE * pacing.duration:

@@ -113,8 +113,7 @@ class Snapshot(Struct, frozen=True, eq=False, gc=False):
     excess: float
     """`Filter.excess` of the filter: relative excess of acceleration [-]."""
     surplus: tuple[float, float]
-    """`Filter.surplus` of the filter: relative excess of velocity and acceleration at the arm's limits
-    [-]."""
+    """`Filter.surplus` of the filter: relative excess of velocity and acceleration at the arm's limits [-]."""
     tcp: tuple[float, ...]
     """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
     body: Body

@@ -159,11 +159,7 @@ class ProgramArm:
     # ------------------------------------------------------------------ guided motions
 
     def guide(self, start: Callable[[bool], int | None], wait: Iterator[None]) -> Turns:
-        """Start or change a guided motion, which outlasts the call.
-
-        `start(shaped)` returns the motion's number, or None if nothing moves; `wait` then runs until the call
-        returns.
-        """
+        """Start or change a guided motion by `start(shaped)`, run `wait`, and return; the motion goes on."""
         yield from self.finish()
         with self._moving():
             yield from self.regain()
@@ -262,10 +258,7 @@ class ProgramArm:
             journey.outcome = "motion_done"
 
     def brake(self, stop: Callable[[], None], *, wholly: bool = False) -> None:
-        """Stop the present motion at the program's request.
-
-        Compliance continues unless the stop is to end it, too (`wholly`).
-        """
+        """Stop the present motion at the program's request; compliance only ends if `wholly`."""
         guidance = self._access.guidance
         if self._motion.activity.moving:
             self._rate_limit.charge()
@@ -318,10 +311,7 @@ class ProgramArm:
         self._abandoned, self._rate_limit.planning = False, 0
 
     def hear(self, event: Event) -> bool:
-        """Handle an event; return whether it ended a motion of the program against its will.
-
-        Motions that the program itself ends were removed before.
-        """
+        """Handle an event; return whether it ended a motion against the program's will."""
         journey = self._journey
         moving = None if journey is None else journey.number
         if event.kind == "protective_stop":

@@ -32,9 +32,8 @@ class Finding:
 def check_program(text: str) -> list[Finding]:
     """Return the findings in a program's text, in order.
 
-    Errors are the compiler's: syntax, unknown names, wrong calls. Warnings are calls of functions that are
-    not simulated, constructs that a UR robot rejects or reads differently, and texts that only define
-    functions.
+    Errors are the compiler's: syntax, unknown names, wrong calls. Warnings are calls of functions that are not
+    simulated, constructs that a UR robot rejects or reads differently, and texts that only define functions.
     """
     findings = [_error(error) for error in check(text, known_signatures())]
     # Without these functions, the same check finds the places where they are called.

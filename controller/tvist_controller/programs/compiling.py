@@ -90,7 +90,6 @@ def built_in(description: RobotDescription) -> dict[str, str]:
 
 
 def _moves(title: str, names: Sequence[str], description: RobotDescription) -> str:
-    """Return a program that moves to poses."""
     moves = [
         f"  movej({[float(angle) for angle in description.poses[name]]}, a=2.0, v=1.5)" for name in names
     ]

@@ -43,10 +43,7 @@ class ForceModeMoves:
             yield from self._arm.halt(lambda: guidance.stop_joints(guidance.limits.acceleration))
 
     def lead(self, segment: Segment, velocity: float, most: float, near: float) -> Turns:
-        """Steer joints or tool to the end of a move, until the distance is at most `near`.
-
-        The tool accelerates at `most`; deceleration is the move's, so that it comes to rest at the end.
-        """
+        """Steer joints or tool to a move's end, until at most `near` away; the tool accelerates at `most`."""
         guidance, deceleration = self._access.guidance, segment.acceleration
 
         def start(shaped: bool) -> int:

@@ -37,10 +37,7 @@ None for no change."""
 
 
 class Popups:
-    """The popup of one robot until it is closed or replaced.
-
-    It belongs to the program that runs when it is shown, returned by `owner`.
-    """
+    """The popup of one robot, owned by the program returned by `owner`, until closed or replaced."""
 
     def __init__(self, emit: Emit, owner: Callable[[], object]) -> None:
         self._emit, self._owner = emit, owner
@@ -119,10 +116,7 @@ class Watchdogs:
         self._tick = 0
 
     def watch(self, name: str, frequency: float, action: str) -> None:
-        """Watch an RTDE input that must be written at a frequency [Hz]; action `pause`, `stop` or `ignore`.
-
-        `ignore` ends the watch.
-        """
+        """Watch an RTDE input to be written at a frequency [Hz]; `pause`, `stop`, or `ignore` to end this."""
         bank, place = _register(name)
         self._peripherals.changed = True
         if action == "ignore":
@@ -171,10 +165,7 @@ def _register(name: str) -> tuple[Bank, int]:
 
 
 class MissedTurns:
-    """Warns about a thread that guides the arm but misses turns because a tick's budget is spent.
-
-    After several missed turns in a row, it slows the arm down.
-    """
+    """Warns about a guiding thread that misses turns for lack of budget; finally slows the arm down."""
 
     def __init__(self, arm: ProgramArm, access: Access) -> None:
         self._arm, self._emit, self._guidance = arm, access.emit, access.guidance

@@ -35,8 +35,7 @@ class StatementQueue:
         """The main program if it accepts statements."""
         self._queue: deque[tuple[int, Script]] = deque()
         self.last: Script | None = None
-        """What the next statement is compiled after: the last one, or the program; None if none are
-        accepted."""
+        """What the next statement is compiled after: the last one, or the program; None if none are accepted."""
         self._lengths: deque[tuple[int, int]] = deque()
         """Number and length of each stored statement."""
         self._waiting = self._ending = self._clearing = self._published = False
@@ -147,10 +146,7 @@ class StatementQueue:
         return self._interpreted
 
     def _check_room(self, length: int, *, clears: bool) -> None:
-        """Refuse a statement that makes the program too large, unless it clears others.
-
-        Statements not yet cleared may take twice the space, so that a client need not wait for that.
-        """
+        """Refuse a statement that makes the program too large; uncleared ones may take twice the space."""
         held = [characters for _, characters in self._lengths]
         added = [characters for number, characters in self._lengths if number > self._forgotten]
         full = len(held) >= HELD * MAX_STATEMENTS or sum(held) + length > HELD * MAX_SCRIPT

@@ -19,10 +19,7 @@ PoseNumbers = tuple[float, float, float, float, float, float]
 
 
 class ProgramKinematics:
-    """Kinematics of the present or another TCP in the base frame.
-
-    `spend` takes evaluations from the running program's budget.
-    """
+    """Kinematics of the present or another TCP; `spend` charges the running program's budget."""
 
     def __init__(
         self, description: RobotDescription, motion: MotionControl, spend: Callable[[int], None]

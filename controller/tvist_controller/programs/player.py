@@ -189,7 +189,6 @@ class ProgramPlayer:
             self.end(why)
 
     def _watch(self, tick: int) -> None:
-        """Pause or stop the program if a watchdog has expired."""
         expired = self._watchdogs.expired(tick)
         if expired is None or self._main is None:
             return
@@ -244,12 +243,10 @@ class ProgramPlayer:
             self._access.force.external.use(None)
 
     def _machine(self) -> Machine:
-        """Return the program whose turn it is."""
         assert self._now is not None, "only programs call their functions"
         return self._now.machine
 
     def _thread(self) -> tuple[Machine, int]:
-        """Return program and number of the running thread."""
         machine = self._machine()
         return machine, machine.thread
 

@@ -1,8 +1,7 @@
 """Sockets of programs: received data and waiting readers.
 
-The network belongs to the host, which gets orders after the programs' turns and reports `SocketNews` before a
-tick. The journal contains these, so a replay gets the same bytes in the same ticks. The gripper of a cell is
-simulated, needs no network, and answers a tick later.
+The network is the host's. It gets orders after the programs' turns and reports `SocketNews` before a tick, which the
+journal contains, so that a replay gets the same bytes. A cell's gripper is simulated and answers a tick later.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -231,10 +230,9 @@ class Sockets:
     ) -> Generator[None, None, T | None]:
         """Read from a socket what `take` finds, waiting until it has arrived.
 
-        Incomplete data stays for the next call. A failed read returns None after at least a tick, so that
-        loops let time pass: on timeout, or if the socket was closed before. The timeout [s] counts robot
-        time, but at least as much wall time; none if not above 0. `meanwhile` is called with the ticks passed
-        before each further tick.
+        Incomplete data stays for the next call. A failed read returns None after at least a tick, so that loops let
+        time pass: on timeout, or if the socket was closed before. The timeout [s] counts robot time, but at least as
+        much wall time; none if not above 0. `meanwhile` is called with the ticks passed before each further tick.
         """
         socket = self._named.get((self._owner(), name))
         if socket is None:
@@ -269,7 +267,6 @@ class Sockets:
     # ------------------------------------------------------------------ parts
 
     def _take(self, socket: _Socket, take: Take[T]) -> tuple[T, int] | None:
-        """Take a value from the received bytes."""
         found = take(bytes(socket.received)) if socket.received else None
         if found is not None:
             del socket.received[: found[1]]

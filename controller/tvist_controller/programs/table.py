@@ -57,7 +57,6 @@ def page() -> str:
 
 
 def _call(name: str, one: Signature) -> str:
-    """Return a call with its parameters and defaults."""
     parameters = [
         parameter.name if parameter.default is REQUIRED else f"{parameter.name}={_shown(parameter.default)}"
         for parameter in one.parameters
@@ -70,7 +69,6 @@ def _shown(value: object) -> str:
 
 
 def _what(functions: type, name: str) -> str:
-    """Return the first paragraph of a function's docstring."""
     text = getdoc(getattr(functions, name)) or ""
     return " ".join(text.partition("\n\n")[0].split())
 

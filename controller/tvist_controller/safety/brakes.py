@@ -17,8 +17,7 @@ LONGEST = 5.0
 def brake(description: RobotDescription, carried: Payload, state: Target, period: float) -> Known:
     """Simulate the rigid arm under its brakes from a state of motion, in ticks of `period` seconds.
 
-    Each joint is slowed down by its brake, assumed as strong as its drive, and stays at rest afterwards. With
-    rotors:
+    Each joint is slowed down by its brake, assumed as strong as its drive, and stays at rest afterwards. With rotors:
 
         (M(q) + B) q̈ + C(q, q̇) q̇ + g(q) = -τ_b sgn(q̇)    over the joints that still turn.
 

@@ -50,10 +50,7 @@ class MotionRecorder:
         self._beliefs: FilterState | None = None
 
     def take(self, sample: Sample, present: Callable[[], FilterState]) -> Record | None:
-        """Take a tick with the drives on; return the motion that it completes or cuts short, if any.
-
-        `present` is called only at the start of a motion.
-        """
+        """Take a tick with drives on; return the motion it ends, if any; `present` is called at its start."""
         resting, done = sample.mode.at_rest, None
         if not resting and (not self._moves or self._stop):
             done = self._finished()

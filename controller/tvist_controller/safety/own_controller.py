@@ -1,7 +1,4 @@
-"""A robot with its own controller, which is only watched, or moved through that controller.
-
-Its reports become the state here; if the robot is moved through it, its safety state is obeyed.
-"""
+"""A robot with its own controller, whose reports become the state here, and whose safety state is obeyed."""
 
 from enum import IntEnum
 
@@ -87,10 +84,7 @@ class Watching(RemoteStatus):
         modes.now = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
 
     def look(self) -> int | None:
-        """Take the next report; return its tick, None without one.
-
-        `tell_cycle` then emits the changes, once the tick has this number.
-        """
+        """Take the next report; return its tick, None without one; `tell_cycle` then emits the changes."""
         self._before = self._sight
         try:
             self._sight = self._plant.sight()
@@ -165,7 +159,6 @@ class Supervision(RemoteStatus):
         return msgspec.structs.replace(super().io(io, force=force), **kept)
 
     def _scale(self, sight: Sight) -> None:
-        """Scale motions by the robot's speed slider."""
         slider, motions = 1.0 if sight.slider is None else sight.slider, self._motion.motions
         before = motions.wanted_speed
         motions.scale(slider)

@@ -21,8 +21,7 @@ EVERY = 10
 MEMORY = 2.0
 """Time constant of the memory, many periods of a vibration [s]."""
 RECENT = 0.1
-"""Shorter time constant for the mass in a warning, because the long memory includes the time before a pick-up
-[s]."""
+"""Shorter time constant for the mass in a warning, because the long memory includes the time before a pick-up [s]."""
 ENOUGH = 1.0
 """Observation time before a judgement [s]."""
 TOLERATED = 0.5
@@ -73,22 +72,21 @@ def correlate(
 class PayloadMonitor(Monitor):
     """Compares the declared payload with drive torques, in motion and at rest.
 
-    The torque r that a drive's feedback adds to the feed-forward is what the model does not explain. A mass
-    error μ adds y(q, q̇, q̈) μ, with y the torque of 1 kg at the declared centre of mass. The estimate over
-    some time is
+    The torque r that a drive's feedback adds to the feed-forward is what the model does not explain. A mass error μ
+    adds y(q, q̇, q̈) μ, with y the torque of 1 kg at the declared centre of mass. The estimate over some time is
 
         μ = Σ yᵀ W r / Σ yᵀ W y,   W = diag(1/F²),      |error of μ| <= Σ_j Σ |y_j| W_j φ F_j / Σ yᵀ W y
 
-    where the bound covers unknown friction of up to φF per joint. Vibrations have zero mean and cancel. A
-    warning requires that μ exceed the bound plus the tolerated error, so there is none in an upright posture,
-    where gravity has no lever arm.
+    where the bound covers unknown friction of up to φF per joint. Vibrations have zero mean and cancel. A warning
+    requires that μ exceed the bound plus the tolerated error, so there is none in an upright posture, where gravity has
+    no lever arm.
 
-    Arms with only vertical axes are not judged: they feel the payload only in acceleration, delayed by soft
-    joints. A changed frequency would be less clear, and visible only in vibration: 3 kg instead of 5 kg
-    change the frequency by a fifth, but the shoulder's torque by half.
+    Arms with only vertical axes are not judged: they feel the payload only in acceleration, delayed by soft joints. A
+    changed frequency would be less clear, and visible only in vibration: 3 kg instead of 5 kg change the frequency by a
+    fifth, but the shoulder's torque by half.
 
-    A robot that learns its payload does so after a motion. The warning waits until a motion has been studied
-    in vain, and then refers to the assumed payload, so that there is one verdict at a time.
+    A robot that learns its payload does so after a motion. The warning waits until a motion has been studied in vain,
+    and then refers to the assumed payload, so that there is one verdict at a time.
     """
 
     needs: ClassVar = "drives alone"  # else what the tool touches would be taken for a payload
@@ -110,10 +108,7 @@ class PayloadMonitor(Monitor):
         self._correlate(np.zeros((QDD + 1, len(still))), nothing)
 
     def declare(self, payload: Payload, ticks: int, *, found: bool = False, told: bool = False) -> None:
-        """Set another payload: discard measurements, and wait while it is phased in.
-
-        `found`: assumed by the robot, not declared; `told`: another warning was already sent.
-        """
+        """Set another payload and discard measurements; `found` by the robot itself, `told` in a warning."""
         self.payload = payload
         self._called = "assumed" if found else "declared"
         self._arm.chain[-2, BODY:] = self._arm.on_flange(Payload(mass=1.0, com=payload.com))
@@ -129,7 +124,6 @@ class PayloadMonitor(Monitor):
         self._be_sure()
 
     def _be_sure(self) -> None:
-        """Reset the doubt."""
         self._doubted = self._rested = 0.0
         self._moved = False
 

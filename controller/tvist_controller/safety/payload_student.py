@@ -37,9 +37,8 @@ UNKNOWN = {
     "link": 0.03,
     "rotor": 0.2,
 }
-"""Prior deviations per joint [-]: Coulomb friction, relative; effect of half its width; viscous friction at 1
-rad/s relative to Coulomb friction; gain of the torque sensor; friction at rest; mass of the link; rotor
-inertia."""
+"""Prior deviations per joint [-]: Coulomb friction, relative; effect of half its width; viscous friction at 1 rad/s
+relative to Coulomb friction; gain of the torque sensor; friction at rest; mass of the link; rotor inertia."""
 FRICTION = ("friction", "friction's width", "viscous friction", "standing")
 """Which of these are friction."""
 NOISE = (0.08, 0.001)
@@ -103,10 +102,7 @@ class Equations:
     """Number n of joints."""
 
     def solve(self, prior: Estimate) -> Estimate | None:
-        """Return mass and centre of mass; None if something else pushed the arm, or a value is not finite.
-
-        `prior` is the knowledge without the motion; its `x` is `at`.
-        """
+        """Return mass and centre of mass, given a prior about `at`; None if pushed, or not finite."""
         if not (np.isfinite(self.rows).all() and np.isfinite(self.measured).all()):
             return None
         mass, per_kg = float(self.at[0]), self.rows[:, 0]

@@ -20,7 +20,6 @@ class RobotModes:
         self._stops: dict[SafetyMode, Event] = {}
         """Events of stops that may still hold, by resulting safety mode, newest last."""
         self.now = 0, 0, 0
-        """Robot mode, safety mode and runtime state."""
         self.update()
 
     def update(self) -> None:
@@ -45,10 +44,7 @@ class RobotModes:
 
     @property
     def stop_reason(self) -> StopReason | None:
-        """The stop that blocks the robot; None without one or its event.
-
-        If the safety system allows motion but power is off, it is the last stop that cut the power.
-        """
+        """The stop that blocks the robot, or cut the power still off; None without one or its event."""
         robot, safety, event = self._motion.robot_mode, self._motion.safety_mode, None
         if safety not in _MAY_MOVE:
             event = self._stops.get(safety)
@@ -63,10 +59,7 @@ class RobotModes:
 
 
 def _cause(event: Event, mode: SafetyMode) -> SafetyMode | None:
-    """Return the safety mode that an event explains, NORMAL for a mere loss of power, None if unknown.
-
-    The present mode is the most severe one and may have another cause.
-    """
+    """Return the safety mode that an event explains, NORMAL for a mere loss of power, None if unknown."""
     if event.kind == "protective_stop":
         return SafetyMode.PROTECTIVE_STOP
     if event.category == 2:

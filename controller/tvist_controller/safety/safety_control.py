@@ -26,7 +26,6 @@ class SafetyControl:
     def __init__(self, motion: MotionControl, emit: Emit) -> None:
         self._motion, self._emit = motion, emit
         self.monitors: Sequence[Monitor] = ()
-        """Monitors of a tick's signals, in order."""
         self._held = True
         self._resumes_by_itself = False
         """Whether a motion paused by a safeguard resumes when it is released."""
@@ -93,10 +92,7 @@ class SafetyControl:
     # ------------------------------------------------------------------ power, brakes and protective stops
 
     def power_on(self, *, release_brakes: bool = True) -> None:
-        """Power the arm and release its brakes, if wanted.
-
-        Raise RefusalError if it moves, is in a protective stop, or does not report its position.
-        """
+        """Power the arm and release its brakes, if wanted; raise RefusalError if not possible now."""
         motion = self._motion
         trigger, held = "power_on" if release_brakes else "power", motion.robot_mode is RobotMode.RUNNING
         motion.check(trigger)
@@ -206,8 +202,7 @@ class SafetyControl:
     def recover(self, error: PlantError, seed: int) -> Sample:
         """Recover from a failed arm: place a simulated one at rest at its reference, in a protective stop.
 
-        One that cannot be placed, or fails again at once, stays without power until the safety system is
-        restarted.
+        One that cannot be placed, or fails again at once, stays without power until the safety system is restarted.
         """
         motion, cycle = self._motion, self._motion.cycle
         placed = isinstance(cycle.plant, SimulatedArm)

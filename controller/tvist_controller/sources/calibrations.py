@@ -1,7 +1,4 @@
-"""Calibrations of the package, and their products: estimators, elastic feed-forward, friction.
-
-An arm's modes follow from its masses, the declared payload, and the calibration's springs and drives.
-"""
+"""Calibrations of the package, and their products: estimators, elastic feed-forward, friction."""
 
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -56,8 +53,7 @@ def available() -> tuple[str, ...]:
 def default_for(model: str) -> str | None:
     """Return the default calibration of a robot model, None without one.
 
-    It is the package's first by name with the paper's polynomials for this model, or else the first for this
-    model.
+    It is the package's first by name with the paper's polynomials for this model, or else the first for this model.
     """
     own = [name for name in available() if load(name).robot == model]
     return next((name for name in own if load(name).polynomial is not None), own[0] if own else None)
@@ -225,7 +221,6 @@ def friction_law(parameters: Sequence[ModalParameter], description: RobotDescrip
 def _values(
     parameters: Sequence[ModalParameter], quantity: Quantity, places: range | tuple[int, ...]
 ) -> list[float]:
-    """Return a quantity of each joint or link."""
     said = [(j, one.value) for one in parameters if one.quantity == quantity for j in one.joints]
     numbers = sorted(place for place, _ in said)
     if numbers != sorted(places):

@@ -69,10 +69,7 @@ def first_source(description: RobotDescription, calibration: Calibration | None)
 
 
 def modal_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource | None:
-    """Return a robot's source `modal`, from its own calibration or one of the package; None if there is none.
-
-    Without a calibration, before identification, the package's are not used.
-    """
+    """Return a robot's source `modal`, from its calibration or one of the package; None without any."""
     if calibration is None:
         return None
     for one in (calibration, *map(load, available())):

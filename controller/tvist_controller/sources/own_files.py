@@ -1,8 +1,4 @@
-"""Users' Python files with a shaper or plant, given as FILE.py:NAME.
-
-Only the command line, configurations and state files can name files. Network clients cannot, and recordings
-never cause a file to be run.
-"""
+"""Users' Python files with a shaper or plant (FILE.py:NAME), never named by network clients or recordings."""
 
 import hashlib
 import re

@@ -1,8 +1,4 @@
-"""Shapers from users' files, given as FILE.py:NAME.
-
-Only the command line, configurations and state files can name files. Network clients choose from loaded
-shapers, and recordings never cause a file to be run.
-"""
+"""Shapers from users' files (FILE.py:NAME), never loaded for network clients or recordings."""
 
 from dataclasses import dataclass, field
 from typing import Any

@@ -12,10 +12,7 @@ from tvist_controller.trajectory.path import Path
 
 @dataclass(frozen=True)
 class Forecast:
-    """When and how hard a trajectory along a path will brake, as known without simulation.
-
-    Values refer to the path's parameter, which for a straight line in joint space is the posture.
-    """
+    """When and how hard a trajectory will brake, in its path's parameter, as known without simulation."""
 
     path: Path
     """Path of the trajectory."""

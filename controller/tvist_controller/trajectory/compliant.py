@@ -89,10 +89,9 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats, period: 
 class Compliant(Following):
     """Moves the tool by force control in compliant axes, and as another reference does in stiff ones.
 
-    The tracked pose P is integrated from twists along the task's axes: the force law's velocity where
-    compliant, that of the inner reference's tool elsewhere. The joints follow P by Newton's method and a
-    `Limiter`. Compliance that joint limits or singular postures prevent is dropped from P, so that nothing is
-    caught up later.
+    The tracked pose P is integrated from twists along the task's axes: the force law's velocity where compliant, that
+    of the inner reference's tool elsewhere. The joints follow P by Newton's method and a `Limiter`. Compliance that
+    joint limits or singular postures prevent is dropped from P, so that nothing is caught up later.
     """
 
     def __init__(
@@ -124,7 +123,6 @@ class Compliant(Following):
         """Start compliance of a tool from the joints' present motion."""
         q, qd, _ = self.state
         self.kinematics = kinematics
-        """Kinematics of the tool centre point."""
         self._pose = kinematics.pose(q)
         self._twist = kinematics.inverse(q)[0] @ qd
         nominal, moving, _ = self.inner.state
@@ -173,10 +171,7 @@ class Compliant(Following):
         super().pace(speed, slowest)
 
     def next(self) -> Floats:
-        """Advance by one tick and return the joint positions.
-
-        Raise StuckError if the inner reference or the joints cannot continue, or the force is not finite.
-        """
+        """Advance by one tick and return the joint positions; raise StuckError if it cannot continue."""
         h, task, felt = self._period, self.task, self._felt()
         if not np.isfinite(felt).all():
             raise StuckError("the force at the tool is no number")
@@ -236,10 +231,8 @@ class Compliant(Following):
 
 
 def _into(axes: Floats, base: Floats) -> Floats:
-    """Transform a twist or wrench from the base frame to axes."""
     return np.concatenate((base[:3] @ axes, base[3:] @ axes))
 
 
 def _out(axes: Floats, own: Floats) -> Floats:
-    """Transform a twist or wrench from axes to the base frame."""
     return np.concatenate((axes @ own[:3], axes @ own[3:]))

@@ -56,10 +56,7 @@ class Guided(Trajectory):
 
 
 class Following(Guided):
-    """Passes a signal through a `Limiter`: the arm's limits, joint range and available torque.
-
-    The client determines the timing, so the speed slider has no effect; reduced mode limits velocity.
-    """
+    """Passes a client's signal, timed by the client, through a `Limiter`; reduced mode limits velocity."""
 
     def __init__(
         self,
@@ -117,7 +114,7 @@ class Servo(Following):
         self.aim(self._q, LOOKAHEAD[0], GAIN[0])
 
     def aim(self, posture: Floats, lookahead: float, gain: float) -> None:
-        """Follow another posture; time constant [s] and gain [1/s^2] are clipped to `LOOKAHEAD` and `GAIN`."""
+        """Follow another posture; lookahead [s] and gain [1/s^2] are clipped to their ranges."""
         self._posture = np.array(posture, dtype=float)
         lag = min(max(lookahead, LOOKAHEAD[0]), LOOKAHEAD[1]) + DELAY * self._period
         k = max(min(max(gain, GAIN[0]), GAIN[1]), DAMPED / lag**2)

@@ -41,7 +41,7 @@ class TimeLaw(Protocol):
         """Times of possibly largest velocity or acceleration; some may be before `begins` [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
-        """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""
+        """Return the parameter [rad], its velocity and acceleration [rad, s] at a time [s], m each."""
 
 
 class DoubleS:
@@ -69,7 +69,6 @@ class DoubleS:
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
             ) from error
         self.limits = limits
-        """Limits."""
         self.begins = 0.0
         """Time from which it is known [s]."""
         self.duration = float(self._trajectory.duration)
@@ -107,7 +106,6 @@ class PlannedMotion(Trajectory):
     ) -> None:
         self.path, self._period = path, period
         self.law = law
-        """Time law."""
         self.agility = law.limits if agility is None else agility
         """Limits of a rate change."""
         self.limits = law.limits

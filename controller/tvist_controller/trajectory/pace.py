@@ -16,15 +16,13 @@ QUICKEST = 20.0
 class Pace:
     """Time rate r of a trajectory, 0 to 1, whose changes keep the motion's limits.
 
-    Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. ṙ may have any value that keeps |q̈|
-    within every joint's limit, so near the limits the rate does not change until the curve leaves room. The
-    rate approaches its target time-optimally within that room, with limited jerk (ruckig), in ticks of
-    `period` seconds.
+    Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. ṙ may have any value that keeps |q̈| within
+    every joint's limit, so near the limits the rate does not change until the curve leaves room. The rate approaches
+    its target time-optimally within that room, with limited jerk (ruckig), in ticks of `period` seconds.
     """
 
     def __init__(self, limits: MotionLimits, period: float, rate: float) -> None:
         self.limits, self._period = limits, period
-        """Limits of every joint."""
         self.acceleration = limits.acceleration
         """Acceleration limit of every joint, the motion's or less [rad/s^2]."""
         self.rate, self._slope = rate, 0.0

@@ -43,10 +43,7 @@ class Path(ABC):
 
     @abstractmethod
     def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return q, q̇ and q̈, shape (n,) or (k, n) [rad, s], for one or k states of the parameter.
-
-        Those are x, its velocity [1/s] and its acceleration [1/s^2], each of shape (m,) or (k, m).
-        """
+        """Return q, q̇ and q̈, (n,) or (k, n) [rad, s], for x, ẋ [1/s] and ẍ [1/s^2], (m,) or (k, m)."""
 
     @abstractmethod
     def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:
@@ -58,10 +55,7 @@ class Path(ABC):
 
     @abstractmethod
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
-        """Return the parameter's limits in a stop from x, shape (m,); None if the curve uses up the joints'.
-
-        The stop is never faster than `velocity` [1/s]; the velocity in `limits` is ignored.
-        """
+        """Return the parameter's limits in a stop from x, (m,), at up to `velocity` [1/s]; None for none."""
 
     @abstractmethod
     def way(self, start: Floats, end: Floats) -> Way:
@@ -82,10 +76,7 @@ class Path(ABC):
 
 
 class JointLine(Path):
-    """The straight line between two postures in joint space, each of shape (n,) [rad].
-
-    Its parameter is the posture itself, so shaping the parameter shapes the posture.
-    """
+    """Straight line between two postures in joint space, shape (n,) [rad]; the parameter is the posture."""
 
     posture_of = None
 

@@ -26,12 +26,11 @@ CLOSE = 1e-6
 class PlayOut:
     """Position of a stream to play at each tick, in sequence numbers.
 
-    The sender's clock may differ, and transport delay varies. The lateness of set-point k is the tick before
-    which it arrived minus k periods. Play-out waits for the latest of recent set-points, but not much longer
-    than the earliest needs. So it compensates jitter, follows a slow or fast clock, and does not wait for
-    gaps. The delay D approaches its target through three first-order lags, without overshoot. With stream
-    velocity q', q̈ contains -q' D̈; the lags' time constant, zero at rest, limits this term and its jerk to a
-    fraction of the limits.
+    The sender's clock may differ, and transport delay varies. The lateness of set-point k is the tick before which it
+    arrived minus k periods. Play-out waits for the latest of recent set-points, but not much longer than the earliest
+    needs. So it compensates jitter, follows a slow or fast clock, and does not wait for gaps. The delay D approaches
+    its target through three first-order lags, without overshoot. With stream velocity q', q̈ contains -q' D̈; the lags'
+    time constant, zero at rest, limits this term and its jerk to a fraction of the limits.
     """
 
     def __init__(
@@ -90,10 +89,7 @@ class PlayOut:
             self._wanted = wanted
 
     def advance(self, speed: float, behind: float) -> None:
-        """Advance by one tick at the fastest joint's velocity [rad/s].
-
-        `behind` is the lag of a reference that cannot catch up [s].
-        """
+        """Advance by one tick at the fastest joint's velocity [rad/s]; `behind`: the reference's lag [s]."""
         self._now += 1
         delay = self._lags[2]
         if behind > 0.0:

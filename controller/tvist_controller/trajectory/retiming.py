@@ -1,12 +1,11 @@
 """Time laws along curves with varying limits: the quickest with bounded jerk.
 
-In the phase plane of s and b = ṡ², constant acceleration is a straight line, db/ds = 2 s̈. A backward and a
-forward pass through the curve's cells find the largest permitted b (Bobrow, Dubowsky and Gibson 1985, with
-bounds independent of the sign of s̈). Its acceleration has steps; the moving mean of s(t) over `ramp` seconds
-has none, and bounded jerk.
+In the phase plane of s and b = ṡ², constant acceleration is a straight line, db/ds = 2 s̈. A backward and a forward
+pass through the curve's cells find the largest permitted b (Bobrow, Dubowsky and Gibson 1985, with bounds independent
+of the sign of s̈). Its acceleration has steps; the moving mean of s(t) over `ramp` seconds has none, and bounded jerk.
 
-This mean, and any shaper behind it, mixes moments of the motion and so passes a place at speeds of its
-neighbourhood. Joint limits in a cell therefore hold for all cells passed within a time window.
+This mean, and any shaper behind it, mixes moments of the motion and so passes a place at speeds of its neighbourhood.
+Joint limits in a cell therefore hold for all cells passed within a time window.
 """
 
 from bisect import bisect_right
@@ -18,9 +17,8 @@ from tvist_controller._compiled import compiled
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 TOOL_SHARE = 0.25
-"""Fraction of the shaper's window for which tool limits hold [-]. The speed changes so little within it that
-the shaped tool exceeds its acceleration in a bend by a hundredth; the whole window would cost half a second
-on some bends."""
+"""Fraction of the shaper's window for which tool limits hold [-]. The speed changes so little within it that the shaped
+tool exceeds its acceleration in a bend by a hundredth; the whole window would cost half a second on some bends."""
 LEAST = 1e-9
 """Smallest divisor."""
 ROUNDS = 3
@@ -67,8 +65,7 @@ def passes(
 ) -> Floats:  # pragma: no cover  compiled
     """Return the largest b = ṡ² at the c + 1 edges, zero at the last; `p` and `q` as in `Cells`.
 
-    `highest` is the largest b per cell. The first edges keep their `known` values, shape (k,): just 0 from
-    rest.
+    `highest` is the largest b per cell. The first edges keep their `known` values, shape (k,): just 0 from rest.
     """
     count, rows = p.shape
     begun = len(known)
@@ -119,8 +116,7 @@ def widened(
 def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
     """Insert constant speed for a ramp [s] between acceleration and braking, which halves their jerk.
 
-    The motion is unchanged up to edge `known`, and first constant if it brakes there; `b` is ṡ² at the edges,
-    (c + 1,).
+    The motion is unchanged up to edge `known`, and first constant if it brakes there; `b` is ṡ² at the edges, (c + 1,).
     """
     out, last = b.copy(), len(b) - 1
     number = known + 1
@@ -192,11 +188,10 @@ class RetimedLaw:
         )
         most = float(np.abs(accelerations).max())
         self.limits = MotionLimits(float(speeds.max()) * rate, most * rate**2, jerk * rate**3)
-        """Limits."""
 
     @property
     def moments(self) -> Floats:
-        """Times at which velocity or acceleration may be largest: where a cell begins, half a ramp and a ramp later."""
+        """Times of possibly largest velocity or acceleration: each cell's start, and up to a ramp later [s]."""
         times = self._times[1:]
         return np.concatenate((times, times + 0.5 * self.ramp, times + self.ramp)) / self.rate
 
@@ -220,7 +215,6 @@ class RetimedLaw:
         return self._origin + s, sd * rate, sdd * rate**2
 
     def _moment(self, time: float) -> tuple[float, float, float]:
-        """Return ∫s, s and ṡ of the motion before the mean."""
         begun, area, s, sd, sdd = self._rows[bisect_right(self._starts, time) - 1]
         t = time - begun
         return area + t * (s + t * (sd / 2.0 + t * sdd / 6.0)), s + t * (sd + 0.5 * t * sdd), sd + t * sdd

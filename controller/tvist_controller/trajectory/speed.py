@@ -31,15 +31,14 @@ of rounding and nearly singular postures [-]."""
 class Speed(Guided):
     """Accelerates joints or tool to a velocity and keeps it.
 
-    In the trajectory's own time, velocity u approaches its goal with constant acceleration, all entries in
-    phase. The reference has velocity r u with the time rate r, so a constant rate scales velocities by r and
-    accelerations by r². The rate changes as quickly as acceleration permits; jerk is not limited. Each tick
-    moves by the mean of its initial and final velocities. If torque or joint limits do not suffice, the
-    velocity changes less, still in phase.
+    In the trajectory's own time, velocity u approaches its goal with constant acceleration, all entries in phase. The
+    reference has velocity r u with the time rate r, so a constant rate scales velocities by r and accelerations by r².
+    The rate changes as quickly as acceleration permits; jerk is not limited. Each tick moves by the mean of its initial
+    and final velocities. If torque or joint limits do not suffice, the velocity changes less, still in phase.
 
-    A tool moves straight: its pose is integrated and tracked by Newton's method, so it does not drift. Near
-    singular postures the joints' path q(s) has a large second derivative; q'' ṡ² may use only a fraction of
-    joint acceleration, which slows the tool down beforehand.
+    A tool moves straight: its pose is integrated and tracked by Newton's method, so it does not drift. Near singular
+    postures the joints' path q(s) has a large second derivative; q'' ṡ² may use only a fraction of joint acceleration,
+    which slows the tool down beforehand.
     """
 
     def __init__(
@@ -100,10 +99,7 @@ class Speed(Guided):
 
     @property
     def _wanted_rate(self) -> float:
-        """The commanded rate, or a lower one at which fast joints keep their limit.
-
-        With a tool, joint velocities are not known ahead; `speed_step` handles them.
-        """
+        """The commanded rate, or less to keep joint limits, which for a tool `speed_step` handles."""
         if self.arm is not None:
             return self._speed
         fastest = max(float(np.abs(self._goal).max()), float(np.abs(self._u).max()))
@@ -135,11 +131,7 @@ class Speed(Guided):
         return not (self._goal.any() or self._u.any())
 
     def next(self) -> Floats:
-        """Advance by one tick and return the position of the joints.
-
-        Raises:
-            StuckError: The joints cannot move the tool on in its direction.
-        """
+        """Advance by one tick and return the joint positions; raise StuckError if it cannot continue."""
         if self.finished:
             self._step = self._qd = self._qdd = np.zeros_like(self._q)
             return self._q
@@ -179,11 +171,7 @@ class Speed(Guided):
 
     @property
     def _lag(self) -> float:
-        """Factor from a joint's acceleration to the difference from its previous step [s^2].
-
-        For joints the step starts from the velocity at the beginning of the tick, for a tool from the
-        previous step.
-        """
+        """Factor from acceleration to step change [s^2]: half a tick squared for joints, a whole one for tools."""
         return (0.5 if self.arm is None else 1.0) * self._period**2
 
     def _ranges(self) -> Floats:

@@ -82,8 +82,7 @@ def speed_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
 ) -> tuple[int, float]:
     """Follow the mean of two velocities for a tick, at the rate that joint limits and curvature permit.
 
-    Returns FOUND and the final rate; or IMPOSSIBLE due to limits; or SINGULAR if curvature permits hardly any
-    speed.
+    Returns FOUND and the final rate; or IMPOSSIBLE due to limits; or SINGULAR if curvature permits hardly any speed.
     """
     rate, speed, slowest, acceleration, lag, h = given[0], given[1], given[2], given[3], given[4], given[5]
     n, straight = len(q), chain.shape[0] > 0

@@ -47,8 +47,7 @@ def hermite(
 ) -> Floats:
     """Return the quintic with given values and first two derivatives (..., m) at both ends.
 
-    The ends are `length` apart, an array for several polynomials. Coefficients of rising powers have shape
-    (6, ..., m).
+    The ends are `length` apart, an array for several polynomials. Coefficients of rising powers have shape (6, ..., m).
     """
     h = length
     p0, v0, a0 = start
@@ -106,7 +105,6 @@ class SplineCurve(Path):
 
     def __init__(self, knots: Knots, most: Floats | None = None) -> None:
         self.knots = knots
-        """Knots."""
         self._knots = np.ascontiguousarray(knots.s)
         ends = [
             (knots.q[part], knots.slope[part], knots.second[part]) for part in (slice(-1), slice(1, None))
@@ -123,7 +121,6 @@ class SplineCurve(Path):
         if not start < end < np.inf:
             raise ValueError(f"length is {end - start}: must be more than 0")
         self.bends = self._bends(0, len(lengths))
-        """Bounds of derivatives."""
         slope, second, third = self.bends
         if not 0.0 < float(slope.max()) < np.inf:
             raise ValueError(f"slope is {slope.tolist()}: must be finite, and of one joint more than 0")

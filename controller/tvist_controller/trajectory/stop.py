@@ -152,9 +152,8 @@ class PathStop(Slowing):
 class SlowedStop(Trajectory):
     """A motion whose time slows down until it stands.
 
-    If tight bends lie ahead, for which the motion itself slows down, no limits based on curvature alone suit
-    a stop. This one passes the bends as the motion would, only later: on the path, never ahead of the motion,
-    and no faster.
+    If tight bends lie ahead, for which the motion itself slows down, no limits based on curvature alone suit a stop.
+    This one passes the bends as the motion would, only later: on the path, never ahead of the motion, and no faster.
     """
 
     path: Path
@@ -195,7 +194,7 @@ class SlowedStop(Trajectory):
         return self.path.forwards(self._samples[self._number(time)] - self._samples[0])
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the joints at k times after the start, each of shape (k, n)."""
+        """Return joint position, velocity and acceleration at k times after the start, each (k, n)."""
         numbers = [self._number(time) for time in times.tolist()]
         q, qd, qdd = (each[numbers] for each in self._states)
         return q, qd, qdd

@@ -111,7 +111,6 @@ class SetpointStream(Following):
         return 0.0 if self._play_out is None else self._play_out.delay * self._period
 
     def _receive(self) -> None:
-        """Take over the set-points since the last tick."""
         play_out, newest = self._play_out, max(self._waiting)
         self.sequence = newest
         if play_out is None:
@@ -145,7 +144,6 @@ class SetpointStream(Following):
         return self._play_out
 
     def _evaluate(self, play_out: PlayOut) -> tuple[Floats, Floats]:
-        """Return position [rad] and velocity [rad/s] of the stream."""
         origin, offset = play_out.position
         after = math.ceil(offset)
         if not self._complete(origin + after + self._look_ahead - 1):
@@ -194,7 +192,6 @@ class SetpointStream(Following):
         self._head = sequence
 
     def _wait(self) -> tuple[Floats, Floats]:
-        """Come to rest and wait for the stream to continue."""
         if self._pause is None:
             self._pause = self.end
         return self._pause.next(), self._pause.velocity
@@ -205,10 +202,7 @@ def linear(
     u: float,  # place between the last two, 0 < u ≤ 1; at 1 the value is exactly the last point [-]
     rate: float,  # of u [1/s]
 ) -> tuple[Floats, Floats, float]:
-    """Interpolate linearly between the last two points, with the slope of the parabola through three.
-
-    Returns the value, its time derivative, and the derivative's largest magnitude.
-    """
+    """Interpolate linearly, with the slope of a parabola; return the value, its derivative, and the largest slope."""
     found = np.empty((2, len(points[0])))
     fastest = on_parabola(points[1], points[2], points[3], u, rate, found)
     return found[0], found[1], fastest

@@ -108,10 +108,7 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
 
 
 def principal(inertia: Tensor) -> tuple[list[float], list[float]]:
-    """Return the principal moments of an inertia and their axes as a MuJoCo quaternion.
-
-    Zero moments become slightly positive, because MuJoCo rejects zero.
-    """
+    """Return principal moments, above zero for MuJoCo, and their axes as a quaternion."""
     xx, xy, xz, yy, yz, zz = inertia
     moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     if np.linalg.det(axes) < 0.0:

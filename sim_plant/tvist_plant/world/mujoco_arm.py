@@ -161,7 +161,6 @@ class MujocoArm(SimulatedArm):
         self._command = end
 
     def _measure(self) -> Measurement:
-        """Evaluate the accelerations at the present state and measure."""
         model, data = self._model, self._data
         mujoco.mj_forward(model, data)
         self._evaluated = True
@@ -242,7 +241,6 @@ class MujocoArm(SimulatedArm):
         return self._met(data)
 
     def _met(self, data: "mujoco.MjData") -> str | None:
-        """Return what the arm overlaps, None if nothing."""
         for touch in data.contact[: data.ncon]:
             geoms = [self._model.geom(geom) for geom in touch.geom]
             ours = any(one.bodyid[0] in self._world.arm or one.name.startswith("arm ") for one in geoms)

@@ -89,10 +89,7 @@ def build(
 
 
 def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjModel") -> None:
-    """Mount the shapes of the scene's tool on the flange without mass, which is part of the payload.
-
-    `alone` is the compiled scene, which has all poses and sizes as numbers.
-    """
+    """Mount the scene's tool on the flange, massless; `alone` is the scene compiled, with final numbers."""
     if tool.joints or tool.bodies:
         raise SceneError(
             "the body 'tool', which is mounted on the flange, has joints or bodies: must have shapes only"
@@ -139,7 +136,6 @@ def _add_capsules(
 
 
 def _name_all(spec: "mujoco.MjSpec", whose: str) -> None:
-    """Name all unnamed bodies and shapes, for pairs and messages."""
     for what, those in (("body", spec.bodies), ("shape", spec.geoms)):
         for number, one in enumerate(those):
             if not one.name:

@@ -8,11 +8,9 @@ from xml.etree.ElementTree import Element
 from tvist_plant.user_file import LARGEST, UserFileError, check_is_file, one_line, read_bytes, xml
 
 SCENES = Path(__file__).parent / "scenes"
-"""Folder of the package's scenes."""
 
 LARGEST_FILES, MOST_PLACES = 256 << 20, 20_000
-"""Largest total size of the files that a scene names [byte], and largest number of paths searched for
-them."""
+"""Largest total size of the files that a scene names [byte], and largest number of paths searched for them."""
 
 
 class SceneError(ValueError):

@@ -1,7 +1,4 @@
-"""Functions of Robotiq's URCap for programs that do not contain them.
-
-A program exported with the URCap has these functions in its preamble and calls those, which use a socket.
-"""
+"""Functions of Robotiq's URCap for programs that do not contain them in their preamble."""
 
 from math import ceil, floor
 from typing import Annotated

@@ -141,7 +141,7 @@ class MotionFunctions(Family):
 
     @costs(60)
     def optimovel(self, goal: object, a: PartOfLargest = 0.3, v: PartOfLargest = 0.3, r: Blend = 0) -> Turns:
-        """Move the tool on a line with shares of the largest acceleration and speed, which the joints limit further."""
+        """Move the tool on a line with fractions of its largest acceleration and speed; joints may limit it."""
         return self.movel(goal, a * MAX_TOOL[1], v * MAX_TOOL[0], 0, r)
 
     def _follow(self, segment: Segment) -> Turns:
@@ -246,7 +246,6 @@ class MotionFunctions(Family):
         return q
 
     def _pose(self, name: str, value: object) -> tuple[float, float, float, float, float, float]:
-        """Return a tool pose, from this or from joint positions."""
         if isinstance(value, Pose):
             return pose(name, value)
         if not isinstance(value, Array):

@@ -98,10 +98,7 @@ class SafetyFunctions(Family):
 
     @costs(10)
     def protective_stop(self) -> Turns:
-        """Make a protective stop, which pauses the program, or ends it if nothing follows.
-
-        Secondary programs wait.
-        """
+        """Make a protective stop, which pauses the program, or ends it if nothing follows. Secondary programs wait."""
         motion = self._access.motion
         motion.protect("the program asked for a protective stop")
         while motion.activity.protective and not self._arm.ends:

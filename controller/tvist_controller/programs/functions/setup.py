@@ -1,7 +1,4 @@
-"""Set-up of terminals, tool and safety by programs from PolyScope.
-
-Settings without effect on the simulated robot are checked; changing them causes a warning.
-"""
+"""Set-up of terminals, tool and safety by programs from PolyScope; settings without effect are only checked."""
 
 from typing import Annotated, Any
 

@@ -179,14 +179,12 @@ class SocketFunctions(Family):
 
 
 def _integers(received: bytes, number: int) -> tuple[tuple[int, ...], int] | None:
-    """Parse `number` 32-bit integers in network byte order."""
     if len(received) < 4 * number:
         return None
     return unpack_from(f">{number}i", received), 4 * number
 
 
 def _octets(received: bytes, number: int) -> tuple[tuple[int, ...], int] | None:
-    """Parse `number` bytes, each as a number."""
     return None if len(received) < number else (tuple(received[:number]), number)
 
 
@@ -199,10 +197,7 @@ def _line(received: bytes) -> tuple[bytes, int] | None:
 
 
 def _between(received: bytes, prefix: bytes, suffix: bytes) -> tuple[bytes, int] | None:
-    """Parse the text between a prefix and a suffix, and drop what precedes the prefix.
-
-    Without a suffix, it is everything received, at most `LONGEST_LINE`.
-    """
+    """Parse the text between a prefix and a suffix (without one, all received); drop what precedes."""
     start = received.find(prefix)
     if start < 0:
         return None
@@ -227,10 +222,7 @@ def _floats(received: bytes, number: int) -> tuple[tuple[float, ...] | None, int
 
 
 def _variable(received: bytes, name: str) -> tuple[int | None, int] | None:
-    """Parse the answer to a variable request, a line with its name and an integer; skip blank lines.
-
-    A blank line can remain from a message whose line feed came late.
-    """
+    """Parse the answer to a variable request, skipping blank lines whose line feed came late."""
     begin = len(received) - len(received.lstrip(b"\r\n"))
     found = _line(received[begin:])
     if found is None:

@@ -279,7 +279,6 @@ class PoseFunctions(Family):
     def _solution(
         self, goal: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None = None
     ) -> tuple[float, ...] | None:
-        """Return the nearest joint positions for a tool pose, None without a solution."""
         try:
             return self._kinematics.posture(goal, near, tcp)
         except Fault:
