@@ -94,7 +94,7 @@ class Controller(Robot):
             raise RefusalError("wrong_mode", "", REFUSED)
         if self.supervision is not None:
             self.supervision.check(command)
-        if not isinstance(command, SimulationStep):  # which changes nothing before its ticks
+        if not isinstance(command, SimulationStep):  # a step changes nothing before its ticks
             self._look_again()
         row, planned = COMMANDS[type(command)], partial(self.plans.found, command, plan)
         if row.check is not None:
@@ -109,7 +109,7 @@ class Controller(Robot):
         """Take a set-point, None if not admitted; `note` journals one of the client in control first."""
         self.counters.setpoints_received += 1
         if setpoint is None or not is_holders(self.session.lease, setpoint.token):
-            self.counters.setpoints_refused += 1  # neither the stream nor the journal is concerned
+            self.counters.setpoints_refused += 1  # not part of the stream or the journal
             return
         if note is not None:
             note()
@@ -145,7 +145,7 @@ class Controller(Robot):
         if self.supervision is not None:
             try:
                 self.supervision.look()
-            except PlantError as error:  # leases still end while it does not answer
+            except PlantError as error:  # leases still expire while the plant does not answer
                 self._failed = error
             self.counters.missed_ticks = self.supervision.missed
         if self.now >= self._next_timeout:

@@ -165,7 +165,7 @@ class Host:
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
             if beliefs.declared != self.controller.assumed.assumed:
-                continue  # it is void: another payload was declared, learnt or forgotten since
+                continue  # outdated: another payload was declared, learnt or forgotten since
             self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
             self.controller.assumed.learn(lesson, plan)
         for error in experience.raised():

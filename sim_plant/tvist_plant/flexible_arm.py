@@ -193,7 +193,7 @@ class FlexibleArm(SimulatedArm):
         self._arm.pushed[:] = 0.0 if self._outside.rests else self._outside.generalized_force(self._q)
         evaluate(self.memory, np.empty(self._width))
         self._arm.pushed[:] = 0.0
-        # The integrator extrapolates from the last two ticks: the jump between them is no trend.
+        # The integrator extrapolates from the last two ticks, but their difference is a jump, not a trend.
         self._arm.dynamics[LAST] = self._arm.dynamics[NOW]
 
     def push(self, torque: Floats) -> None:

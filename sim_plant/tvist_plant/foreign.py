@@ -149,7 +149,7 @@ def check_sight(sight: Sight, joints: int) -> None:
     felt, load = sight.measured, sight.payload
     measured = np.concatenate((felt.q, felt.qd, felt.moment)).tolist()
     body = None if load is None else (load.mass, *load.com, *load.inertia)
-    for name, said, count in (  # whose sums are finite only if they are, and quicker to see than by numpy
+    for name, said, count in (  # a finite sum means finite values; faster than numpy
         ("target", np.ravel(sight.target).tolist(), 4 * joints), ("measured", measured, 3 * joints),
         ("modes", sight.modes, 3), ("speed", (sight.speed,), 1), ("tick", (sight.tick,), 1),
         ("tool", sight.tool, 6), ("force", sight.force, 6), ("payload", body, 10),

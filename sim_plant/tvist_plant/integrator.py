@@ -165,7 +165,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
     bias, last_bias = arm.dynamics[NOW, links], arm.dynamics[LAST, links]
     springs, f = arm.springs, arm.force
     h = period / substeps
-    sticks = False  # found once, since the arms whose motors do not stick have to stay as fast as without
+    sticks = False  # keeps arms without stiction fast
     for j in range(n):
         joint = of_joint(arm.joints, j)
         sticks = sticks or joint.stiction > 0.0 or joint.stiction_load > 0.0
@@ -184,7 +184,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
             if joint.breakaway != 1.0:
                 fall = math.exp(-((speed / joint.stribeck_speed) ** 2))
                 rise = 1.0 + (joint.breakaway - 1.0) * fall
-            # Friction's slope at rest is implicit in `springs`; the part that saturates is corrected here.
+            # `springs` treats friction's slope at rest implicitly; correct the saturated part here.
             slack = 0.0
             if joint.friction > 0.0:
                 steep = speed / joint.friction_width

@@ -89,7 +89,7 @@ def flexible_model(
         flexes += bending[-2:]
         stiffness += [stiffness_of[number]] * 2
         if torsion is not None:
-            # A tube twists about its middle, which the line between the joints' frames may be far from.
+            # A tube twists about its axis, which may be far from the line between the joint frames.
             _, y, z = frame.rotation @ np.array(description.links.com[number])
             axis = pin.SE3(np.eye(3), np.array([0.0, y, z]))
             parent = model.addJoint(parent, pin.JointModelRX(), axis, f"{name}_torsion")

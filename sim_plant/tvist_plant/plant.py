@@ -234,7 +234,7 @@ class Plant(ABC):
         found = getattr(self, method.__name__)
         return callable(found) and getattr(found, "__func__", found) is not method
 
-    # ------------------------------------------------------------------ what it carries and grips
+    # ------------------------------------------------------------------ payload and gripper
 
     def load(self, payload: Payload) -> None:
         """Carry another payload from now on; positions and velocities stay."""
@@ -257,7 +257,7 @@ class Plant(ABC):
         """Return the measured distance between the fingers [m]."""
         self._lacks("opening")
 
-    # ------------------------------------------------------------------ power, and the tick
+    # ------------------------------------------------------------------ power and ticks
 
     @property
     def condition(self) -> Condition:
@@ -289,7 +289,7 @@ class Plant(ABC):
         """Whether tvist moves it through its own controller; see `RealArm.seen`."""
         return False
 
-    # ------------------------------------------------------------------ what only a simulation knows
+    # ------------------------------------------------------------------ simulation only
 
     def truth(self) -> PlantTruth | None:
         """Return what a real robot cannot measure, after the last step or reset; None if unknown."""
@@ -325,7 +325,7 @@ class Plant(ABC):
         """Make the state NaN for the fault `nan`; the next step then raises `PlantError`."""
         self._lacks("make_nan")
 
-    # ------------------------------------------------------------------ the world around it
+    # ------------------------------------------------------------------ world
 
     def things(self) -> Things | None:
         """Return the objects around the arm, which do not change; None if there are none."""

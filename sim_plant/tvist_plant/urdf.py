@@ -210,7 +210,7 @@ def _content(
         placement = turn.inverse() * ends[number + 1]
         into.append((turn * placement).inverse())
         bodies.append(into[-1].act(model.inertias[number + 1]))
-        if number == 0:  # turning about the first axis and moving along it change places with the joint
+        if number == 0:  # rotation about and shift along the first axis commute with the joint
             placement = pin.SE3(first.rotation, first.translation - away) * placement
         placements.append(_row(placement))
     meshes = [
@@ -278,7 +278,7 @@ def mesh_file(name: str, urdf: Path) -> Path:
     if not name.startswith("package://"):
         return folder / name.removeprefix("file://")
     inside = Path(name.removeprefix("package://"))
-    # A URDF stands somewhere in its package, or in one beside it.
+    # A URDF is in its own package, or in a neighbouring one.
     places = [
         above / part for above in (folder, *folder.parents) for part in (inside, Path(*inside.parts[1:]))
     ]

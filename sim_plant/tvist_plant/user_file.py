@@ -37,8 +37,8 @@ class UserFileError(ValueError):
 
 def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
     """Read a file named by a user; `what` names its kind in messages, such as "robot file"."""
-    # Check before opening, since opening a device may already have an effect, and again afterwards, since the path
-    # may refer to another file by then. Open without blocking, since that may be a pipe.
+    # Opening a device may have effects, so check before; the file may be replaced meanwhile, so check again
+    # afterwards. It may then be a pipe, so open without blocking.
     check_is_file(path, what)
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with open(descriptor, "rb") as stream:  # noqa: PTH123  a descriptor, not a path
@@ -87,7 +87,7 @@ def xml(data: bytes) -> Element:
         root: Element = parser.close()
     except UserFileError:
         raise
-    except (ParseError, LookupError, ValueError) as error:  # the last two: of an unknown encoding
+    except (ParseError, LookupError, ValueError) as error:  # the last two: unknown encoding
         raise UserFileError(f"it is not valid XML: {error}") from error
     return root
 

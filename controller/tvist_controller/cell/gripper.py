@@ -240,10 +240,10 @@ def answer(gripper: Gripper, request: bytes) -> bytes:
         case ["GET", name] if (value := gripper.read(name)) is not None:
             digits = _DIGITS.get(name, 1)
             return (f"{value:0{digits}d}" if alone else f"{name} {value}\n").encode()
-        case ["SET", "SCN_BLOCK", _]:  # looks for grippers no more
+        case ["SET", "SCN_BLOCK", _]:  # stop scanning for grippers
             return b"ack"
         case ["SET", "SID", slave]:
-            return b"ack" if slave in SLAVES else b""  # nobody answers for a gripper that is not there
+            return b"ack" if slave in SLAVES else b""  # no answer for a gripper that does not exist
         case ["SET", *pairs] if pairs and len(pairs) % 2 == 0:
             return _set(gripper, pairs)
     return UNKNOWN

@@ -50,7 +50,7 @@ class Wires:
         self._wires = [(bit_of(one.output), bit_of(one.input), one.ticks, one.inverted) for one in wires]
         self._outputs: int | None = None
         """Outputs of the last tick; None before the first."""
-        # Those of one wire are in order of time, as its delay is always the same.
+        # Entries of one wire are in order of time, since its delay is constant.
         self._under_way: list[deque[tuple[int, bool]]] = [deque() for _ in wires]
         self._left = 0
 
@@ -165,7 +165,7 @@ class LiveCell:
             return
         if self._held is not None:
             self._put_down(q)
-            self._share = 0  # it stays behind with the tool
+            self._share = 0  # it stays with the tool
         self._tool = tool
         self._load = self._first_load if tool is self._cell.tools[0] else _tool_body(tool)
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")

@@ -58,7 +58,7 @@ class Robot(ABC):
         plant = self.cycle.plant
         self.seed = setup.seed
         """Seed for the next reset of a simulated arm."""
-        # What only watches has no power to move anything, whatever is asked of it.
+        # A robot that is only watched cannot be moved.
         mode = "POWER_OFF" if plant.watched else setup.mode
         collisions = CollisionModel(description, body(setup.payload))
         self.motion = motion = MotionControl(self.cycle, collisions, self.emit, mode)
@@ -98,7 +98,7 @@ class Robot(ABC):
     def _monitors(self) -> tuple[Monitor, ...]:
         description = self.setup.description
         overload = Overload(description.robot.joints, description.limits.torque)
-        # An arm with a controller of its own is watched by that; here its torques may be guessed from currents.
+        # A driven arm's own controller monitors its torques; those reported here may be estimates from currents.
         drives = () if self.cycle.plant.supervised else (overload,)
         return *drives, ShaperMonitor(self.cycle), self.force_control, self.assumed.monitor
 

@@ -40,7 +40,7 @@ def _take_control(robot: Robot, call: Call[c.TakeControl]) -> Reply:
 _RIGHTS = (
     Row(c.TakeControl, _take_control, lease="none", check=_check_version),
     Row(c.KeepAlive, lambda _, __: None),  # every command renews the lease
-    # Who takes control from the new holder gets a token of its own.
+    # The new holder takes control with its own token.
     Row(c.HandOver, lambda robot, call: robot.session.hand_over(call.command.client, call.now, call.session)),
     Row(c.ReleaseControl, lambda robot, _: robot.session.release()),
     Row(

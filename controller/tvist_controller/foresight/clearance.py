@@ -86,7 +86,7 @@ def rooms(
         for j in range(q.shape[0]):
             way += pairs[p, ARMS + j] * turned[j]
         found[p] = gap(bodies, ends, int(pairs[p, ONE]), int(pairs[p, OTHER])) - way
-        # Nothing is clear in a posture that is not finite.
+        # A non-finite posture is never clear.
         least = min(least, found[p]) if math.isfinite(found[p]) else -math.inf
     return least
 
@@ -130,7 +130,7 @@ def stop_has_room(
                 way += pairs[p, ARMS + j] * left[j]
                 speed += pairs[p, ARMS + j] * fastest[j]
             room = gap(bodies, ends, int(pairs[p, ONE]), int(pairs[p, OTHER])) - least
-            if not room > 0.0:  # negated, so that nothing is clear in a posture that is not finite
+            if not room > 0.0:  # negated, so that NaN is never clear
                 return False
             if not room > way:
                 waiting[count] = p

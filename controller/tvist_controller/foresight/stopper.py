@@ -67,7 +67,7 @@ class Stopper:
     def brake(self, trajectory: Trajectory) -> None:
         """Follow the arm while its brakes stop it; no other stop replaces this."""
         self._cycle.begin(trajectory, LineMode.STOPPING)
-        self._wanted = math.inf  # as if the hardest stop had been asked for
+        self._wanted = math.inf  # like a request for the hardest stop
 
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
         """Return the quickest permitted stop from the present state without starting it; see `stop`."""
@@ -77,7 +77,7 @@ class Stopper:
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
         stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
-        # A stop that goes on is replaced by a harder one only: each new one begins with a ramp of its own.
+        # Replace a running stop only by a harder one, since each new stop begins with a ramp.
         braking = cycle.mode is LineMode.STOPPING or present.acceleration > 0.0
         if braking and (stop is None or stop.acceleration <= present.acceleration):
             return None
@@ -88,21 +88,20 @@ class Stopper:
 
     def _on_path(self, forecast: Forecast, deceleration: float | None) -> StopPlan | None:
         cycle, forecast = self._cycle, self._shaped(forecast)
-        # Stops on a path are sought in the order of their cost: by bounds alone, then beside the motion simulated for
-        # as long as a stop lasts, then beside the whole of it.
+        # Try the cheapest search first: bounds only, then simulation of a stop's duration, then of the whole motion.
         state, newest = cycle.along.published, cycle.along.position
         stop = self.stops.on_path(state, newest, forecast, deceleration)
         lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
         ahead = None
         if stop is None:
             ahead = LineSimulation(*cycle.fork())
-            # A motion that cannot turn back has to be simulated only for as long as a stop lasts.
+            # Unless the motion may turn back, simulating a stop's duration is enough.
             ahead.until(MAX_AHEAD if forecast.turns else 0)
             stop = self.stops.under(ahead, state, forecast, deceleration)
         if stop is None and ahead is not None:
             ahead.until(MAX_AHEAD)
             asked = None
-            if not ahead.rests:  # it lasts so long that any stop is sooner
+            if not ahead.rests:  # too long: any stop ends sooner
                 stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
             else:
                 last, asked = ahead.last, self.stops.asked(np.array(ahead.references))

@@ -81,8 +81,8 @@ class StopPlanner:
         if hardest is None:
             return None
         in_time = forecast.steady + COUNTED * max(speed, 0.0) / forecast.braking
-        # A motion that is very slow may turn back a little, one that brakes with as much jerk as a stop may be as
-        # quick, and one that is about to rest is quicker than anything within the limits.
+        # A very slow motion may turn back a little; braking with a stop's jerk may end as soon as the stop; and a
+        # motion about to rest ends sooner than any stop within the limits.
         creeps = speed < SLOW
         jerks = HARDER * forecast.jerk > hardest.jerk and forecast.steady < SOON
         rests = rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * hardest.jerk)

@@ -88,7 +88,7 @@ def gather(
 
 @compiled_for_ticks
 def write_state(
-    out: Bytes,  # of such a state; to return an array would take a microsecond more
+    out: Bytes,  # result; returning an array would take 1 µs longer
     places: Integers,  # of each of its numbers, in the order of its fields
     integers: Integers,  # place and encoded size of the tick and of the sequence number, shape (2, 2)
     tick: int,
@@ -97,7 +97,7 @@ def write_state(
     speed: float,  # share of the programmed speed [-]
     delay: float,  # of the shaper and of the drives [s]
     signals: Floats,  # before the arm, shape (9, n), see `line_tick`
-    before: Floats,  # references without the filter, shape (n,) [rad]; (0,) if the target is what they tell
+    before: Floats,  # references without the filter, shape (n,) [rad]; (0,) if they equal the target
     middle: Floats,  # the one of the target
     last: Floats,
     q: Floats,  # as measured, shape (n,) [rad]

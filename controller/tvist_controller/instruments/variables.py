@@ -81,7 +81,7 @@ def _constant(name: str, type_: str, what: str, value: object = 0) -> Variable:
     return Variable(name, type_, "constant", what, lambda _: value)
 
 
-# ---------------------------------------------------------------------- what takes more than an expression
+# ---------------------------------------------------------------------- reading functions
 
 
 def _runtime_state(r: Reading) -> int:

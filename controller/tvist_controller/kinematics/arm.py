@@ -149,7 +149,7 @@ class Arm:
         """Return joint positions near q at a tool pose, and the remaining error; `inverse` as in `newton`."""
         rotation, position = map(
             np.ascontiguousarray, goal
-        )  # of one layout, so that the kernel is compiled once
+        )  # same memory layout, so that the kernel is compiled only once
         found, error = q.copy(), np.empty(6)
         nearby = self.inverse(q)[1] if inverse is None else inverse
         newton(self.chain, rotation, position, nearby, steps, found, error)

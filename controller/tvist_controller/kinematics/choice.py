@@ -73,7 +73,7 @@ def _sample_curves(
         posture = table[row].copy()
         if approach(chain, rotation, position, near, posture) <= ACCURACY:
             _, inside = represent(arm, near, posture)
-            # The way from a posture within the ranges to the nearest one may lead out of them.
+            # Refinement may leave the joint ranges.
             if inside or least[row] >= OUTSIDE:
                 put(posture, table[row])
 
@@ -119,7 +119,7 @@ def closest(arm: Floats, chain: Floats, rotation: Floats, position: Floats, near
             put(table[best], q)
             locate(chain, q, now, place, J)
             far, angle = pose_error(rotation, position, now, place, error)
-            # Written so that a number that is none does not pass.
+            # Negated so that NaN fails.
             if max(far, angle) <= AIM or descend(chain, rotation, position, near, 0.0, 5, q) <= ACCURACY:
                 return (OUT_OF_RANGE if wrong else FOUND) + curve
             squares[best] = math.inf

@@ -58,7 +58,7 @@ class InverseKinematics:
         nearest posture of that curve is returned. The pose is accurate to 1e-9 m and 1e-9 rad. Raise
         InverseKinematicsError if no posture is in range.
         """
-        # Of one layout, so that the kernels are compiled once.
+        # Same memory layout, so that kernels are compiled only once.
         rotation, position, near = (np.array(given, float, order="C") for given in (rotation, position, near))
         if not self._closed:
             return self._search(rotation, position, near)

@@ -89,7 +89,7 @@ def locate(chain: Floats, q: Floats, R: Floats, o: Floats, J: Floats) -> None:
     for j in range(n):
         step_along(chain[j], R, o)
         bend(R, q[j])
-        # Each column holds the joint's axis, and a point on it in place of the lever, until the end is known.
+        # Until the end is known, each column holds the joint's axis and a point on it instead of the lever arm.
         for k in range(3):
             J[k, j], J[3 + k, j] = o[k], R[k, 2]
     step_along(chain[n], R, o)
@@ -163,7 +163,7 @@ def newton(
     inverse: Floats,
     steps: int,
     q: Floats,  # start, which becomes the result
-    error: Floats,  # result: what lacks to the pose, shape (6,) [m, rad]
+    error: Floats,  # result: remaining error, shape (6,) [m, rad]
 ) -> float:
     """Bring a chain's end to a pose by Newton's method with a nearby inverse Jacobian (n, 6).
 

@@ -94,7 +94,7 @@ def representation(angle: float, near: float, limit: float) -> float:
     value = angle + turn * math.floor((near - angle) / turn + 0.5)
     if abs(value) <= limit:
         return value
-    # A limit is a number in a file, and an angle that should be on it is beyond it by rounding half of the time.
+    # Tolerate rounding errors of angles exactly at the limit.
     fewest, most = math.ceil((-limit - 1e-10 - angle) / turn), math.floor((limit + 1e-10 - angle) / turn)
     if fewest > most:
         return angle - turn * math.floor(angle / turn + 0.5)

@@ -106,7 +106,7 @@ class ControlCycle:
             mode, reference, self.shaped.references, self.shaped.joints.window, signals, command, measured,
             self.drives.reference, refused, external,
         )  # fmt: skip
-        self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
+        self._settle()  # last, so that the final tick still counts as motion
         return self.sample
 
     def _to_drives(self, reference: Floats) -> Floats:
@@ -135,7 +135,7 @@ class ControlCycle:
             assert guard is not None, "what may be stuck is guarded"
             return self._stopped(guard, guard.give_up(str(error)))
         x_star = self.filter.filter(x) if self.mode.shaped else x
-        # Judged after the filter, since it is the shaped reference from which the arm must be able to stop.
+        # Check after the filter, since the arm must be able to stop from the shaped reference.
         if self.mode.guarded and guard is not None:
             stop = guard(self.shaped.joints.after(x_star))
             if stop is not None:
@@ -158,7 +158,7 @@ class ControlCycle:
         guard, path = guard or self.guard, trajectory.path
         check_change(self.mode, mode, guarded=guard is not None)
         if not mode.shaped:
-            # What the delay line still holds would carry the arm on after the stop: it is never played.
+            # Drop the delay line's content, which would move the arm after the stop.
             if path is None:
                 self.shaped.enter(None, self.position)
             self.filter.cut()
@@ -181,7 +181,7 @@ class ControlCycle:
         feed-forward, the paper's is used.
         """
         self.drives.use(elastic)
-        if self.mode.at_rest:  # both kinds of feed-forward are equal there, so that none has to fade
+        if self.mode.at_rest:  # both kinds of feed-forward are equal at rest: no fading
             self.drives.rest()
         if self.mode.at_rest or not self.mode.shaped:
             self.filter.begin(tvist, self.sample.reference)
@@ -243,7 +243,7 @@ class ControlCycle:
         on_path = self.shaped.posture_of is not None
         if on_path or not mode.shaped:  # the delay line restarts from where the motion ended
             self._enter(reference)
-        if on_path or not trajectory.finished:  # a motion that ran out while paused ends here
+        if on_path or not trajectory.finished:  # a motion that finished while paused ends here
             self.trajectory = Rest(reference)
         self.mode, self.guard = LineMode.REST, None
         self.drives.rest()

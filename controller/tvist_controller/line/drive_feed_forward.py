@@ -127,17 +127,17 @@ class DriveFeedForward:
             self._begin()
         rises = smooth and self._elastic is not None and self._elastic is self.wanted
         if self._share == 0 and rises and self._elastic is not None:
-            # Its lead is a history, which must be that of this motion.
+            # Its lead depends on past ticks; forget those of earlier motions.
             self._elastic.reset(self.rows[STICTION])
         if self._share in {0, FADE}:
             self._rising = rises
-        # It never turns back half-way: only a whole rise or fall has the smooth rate that `_blend` adds.
+        # Complete each transition, since `_blend` adds the rate of a complete one.
         self._share = min(max(self._share + (1 if self._rising else -1), 0), FADE)
 
     def _blend(self, plain: DriveCommand, elastic: DriveCommand) -> DriveCommand:
         """Blend both commands; the velocity is the derivative of the position."""
         x = self._share / FADE
-        # A quintic, whose velocity and acceleration are zero at both ends.
+        # Quintic with zero velocity and acceleration at both ends.
         share = x * x * x * (10.0 - x * (15.0 - 6.0 * x))
         rate = 30.0 * (x * (1.0 - x)) ** 2 * (self._rate if self._rising else -self._rate)
         away = elastic.q - plain.q

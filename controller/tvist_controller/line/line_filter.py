@@ -36,7 +36,7 @@ class LineFilter:
     def fault(self) -> str | None:
         """Name and fault of a shaper that could not compute weights at the last tick; None without fault."""
         fade, tvist = self._fade, self.tvist
-        if fade is None and tvist.fault is None:  # as at nearly every tick
+        if fade is None and tvist.fault is None:  # the usual case
             return None
         filters = (tvist,) if fade is None else (tvist, fade.old, fade.new)
         return next((f"shaper {one.name} {one.fault}" for one in filters if one.fault is not None), None)

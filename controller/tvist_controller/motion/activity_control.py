@@ -76,7 +76,7 @@ class MotionControl:
 
     @activity.setter
     def activity(self, activity: Activity) -> None:
-        # What every tick asks is looked up once.
+        # Cache what every tick reads.
         self._activity, self._moving, self.robot_mode = activity, activity.moving, activity.robot_mode
         self.changed = True
 
@@ -111,7 +111,7 @@ class MotionControl:
         move = self.motions.move
         if move is None or move.course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
             return replace(now, movable=False)
-        # Its time runs at full rate, whatever the rate of the running motion is.
+        # Its time rate is 1, independent of the running motion.
         return replace(
             now,
             movable=True,
@@ -278,7 +278,7 @@ class MotionControl:
         if self.power is not None:
             self.power.follow(self.robot_mode)
         sample = self.cycle.step(wrench)
-        # The line has begun a stop by itself, in the tick in which its guard refused a reference.
+        # The guard refused a reference, so the line has begun a stop.
         interrupted = None if sample.refused is None else after(self.activity, "interruption")
         if sample.refused is not None and interrupted is not None:
             self.activity = interrupted

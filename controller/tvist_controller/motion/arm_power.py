@@ -53,7 +53,7 @@ class ArmPower:
 
     def stop(self) -> None:
         """Make the plant stop itself, if it can."""
-        self._told = None  # by its own stop it has switched itself
+        self._told = None  # the arm has switched itself by its own stop
         with suppress(PlantError):  # the robot stops in any case, and says why
             self._plant.stop()
 

@@ -145,7 +145,7 @@ class ForceControl(Monitor):
 
     def look(self, sample: Sample) -> Finding | None:
         """Detect excessive force, and deviation in an axis that is not compliant."""
-        # Most arms have no sensor, and give way seldom: it then sleeps until something else is asked of it.
+        # Without sensor and compliance there is nothing to monitor: sleep.
         leads = isinstance(self._cycle.trajectory, Compliant)
         if sample.wrench is None and self._contact is None and self._source == DRIVES and not leads:
             self._beyond, self.awake = 0, False
@@ -161,7 +161,7 @@ class ForceControl(Monitor):
         ]
         if self._contact is not None:
             self._note_contact(self._contact, sample, pressed)
-        # NumPy's maximum, unlike Python's, is NaN if one of them is.
+        # NumPy's maximum propagates NaN, unlike Python's.
         force = float(np.max([np.linalg.norm(one) for one in pressed])) if pressed else 0.0
         why = self._excess(sample, force)
         self._beyond = 0 if why is None else self._beyond + 1

@@ -102,7 +102,7 @@ class RunningMove:
         if present is None or forecast is None or forecast.path is not self._trajectory.path:
             return None
         if self._held and self._cycle.trajectory is self._trajectory:
-            return present  # it is paused, and does not go on to its end
+            return present  # paused: it does not continue to its end
         return present[0], float(forecast.end[0])
 
     @property
@@ -130,7 +130,7 @@ class RunningMove:
         room = PAUSE_SHARE * acceleration_on_way(
             cycle.dynamics, trajectory.path, newest.q, way, speed, limits
         )
-        if not trajectory.steady:  # the slider is changing its speed already, and may use all
+        if not trajectory.steady:  # the slider is already changing its speed, possibly at full acceleration
             room = most
         self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
 

@@ -57,7 +57,7 @@ class Setpoints:
     @property
     def silent_at(self) -> float:
         """Time at which the stream becomes silent without another set-point, infinite without one [s]."""
-        # A little early, since sums round: `silence` decides.
+        # Slightly early because of rounding; `silence` decides.
         return math.inf if self.stream is None else self._heard + TIMEOUT - 1e-6
 
     def silence(self, now: float) -> str | None:

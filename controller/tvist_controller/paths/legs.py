@@ -158,7 +158,7 @@ def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> Meeting 
     bend = np.concatenate([_between(before[part], behind[part]) for part in (slice(3), slice(3, 6))])
     along = way.first[:3]
     speed = float(along @ along)
-    if speed > 0.0:  # the way is curved there, and not hurried
+    if speed > 0.0:  # the path is curved there, and not sped up
         bend[:3] -= (bend[:3] @ along / speed) * along
     return Meeting(0.5 * (start + end), bend)
 

@@ -68,7 +68,7 @@ def law_of(
     """Return the quickest time law of a run, or the one with the requested duration."""
     asked = [piece.pacing.duration for piece in run]
     if all(asked):
-        jerk = FASTEST * limits.jerk  # durations leave the jerk to the joints
+        jerk = FASTEST * limits.jerk  # with a duration, only the joints limit the jerk
     law = quickest_law(ground.way(limits, 1.0), jerk, window, goes_on=goes_on)
     if all(asked):
         wanted, hurry = sum({piece.where: piece.pacing.duration or 0.0 for piece in run}.values()), 1.0
@@ -165,7 +165,7 @@ class Ground(NamedTuple):
 
     def way(self, limits: JointLimits, hurry: float) -> Way:
         """Return the limits of the motion sped up by the factor `hurry`."""
-        # Joints jerk by the third derivative times ṡ³, by 3 q'' ṡ s̈, and by q' s⃛: the first two take a share each.
+        # Joint jerk: q''' ṡ³ + 3 q'' ṡ s̈ + q' s⃛; each of the first two terms gets a share.
         smooth = np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(self.third, LEAST))
         even = np.minimum(hurry * self.speed, smooth)
         fastest = (limits.velocity / np.maximum(self.slope, LEAST)).min(axis=1)

@@ -231,7 +231,7 @@ def _blend(
     drawn_out = meets != (None, None)
     share = _rounding(leg, first, last, drawn_out=drawn_out)
     blend = ToolBlend(first, last, leg.corner.rotation, share * (before + after))
-    curve = blend if drawn_out else evenly(blend)  # one that is drawn out is even by itself
+    curve = blend if drawn_out else evenly(blend)  # an extended one is already even
     if meets[0] is None:
         q, _, _ = _joints(leg, start, tracker, from_end=True)
     return Piece(tracker.follow(curve, q), pacing, None if pacing.even else curve, False, leg.where), curve

@@ -75,7 +75,7 @@ class Tracker:
         """Return the joints' motion along a tool path; raise WayError if singular or out of reach."""
         pieces = 1 if curve.length < SHORT else max(int(np.ceil(curve.length / SPACING)), 2)
         knots, step = [self._knot(curve, 0.0, q)], curve.length / pieces
-        # One after the other: of a way that leads out of the arm's reach, whatever its length, few knots are made.
+        # One by one, so that a long path out of reach fails after few knots.
         for piece in range(1, pieces + 1):
             knots += self._between(curve, knots[-1], curve.length if piece == pieces else piece * step)
         s, *rest = zip(*knots, strict=True)

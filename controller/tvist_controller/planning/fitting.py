@@ -113,7 +113,7 @@ class Fitter:
             by = found.slower
             need = found if need is None else min(need, found, key=lambda each: each.slower.rate)
             if number >= SPLIT:
-                # The spread of the impulses stays, so a slower motion may use more of a limit than the last one.
+                # The impulses' duration is constant, so a slower motion may use more of a limit than the last one.
                 most = 1.0 - min(HASTE * 2.0 ** (number - TRIES), 0.5) if number >= TRIES else 1.0
                 rate = min(by.rate, most)
                 by = Slower(rate, rate**2)

@@ -144,10 +144,10 @@ class PathPlanner:
         count: int,
         *,
         goes_on: bool = False,
-        several: bool = True,  # whether what makes it slower is to name the part of the path
+        several: bool = True,  # whether reasons for slowing down name the part of the path
     ) -> PlannedMove:
         """Plan a motion from rest along a run of a route with `count` segments."""
-        if not run:  # the arm is there already
+        if not run:  # already there
             still = JointLine(now.q, now.q)
             motion = quickest_motion(still, arm_limits(self._description), PERIOD, now.speed)
             return PlannedMove((motion,), 0.0, None, window=0.0, peak=tvist.peak)
@@ -248,7 +248,7 @@ def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tupl
         lengths = [piece.knots.s[-1] for piece in run]
         ends = ((0.0 if part else start) + np.cumsum(lengths)).tolist()
         for number, piece in enumerate(run):
-            # On the way to another segment, the last piece of one is its blend.
+            # Before another segment, the last piece is the blend.
             last = run[-1].where == piece.where
             marks[_number(piece.where)] = (
                 part,

@@ -46,7 +46,7 @@ class Plan(NamedTuple):
 def _same(one: Any, other: Any) -> bool:
     if isinstance(one, np.ndarray):
         return np.array_equal(one, other)
-    if isinstance(one, tuple):  # of arrays, perhaps, whose number changes while a payload is phased in
+    if isinstance(one, tuple):  # may contain arrays, whose number changes while a payload is phased in
         return len(one) == len(other) and all(map(_same, one, other))
     return one is other or one == other
 

@@ -48,7 +48,7 @@ def surplus_of(
                 hastens = max(
                     hastens, _hastens(tvist, estimator, random.uniform(-reach, reach), limits.velocity)
                 )
-            except FAILURES:  # a user's shaper, which reports this when it is used there
+            except FAILURES:  # a user's shaper reports this when it is used
                 continue
     hastens *= MARGIN
     hardens = (2.0 + RISE * limits.velocity / limits.acceleration) * hastens + STEADY * tvist.excess

@@ -48,7 +48,7 @@ def _check_of(annotation: Any, joints: int) -> Check | None:
         parts = get_args(annotation)
         inner = _check_of(parts[0], joints) if NoneType in parts else None
         return None if inner is None else lambda name, value: None if value is None else inner(name, value)
-    check: Any = get_args(annotation)[-1]  # behind what the protocol says of the type
+    check: Any = get_args(annotation)[-1]  # follows the protocol's metadata
     if isinstance(check, Meta):
         return within(*bounds(annotation))
     found: Check = several(joints) if check == OF_JOINTS else check
@@ -169,7 +169,7 @@ Vector3 = Annotated[tuple[float, ...], several(3)]
 Vector6 = Annotated[tuple[float, ...], several(6)]
 Target = Annotated[values.Pose, pose]
 
-# ---------------------------------------------------------------------- what programs get, and texts
+# ---------------------------------------------------------------------- return values and texts
 
 
 def a_list(values: Sequence[float]) -> Array:

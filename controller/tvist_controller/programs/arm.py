@@ -262,7 +262,7 @@ class ProgramArm:
         guidance = self._access.guidance
         if self._motion.activity.moving:
             self._rate_limit.charge()
-        guided, self._guided = self._guided, None  # so that `hear` does not miss it
+        guided, self._guided = self._guided, None  # so that `hear` ignores its end
         self.driver, self._abandoned = None, False
         if self._journey is not None:
             self._journey.number = None

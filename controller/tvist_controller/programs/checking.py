@@ -36,7 +36,7 @@ def check_program(text: str) -> list[Finding]:
     simulated, constructs that a UR robot rejects or reads differently, and texts that only define functions.
     """
     findings = [_error(error) for error in check(text, known_signatures())]
-    # Without these functions, the same check finds the places where they are called.
+    # Checking again without these functions locates their calls.
     known = {(finding.line, finding.column) for finding in findings}
     for error in check(text, _SIMULATED):
         unknown = _UNKNOWN.fullmatch(error.text)

@@ -30,9 +30,9 @@ class ScriptCompiler:
 
     def rehearse(self) -> None:
         """Build everything that compilation needs, in advance."""
-        from tvist_urscript import compile_script  # with the compiler, which no start waits for
+        from tvist_urscript import compile_script  # imported late, to keep the start fast
 
-        # Once as a program, and once as a statement that is added to it, which takes other ways through the compiler.
+        # A program, then a statement added to it: the compiler treats them differently.
         compile_script("sync()", known_signatures(), compile_script("sync()", known_signatures()))
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:

@@ -163,7 +163,7 @@ class Journey:
             if self.skipped:
                 break
             if isinstance(plan.found, RefusalError):
-                self._refused(plan.found, legs)  # in a protective stop, it tries again when it is resumed
+                self._refused(plan.found, legs)  # after a protective stop, resuming tries again
                 continue
             self._start(legs, plan)
             while self.outcome is None:
@@ -208,7 +208,9 @@ class Journey:
             self._rate_limit.charge()
             return plans.now(command, within_tick=True)
         while True:
-            while self._rate_limit.planning > 0:  # of a thread that was killed meanwhile: one after the other
+            while (
+                self._rate_limit.planning > 0
+            ):  # of a thread that was killed meanwhile; plan only one at a time
                 yield
             self._rate_limit.planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
             ordered = plans.later(command)
@@ -240,9 +242,9 @@ class Journey:
         if self._access.latest().tick < due:
             return False
         plan, self._further = ordered(), None
-        if not self._access.plans.hold(plan):  # what it depends on has changed
+        if not self._access.plans.hold(plan):  # outdated
             return True
-        if not isinstance(plan.found, PlannedMove):  # the moves begin anew where the motion ends
+        if not isinstance(plan.found, PlannedMove):  # plan the moves again from the end of the motion
             self._ends, self._refuses = True, plan.found is not None
             return False
         part = self._marks[-1][0]

@@ -113,8 +113,8 @@ class ProgramPlayer:
             self._told, self._access.peripherals.changed = now, True
 
     def _give_turns(self, tick: int) -> None:
-        # Evaluations are counted rather than timed, so that a run is the same live, in lockstep and in a replay.
-        # What a tick takes beyond them, the next ticks pay.
+        # Count evaluations instead of time, so that live, lockstep and replayed runs are equal. Excess is subtracted
+        # from the next ticks.
         self.sockets.answer()
         left = self._left = min(self._left, 0) + EVALUATIONS
         if not self._all:
@@ -122,11 +122,11 @@ class ProgramPlayer:
         if self.state == "PLAYING":
             self._watch(tick)
         if self._main is not None and not self._held:
-            self._now = self._main  # what it does behind a blend is done by this program
+            self._now = self._main  # actions behind a blend belong to this program
             self.arm.advance()
             self._now = None
         left -= GUIDED if self.arm.guides else 0
-        # Whoever got nothing of the last tick's evaluations comes first, else the oldest.
+        # Threads that got no evaluations in the last tick come first, then the oldest.
         for running in sorted(self._all, key=lambda one: one not in self._starved) if left > 0 else ():
             if running not in self._all or (running is self._main and self._held):
                 continue

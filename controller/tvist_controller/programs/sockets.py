@@ -176,7 +176,7 @@ class Sockets:
             socket.received += data
         self._answers.clear()
 
-    # ------------------------------------------------------------------ what programs call
+    # ------------------------------------------------------------------ for programs
 
     def connect(self, name: str, address: str, port: int) -> Generator[None, None, bool]:
         """Connect a socket, replacing one of this name, and wait for it; return whether it is open."""

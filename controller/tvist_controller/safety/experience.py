@@ -127,8 +127,8 @@ class Experience:
     def __init__(
         self,
         study: Study,
-        later: Later = at_once,  # has a study made beside the ticks
-        plan: Plans | None = None,  # of what a lesson changes; None: in the tick that takes it
+        later: Later = at_once,  # runs a study in parallel
+        plan: Plans | None = None,  # plans the changes of a lesson; None to plan in the tick that applies it
     ) -> None:
         self._recorder = MotionRecorder()
         self._study, self._later, self._plan = study, later, plan
@@ -140,10 +140,10 @@ class Experience:
     def watch(
         self,
         sample: Sample,
-        present: Callable[[], FilterState],  # what the controller takes the arm for
+        present: Callable[[], FilterState],  # the controller's assumptions about the arm
         *,
         held: bool,  # whether the drives hold the arm
-        placements: int,  # number of times that the arm was put somewhere, see `ControlCycle`
+        placements: int,  # number of times that the arm was placed, see `ControlCycle`
     ) -> None:
         """Take a tick."""
         if placements != self._placements or not held:

@@ -84,7 +84,7 @@ class Faults:
             self._add(joint, value)
             self._at(ends, fault, lambda: self._add(joint, -value))
             return
-        # An input that is set again or released no longer ends at the earlier time.
+        # Setting or releasing an input cancels its earlier end time.
         self._forget({*self._inputs} if fault == "normal" else {fault})
         if fault in self._inputs:
             begin, end = self._inputs[fault]

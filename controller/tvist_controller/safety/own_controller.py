@@ -102,7 +102,7 @@ class Watching(RemoteStatus):
         _, safety, _ = self._modes.now = sight.modes
         if before is not None and safety != before.modes[1]:
             why = f"the robot reports safety_mode {_name(SafetyMode, safety)}"
-            # A `protective_stop` would let clients unlock it, which can be done at the robot only.
+            # Not a `protective_stop`: that could be unlocked by clients, this one only at the robot.
             self._emit("warning" if safety in _NO_STOP else "safety_stop", why=why)
 
     def sample(self) -> Sample:

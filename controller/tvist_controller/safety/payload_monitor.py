@@ -89,7 +89,7 @@ class PayloadMonitor(Monitor):
     and then refers to the assumed payload, so that there is one verdict at a time.
     """
 
-    needs: ClassVar = "drives alone"  # else what the tool touches would be taken for a payload
+    needs: ClassVar = "drives alone"  # else contact of the tool would look like a payload
 
     def __init__(self, description: RobotDescription, declared: Payload, *, follows: bool = False) -> None:
         self._follows = follows
@@ -164,7 +164,7 @@ class PayloadMonitor(Monitor):
         if self._follows and self._waits(at_rest):
             return None
         mass, bound = self._estimate(1)
-        if not _contradicts(mass, bound):  # what is named has to contradict the declaration, too
+        if not _contradicts(mass, bound):  # the reported mass must contradict the declaration, too
             return None
         self._warned = True
         felt = self.payload.mass + mass

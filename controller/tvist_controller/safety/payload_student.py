@@ -108,7 +108,7 @@ class Equations:
         mass, per_kg = float(self.at[0]), self.rows[:, 0]
         right = self.measured - self.bare - mass * per_kg
         known = np.diag(np.concatenate([np.zeros(4), self.others**-2.0]))
-        for _ in range(3):  # first moments are as uncertain, and a gain as much wrong, as the mass is large
+        for _ in range(3):  # errors of first moments and gains grow with the mass
             scale = np.array([1.0, *[max(mass, LIGHT)] * 3])
             known[:4, :4] = np.linalg.inv(prior.covariance * np.outer(scale, scale))
             gains = _each((self.bare + mass * per_kg).reshape(-1, self.joints))
@@ -203,7 +203,7 @@ class PayloadStudent:
         others = [UNKNOWN[name] for name in [*own, "link", "sensor"] for _ in links]
         slow = np.zeros_like(qd) if self._linear else np.exp(-np.square(qd / self._width))
         weight = 1.0 / np.hypot(self._noise, STICKING * self._friction * slow)
-        weight[[0, -1]] = 0.0  # their accelerations are differences to one side
+        weight[[0, -1]] = 0.0  # their accelerations are one-sided differences
         rows = np.stack([per_kg, *(side / 0.01 for side in sides), *columns], axis=-1)
         bare = np.sum(links, axis=0) + own["rotor"] + own["friction"]
         return Equations(

@@ -29,7 +29,7 @@ class RobotModes:
         if safety in _MAY_MOVE and robot is RobotMode.RUNNING:
             self._stops.clear()
         self.now = int(robot), int(safety), int(motion.runtime)
-        # A paused motion comes to a standstill without any event.
+        # A paused motion stops without an event.
         motion.changed = motion.activity is Activity.PAUSED
 
     def hear(self, event: Event) -> None:

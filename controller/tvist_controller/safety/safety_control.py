@@ -56,7 +56,7 @@ class SafetyControl:
             return
         why = "a safeguard asked for a stop"
         if not motion.activity.moving:
-            # Although nothing moves and nothing ends, this now keeps the robot from moving.
+            # Nothing moves or ends, but this now blocks motion.
             self._emit("safety_stop", why=why, category=2, duration=0.0, way=0.0)
             return
         if after(motion.activity, "pause") is None:
@@ -141,7 +141,7 @@ class SafetyControl:
             self._motion.check("unlock_protective_stop")
             self._hold()
         self._motion.go("unlock_protective_stop")
-        for monitor in self.monitors:  # what was found before the unlock does not count again
+        for monitor in self.monitors:  # ignore findings before the unlock
             if monitor.needs == "drives":
                 monitor.restart()
 
@@ -211,7 +211,7 @@ class SafetyControl:
             sample = cycle.reset(position, seed=seed)
             if placed:
                 sample = cycle.step()
-        except (ValueError, PlantError):  # it goes on failing; `power_on` asks it again
+        except (ValueError, PlantError):  # still failing; `power_on` tries again
             placed, sample = False, cycle.reset(position, measured=cycle.sample.measured)
         if placed:
             why = f"{why}: the simulation put the arm at rest at its reference"

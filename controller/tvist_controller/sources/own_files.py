@@ -83,7 +83,7 @@ def _run(content: bytes, place: str, kind: str, sha256: str) -> ModuleType:
     file = place.rpartition(":")[0]
     module = ModuleType(f"tvist_own_{kind}_{sha256[:16]}")
     module.__file__ = str(Path(file).resolve())
-    sys.modules[module.__name__] = module  # dataclasses and others look their own module up there
+    sys.modules[module.__name__] = module  # dataclasses look up their module there
     try:
         exec(compile(content, module.__file__, "exec"), module.__dict__)  # noqa: S102  it is what the user asked for
     except (Exception, SystemExit) as failure:

@@ -62,7 +62,7 @@ class OwnPlant:
             made = self.maker(description, carried)
             if is_plant(made):
                 return called(made, description.joints)
-        except (PlantError, SceneError) as error:  # it says in a sentence why it cannot be made
+        except (PlantError, SceneError) as error:  # its message gives the reason
             said = f"{error}" if self.place.startswith(WORLD) else f"plant {self.place}: {error}"
             raise OwnFileError(said) from error
         except (Exception, SystemExit) as error:

@@ -102,7 +102,7 @@ class Compliant(Following):
         torque: TorqueRoom,
         period: float,
         *,
-        tool: Callable[[], Arm],  # of the tool centre point, which another one may replace at any time
+        tool: Callable[[], Arm],  # of the tool centre point, which may change at any time
         inner: Guided,  # moves the tool otherwise, and continues from the same state
         felt: Callable[[], Floats],  # on the tool centre point in the last tick, base frame [N, N m]
     ) -> None:
@@ -187,7 +187,7 @@ class Compliant(Following):
         inverse = self.kinematics.inverse(q)[1]
         slope = np.abs(inverse @ _out(axes, given)).max()
         self.hindered = share = min(1.0, FASTEST * self.limits.velocity / max(slope, 1e-12))
-        for part in (share, 0.0):  # a singular posture may forbid all of what the law wants
+        for part in (share, 0.0):  # a singular posture may forbid all of the wanted change
             self._given = _out(axes, part * given)
             self._twist = _out(axes, kept) + self._given
             self._pose = self._shifted(present, h * self._twist)

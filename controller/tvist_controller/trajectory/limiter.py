@@ -217,8 +217,7 @@ class Limiter:
         sign = np.sign(qd)
         speed, rise = np.abs(qd), sign * qdd
         ramp = np.abs(rise) / jerk
-        # The shortest stop from zero acceleration, plus the way from here to its start, or minus the way from there
-        # to here.
+        # Shortest stop from zero acceleration, plus or minus the distance between its start and the present state.
         top = speed + 0.5 * jerk * ramp**2
         gentle = top < limit**2 / jerk
         swing = top / limit + limit / jerk
@@ -255,7 +254,7 @@ class Limiter:
                 state = np.where(fits, passed, self._catch_up(q, qd, limit, fits))
         sign = np.sign(state[2])
         fast = sign * state[1] + state[2] ** 2 / (2.0 * limits.jerk) > limits.velocity
-        # The last ticks of the way to a signal that rests near the end of the range need no ticks to spare.
+        # Close to a signal at rest near the end of the range, no spare ticks are needed.
         lands = (qd == 0.0) & (np.abs(q) <= self._reach) & (np.abs(q - self.q) <= self.NEAR)
         for astray, goal in (
             (fast, sign * limits.velocity),
@@ -278,7 +277,7 @@ class Limiter:
         request.current_position = (present[0] - (q - h * (qd - 0.5 * h * qdd))).tolist()
         request.current_velocity = (present[1] - (qd - h * qdd)).tolist()
         request.current_acceleration = (present[2] - qdd).tolist()
-        # Gain no more on the signal than the lag, even if the signal brakes as hard as permitted.
+        # Do not overtake the signal, even if it brakes with the limit.
         closing = (np.abs(q - self.q) + self.NEAR) * limits.acceleration / np.maximum(np.abs(qd), 1e-9)
         request.max_velocity = np.minimum(limits.velocity - qd, closing).tolist()
         request.min_velocity = np.maximum(-limits.velocity - qd, -closing).tolist()

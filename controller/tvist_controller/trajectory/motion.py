@@ -63,7 +63,7 @@ class DoubleS:
         self._trajectory = ruckig.Trajectory(m)
         try:
             ruckig.Ruckig(m).calculate(request, self._trajectory)
-        except (ruckig.RuckigError, ValueError) as error:  # ruckig's way to fail above 7600 s
+        except (ruckig.RuckigError, ValueError) as error:  # ruckig fails above 7600 s
             raise ValueError(
                 f"no motion goes from {start.tolist()} to {end.tolist()} in less than two hours within "
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
@@ -73,7 +73,7 @@ class DoubleS:
         """Time from which it is known [s]."""
         self.duration = float(self._trajectory.duration)
         """Duration from rest to rest [s]."""
-        # The motion from rest to rest is symmetric in time: it brakes for as long as it accelerates.
+        # Motion from rest to rest is symmetric in time.
         leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
         self.brakes_at = self.duration - sum(leading.t[:3])
         """Time at which it starts braking [s]."""
@@ -213,7 +213,7 @@ class PlannedMotion(Trajectory):
         """
         paused = self.fork()
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
-        most, forecast = self.limits.acceleration, self.forecast  # it brakes so by itself
+        most, forecast = self.limits.acceleration, self.forecast  # the motion's own braking
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
         hardest = self.agility.acceleration <= most
         if forecast.steady == 0.0 and self.rate == 1.0 and self.steady and hardest:

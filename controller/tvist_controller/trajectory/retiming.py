@@ -137,7 +137,7 @@ def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragm
                 high += 1
             else:
                 break
-            if max(out[low], out[high]) <= 0.0:  # it is as short as a ramp
+            if max(out[low], out[high]) <= 0.0:  # no longer than a ramp
                 break
             most = max(out[low], out[high])
         for number in range(low + 1, high):
@@ -164,8 +164,8 @@ class RetimedLaw:
         spans, here = np.diff(times), edges - edges[0]
         accelerations = 0.5 * np.diff(b) / np.diff(edges)
         areas = np.cumsum(spans * (here[:-1] + spans * (speeds[:-1] / 2.0 + spans * accelerations / 6.0)))
-        # The motion before the mean, from the first edge on: its integral, s, ṡ and s̈ when each cell begins; before the
-        # first and behind the last, it is at rest.
+        # Motion before averaging: integral of s, s, ṡ and s̈ at the start of each cell; at rest before the first and
+        # after the last.
         self._times = np.concatenate(([-np.inf], times))
         self._begun = np.concatenate(([start], times))
         self._pieces = np.zeros((4, len(edges) + 1))
@@ -247,7 +247,7 @@ def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False)
     ramp = float(max(accelerations.max() / jerk, (way.slope * accelerations).max() / way.jerk))
     b = _lastingly(way, b, ramp, window, AT_REST)
     law = RetimedLaw(way.edges, level(way.edges, b, ramp, 0) if goes_on else b, ramp)
-    if law.limits.jerk > jerk * (1.0 + 1e-6):  # it changes from speeding up to braking within a ramp
+    if law.limits.jerk > jerk * (1.0 + 1e-6):  # it goes from acceleration to braking within a ramp
         ramp *= law.limits.jerk / jerk
         law = RetimedLaw(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp)
     return law
@@ -262,7 +262,7 @@ def longer_law(
     way's edge `known`. Jerk and window as in `quickest_law`. None if the limits cannot be kept from there.
     """
     fixed, ramp, start = before.b[first : first + known + 1], before.ramp, float(before.times[first])
-    # The ramp being given, it is the acceleration that has to keep the jerk.
+    # The ramp is fixed, so limit the acceleration to keep the jerk.
     joints = replace(way.joints, p=np.maximum(way.joints.p, way.slope[:, None] / (way.jerk * ramp)))
     tool = replace(way.tool, p=np.maximum(way.tool.p, 1.0 / (jerk * ramp)))
     way = replace(way, joints=joints, tool=tool)

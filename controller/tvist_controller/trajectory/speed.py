@@ -57,7 +57,7 @@ class Speed(Guided):
         self.arm = arm
         """The arm whose tool has the velocity; None for joint velocities."""
         n, fastest = len(self._q), float(np.abs(self._qd).max())
-        # The present step of a tool is the one that was made, even if the joints count as standing.
+        # A tool continues from the actual step, even if the joints count as standing.
         self._step = period * (self._qd - 0.5 * period * self._qdd)
         if stands := fastest <= STANDING:
             self._qd = np.zeros(n)

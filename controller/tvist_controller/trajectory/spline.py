@@ -131,7 +131,7 @@ class SplineCurve(Path):
 
     def become(self, other: "SplineCurve") -> None:
         """Continue as another curve that is equal between the present point and this one's end."""
-        posture_of = self.posture_of  # what shapes on this curve keeps it
+        posture_of = self.posture_of  # captured by what is shaped on this curve
         self.__dict__.update(other.__dict__)
         self.posture_of = posture_of
         self._one = np.empty_like(self._one)

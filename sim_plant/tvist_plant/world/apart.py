@@ -30,7 +30,7 @@ def build_apart(asked: Asked) -> World:
         input=pickle.dumps((LONGEST, asked)),
         capture_output=True,
         check=False,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # the memory of others would be counted
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # other threads' memory would count
     )
     found = f"MuJoCo ends with exit code {done.returncode}: a scene may take {LONGEST} s and {MOST_MEMORY >> 20} MiB"
     if done.returncode == 0 and isinstance(found := pickle.loads(done.stdout), World):  # noqa: S301  from above
@@ -41,11 +41,11 @@ def build_apart(asked: Asked) -> World:
 def _main() -> None:
     """Build the world described on stdin, settle the arm once, and write the world or an error message."""
     answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # MuJoCo prints warnings, and writes a log of them where it is
+    os.dup2(2, 1)  # MuJoCo prints warnings, and logs them to its directory
     os.chdir("/")
     longest, asked = pickle.load(sys.stdin.buffer)  # noqa: S301  from above
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
-    signal.alarm(longest)  # also ends what waits inside MuJoCo, and what nobody waits for any more
+    signal.alarm(longest)  # also ends a process that hangs in MuJoCo or was abandoned
     found: World | str
     try:
         description, found = asked[0], build(*asked)

@@ -86,9 +86,9 @@ def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
         _count_turning(model)
     for number, (stiffness, damping) in enumerate(given):
         if model.pair_solimp[number][0] != IMPEDANCE:
-            continue  # the scene's own pair is as its file says
+            continue  # keep the scene's own pairs
         if (inverse := _inverse_mass(model, number)) == 0.0:
-            continue  # no force moves either
+            continue  # both are immovable
         k = STIFFNESS if stiffness is None else stiffness
         c = 2.0 * DAMPING_RATIO * np.sqrt(k / inverse) if damping is None else damping
         kinds = {int(model.geom_type[geom]) for geom in (model.pair_geom1[number], model.pair_geom2[number])}

@@ -153,7 +153,7 @@ class MujocoArm(SimulatedArm):
         motors, laws, s, (q, qd, applied) = self._motors, self._laws, self._s, self._state
         for k in range(steps):
             drive(start, end, (k + 0.5) / steps, timestep, motors, laws, s, q, qd, applied)
-            if self._evaluated:  # the first half of MuJoCo's step is done
+            if self._evaluated:  # first half of MuJoCo's step already done
                 mujoco.mj_step2(model, data)
                 self._evaluated = False
             else:

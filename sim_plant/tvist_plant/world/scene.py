@@ -59,7 +59,7 @@ def build(
     _name_all(spec, "arm ")
     load, before = spec.body(LOAD), {one.name for one in spec.bodies}
     if tooled:
-        content.compiler.fusestatic = False  # else the tool would be part of the world
+        content.compiler.fusestatic = False  # else the tool would merge with the world
         _mount(tool, load, content.compile())
         content.delete(tool)
     if hand is not None:
@@ -129,7 +129,7 @@ def _add_capsules(
         body = spec.worldbody if one.link < 0 else spec.body(link_name(description, one.link))
         add(body, one.name, one.start, one.end, one.radius)
     radius, end = description.collision.payload_radius, 2.0 * np.array(payload.com)
-    if hand is not None:  # the palm, as far as the fingers' roots
+    if hand is not None:  # palm, up to the fingers' roots
         radius, end = min(radius, 0.04), hand.root - 0.04 * hand.direction
     if not tooled and description.collision.bodies and (payload.mass or hand is not None):
         add(spec.body(LOAD), "payload", (0.0, 0.0, 0.0), end.tolist(), radius)

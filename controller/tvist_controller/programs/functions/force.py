@@ -128,7 +128,7 @@ class ForceFunctions(Family):
                 "the force sensor stays the same in force mode and freedrive: call end_force_mode before"
             )
         self._access.force.external.use(sensor_measuring_offset if enable else None)
-        yield  # what the program asks for next is told by that sensor
+        yield  # from the next tick on, the program reads this sensor
 
     enable_external_ft_sensor = ft_rtde_input_enable
 

@@ -168,7 +168,7 @@ class MotionFunctions(Family):
         def start(shaped: bool) -> int | None:
             rests = self._access.motion.activity is Activity.REST
             if rests and np.abs(posture - self._reference).max() <= STILL:
-                return None  # clients repeat where the arm is: no motion of a tick for each
+                return None  # clients often repeat the present position: avoid motions of one tick
             return self._access.guidance.servo(posture, lookahead_time, gain, shaped=shaped)
 
         return self._arm.guide(start, iter([None] * max(round(t / PERIOD), 1)))

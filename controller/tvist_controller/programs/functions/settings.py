@@ -110,8 +110,8 @@ class SettingFunctions(Family):
     ) -> Turns:
         yield from self._arm.finish()
         command = SetPayload(token=OWN_TOKEN, mass=mass, com=com, inertia=inertia, transition_time=seconds)
-        # Planned beside the ticks and taken after a fixed number of them, as a move is: so it takes effect at the same
-        # tick on every machine.
+        # Planned in parallel and applied after a fixed number of ticks, so that every machine applies it at the same
+        # tick.
         ordered = self._access.plans.later(command)
         for _ in range(DELAY):
             yield

@@ -174,8 +174,8 @@ class SocketFunctions(Family):
 
 # ---------------------------------------------------------------------- messages
 #
-# Each function takes what has been received so far and returns the message with its length in bytes, or None as
-# long as it is incomplete. A message that is not valid is None with the length of what is thrown away.
+# Each function gets the received bytes and returns a message with its length in bytes, or None while it is
+# incomplete. An invalid message is None with the number of bytes to discard.
 
 
 def _integers(received: bytes, number: int) -> tuple[tuple[int, ...], int] | None:
@@ -216,7 +216,7 @@ def _floats(received: bytes, number: int) -> tuple[tuple[float, ...] | None, int
     rest = next((len(mark) for mark in (b"\n", b"\r\n") if received.startswith(mark, end + 1)), 0)
     start = received.rfind(b"(", 0, end)
     parts = received[start + 1 : end].decode("ascii", "replace").split(",")
-    short = all(len(part) <= LONGEST_NUMBER for part in parts)  # the pattern takes long for long ones
+    short = all(len(part) <= LONGEST_NUMBER for part in parts)  # the pattern is slow for long ones
     valid = start >= 0 and len(parts) == number and short and all(map(DECIMAL.fullmatch, parts))
     return tuple(map(float, parts)) if valid else None, end + 1 + rest
 
