@@ -60,10 +60,7 @@ def test_a_robot_is_compared_with_the_thread_by_the_mean_of_the_pairs():
 
 @pytest.mark.parametrize(
     ("words", "why"),
-    [
-        (["--only", "lines"], "invalid choice: 'lines'"),
-        (["--seconds", "-1"], "is -1: must be 0 to 86400"),
-    ],
+    [(["--only", "lines"], "invalid choice: 'lines'"), (["--seconds", "-1"], "is -1: must be 0 to 86400")],
 )
 def test_what_cannot_be_measured_is_refused(words, why, capsys):
     with pytest.raises(SystemExit) as ended:
@@ -72,7 +69,18 @@ def test_what_cannot_be_measured_is_refused(words, why, capsys):
     assert why in capsys.readouterr().err
 
 
+@pytest.fixture
+def _few(monkeypatch):
+    """Repeat measurements as often as is needed to see that they work."""
+    few = {
+        "line.REPETITIONS": 2, "programs.PAIRS": 2, "programs.COMPILED": 2, "served.OF_READER": 2, "served.OF_RTDE": 2,
+    }  # fmt: skip
+    for name, number in few.items():
+        monkeypatch.setattr(f"benchmarks.{name}", number)
+
+
 @pytest.mark.nightly
+@pytest.mark.usefixtures("_few")
 def test_each_figure_of_what_is_computed_comes_with_its_reference(capsys):
     assert main(["--seconds", "0", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
@@ -84,6 +92,7 @@ def test_each_figure_of_what_is_computed_comes_with_its_reference(capsys):
 
 @pytest.mark.nightly
 @pytest.mark.realtime
+@pytest.mark.usefixtures("_few")
 @pytest.mark.parametrize("part", ["reader", "rtde", "lateness", "bridge"])
 def test_the_parts_that_serve_robots_measure_something(part, capsys):
     assert main(["--only", part, "--seconds", "2", "--json"]) == 0

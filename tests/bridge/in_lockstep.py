@@ -79,7 +79,24 @@ class Heard(Sink):
         self.events.append(event)
 
 
-class HiddenRobot:
+class Side:
+    """A controller that a client has control of, beside the events that it tells."""
+
+    def __init__(self, setup, plant):
+        self.controller, heard = Controller(setup, plant), Heard()
+        reply = self.controller.receive(TakeControl(client=CLIENT))
+        assert isinstance(reply, Accepted), "nobody else has control"
+        self._token, self.events, self._host = str(reply.token), heard.events, Host(self.controller, heard)
+
+    def send(self, kind, **fields):
+        return self.controller.receive(kind(token=self._token, **fields))
+
+    def tick(self):
+        self._host.tick()
+        return self.controller.latest
+
+
+class HiddenRobot(Side):
     """A hidden robot with our controller."""
 
     late = 0
@@ -87,9 +104,7 @@ class HiddenRobot:
 
     def __init__(self, description, seed, q, payload, shaper="none"):
         self.plant = hidden_variant(seed).make(description, body(payload), seed)
-        self.controller = Controller(setup_of(description, q, payload, shaper, seed), self.plant)
-        self._token, heard = control(self.controller), Heard()
-        self.events, self._host = heard.events, Host(self.controller, heard)
+        super().__init__(setup_of(description, q, payload, shaper, seed), self.plant)
 
     @property
     def robot(self):
@@ -101,19 +116,12 @@ class HiddenRobot:
         """Joint angles to which the line leads the arm, shape (n,) [rad]."""
         return self.controller.cycle.sample.target.q
 
-    def send(self, kind, **fields):
-        return self.controller.receive(kind(token=self._token, **fields))
-
     def follow(self, speed):
         """Run the program that follows set-points, up to a speed [rad/s]."""
         deceleration = min(self.controller.cycle.description.limits.acceleration)
         text = program(RUN, speed=speed, deceleration=deceleration, lookahead=LOOKAHEAD, gain=GAIN)
         reply = self.send(ProgramRun, text=text)
         assert not isinstance(reply, Refused), reply
-
-    def tick(self):
-        self._host.tick()
-        return self.controller.latest
 
 
 @dataclass
@@ -172,9 +180,8 @@ class Port:
         self._deliver(now + TICK)
         before = robot.controller.latest.target_q
         state = robot.tick()
-        counts.largest_step = max(
-            counts.largest_step, float(np.abs(np.subtract(state.target_q, before)).max())
-        )
+        step = float(np.abs(np.subtract(state.target_q, before)).max())
+        counts.largest_step = max(counts.largest_step, step)
         age = counts.ticks - self.output(r.PLAYED)
         counts.played[age] = counts.played.get(age, 0) + 1
         return self._measured
@@ -197,7 +204,7 @@ class Port:
         )
 
 
-class Bridge:
+class Bridge(Side):
     """A controller with a shaper in front of a hidden robot without one."""
 
     def __init__(self, description, seed, q, payload, shaper, link=IDEAL):
@@ -208,13 +215,9 @@ class Bridge:
         setpoints = Setpoints(q, ServoLag.simulated(), fastest=(MARGIN - 0.01) * speed, reach=reach)
         self.port = Port(self.robot, setpoints, link, seed)
         # The robot's own controller lets motors lead by the gears' wind-up: ours must not do so, too.
-        leads = (0.0,) * description.joints
-        plain = structs.replace(
-            description, drives=structs.replace(description.drives, windup_feedforward=leads)
-        )
-        self.controller = Controller(setup_of(plain, q, payload, shaper, seed), self.port)
-        self._token, heard = control(self.controller), Heard()
-        self.events, self._host = heard.events, Host(self.controller, heard)
+        drives = structs.replace(description.drives, windup_feedforward=(0.0,) * description.joints)
+        plain = structs.replace(description, drives=drives)
+        super().__init__(setup_of(plain, q, payload, shaper, seed), self.port)
         while self.port.output(r.STATE) != r.State.FOLLOWING:
             self.tick()
 
@@ -228,13 +231,6 @@ class Bridge:
         """Ticks by which the robot's target is later than `wanted`."""
         return self.port.counts.usual + 1  # for the robot's own differentiator
 
-    def send(self, kind, **fields):
-        return self.controller.receive(kind(token=self._token, **fields))
-
-    def tick(self):
-        self._host.tick()
-        return self.controller.latest
-
 
 def setup_of(description, q, payload, shaper, seed):
     """Return the setup of a robot whose calibration is that of its model, and whose gear errors are a seed's."""
@@ -242,12 +238,6 @@ def setup_of(description, q, payload, shaper, seed):
         description=description, q=tuple(q.tolist()), payload=payload, shaper=shaper, clock="free", seed=seed,
         calibration=load_calibration(f"{description.robot.name}_modal"),
     )  # fmt: skip
-
-
-def control(controller):
-    reply = controller.receive(TakeControl(client=CLIENT))
-    assert isinstance(reply, Accepted), "nobody else has control"
-    return str(reply.token)
 
 
 def measured(state):

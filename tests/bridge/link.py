@@ -43,11 +43,10 @@ class _Uneven(Relay):
 class LinkProcess:
     """A `Link` in another process, which ends with this object's use as a context."""
 
-    def __init__(self, robot, near, seed, slower):
-        command = [sys.executable, "-m", "tests.bridge.link", robot, near, str(seed), str(slower)]
-        self._process = subprocess.Popen(
-            command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
+    def __init__(self, *arguments):
+        command = [sys.executable, "-m", "tests.bridge.link", *map(str, arguments)]
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        self._process = subprocess.Popen(command, cwd=ROOT, **pipes)
 
     def __enter__(self):
         self.do("flow")

@@ -1,36 +1,38 @@
 """A controller in front of a robot moves it as one inside would, over a link that loses packages."""
 
-from itertools import islice, pairwise
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from tests.bridge.in_lockstep import IDEAL, Bridge, HiddenRobot, Link, Way
-from tests.bridge.motions import PAPER, Asked, asked, made
+from scipy.spatial.transform import Rotation
+from tests.bridge.in_lockstep import IDEAL, Bridge, HiddenRobot, Link
 from tests.controller.robots import Q1, UR5E
 
-from tvist_controller.setup import paper_payload
+from tvist_controller.api.line import (
+    STILL,
+    CollisionModel,
+    InverseDynamics,
+    MotionLimits,
+    body,
+    central_differences,
+    paper_payload,
+)
+from tvist_controller.api.robot import truth_of
+from tvist_lab.metrics import MotionRows
+from tvist_lab.metrics.common_clock import AFTER_STOP, peak_later_than
+from tvist_lab.recordings import Recording
+from tvist_lab.study.line import point_to_point
 from tvist_lab.study.measures import WORTH
+from tvist_lab.study.moves import Move, is_free
+from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
+from tvist_protocol.replies import Accepted
 from tvist_server.moving import program as registers
 
 PAYLOAD = paper_payload(UR5E)
 NEAR = Q1 + np.array([0.15, 0.0, 0.0, 0.1, 0.1, 0.1])  # what needs more than 90 % of a torque is late
-SHORT = Asked(NEAR, (1.5, 2.0, 100.0))
-
-
-def test_packages_arrive_in_order_within_the_jitter_and_those_behind_a_lost_one_with_it():
-    link, sent = Link(loss=0.02), np.arange(0.0, 20_000.0, 2.0)
-    way = Way(link, [7])
-    took = np.array([way.arrival(now) - now for now in sent])
-    assert (np.diff(took) >= -2.0).all()
-    late = took > link.delay + link.jitter
-    assert took[~late].min() >= link.delay - link.jitter
-    assert took.max() <= 2.0 * (link.delay + link.jitter + link.again[1])
-    lost = [now and not before for before, now in pairwise(late)]
-    assert 0.7 < np.sum(lost) / (0.02 * len(sent)) < 1.3
-    assert np.allclose(took, [again.arrival(now) - now for again in [Way(link, [7])] for now in sent])
 
 
 def targets(side, ticks):
@@ -68,59 +70,109 @@ def test_equal_seeds_make_equal_motions_and_other_links_other_ones():
     assert motion(lossy) == motion(lossy) != motion(Link())
 
 
-@pytest.mark.parametrize("robot", ["ur5e", "ur5-light"])
-def test_the_paper_s_motions_come_first_and_random_ones_follow_from_where_each_ended(robot):
-    description = load(robot)
-    few, same = (list(islice(asked(description, 3, 11), None)) for _ in range(2))
-    assert [one.q.tolist() for one in few[: len(PAPER)]] == [list(description.poses[name]) for name in PAPER]
-    assert len(few) == len(PAPER) + 3
-    assert all((one.q == other.q).all() for one, other in zip(few, same, strict=True))
+PAPER = ("Q2", "Q1", "Q3", "Q1")
+"""Where the paper's motions end, from Q1."""
+SPEEDS = ((1.5, 2.0, 100.0), (1.05, 1.4, 50.0), (0.8, 2.0, 200.0))
+"""Velocity, acceleration and jerk of the motions [rad/s, rad/s², rad/s³]; the first are the paper's."""
+REST = 250
+"""Ticks at rest after a motion."""
+TORQUE = 0.95
+"""Share of the joints' torques that twice the motion's accelerations may need [-]. The simulated `servoj` is late where
+they need more than the torques: nothing smooths what a client sends, and the arm swings as far again.
+"""
+BAD = ("protective_stop", "motion_stopped", "program_stopped")
+"""Kinds of events that end a motion."""
 
 
-def test_a_motion_that_the_robot_refuses_ends_the_comparison_and_says_why():
-    far = Asked(np.full(6, 7.0), SHORT.speed)
-    done = made(HiddenRobot(UR5E, 3, Q1, PAYLOAD), [far, SHORT])
-    assert done.peaks == []
-    assert "q[0]" in done.stops[0]
+def asked(description, count, seed):
+    """Yield ends and speeds of the paper's motions and of random ones, each from the end of the one before.
+
+    They are free of collisions, and the random ones leave the torques that `servoj` wants, see `TORQUE`.
+    """
+    payload, random = paper_payload(description), np.random.default_rng([seed, 79])
+    collision = CollisionModel(description, body(payload))
+    dynamics, most = InverseDynamics(description, body(payload)), TORQUE * np.array(description.limits.torque)
+    yield from ((np.array(description.poses[name]), SPEEDS[0]) for name in PAPER)
+    here, found = np.array(description.poses["Q1"]), 0
+    while found < count:
+        far = random.uniform([*WORKSPACE.low, -2.0, -2.0], [*WORKSPACE.high, 2.0, 2.0])
+        there = here + random.uniform(0.3, 1.0) * (far - here)
+        speed = SPEEDS[random.integers(len(SPEEDS))]
+        way = point_to_point(here, there, MotionLimits(*speed))
+        states = zip(*central_differences(way, PERIOD), strict=True)
+        light = all((np.abs(dynamics.torque(q, qd, 2.0 * qdd)) <= most).all() for q, qd, qdd in states)
+        if light and is_free(collision, Move(tuple(here.tolist()), tuple(there.tolist()), payload.mass)):
+            found, here = found + 1, there
+            yield there, speed
+
+
+@dataclass
+class Made:
+    """The motions that a robot made."""
+
+    peaks: list[float] = field(default_factory=list)
+    """Largest acceleration of the tool later than 10 ms after the stop of each [m/s²]."""
+    ends: list[np.ndarray] = field(default_factory=list)
+    """Joint angles at the end of each rest, shape (n,) [rad]."""
+
+    @classmethod
+    def by(cls, side, motions):
+        """Let a robot make motions, one after the other from rest to rest."""
+        done = cls()
+        for q, (velocity, acceleration, jerk) in motions:
+            how = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+            assert isinstance(side.send(MoveJ, q=tuple(q.tolist()), **how), Accepted)
+            done.peaks.append(peak(side))
+            done.ends.append(np.array(side.robot.controller.latest.actual_q))
+            assert not [event for event in (*side.events, *side.robot.events) if event.kind in BAD]
+        return done
+
+
+def peak(side):
+    """Tick until the motion that begins has ended, and rest; return its peak [m/s²]."""
+    ticks, stop, before, rows = 0, 0, side.wanted, []
+    while len(rows) < REST:
+        side.tick()
+        ticks += 1
+        if np.abs(side.wanted - before).max() > STILL:
+            stop = ticks
+        before = side.wanted
+        if side.controller.cycle.mode.at_rest:
+            truth = truth_of(side.robot.plant)
+            rows.append((ticks, truth.specific_force, truth.flange_rotation))
+    tick, force, rotation = (np.array(column) for column in zip(*rows, strict=True))
+    turn = Rotation.from_matrix(rotation).as_rotvec()
+    recording = Recording({
+        "tick": tick.astype(float), "timestamp": tick * PERIOD, "truth_tool_acceleration": force,
+        "truth_flange_pose": np.hstack([np.zeros_like(turn), turn]),
+    })  # fmt: skip
+    rest = MotionRows(start=0, reference_stop=0, shaped_stop=0, end=len(rows))
+    return peak_later_than(recording, rest, (stop + side.late) * PERIOD + AFTER_STOP)
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("shaper", ["auto", "auto-target"])
-@pytest.mark.parametrize(("name", "seed"), [("ur5e", 11), ("ur5-light", 12), ("ur5e", 13)])
+@pytest.mark.parametrize(("name", "seed", "shaper"), [("ur5e", 11, "auto"), ("ur5-light", 12, "auto-target")])
 def test_over_a_link_that_loses_packages_a_shaper_in_front_leaves_what_one_inside_leaves(
     name, seed, shaper, measured
 ):
     description = load(name)
-    payload, start = paper_payload(description), np.array(description.poses["Q1"])
-    motions = list(asked(description, 12, seed))
-    bridge = Bridge(description, seed, start, payload, shaper, Link())
-    sides = (
-        HiddenRobot(description, seed, start, payload),
-        HiddenRobot(description, seed, start, payload, shaper),
-        bridge,
-    )
-    plain, inside, through = (made(side, motions) for side in sides)
-    assert not inside.stops + through.stops
-    before, within, behind = map(np.array, (plain.peaks, inside.peaks, through.peaks))
-    count = min(map(len, (before, within, behind)))
-    rings = before[:count] >= WORTH
-    less, less_through = (
-        100.0 * (1.0 - peaks[:count][rings] / before[:count][rings]) for peaks in (within, behind)
-    )
-    points = less_through - less
+    own = description, seed, np.array(description.poses["Q1"]), paper_payload(description)
+    bridge = Bridge(*own, shaper, Link())
+    sides = HiddenRobot(*own), HiddenRobot(*own, shaper), bridge
+    motions = list(asked(description, 8, seed))
+    plain, inside, through = (Made.by(side, motions) for side in sides)
+    before, within, behind = (np.array(one.peaks) for one in (plain, inside, through))
+    rings = before >= WORTH
+    less, less_through = (100.0 * (1.0 - peaks[rings] / before[rings]) for peaks in (within, behind))
     apart = 1e3 * float(np.abs(np.array(inside.ends) - np.array(through.ends)).max())
-    ages, speed = bridge.port.counts.played, min(description.limits.velocity)
-    older = 100.0 * sum(number for age, number in ages.items() if age > 2) / sum(ages.values())
     for what, value in {
         "motions that ring": rings.sum(), "inside, median [%]": np.median(less),
-        "through, median [%]": np.median(less_through), "points, median": np.median(points),
-        "points, p5": np.percentile(points, 5), "points, worst": points.min(),
-        "periods alone": bridge.port.output(registers.ALONE), "set-points older than two ticks [%]": older,
+        "points, worst": (less_through - less).min(), "periods alone": bridge.port.output(registers.ALONE),
         "rest apart [mrad]": apart,
     }.items():  # fmt: skip
         measured(what, f"{value:.4g}")
-    assert rings.sum() >= 8
-    assert points.min() > -3.0
-    assert bridge.port.counts.largest_step <= speed * PERIOD
+    assert rings.sum() >= 6
+    assert (less_through - less).min() > -3.0
+    assert bridge.port.counts.largest_step <= min(description.limits.velocity) * PERIOD
     assert bridge.port.setpoints.limited == 0
     assert apart < 0.05

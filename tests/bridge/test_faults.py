@@ -2,24 +2,29 @@
 
 import contextlib
 import random
+import selectors
 import signal
 import socket
+import threading
 import time
 from collections import defaultdict
 
+import numpy as np
 import pytest
 from tests.bridge.link import LinkProcess
-from tests.bridge.watch import STILL, Watch, wait_for
 from tests.conformance.served import Served
 from tests.places import own_address
 
 from tvist_client import MotionStoppedError, RefusedError
 from tvist_client.blocking import Robot
-from tvist_protocol.modes import RobotMode
-from tvist_server.moving.program import State
+from tvist_plant.plant import PERIOD
+from tvist_protocol.modes import RobotMode, RuntimeState
+from tvist_server.moving.program import NUMBER, STATE, State
+from tvist_server.rtde.client import RtdeClient
+from tvist_server.rtde.wire import Field, Wire
 
-MOMENTS, SEED = 10, 7
-"""Number of faults, which take turns, and the seed of their moments and of what the robot hides."""
+SEED = 7
+"""Of the faults' moments and of what the robot hides."""
 TIME = 0.5
 """Speed of the robot's time, for machines on which others compute; all times are by its clock."""
 SPEED, SWING = 0.4, 0.3
@@ -36,6 +41,87 @@ LIMITS = {"braking_ms": 40.0, "step_mrad": 2.0, "moved_mrad": 0.1}
 """Largest time from the last set-point's arrival until braking begins, way of a joint's target in a period until the
 next motion has ended, and way from its rest until the bridge was told to go on.
 """
+
+
+OUTPUT, INPUT = f"output_int_register_{STATE}", f"input_int_register_{NUMBER}"
+READ = {
+    "timestamp": Wire.DOUBLE, "target_q": Wire.VECTOR6D, "target_qd": Wire.VECTOR6D, "runtime_state": Wire.UINT32,
+    INPUT: Wire.INT32, OUTPUT: Wire.INT32,
+}  # fmt: skip
+STILL = 1e-6
+"""Speed below which the target is at rest [rad/s]."""
+
+
+class Watch:
+    """Reads a robot's rows from its own RTDE interface, without a link in between, in a thread of its own."""
+
+    def __init__(self, robot):
+        self._client = RtdeClient({name: Field(wire) for name, wire in READ.items()}, {})
+        self._socket = socket.create_connection((robot, 30004))
+        self.rows, self._ended = [], False
+        self._thread = threading.Thread(target=self._read, daemon=True)
+
+    def __enter__(self):
+        self._socket.sendall(self._client.begin())
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._ended = True
+        self._thread.join()
+        self._socket.close()
+
+    def _read(self):
+        with selectors.DefaultSelector() as ready:
+            ready.register(self._socket, selectors.EVENT_READ)
+            while not self._ended:
+                if ready.select(0.1):
+                    received = self._client.receive(self._socket.recv(1 << 16))
+                    self.rows += received.rows
+                    if received.send:
+                        self._socket.sendall(received.send)
+
+    @property
+    def follows(self):
+        """Whether the program follows set-points."""
+        return int(self.rows[-1][OUTPUT][0]) == State.FOLLOWING
+
+    @property
+    def rests(self):
+        """Whether the robot plays no program, and its target is at rest."""
+        plays = int(self.rows[-1]["runtime_state"][0]) == RuntimeState.PLAYING
+        return not plays and max(map(abs, self.rows[-1]["target_qd"])) < STILL
+
+    def since(self, first, name):
+        """Values of a column from a row on."""
+        return np.array([row[name] for row in self.rows[first:]]).squeeze()
+
+    def largest_step(self, first):
+        """Largest way of a joint's target in a period [rad]."""
+        ways = np.abs(np.diff(self.since(first, "target_q"), axis=0)).max(axis=1)
+        return float((ways / np.round(np.diff(self.since(first, "timestamp")) / PERIOD)).max())
+
+    def silence(self, first):
+        """Time from the last new number before braking to the beginning of braking [s].
+
+        Braking has begun at the last row before rest at which the fastest joint was not slower than a row before, or
+        where the program says so, whichever is later.
+        """
+        speed, time = np.abs(self.since(first, "target_qd")).max(axis=1), self.since(first, "timestamp")
+        said = int(np.argmax(self.since(first, OUTPUT) >= State.BRAKING))  # 0 where it does not say so
+        rest = int(np.argmax(speed[said:] < STILL)) + said
+        faster = np.flatnonzero(np.diff(speed[: rest + 1]) >= 0.0)
+        begun = max(said, int(faster[-1]) + 1 if len(faster) else 0)
+        came = np.flatnonzero(np.diff(self.since(first, INPUT)[: begun + 1]))
+        return float(time[begun] - time[came[-1] + 1 if len(came) else 0])
+
+
+def wait_for(true, seconds, what):
+    """Wait until something is so."""
+    deadline = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < deadline, f"{what}: not within {seconds:g} s"
+        time.sleep(0.005)
 
 
 class Faults:
@@ -55,8 +141,8 @@ class Faults:
             with LinkProcess(self.robot, self.near, SEED, 1.0 / TIME) as link, Watch(self.robot) as watch:
                 bridge = self.bridge()
                 try:
-                    for number in range(MOMENTS):
-                        bridge = self.fail(list(EXPECTED)[number % len(EXPECTED)], bridge, link, watch)
+                    for fault in EXPECTED:
+                        bridge = self.fail(fault, bridge, link, watch)
                 finally:
                     bridge.kill()
 
@@ -70,17 +156,17 @@ class Faults:
         with Robot.connect(bridge.endpoint, bridge.name) as robot, robot.control("faults") as arm:
             first, said = self.until_moving(bridge, watch, robot, arm)
             going_on = self.break_off(fault, bridge, link)
-            wait_for(lambda: not watch.plays and watch.speed < STILL, 20.0 / TIME, f"rest after {fault}")
-            rested = watch.count
+            wait_for(lambda: watch.rests, 20.0 / TIME, f"rest after {fault}")
+            rested = len(watch.rows)
             if fault in {"kill", "freeze", "cut"}:
-                self.figures["braking_ms"].append((fault, 1e3 * watch.since(first).silence))
+                self.figures["braking_ms"].append((fault, 1e3 * watch.silence(first)))
             time.sleep(self.random.uniform(0.0, 0.3))
             going_on()
             if fault != "kill":
                 wait_for(lambda: EXPECTED[fault] in bridge.said[said:], 20.0, f"words on {fault}")
             time.sleep(0.2 / TIME)
-            waited = watch.since(rested)
-            self.figures["moved_mrad"].append((fault, 1e3 * float(abs(waited.q - waited.q[0]).max())))
+            waited = watch.since(rested, "target_q")
+            self.figures["moved_mrad"].append((fault, 1e3 * float(abs(waited - waited[0]).max())))
             if fault != "kill":
                 until_done(arm.unlock_protective_stop if fault == "protective stop" else arm.power_on)
                 self.go_on(robot, arm)
@@ -89,20 +175,20 @@ class Faults:
             bridge = self.bridge()
             with Robot.connect(bridge.endpoint, bridge.name) as robot, robot.control("faults") as arm:
                 self.go_on(robot, arm)
-        self.figures["step_mrad"].append((fault, 1e3 * watch.since(first).largest_step))
+        self.figures["step_mrad"].append((fault, 1e3 * watch.largest_step(first)))
         return bridge
 
     def until_moving(self, bridge, watch, robot, arm):
         """Move until a random moment, unless the robot stops before; return numbers of the row and letter before it."""
         while True:
             until_held(robot, arm)
-            first, said = watch.count, len(bridge.said)
+            first, said = len(watch.rows), len(bridge.said)
             goal = list(self.centre)
             goal[0] += SWING if robot.state().target_q[0] < self.centre[0] else -SWING
             goal[5] += self.random.uniform(-SWING, SWING)
             arm.move_j(goal, velocity=SPEED, wait=False)
             time.sleep(self.random.uniform(0.05, 1.2) / TIME)
-            if watch.state is State.FOLLOWING:
+            if watch.follows:
                 return first, said
             self.others += 1
 
