@@ -140,6 +140,7 @@ release:
 schemas: setup
 	$(BIN)/python -m tools.stubs
 	$(BIN)/python -m tvist_protocol.generate
+	$(BIN)/python -m tvist_server.gateways.metrics > docs/reference/generated/metrics.md
 
 clean:
 	rm -rf .venv .venv-docs .venv-release build dist .mypy_cache .ruff_cache .pytest_cache

@@ -9,6 +9,7 @@ import tests.examples  # noqa: F401  registers the profiles
 from hypothesis import settings
 from tests.durations import Durations, arrange, quick
 from tests.nightly import NightlyRecord
+from tests.skips import Skips
 
 settings.load_profile("full")
 
@@ -24,9 +25,12 @@ def pytest_addoption(parser):
         "--keep-durations", action="store_true", help="write how long tests took: durations.json"
     )
     parser.addoption("--record-nightly", action="store_true", help="write the outcome: nightly.json")
+    parser.addoption(
+        "--known-skips", action="store_true", help="fail unless skipped is what skips.json lists"
+    )
     parser.addoption("--quick", action="store_true", help="run what is quick by durations.json")
     parser.addoption(
-        "--cases", type=_count, default=5, help="number of cases of each test with the mark `search`"
+        "--cases", type=_count, default=2, help="number of cases of each test with the mark `search`"
     )
     parser.addoption("--seed", type=int, default=0, help="seed of these cases")
 
@@ -36,6 +40,8 @@ def pytest_configure(config):
         config.pluginmanager.register(Durations())
     if config.option.record_nightly and not hasattr(config, "workerinput"):
         config.pluginmanager.register(NightlyRecord())
+    if config.option.known_skips and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Skips())
 
 
 @pytest.hookimpl(wrapper=True)

@@ -1,38 +1,33 @@
-"""`python -m tvist_protocol.generate`: everything in `protocol/` that is made from the message types.
+"""`python -m tvist_protocol.generate`: writes what is made from the message types: pages, schemas, golden bytes.
 
-The tables of README.md and messages.md, `schemas/`, and the MessagePack beside each golden message.
-Runs in a checkout, and needs the `msgpack` package: golden bytes must not come from the codec they are to test.
+The `msgpack` package encodes golden bytes, because they must not come from the codec that they test.
 """
 
 import json
-import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from tvist_protocol.channels import MESSAGES, tag
+from tvist_protocol.pages import pages
 from tvist_protocol.schema import json_schema
-from tvist_protocol.tables import tables
 
 FOLDER = Path(__file__).parents[1]
 """`protocol/` in a checkout."""
-SENT = {"commands", "setpoint", "parts"}
-"""The tables of messages.md; the others are in README.md."""
+PAGES = FOLDER.parent / "docs" / "reference" / "generated"
+"""Folder of the generated pages in a checkout."""
 
 
 def generated(folder: Path) -> dict[Path, bytes]:
-    """Return the content that every generated file should have, by its path."""
+    """Return the content of every generated file, by its path."""
     files = {folder / "schemas" / f"{tag(kind)}.json": _json(json_schema(kind)) for kind in MESSAGES}
     files |= {source.with_suffix(".msgpack"): _msgpack(source) for source in golden(folder)}
-    parts = tables()
-    for page, names in {"messages.md": SENT, "README.md": parts.keys() - SENT}.items():
-        text = (folder / page).read_text(encoding="utf-8")
-        files[folder / page] = filled(text, {name: parts[name] for name in names}).encode()
+    files |= {PAGES / name: text.encode() for name, text in pages().items()}
     return files
 
 
 def stray(folder: Path, files: Iterable[Path]) -> set[Path]:
-    """Return files that are in the places of generated ones and not among them, such as those of a removed message."""
+    """Return files in the places of generated ones that are not among them, such as those of a removed message."""
     there = {*(folder / "schemas").iterdir(), *(folder / "fixtures" / "v1").glob("*.msgpack")}
     return there - set(files)
 
@@ -40,15 +35,6 @@ def stray(folder: Path, files: Iterable[Path]) -> set[Path]:
 def golden(folder: Path) -> list[Path]:
     """Return the golden messages, which are written by hand."""
     return sorted((folder / "fixtures" / "v1").glob("*.json"))
-
-
-def filled(text: str, parts: dict[str, str]) -> str:
-    """Return a text with each part between its markers `<!-- generated: name -->` and `<!-- end -->`."""
-    marked = re.compile(r"(<!-- generated: (?P<name>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
-    names = [found["name"] for found in marked.finditer(text)]
-    if sorted(names) != sorted(parts):
-        raise ValueError(f"markers are {sorted(names)}, tables are {sorted(parts)}")
-    return marked.sub(lambda found: f"{found[1]}\n{parts[found['name']]}\n\n{found[3]}", text)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""The tables of the protocol's README, made from the message types."""
+"""The tables of the protocol's generated pages, made from the message types."""
 
 from collections.abc import Iterable, Mapping
 from enum import IntEnum
@@ -27,11 +27,11 @@ _LISTS = {
     frozenset(CODE_MEANINGS): "a [code](#codes)",
     frozenset(EVENT_MEANINGS): "a [kind](#kinds-of-event)",
 }
-"""Choices that have a table of their own."""
+"""Choices that have their own table."""
 
 
 def tables() -> dict[str, str]:
-    """Return the Markdown of every generated part of the README, by the name in its markers."""
+    """Return the Markdown of every table of the generated pages, by its name."""
     return {
         "keys": _table(("key", "kind", "by", "carries", "what"), map(_channel_row, CHANNELS)),
         "commands": _messages(COMMANDS),
@@ -96,12 +96,12 @@ def _message(kind: Struct, schema: Schema) -> str:
     fields = {field: part for field, part in schema["properties"].items() if field != "type"}
     text = " ".join((kind.__doc__ or "").split())
     if list(fields) == ["token"]:
-        return f"#### `{name}`\n\n{text} Carries `token` alone."
+        return f"### `{name}`\n\n{text} Carries `token` alone."
     rows = (
         (f"`{field}`", _values(part), _default(field, part, schema), part["description"])
         for field, part in fields.items()
     )
-    return f"#### `{name}`\n\n{text}\n\n{_table(('field', 'values', 'default', 'meaning'), rows)}"
+    return f"### `{name}`\n\n{text}\n\n{_table(('field', 'values', 'default', 'meaning'), rows)}"
 
 
 def _default(field: str, part: Schema, schema: Schema) -> str:
@@ -111,7 +111,6 @@ def _default(field: str, part: Schema, schema: Schema) -> str:
 
 
 def _values(part: Schema) -> str:
-    """Return in words which values a type allows."""
     match part:
         case {"anyOf": choices}:
             words = " or ".join(map(_values, choices))

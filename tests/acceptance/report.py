@@ -38,14 +38,19 @@ def note(client: str, version: str, outcomes: Mapping[str, str], why: Mapping[st
 
 def with_results(page: str, results: Mapping[str, Any]) -> str:
     """Return the page with these results in place of those that it has."""
-    lines = ["| client | version | on | TVIST | tests or calls | passed |", "|---|---|---|---|---:|---:|"]
+    lines = ["| client | version | on | TVIST | passed |", "|---|---|---|---|---:|"]
+    counts: dict[str, list[int]] = {}
     for client, one in sorted(results.items()):
-        count = len(one["passed"])
-        cells = client, one["version"], one["date"], f"`{one['tvist']}`", count + len(one["others"]), count
-        lines.append(f"| {' | '.join(map(str, cells))} |")
+        row = f"| {client.partition(':')[0]} | {one['version']} | {one['date']} | `{one['tvist']}` |"
+        passed, failed = counts.setdefault(row, [0, 0])
+        counts[row] = [passed + len(one["passed"]), failed + len(one["others"])]
+    lines += [f"{row} {passed} of {passed + failed} |" for row, (passed, failed) in counts.items()]
+    lines += ["", "Not passed:", ""]
     for client, one in sorted(results.items()):
-        lines += ["", f"{client}, not passed:", ""] if one["others"] else []
-        lines += [f"- `{name}`: {came}" for name, came in sorted(one["others"].items())]
+        alike: dict[str, list[str]] = {}
+        for name, came in sorted(one["others"].items()):
+            alike.setdefault(came, []).append(f"`{name}`")
+        lines += [f"- {client}: {', '.join(names)}: {came}" for came, names in alike.items()]
     before, _, rest = page.partition(BEGIN)
     return before + BEGIN + "\n" + "\n".join(lines) + "\n\n" + END + rest.partition(END)[2]
 

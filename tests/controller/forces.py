@@ -14,9 +14,7 @@ from .scripts import URSIM
 
 KINEMATICS = Arm(UR5E)
 NOTHING = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
-LIMITS = (0.1, 0.1, 0.1, 0.5, 0.5, 0.5)
 Z = (False, False, True, False, False, False)
-ALL = (True,) * 6
 UR5E_IN_AIR = UR5E.quiet().without_floor()
 
 

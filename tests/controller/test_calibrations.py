@@ -11,9 +11,10 @@ from tvist_plant.description import fingerprint, robots
 from tvist_plant.description import load as load_robot
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol import commands as c
+from tvist_protocol.replies import Done
 from tvist_shaping.errors import EstimatorError
 
-from .robots import UR5E, Robot
+from .robots import Q3, UR5E, H, Robot
 
 REPLACE = msgspec.structs.replace
 SHIPPED = [load_robot(name) for name in robots()]
@@ -116,3 +117,77 @@ def test_the_first_move_after_a_rest_is_no_reason_to_doubt_the_payload(mass, acc
         robot.send(c.MoveJ, q=(-0.1, elbow - 0.1), acceleration=acceleration)
         robot.until_rest()
         assert "warning" not in robot.kinds()
+
+
+POLYNOMIAL = load("ur5e_5kg")
+NAMES = ("auto", "short", "auto-target", "elastic-auto")
+
+
+def ringing(robot: Robot) -> float:
+    """Largest true acceleration of the tool later than 10 ms after the reference has stopped [m/s²]."""
+    arm = robot.controller.cycle.plant
+    robot.tick(5)
+    felt = []
+    for _ in range(300):
+        robot.tick()
+        felt.append(arm.truth().specific_force)
+    return np.linalg.norm(np.array(felt) - felt[-1], axis=1)[:200].max()
+
+
+def test_they_bring_their_own_estimator_and_leave_less_than_the_papers_shaper():
+    left = {}
+    for shaper in ("none", "zv", *NAMES):
+        robot = Robot(calibration=POLYNOMIAL)
+        assert robot.send(c.SetShaper, name=shaper) == Done()
+        robot.send(c.MoveJ, q=tuple(Q3))
+        robot.until_rest()
+        left[shaper] = ringing(robot)
+        if shaper in NAMES:
+            assert robot.controller.assumed.source.name == "modal"
+            assert "with estimator modal" in next(e.why for e in robot.events if e.kind == "shaper_changed")
+            assert left[shaper] < min(0.1 * left["none"], left["zv"]), shaper
+
+
+def test_to_know_the_end_is_to_be_there_sooner_and_a_stream_is_followed_all_the_same():
+    ticks = {}
+    for name in ("auto", "auto-target"):
+        robot = Robot(calibration=POLYNOMIAL, shaper=name)
+        robot.send(c.MoveJ, q=tuple(Q3))
+        ticks[name] = robot.until_rest().tick
+        assert robot.states[-1].estimated_f_d[0] == pytest.approx(14.8, abs=1.0)
+    assert ticks["auto-target"] < ticks["auto"]
+    at_rest = robot.controller.cycle.tvist.f_d.copy()
+    robot.send(c.ServoStart)
+    for k in range(400):
+        robot.setpoint(k, Q3 - 0.2 * (1.0 - np.cos(2.0 * k * H)) * np.array([0, 1, 1, 0, 0, 0]))
+        robot.tick()
+    assert abs(robot.states[-1].estimated_f_d[0] - at_rest[0]) > 0.02  # it follows the arm
+
+
+def test_a_filter_that_cannot_do_what_it_should_says_so_once():
+    """Hardly damped modes would need a longer filter than this one gets."""
+    robot = Robot()
+    slow = {"f_d": (2.0, 3.0, 4.0, 5.0), "zeta": (0.01, 0.01, 0.01, 0.01)}
+    assert robot.send(c.SetEstimator, name="fixed", **slow) == Done()
+    assert robot.send(c.SetShaper, name="auto") == Done()
+    robot.tick(50)
+    said = [event for event in robot.events if event.code == "out_of_range"]
+    assert len(said) == 1
+    assert "auto" in said[0].why
+    assert robot.send(c.SetShaper, name="none") == Done()
+    robot.tick(5)
+    assert robot.send(c.SetShaper, name="auto") == Done()
+    robot.tick(5)
+    assert len([event for event in robot.events if event.code == "out_of_range"]) == 2
+
+
+def test_a_clipped_filter_is_a_bit_in_every_state_and_one_event():
+    robot = Robot()
+    estimator = robot.controller.cycle.tvist.estimator
+    for now in (False, True, False, True):
+        estimator.clipped = now
+        robot.tick(3)
+    bits = [state.shaper_clipped for state in robot.states]
+    assert bits == [False] * 3 + [True] * 3 + [False] * 3 + [True] * 3
+    said = [event.tick for event in robot.events if event.code == "out_of_range"]
+    assert said == [4, 10]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.own_arm import OwnArm
 
 from tvist_controller.cell.description import Wire
-from tvist_controller.cell.gripper import ACTIVATION, CLOSED, OPEN, Gripper, Requests, answer
+from tvist_controller.cell.gripper import CLOSED, OPEN, Gripper, Requests, answer
 from tvist_controller.cell.live_cell import TRANSFER, Wires
 from tvist_controller.host import Host
 from tvist_controller.setup import Setup
@@ -102,18 +102,6 @@ class TestFingers:
         assert self.ticks(gripper, "OBJ", 3) == pytest.approx(seconds / PERIOD, abs=1)
         assert (gripper.read("POS"), gripper.read("PRE"), gripper.opening) == (CLOSED, 255, 0.0)
 
-    def test_nothing_moves_before_the_gripper_is_active(self):
-        gripper = Gripper(0.085, activated=False)
-        gripper.write({"POS": 255, "GTO": 1})
-        gripper.tick(lambda _wide, _narrow: None)
-        assert (gripper.read("POS"), gripper.read("FLT")) == (OPEN, 7)
-        gripper.write({"ACT": 1})
-        assert (gripper.read("STA"), gripper.read("FLT")) == (1, 5)
-        assert self.ticks(gripper, "STA", 3) == ACTIVATION
-        self.ticks(gripper, "POS", 100)
-        gripper.write({"GTO": 0})
-        assert gripper.read("OBJ") == 3
-
 
 class TestParts:
     def test_a_part_stops_the_fingers_and_loads_the_arm_until_it_is_released_elsewhere(self):
@@ -171,14 +159,6 @@ class TestParts:
         assert said(robot) == [f"False{CLOSED}"]
         assert any(re.search(said_, why) for why in warnings(robot))
         assert carried(robot).mass == TOOL["mass"]
-
-    @pytest.mark.parametrize("declared", [True, False])
-    def test_a_part_that_is_not_declared_is_noticed(self, declared):
-        robot = in_cell(part())
-        declaration = f"set_payload({2.4 if declared else 0.9}, [0, 0, {0.124 if declared else 0.06}])"
-        run(robot, "rq_close_and_wait()", declaration, "sleep(4)")
-        mismatches = [event for event in robot.events if event.code == "payload_mismatch"]
-        assert bool(mismatches) != declared
 
     def test_a_reset_begins_the_cell_anew(self):
         robot = in_cell(part())

@@ -1,132 +1,36 @@
-"""Filter and payload changed while the arm moves: no step, nothing beyond the limits, atomic, deterministic."""
+"""What changes while the arm moves, what is looked at before it is done, and the limits of every arm."""
+
+import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.search.draws import WITHIN, own_limits
+from tests.search.subject import Subject, refused, speeds, torques
 
+from tvist_controller.about import info_of
+from tvist_controller.dispatch.planner import Planner
+from tvist_controller.foresight.collision import CLEARANCE
+from tvist_controller.foresight.line_copy import resting_after
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.inverse_dynamics import SLEW, InverseDynamics
 from tvist_controller.line.limits import TORQUE_SHARE
+from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
+from tvist_plant.description import load
 from tvist_protocol import commands as c
-from tvist_protocol.replies import Done
+from tvist_protocol.kinematics import ForwardKinematics
+from tvist_protocol.motions import MoveL
+from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.transitions import Activity
-from tvist_shaping.catalogue import shaper
-from tvist_shaping.estimators.fixed import Fixed
-from tvist_shaping.estimators.polynomial import Polynomial
-from tvist_shaping.filter import TvistFilter
 
-from .robots import FITTING, PAPER, POLYNOMIAL, Q1, Q2, Q3, UR5E, H, bits, calibration, without_arm
+from .robots import FITTING, PAPER, Q1, Q2, Q3, UR5E, H, Robot, bits, calibration, without_arm
 from .test_modes import at
 
 DISC = paper_payload(UR5E)
-TOLERANCE = 1e-6
-"""Share of a limit that is rounding."""
-
-
-def a_filter(random, name=None):
-    estimator = Polynomial(**POLYNOMIAL)
-    if random.random() < 0.5:
-        estimator = Fixed([random.uniform(5.0, 15.0)], [random.uniform(0.02, 0.4)])
-    return TvistFilter(shaper(name or random.choice(FITTING)), estimator, joints=6)
-
-
-def a_line(tvist):
-    line = without_arm()
-    line.use(tvist)
-    return line
-
-
-class Alone:
-    """The shaped references of filters that are fed what a line is fed, and the bounds they give."""
-
-    def __init__(self, tvist):
-        self.filters, self.shaped = [tvist.replace()], [[]]
-
-    def add(self, tvist):
-        other = tvist.replace()
-        other.take_over(self.filters[-1])
-        self.filters.append(other)
-        self.shaped.append([])
-
-    def feed(self, reference):
-        for tvist, shaped in zip(self.filters, self.shaped, strict=True):
-            shaped.append(tvist.filter(reference))
-
-    def bound(self, order, limit, length):
-        """Largest of the limit and what one of them gives, shape (length - order, n)."""
-        bound = np.full((length - order, 6), float(limit))
-        for shaped in self.shaped:
-            if len(shaped) > order:
-                own = np.abs(np.diff(shaped, order, axis=0)) / H**order
-                bound[-len(own) :] = np.maximum(bound[-len(own) :], own)
-        return bound
-
-
-def drive(line, first, changes, limits, most=4000):
-    """Run to rest with changes of the filter at their ticks; shaped reference and what was promised of it."""
-    alone, shaped = Alone(first), []
-    for tick in range(most):
-        if tick in changes:
-            alone.add(changes[tick])
-            line.use(changes[tick])
-        line.step()
-        alone.feed(line.reference)
-        shaped.append(line.position)
-        if line.at_rest:
-            break
-    shaped = np.array(shaped)
-    for order, limit in ((1, limits.velocity), (2, limits.acceleration)):
-        own = np.abs(np.diff(shaped, order, axis=0)) / H**order
-        assert (own / alone.bound(order, limit, len(shaped))).max() < 1.0 + TOLERANCE
-    return shaped
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_a_motion_keeps_its_limits_and_its_target_through_changes_of_the_filter(seed):
-    random = np.random.default_rng(seed)
-    first = a_filter(random)
-    line = a_line(first)
-    limits = PAPER if seed % 2 else MotionLimits(*random.uniform((0.5, 1.0, 50.0), (3.0, 8.0, 1000.0)))
-    target = Q1 + random.uniform(-1.0, 1.0, 6) * random.uniform(0.1, 2.0)
-    duration = line.begin(line.plan(target, limits)).duration
-    ticks = np.sort(random.integers(0, int(duration / H), 3))
-    changes = {int(tick): a_filter(random) for tick in ticks}
-    shaped = drive(line, first, changes, limits)
-    assert line.at_rest
-    assert np.abs(shaped[-1] - target).max() <= STILL
-    assert line.tvist is list(changes.values())[-1]
-    for _ in range(20):
-        line.step()
-    assert (line.position == target).all()
-
-
-def test_a_stream_at_its_limit_keeps_it_through_a_change():
-    first, then = (TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=6) for name in ("zv", "ei"))
-    line = a_line(first)
-    stream = line.stream(H, PAPER)
-    w, alone, shaped = 1.6, Alone(first), []
-    way = np.array([1.0, -0.5, 0.3, 0.0, 0.0, 0.0])
-    amplitude = PAPER.acceleration / w**2
-    for k in range(2800):
-        t = k * H
-        q = Q1 + 0.99 * amplitude * min(1.0, t / 2.0) ** 3 * np.sin(w * t) * way * 0.75
-        stream.offer(k, q)
-        if k == 1500:
-            alone.add(then)
-            line.use(then)
-        line.step()
-        alone.feed(line.reference)
-        shaped.append(line.position)
-    shaped = np.array(shaped)
-    own = np.abs(np.diff(shaped, 2, axis=0)) / H**2
-    assert (own / alone.bound(2, PAPER.acceleration, len(shaped))).max() < 1.0 + TOLERANCE
-    assert line.filter._fade is None
-    line.begin(stream.end)
-    while not line.at_rest:
-        line.step()
-    assert np.abs(line.position - line.reference).max() <= STILL
 
 
 @pytest.mark.parametrize("masses", [(5.0, 0.0), (1.0, 4.0)])
@@ -194,5 +98,172 @@ def test_changes_are_done_in_motion_and_the_same_every_time(activity):
         robot.until_rest()
         robot.tick(50)
         assert robot.states[-1].target_qd == pytest.approx([0.0] * 6, abs=1e-6)
+        assert activity is not Activity.MOVING or robot.states[-1].target_q == pytest.approx(Q3, abs=1e-6)
         assert robot.kinds().count("shaper_changed") == 2
     assert bits(robots[0].states) == bits(robots[1].states)
+
+
+@pytest.mark.parametrize("name", [*FITTING[:4], "none"])
+def test_what_is_foreseen_is_what_happens_to_the_bit(name):
+    random = np.random.default_rng(FITTING.index(name) if name in FITTING else 99)
+    line = without_arm(name)
+    motion = line.begin(line.plan(Q3, PAPER))
+    for moment in sorted(random.integers(2, 1100, 3)):
+        while line.trajectory._ticks < moment and not line.at_rest and motion.rate == 1.0:
+            line.step()
+        ahead = Stopper(line).foresee()
+        assert ahead is not None
+        if moment > 800:
+            break
+    for expected in ahead[2:]:
+        line.step()
+        assert (line.position == expected).all()
+    assert line.at_rest
+    assert np.abs(np.diff(ahead[resting_after(ahead) :], axis=0)).max(initial=0.0) <= STILL
+
+
+@pytest.mark.parametrize("shaper", ["none", "zv", "ei3"])
+def test_a_stream_whose_end_through_the_filter_would_meet_is_stopped_instead(shaper):
+    """With its own low acceleration the stream would come to rest in the floor; a hard stop does not."""
+    robot, start = Robot(), np.array([0.0, -1.6, 0.0, -1.57, 0.0, 0.0])
+    robot.send(c.SetShaper, name=shaper)
+    robot.send(SimulationReset, q=tuple(start))
+    robot.send(c.ServoStart, velocity=1.5, acceleration=1.0, jerk=100.0)
+    q, speed, sequence = start.copy(), 0.0, 0
+    while q[1] < -0.2:
+        speed = min(speed + 0.9 * H, 1.0)
+        q[1] += speed * H
+        robot.setpoint(sequence, q)
+        robot.tick()
+        sequence += 1
+    assert robot.controller.motion.streaming
+    assert robot.send(c.ServoStop) == Done()
+    robot.until_rest()
+    ended = [event for event in robot.events if event.kind == "stream_stopped"]
+    assert [event.code for event in ended] == ["collision"]
+    assert "through the filter" in ended[0].why
+    model = robot.controller.motion.collisions
+    assert model.nearest(robot.column("target_q")) >= CLEARANCE
+
+
+def test_info_says_how_long_stops_last():
+    info = info_of(Robot().controller).stopping
+    assert [(row.payload, row.speed) for row in info] == [
+        (mass, speed) for mass in (0.0, UR5E.limits.payload) for speed in (0.33, 0.66, 1.0)
+    ]
+    for slow, fast in itertools.pairwise(info[:3]):
+        assert slow.duration < fast.duration
+        assert slow.way < fast.way
+    assert all(empty.way < loaded.way for empty, loaded in zip(info[:3], info[3:], strict=True))
+
+
+SEVEN = str(Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf")
+TORQUE = 1.001
+"""Largest ratio of a shaped reference's torque to the limit, for sampling [-]."""
+USED = 0.985
+"""Smallest share of a limit that a move uses which is slower for it [-]: its torque is taken for proportional to its
+acceleration, of which a shaper makes less where its impulses overlap less.
+"""
+
+
+def ratios(robot):
+    """Largest velocity, acceleration and torque of the shaped references over the joints' limits [-]."""
+    arm, q = robot.description, np.array(robot.references)
+    torque = np.abs(torques(arm, robot.payload, q)) / arm.limits.torque
+    return np.array([*speeds(arm, q), torque.max()])
+
+
+def assert_kept(robot, *, torque=True):
+    found = ratios(robot)
+    assert (found <= [WITHIN, WITHIN, TORQUE if torque else np.inf]).all(), found
+
+
+def moved(arm, shaper, start, goal, payload, limits):
+    """Make a move that is as quick as the arm can, and says what it is slower for; False if it would collide."""
+    robot = Subject(arm, np.array(start), payload, shaper=shaper)
+    reply = robot.send(c.MoveJ, q=tuple(goal), **limits)
+    if refused(reply):
+        assert reply.code == "collision", reply
+        return False
+    assert robot.until_rest()
+    assert_kept(robot)
+    if reply.limited is not None:
+        assert ratios(robot).max() > USED, (reply.limited, ratios(robot))
+    return True
+
+
+@pytest.mark.parametrize(
+    ("name", "shaper", "start", "goal"),
+    [
+        (
+            SEVEN,
+            "none",
+            (1.958304, -1.028545, -1.13757, -1.139029, 1.528591, 1.698451, 0.433821),
+            (-2.8215, -1.593834, 2.016334, -1.672621, 1.940885, 0.612649, -1.826071),
+        ),
+        (
+            "ur30",
+            "auto-target",
+            (1.742287, -0.668323, -0.58706, -0.625696, -1.401523, 1.611268),
+            (-3.068842, -2.55983, -0.295144, -0.865182, -0.721249, -0.326427),
+        ),
+    ],
+    ids=["seven", "ur30"],
+)
+def test_moves_that_are_heavy_for_a_moment_or_hardly_lighter_when_slower_keep_all_limits(
+    name, shaper, start, goal
+):
+    arm = load(name)
+    assert moved(arm, shaper, start, goal, paper_payload(arm), own_limits(arm))
+
+
+def paper_robot(shaper, pose="Q1"):
+    arm = load("ur5e")
+    q = arm.poses[pose] if isinstance(pose, str) else pose
+    return Subject(arm, np.array(q), paper_payload(arm), shaper=shaper)
+
+
+@pytest.mark.parametrize("shaper", ["zv", "auto", "zvd"])
+def test_a_line_of_the_tool_keeps_the_torques_as_well(shaper):
+    q = (0.0, -0.55, 1.0, -2.02, -1.57, 0.0)
+    robot = paper_robot(shaper, q)
+    x, y, z, *turn = robot.send(ForwardKinematics, q=q).pose
+    reply = robot.send(MoveL, pose=(x, y, z + 0.25, *turn), velocity=3.0, acceleration=40.0, jerk=4000.0)
+    assert isinstance(reply, Accepted), reply
+    assert reply.limited.endswith("so that the torque of joint shoulder stays within 150 N m")
+    assert robot.until_rest()
+    assert_kept(robot)
+    assert ratios(robot)[2] > 0.99
+
+
+@pytest.mark.parametrize("kind", ["servo_j", "speed_j"])
+def test_a_shaper_that_exceeds_more_slows_down_a_guided_motion(kind):
+    robot = paper_robot("none")
+    q1, q3 = (np.array(robot.description.poses[name]) for name in ("Q1", "Q3"))
+    fastest = min(robot.description.limits.velocity) * (q3 - q1) / np.abs(q3 - q1).max()
+    for tick in range(900):
+        if tick == 100:
+            assert not refused(robot.send(c.SetShaper, name="zvddd"))
+        if tick % 50 == 0 and kind == "servo_j":
+            reply = robot.send(c.ServoJ, q=tuple(q3.tolist()), lookahead=0.03, gain=2000.0, shaped=True)
+        elif tick % 50 == 0:
+            qd = fastest if tick < 300 else 0.0 * fastest
+            reply = robot.send(c.SpeedJ, qd=tuple(qd.tolist()), acceleration=40.0, shaped=True)
+        assert isinstance(reply, Accepted), reply
+        robot.tick()
+    assert_kept(robot, torque=False)
+
+
+@pytest.mark.parametrize("name", ["ur5e", "ur20"])
+def test_a_move_that_is_planned_in_the_tick_keeps_the_limits_and_names_what_made_it_slowest(name):
+    """It is slowed down by half for a torque, and then a little for a velocity."""
+    arm = load(name)
+    robot = Subject(arm, np.array(arm.poses["Q1"]), paper_payload(arm), shaper="zv")
+    fields = {"velocity": min(arm.limits.velocity), "acceleration": 8.0, "jerk": 500.0}
+    command = c.MoveJ(token=robot.token, q=arm.poses["Q3"], **fields)
+    found = Planner(robot.controller.setup).plan(command, robot.controller.snapshot(), within_tick=True).found
+    assert isinstance(found, PlannedMove)
+    assert found.limited[0] == "limit_torque", found.limited
+    robot.controller.motion.move(found)
+    assert robot.until_rest()
+    assert_kept(robot)

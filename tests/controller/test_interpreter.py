@@ -2,17 +2,14 @@
 
 import pytest
 
-from tvist_protocol.commands import UnlockProtectiveStop
 from tvist_protocol.programs import (
     MAX_SCRIPT,
     Interpreter,
     ProgramInterpret,
-    ProgramPlay,
     ProgramSkip,
     ProgramStop,
 )
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_protocol.simulation import SimulationInject
 
 from .scripts import URSIM, a_robot, failure, finish, playing, said, start
 
@@ -158,25 +155,6 @@ def test_statements_that_come_before_the_program_waits_are_dropped_with_a_warnin
     assert said(robot) == ["late"]
     (warning,) = [event.why for event in robot.events if event.kind == "warning"]
     assert "statements 1 to 2" in warning
-
-
-def test_after_a_protective_stop_the_statement_is_resumed_and_later_ones_follow():
-    robot = waiting()
-    add(robot, f"movej({NEAR}, a=2, v=1)", 100)
-    robot.send(SimulationInject, fault="protective_stop")
-    robot.until_rest()
-    assert add(robot, 'textmsg("there")') == Accepted(id=2)
-    assert robot.controller.programs.state == "PAUSED"
-    assert said(robot) == []
-    robot.tick(3000)
-    assert robot.send(UnlockProtectiveStop) == Done()
-    assert robot.send(ProgramPlay) == Done()
-    robot.until_rest()
-    robot.tick(5)
-    assert said(robot) == ["there"]
-    assert robot.states[-1].reference_q == pytest.approx(NEAR)
-    assert add(robot, "end_interpreter()") == Accepted(id=3)
-    finish(robot)
 
 
 def test_a_move_is_skipped_before_it_has_begun():

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.search.draws import SHAPERS
-from tests.search.paths import assert_on_path, interfere, journey, judge, judge_stop
 from tests.search.spaces import BENT, NO_TOOL, away, begun, pose_of, tool_pose
 from tests.search.subject import Subject
 
@@ -15,17 +13,7 @@ from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.transitions import Activity
 
-from .robots import UR5E, H
-
-
-@pytest.mark.parametrize("seed", [3, 7, 581])  # 581 creeps to its end; `make search` draws others
-def test_a_random_path_is_where_it_should_be(seed):
-    judge(seed)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_every_kind_of_stop_stays_on_the_path_behind_the_motion_and_rests_no_later(seed):
-    judge_stop(seed)
+from .robots import H
 
 
 def went(robot: Subject, kind, **fields) -> np.ndarray:
@@ -149,23 +137,6 @@ def test_a_joint_that_would_leave_its_range_is_named_with_the_share_of_the_way()
     assert [one.code for one in refused] == ["limit_position"]
     assert "wrist_3" in refused[0].why
     assert "% of the way" in refused[0].why
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_slider_and_pauses_stay_on_the_path_and_lead_to_its_end(seed):
-    trip = journey([seed, 43], [name for name in SHAPERS if not name.startswith("um_")])
-    random = np.random.default_rng([seed, 44])
-    robot = trip.begin()
-    interfere(robot, random, 200, ["none", "zv", "zvd", "auto"])
-    robot.until_rest(500_000)
-    robot.tick(20)
-    q = np.array(robot.references)
-    assert_on_path(q, trip.legs)
-    assert np.abs(np.diff(q, axis=0)).max() / H <= 1.01 * min(UR5E.limits.velocity)
-    assert np.abs(np.diff(q, 2, axis=0)).max() / H**2 <= 1.01 * min(UR5E.limits.acceleration)
-    assert [event.kind for event in robot.events if event.kind in {"motion_done", "motion_stopped"}] == [
-        "motion_done"
-    ]
 
 
 def two_parts(shaper: str = "zv"):

@@ -1,13 +1,10 @@
 """Programs: the controller carries them out by itself, line by line, with the authority of whoever played them."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from tests.examples import examples
 
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
-from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import Q1, Q2, Q3, Robot
@@ -156,21 +153,6 @@ def test_pause_holds_the_motion_and_play_goes_on_with_it(robot):
     assert reached(robot) == [Q2.tolist()]
 
 
-def test_a_motion_that_ends_while_it_is_paused_leaves_the_next_line_to_play(robot):
-    play(robot, "paper.urp")
-    until(robot, lambda: len(reached(robot)) == 1)
-    until(robot, lambda: robot.events[-1].kind == "motion_started")
-    robot.tick(440)  # it brakes: a pause would not end it sooner
-    robot.send(ProgramPause)
-    robot.tick(LONG)
-    _, now, line = state(robot)
-    assert now == "PAUSED"
-    robot.send(ProgramPlay)
-    until(robot, stopped(robot))
-    assert line in {3, 4}
-    assert reached(robot) == ALL
-
-
 def test_a_safeguard_between_two_lines_has_the_next_one_wait(robot):
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)
@@ -181,60 +163,6 @@ def test_a_safeguard_between_two_lines_has_the_next_one_wait(robot):
     robot.send(SimulationInject, fault="normal")
     until(robot, stopped(robot))
     assert reached(robot) == ALL
-
-
-COMMANDS = {
-    "load": (ProgramLoad, {"name": "paper.urp"}),
-    "wait": (ProgramLoad, {"name": "wait_program.urp"}),
-    "play": (ProgramPlay, {}),
-    "pause": (ProgramPause, {}),
-    "stop": (ProgramStop, {}),
-    "motion pause": (c.Pause, {}),
-    "motion resume": (c.Resume, {}),
-    "motion stop": (c.Stop, {}),
-    "move": (c.MoveJ, {"q": tuple(Q2)}),
-    "protective": (SimulationInject, {"fault": "protective_stop"}),
-    "safeguard": (SimulationInject, {"fault": "safeguard_stop"}),
-    "normal": (SimulationInject, {"fault": "normal"}),
-    "unlock": (c.UnlockProtectiveStop, {}),
-    "power off": (c.PowerOff, {}),
-    "power on": (c.PowerOn, {}),
-    "release": (c.ReleaseControl, {}),
-    "take": (c.TakeControl, {"client": "a"}),
-}
-
-
-@examples(30)
-@given(
-    st.lists(st.tuples(st.sampled_from(sorted(COMMANDS)), st.sampled_from([0, 1, 3, 100, 600])), max_size=25)
-)
-def test_whatever_happens_every_motion_ends_once_and_only_a_playing_program_begins_one(steps):
-    robot = Robot(shaper="ei3")
-    ours, wanted = set(), set()
-    for name, ticks in steps:
-        kind, fields = COMMANDS[name]
-        reply = robot.send(kind, **fields)
-        if isinstance(reply, Accepted) and reply.token is not None:
-            robot.token = reply.token
-        if isinstance(reply, Accepted) and reply.id is not None:
-            ours.add(reply.id)
-        for _ in range(ticks):
-            playing = state(robot)[1] == "PLAYING"
-            known = len(robot.events)
-            robot.tick()
-            begun = {event.id for event in robot.events[known:] if event.kind == "motion_started"} - ours
-            assert playing or not begun
-            wanted |= begun
-            if robot.controller.session.lease is None:
-                assert state(robot)[1] == "STOPPED"
-            if robot.states[-1].robot_mode != 7:
-                assert state(robot)[1] == "STOPPED" or playing
-    robot.send(ProgramStop)
-    if isinstance(robot.send(SimulationReset), Refused):
-        robot.controller.receive(c.Stop())
-    robot.tick(LONG)
-    ended = [event.id for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]
-    assert sorted(ended) == sorted(ours | wanted)
 
 
 LABELS = """

@@ -232,26 +232,6 @@ def test_the_end_of_a_program_closes_its_sockets_at_once():
     robot.tick()
 
 
-def test_two_threads_share_a_socket_and_a_killed_one_waits_no_more():
-    robot, far = opened(
-        "global got = 0", "thread one():\n got = socket_read_binary_integer(1, timeout=0)\n end", "h = run one()",
-        "sleep(0.1)", "kill h", "textmsg(socket_read_binary_integer(1, timeout=0))", "textmsg(got)",
-    )  # fmt: skip
-    robot.tick(80)
-    far.tell("received", ints(9))
-    finish(robot)
-    assert said(robot) == ["[1, 9]", "0"]
-
-
-def test_a_socket_that_one_thread_closes_ends_the_read_of_another():
-    robot, far = opened("thread one():\n sleep(0.05)\n socket_close()\n end", "run one()",
-                        "textmsg(socket_read_binary_integer(1, timeout=0))")  # fmt: skip
-    far.tell("received", b"\0")
-    finish(robot, 60)
-    assert said(robot) == ["[0, -1]"]
-    assert far.of(Close) == [Close(1)]
-
-
 MOVES = (
     "q = [-1.60, -1.727, -2.203, -0.808, 1.595, -0.031]",
     "i = 0",

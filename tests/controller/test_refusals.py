@@ -12,7 +12,7 @@ from tvist_controller.planning.filter_planner import (
     make_estimator,
     wanted_modes,
 )
-from tvist_controller.refusal import RefusalError, check_body
+from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
@@ -27,6 +27,8 @@ from .robots import POLYNOMIAL, Q1, Q2, Q3, UR5E, NoArm, Robot, bits, calibratio
 
 Q1_, Q2_, Q3_ = tuple(Q1), tuple(Q2), tuple(Q3)
 REST, NAN = (0.0,) * 6, float("nan")
+LOW = (0.0, 0.6, 0.0, -1.57, 0.0, 0.0)
+"""The upper arm points below the horizon, into the floor."""
 DISC = paper_payload(UR5E)
 BODY = {"mass": 1.0, "com": DISC.com, "inertia": DISC.inertia}
 IMPOSSIBLE = (1.0, 0.9, 0.0, 1.0, 0.0, 1.0)
@@ -87,6 +89,7 @@ def path(*segments):
 
 COEFFICIENTS = POLYNOMIAL["f_d_coefficients"]
 TOO_MANY = Registers(bank="input_double", first=47, values=(1.0, 2.0))
+NO_BIT = Registers(bank="input_bit", values=(2,))
 FIXED = {"name": "fixed", "f_d": (8.0,), "zeta": (0.2,)}
 WRONG = [
     (c.TakeControl, {"client": "b"}, "no_control", "token"),
@@ -146,11 +149,23 @@ WRONG = [
     (SetRegisters, {"bank": "input_int", "values": (True,)}, "out_of_range", "values[0]"),
     (SetRegisters, {"bank": "input_bit", "values": (True, 1)}, "out_of_range", "values[1]"),
     (SetRegisters, {"bank": "input_double", "values": (False,)}, "out_of_range", "values[0]"),
-    (SetRegisters, {"bank": "input_int", "values": (8,), "also": (TOO_MANY,)}, "out_of_range", "values"),
+    (
+        SetRegisters,
+        {"bank": "input_int", "values": (8,), "also": (TOO_MANY,)},
+        "out_of_range",
+        "also[0].values",
+    ),
+    (
+        SetRegisters,
+        {"bank": "input_int", "values": (8,), "also": (NO_BIT,)},
+        "out_of_range",
+        "also[0].values[0]",
+    ),
     (SetRegisters, {"bank": "output_double", "values": (1.5,), "token": None}, "missing_field", "token"),
     (SimulationReset, {"q": Q2_[:2]}, "out_of_range", "q"),
     (SimulationReset, {"q": Q2_, "shaper": "zvv"}, "unknown_shaper", "shaper"),
     (SimulationReset, {"q": Q2_, "payload": HEAVY}, "out_of_range", "payload.inertia"),
+    (SimulationReset, {"q": LOW, "seed": 7, "mode": "IDLE", "shaper": "ei"}, "collision", "q"),
     (SimulationInject, {"fault": "gravity"}, "unknown_fault", "fault"),
     (SimulationInject, {"fault": "nan", "value": 1.0}, "out_of_range", "value"),
     (SimulationInject, torque(), "missing_field", "joint"),
@@ -170,22 +185,11 @@ PLANNED = [
     (m.MovePath, {"segments": (TOO_GENTLE,)}, "out_of_range", "segments[0].acceleration"),
 ]
 WITH_TOKEN = [
-    (c.KeepAlive, {}),
-    (c.ReleaseControl, {}),
-    (c.MoveJ, {"q": Q2_}),
-    (c.ServoStart, {}),
-    (c.ServoStop, {}),
-    (c.Stop, {}),
-    (c.SetShaper, {"name": "ei"}),
-    (c.SetEstimator, FIXED),
-    (c.SetPayload, BODY),
-    (SimulationReset, {"q": Q2_}),
-    (SimulationStep, {"ticks": 1}),
-    (c.PowerOn, {}),
-    (c.PowerOff, {}),
-    (c.UnlockProtectiveStop, {}),
-    (SimulationInject, {"fault": "protective_stop"}),
-]
+    (c.KeepAlive, {}), (c.ReleaseControl, {}), (c.MoveJ, {"q": Q2_}), (c.ServoStart, {}), (c.ServoStop, {}),
+    (c.Stop, {}), (c.SetShaper, {"name": "ei"}), (c.SetEstimator, FIXED), (c.SetPayload, BODY),
+    (SimulationReset, {"q": Q2_}), (SimulationStep, {"ticks": 1}), (c.PowerOn, {}), (c.PowerOff, {}),
+    (c.UnlockProtectiveStop, {}), (SimulationInject, {"fault": "protective_stop"}),
+]  # fmt: skip
 
 
 def assert_refused(robot, twin, table):
@@ -278,11 +282,6 @@ def test_a_move_that_would_last_for_hours_is_refused():
     assert robot.send(c.MoveJ, q=Q2_) == Accepted(id=1)
 
 
-@pytest.mark.parametrize("inertia", [REST, (0.01, 0, 0, 0.01, 0, 0.02), (0, 0, 0, 0.01, 0, 0.01)])
-def test_points_discs_and_rods_are_bodies(inertia):
-    check_body(Payload(mass=1.0, com=(0.0, 0.0, 0.0), inertia=inertia), rated=5.0)
-
-
 @pytest.mark.parametrize("name", BUILT_IN.names())
 def test_every_shaper_that_is_named_can_be_chosen(name):
     modes = wanted_modes(name, 1, "name")
@@ -307,13 +306,6 @@ def test_a_calibration_comes_as_a_map_or_by_its_name_or_is_the_server_s_own():
     own = calibration(name="own")
     for named in (None, "own"):
         assert estimator(own, name="polynomial", calibration=named).calibration is own
-
-
-def test_modal_takes_the_calibration_that_comes_with_the_package():
-    source = estimator(calibration(name="own"), name="modal")
-    assert (source.name, source.calibration.name) == ("modal", "ur5e_modal")
-    assert source.estimator(3, DISC).modes == 3
-    assert estimator(name="modal", calibration="ur5e_modal") == source
 
 
 def test_the_number_of_modes_is_that_of_the_estimator_or_the_filter_s_own():

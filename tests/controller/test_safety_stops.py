@@ -64,17 +64,6 @@ def test_a_motion_that_its_client_paused_waits_for_its_client(first):
     assert robot.kinds()[-1] == "motion_done"
 
 
-def test_at_rest_a_safeguard_keeps_the_arm_where_it_is():
-    robot = Robot()
-    inject(robot, "safeguard_stop")
-    for kind, fields in ((c.MoveJ, MOVE), (c.ServoStart, {})):
-        reply = robot.send(kind, **fields)
-        assert (reply.code, "SAFEGUARD_STOP" in reply.why) == ("wrong_mode", True)
-    assert robot.tick().safety_mode == SafetyMode.SAFEGUARD_STOP
-    inject(robot, "normal")
-    assert isinstance(robot.send(c.MoveJ, **MOVE), Accepted)
-
-
 @pytest.mark.parametrize(
     ("fault", "mode"), [("emergency_stop", "ROBOT"), ("system_emergency_stop", "SYSTEM")]
 )

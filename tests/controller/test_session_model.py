@@ -33,17 +33,8 @@ MOTION = {name: kind for name, (kind, _) in COMMANDS.items()}
 NUMBERED = {"move_j", "servo_j", "speed_j", "speed_l"}
 """Commands that are answered by the number of a motion."""
 INTERFERING = [
-    "pause",
-    "pause",
-    "resume",
-    "servo_stop",
-    "stop",
-    "power_off",
-    "servo_j",
-    "speed_j",
-    "stop_j",
-    "stop_l",
-]
+    "pause", "pause", "resume", "servo_stop", "stop", "power_off", "servo_j", "speed_j", "stop_j", "stop_l",
+]  # fmt: skip
 PUT = {"RUNNING": Activity.REST, "IDLE": Activity.IDLE, "POWER_OFF": Activity.POWER_OFF}
 ENDS = {"motion_done", "motion_stopped"}
 

@@ -1,10 +1,7 @@
 """Stops: their trajectories, and in mid-motion at random moments."""
 
-import itertools
-
 import numpy as np
 import pytest
-from tests.search.stops import draw, judge
 
 from tvist_controller.foresight.stops import STEP, StopPlanner
 from tvist_controller.line.differentiator import Target
@@ -15,7 +12,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 from tvist_protocol.simulation import SimulationInject, SimulationReset
 
-from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot, calibration, stop, without_arm
+from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot, stop, without_arm
 
 
 def run(line, ticks):
@@ -29,17 +26,6 @@ def until_rest(line):
     while not line.at_rest:
         out.append(run(line, 1)[0])
     return np.array(out)
-
-
-@pytest.mark.parametrize("number", range(8))
-def test_every_kind_of_stop_stays_on_the_way_behind_the_motion_and_rests_no_later(number):
-    """Against the same motion left alone: on its line, at no tick further along it, no later, within the torque."""
-    outcome = judge(UR5E, draw(UR5E, number))
-    assert outcome.kept, outcome
-    duration, way = outcome.told
-    if duration is not None:
-        assert duration == pytest.approx(outcome.duration, abs=3 * H), "the event says how long it takes"
-        assert way == pytest.approx(outcome.way, abs=1e-6), "and how far it goes"
 
 
 def test_a_stop_that_torque_would_let_go_through_the_floor_is_no_later_than_the_move():
@@ -108,57 +94,6 @@ def test_with_negative_impulses_a_motion_is_done_only_where_nothing_more_comes_o
     assert np.abs(robot.column("target_q")[-250:] - rested).max() < 1e-7
 
 
-def test_a_pause_while_the_slider_slows_is_not_ahead_of_what_the_slider_would_have_done():
-    gone = []
-    for pauses in (True, False):
-        robot = Robot(shaper="mzv")
-        robot.send(c.MoveJ, q=tuple(Q3), velocity=3.0, acceleration=33.0, jerk=2000.0)
-        robot.tick(200)
-        robot.send(c.SetSpeed, fraction=0.25)
-        robot.tick(6)
-        if pauses:
-            robot.send(c.Pause)
-        robot.tick(600)
-        gone.append((robot.column("target_q") - Q1) @ (Q3 - Q1))
-    assert (gone[0] - gone[1]).max() <= 1e-9
-
-
-def test_a_stop_is_not_ahead_of_a_motion_that_negative_impulses_let_turn_back():
-    """Of a short move, at every other tick of it: its shaped reference goes forwards and back again."""
-    target = (Q1[0] + 0.003, *Q1[1:])
-    robot = Robot()
-    robot.send(c.SetEstimator, name="fixed", f_d=(5.0,), zeta=(0.1,))
-    robot.send(c.SetShaper, name="um_zv")
-    for moment in range(8, 80, 2):
-        robot.send(SimulationReset, q=tuple(Q1), mode="RUNNING")
-        robot.tick(3)
-        assert isinstance(robot.send(c.MoveJ, q=target, velocity=0.5, acceleration=2.0, jerk=50.0), Accepted)
-        robot.tick(moment)
-        if robot.controller.cycle.mode.at_rest:
-            break
-        free = robot.controller.motion.stopper.foresee()[2:, 0]
-        robot.send(c.Stop)
-        stopped = []
-        for _ in free:
-            robot.tick()
-            stopped.append(robot.controller.cycle.position[0])
-        assert (np.array(stopped) - free).max() <= 1e-9, moment
-    assert moment > 20
-
-
-@pytest.mark.parametrize("shaper", ["none", "ei3", "auto", "elastic"])
-def test_a_move_that_has_barely_begun_stands_as_soon_as_it_is_stopped(shaper):
-    for ticks, deceleration in zip(range(12), itertools.cycle([None, 1.0]), strict=False):
-        robot = Robot(shaper=shaper, calibration=calibration())
-        robot.send(c.MoveJ, q=tuple(Q3.tolist()))
-        robot.tick(ticks)
-        before = robot.controller.cycle.position
-        robot.send(c.Stop, deceleration=deceleration)
-        stopped = robot.controller.tick_number
-        assert robot.until_rest().tick - stopped <= 25
-        assert np.abs(robot.controller.cycle.position - before).max() < 1e-3
-
-
 DISC = UR5E.payload
 LIMITS = UR5E.limits
 
@@ -175,7 +110,7 @@ def moving(seed):
     return random.uniform(-3, 3, 6), random.uniform(-1.5, 1.5, 6), random.uniform(-2, 2, 6)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_of_all_decelerations_that_keep_the_torque_the_hardest_is_taken(seed):
     """Each is asked for itself: what a hard stop does not keep a gentler one may not, either."""
     state = Target(*map(np.array, moving(seed)))
@@ -200,7 +135,7 @@ def test_a_stop_that_is_not_clear_is_passed_over_for_one_that_is():
     assert gentle.acceleration < free.acceleration, "hardened until it is clear, and no more"
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_stop_is_no_protective_stop(seed):
     """The flexible arm swings beyond what is asked of it, but never for more than 10 ms beyond its drives' limits."""
     random = np.random.default_rng(seed)
@@ -232,7 +167,7 @@ def test_a_wish_that_would_end_beyond_the_joint_s_range_is_overruled():
     assert stop.at(9.0)[0][0] < LIMITS.position[0]
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_motion_with_the_acceleration_that_its_way_leaves_keeps_its_share_of_torque(seed):
     random = np.random.default_rng(seed)
     start, target = random.uniform(-2, 2, (2, 6))

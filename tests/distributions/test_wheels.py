@@ -109,6 +109,7 @@ class TestContents:
         assert all(line.endswith(f"=={common['version']}") for line in ours)
 
 
+@pytest.mark.nightly
 class TestFresh:
     @pytest.mark.nightly
     @pytest.mark.parametrize("name", ["tvist-protocol", "tvist-shaping", "tvist-urscript"])

@@ -33,7 +33,6 @@ LINKED = sorted(
         *ROOT.glob("*.md"),
         *ROOT.glob("*/README.md"),
         *ROOT.glob("*/*/README.md"),
-        ROOT / "protocol" / "messages.md",
     }
 )
 ENDPOINT = "tcp/127.0.0.1:7447"
@@ -117,7 +116,7 @@ class TestLinks:
         assert drawn == layers
 
     def test_the_picture_of_the_protocol_has_its_keys_and_who_sends_them(self):
-        text = (ROOT / "protocol" / "README.md").read_text(encoding="utf-8")
+        text = (DOCS / "reference" / "generated" / "protocol.md").read_text(encoding="utf-8")
         keys = dict(re.findall(r"^\| `tvist/<robot>/([^`]+)` \| \w+ \| (\w+) \|", text, re.MULTILINE))
         picture = (DOCS / "images" / "protocol.svg").read_text(encoding="utf-8")
         arrows = re.findall(r'd="M(150|600),\d+H\d+"/>\n<text[^>]*>([^<]+)<', picture)
@@ -126,7 +125,7 @@ class TestLinks:
 
     def test_the_readme_counts_what_the_paper_page_does_not_match(self):
         origin = "(fitted|tuned|predicted|not matched)"
-        page = (DOCS / "reference" / "paper.md").read_text(encoding="utf-8")
+        page = (DOCS / "results" / "paper.md").read_text(encoding="utf-8")
         first, second = zip(
             *re.findall(rf"\| {origin} \| [^|]+ \| {origin} \|$", page, re.MULTILINE), strict=True
         )
@@ -246,6 +245,8 @@ def tell(folder, words, endpoint):
     return told
 
 
+@pytest.mark.realtime
+@pytest.mark.nightly
 class TestTutorial:
     def test_every_command_works_in_its_order(self, story):
         _, said = story
@@ -276,6 +277,8 @@ class TestSnippets:
         assert results.attempted > 0
         assert results.failed == 0
 
+    @pytest.mark.realtime
+    @pytest.mark.nightly
     @pytest.mark.parametrize("text", blocks("python"))
     def test_scripts_run(self, text, request, tmp_path):
         folder = ROOT

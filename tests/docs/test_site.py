@@ -44,10 +44,10 @@ def test_the_navigation_names_every_page_once(collected):
     }  # reached from the page about tests
 
 
-def test_the_navigation_has_the_kinds_of_documents():
+def test_the_navigation_has_a_section_for_each_reader():
     titles = [title for item in navigation.navigation([], {}) for title in item]
-    kinds = ["Tutorials", "How-to guides", "Explanations", "Reference", "Commands", "API", "Project"]
-    assert titles == ["Home", *kinds]
+    readers = ["Try it", "Test programs", "Quiet a robot", "Study shapers", "Simulate arms", "Operate robots"]
+    assert titles == ["Home", *readers, "Commands", "API", "Project"]
 
 
 def test_every_package_that_is_imported_has_a_page():

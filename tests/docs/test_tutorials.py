@@ -17,8 +17,6 @@ from tests.places import free_endpoint
 
 from tvist_cli.main import GROUPS, OF_GROUPS, application, examples
 
-pytestmark = pytest.mark.realtime
-
 EXAMPLES = examples()
 COMPARED = (DOCS / "how-to" / "change-a-shaper.md").read_text("utf-8")
 WAVE = ROOT / "clients" / "examples" / "wave.script"
@@ -52,9 +50,9 @@ def commands(text):
         yield words, int(re.search(r"# exit code (\d)|$", line)[1] or 0)
 
 
-@pytest.mark.parametrize(
-    "page", ["program-in-ci", "your-log", pytest.param("your-shaper", marks=pytest.mark.nightly)]
-)
+@pytest.mark.realtime
+@pytest.mark.nightly
+@pytest.mark.parametrize("page", ["program-in-ci", "your-log", "your-shaper"])
 def test_a_tutorial_says_and_leaves_what_its_commands_do(page, tmp_path, monkeypatch):
     text, told, served = tutorial(page), "", None
     folder = with_files(tmp_path, text)
@@ -80,6 +78,7 @@ def test_a_tutorial_says_and_leaves_what_its_commands_do(page, tmp_path, monkeyp
     assert all((folder / name).exists() for name in pictures)
 
 
+@pytest.mark.nightly
 def test_the_comparison_of_shapers_prints_what_the_page_says(tmp_path):
     folder = with_files(tmp_path, tutorial("your-shaper"))
     (script,) = [text for text in blocks(COMPARED, "python") if "asyncio.run" in text]
@@ -142,6 +141,8 @@ def until(sign, *words, cwd):
         assert process.wait() in (0, 130)
 
 
+@pytest.mark.realtime
+@pytest.mark.nightly
 @pytest.mark.parametrize("command", [name for name in EXAMPLES if name != "serve"])
 def test_the_example_works(command, place, request):
     """That of `serve` is run by the fixture."""

@@ -134,9 +134,3 @@ def figures():
     import tvist_lab.figures
 
     return tvist_lab.figures
-
-
-@pytest.fixture(scope="session")
-def style(figures):
-    """The style of all figures."""
-    return figures.style

@@ -88,11 +88,14 @@ class SyntheticLog:
             values.append(flat)
         return names, np.hstack(values)
 
-    def csv(self, path: Path, separator: str = ",", write=repr) -> Path:
-        """Write CSV with full precision."""
+    def text(self, separator: str = ",", write=repr) -> list[str]:
+        """Return the lines of a CSV, with full precision."""
         names, values = self.table()
-        lines = [separator.join(names)] + [separator.join(write(float(v)) for v in row) for row in values]
-        path.write_text("\n".join(lines) + "\n")
+        return [separator.join(names), *(separator.join(map(write, row)) for row in values.tolist())]
+
+    def csv(self, path: Path, separator: str = ",", write=repr) -> Path:
+        """Write them."""
+        path.write_text("\n".join(self.text(separator, write)) + "\n")
         return path
 
     def dump(self, path: Path, size: int = 1116, skip: int = 0, lost: int = 0) -> Path:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,21 +13,15 @@ from tvist_controller.setup import body, paper_payload
 from tvist_controller.sources import calibrations
 from tvist_lab.studies.moves import study
 from tvist_lab.study.asked import Asked
-from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import baselines, some
 from tvist_lab.study.held_out import interval
-from tvist_lab.study.line import (
-    PAPER,
-    lengthened,
-    point_to_point,
-    round_a_corner,
-)
+from tvist_lab.study.line import PAPER, lengthened, point_to_point
 from tvist_lab.study.measures import WORTH
-from tvist_lab.study.method import Task
 from tvist_lab.study.moves import Move, MovesError, draw_moves, is_free, read_moves, write_moves
 from tvist_lab.study.recipes import FrequencyError, Recipe, RecipeError
 from tvist_lab.study.shaping import shape
 from tvist_lab.study.work import measure
+from tvist_lab.workspace import WORKSPACE
 from tvist_plant.plant import PERIOD
 from tvist_shaping.estimators.fixed import Fixed
 
@@ -53,15 +48,6 @@ def written(tmp_path, ur5e):
     return read
 
 
-class Short:
-    """A shaper that does not go all the way."""
-
-    delay = 0.0
-
-    def step(self, q):
-        return 0.999 * q
-
-
 HOME = [0.0, -1.0, 1.0, -1.0, 0.0, 0.0]
 
 
@@ -70,15 +56,12 @@ def but(joint, angle):
 
 
 class TestFiles:
-    def test_a_move_says_where_from_and_where_to(self, written):
-        (move,) = written([{"start": HOME, "target": but(0, 1.0)}])
-        assert move == Move(tuple(HOME), tuple(but(0, 1.0)), 5.0)
-
-    def test_a_move_may_have_a_payload_of_its_own(self, written):
+    def test_a_move_says_where_from_and_where_to_and_may_have_a_payload_of_its_own(self, written):
         first, second = written(
             [{"start": HOME, "target": but(0, 1.0), "payload": 0}, {"start": HOME, "target": but(1, 0.0)}]
         )
-        assert (first.mass, second.mass) == (0.0, 5.0)
+        assert first == Move(tuple(HOME), tuple(but(0, 1.0)), 0.0)
+        assert second == Move(tuple(HOME), tuple(but(1, 0.0)), 5.0)
 
     def test_what_is_written_is_read(self, tmp_path, ur5e):
         moves = draw_moves(ur5e, 5, 1, (0.0, 5.0)).moves
@@ -92,27 +75,20 @@ class TestFiles:
             ("{}", ["moves.json", "must be a list"]),
             ([], ["moves.json", "at least 1 entry"]),
             ([{"start": HOME}], ["move 1", "target"]),
-            ([{"start": HOME, "target": but(0, 1.0), "load": 1}], ["move 1", "load"]),
             ([{"start": HOME, "target": but(0, 1.0), "payload": -1}], ["move 1", "payload", "0"]),
             (
                 [{"start": HOME, "target": but(0, 1.0)}, {"start": HOME, "target": HOME}],
-                ["move 2", "is too short"],
+                ["move 2", "too short"],
             ),
             ([{"start": HOME, "target": HOME[:5]}], ["move 1", "target", "5 angles", "6 joints"]),
             ([{"start": HOME, "target": but(2, 9.0)}], ["move 1", "target", "joint 3", "elbow", "±6.28319"]),
             ([{"start": but(4, "x"), "target": HOME}], ["move 1", "start", "joint 5"]),
-            ('[{"start": [0, 0, 0, 0, 0, NaN], "target": []}]', ["moves.json"]),
-            ([{"start": HOME, "target": but(0, 1e300)}], ["move 1", "target", "joint 1"]),
         ],
     )
     def test_what_is_wrong_is_named(self, written, content, words):
         with pytest.raises(MovesError) as error:
             written(content)
         assert all(word in str(error.value) for word in words), error.value
-
-    def test_a_file_that_is_not_there_is_named(self, tmp_path, ur5e):
-        with pytest.raises(MovesError, match=r"none\.json"):
-            read_moves(tmp_path / "none.json", ur5e, lambda: 5.0)
 
 
 class TestDraws:
@@ -122,14 +98,13 @@ class TestDraws:
         assert few.moves != draw_moves(ur5e, 5, 4, (0.0, 5.0)).moves
 
     def test_moves_are_those_of_the_workspace_and_free(self, ur5e):
-        drawn = draw_moves(ur5e, 60, 7, (1.0, 4.0))
+        drawn = draw_moves(ur5e, 30, 7, (1.0, 4.0))
         collision = CollisionModel(ur5e, body(paper_payload(ur5e, 5.0)))
         for move in drawn.moves:
             start, target = np.array(move.start), np.array(move.target)
             for q in (start, target):
-                assert np.abs(q[0]) <= np.pi
-                assert -np.pi <= min(q[1], q[3]) <= max(q[1], q[3]) <= 0.0
-                assert np.abs(q[2]) <= 5.0 * np.pi / 6.0
+                assert (np.array(WORKSPACE.low) <= q[:4]).all()
+                assert (q[:4] <= np.array(WORKSPACE.high)).all()
                 assert not q[4:].any()
             assert 1.0 <= move.mass <= 4.0
             collision.declare(body(paper_payload(ur5e, move.mass)))
@@ -139,10 +114,8 @@ class TestDraws:
         assert 0.0 < drawn.share <= 1.0
 
     def test_wrists_turn_where_they_may(self, ur5e):
-        wrists = np.array(
-            [move.target[4:] for move in draw_moves(ur5e, 20, 7, (0.0, 0.0), wrists=True).moves]
-        )
-        assert np.abs(wrists).max() > 1.5
+        moves = draw_moves(ur5e, 20, 7, (0.0, 0.0), wrists=True).moves
+        assert np.abs([move.target[4:] for move in moves]).max() > 1.5
 
 
 class TestLine:
@@ -154,14 +127,9 @@ class TestLine:
             np.testing.assert_array_equal(longer[-1], target)
             assert np.abs(np.diff(longer, 2, axis=0)).max() <= (1.0 + 1e-9) * PAPER.acceleration * PERIOD**2
 
-    def test_a_path_round_a_corner_is_smooth_and_ends_at_the_target(self):
-        path = round_a_corner(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([1.0, -1.0, 0.5]))
-        np.testing.assert_allclose(path[-1], [1.0, -1.0, 0.5], atol=1e-12)
-        assert np.abs(np.diff(path, 2, axis=0)).max() <= 2.0 * PAPER.acceleration * PERIOD**2
-
     def test_a_reference_that_is_not_followed_to_the_end_is_said_not_to_end(self):
-        reference = point_to_point(np.zeros(2), np.ones(2))
-        assert not shape(Short(), reference, watched=False).ended
+        short = SimpleNamespace(delay=0.0, step=lambda q: 0.999 * q)
+        assert not shape(short, point_to_point(np.zeros(2), np.ones(2)), watched=False).ended
 
 
 class TestRecipes:
@@ -172,11 +140,9 @@ class TestRecipes:
         np.testing.assert_allclose(zeta, [0.1, 0.2])
         assert (wrong.modes, wrong.f_d_min, wrong.zeta_max) == (2, 8.0, 0.2)
 
-    def test_several_modes_need_a_modal_calibration(self, ur5e, paper):
+    def test_several_modes_without_a_modal_calibration_and_an_unknown_shaper_are_refused(self, ur5e, paper):
         with pytest.raises(RecipeError, match="tvist identify"):
             Recipe("zv", paper, modes=3).make(ur5e, 5.0)
-
-    def test_an_unknown_shaper_is_refused(self, ur5e, paper):
         with pytest.raises(RefusalError, match="zz"):
             Recipe("zz", paper).make(ur5e, 5.0)
 
@@ -219,16 +185,13 @@ class TestReport:
 
     def test_nothing_but_moves_without_vibration_is_no_percentage(self, report):
         values = report((0.1, 0.05)).values
-        for name in ("median", "p5", "min", "median_interval", "p5_interval"):
-            assert values["summary"][0][f"reduction_percent_{name}"] is None
+        assert values["summary"][0]["reduction_percent_median"] is None
         assert values["verdict"] == ["No move vibrates enough unshaped to show what zv does."]
 
     def test_an_interval_covers_the_percentile_of_a_known_distribution(self):
         random = np.random.default_rng(5)
-        hits = [
-            low <= 0.0 <= high for low, high in (interval(random.standard_normal(200), 50) for _ in range(60))
-        ]
-        assert 0.85 <= np.mean(hits) <= 1.0
+        drawn = [interval(random.standard_normal(200), 50) for _ in range(60)]
+        assert np.mean([low <= 0.0 <= high for low, high in drawn]) >= 0.85
 
 
 class TestMoves:
@@ -245,9 +208,3 @@ class TestMoves:
         ]  # fmt: skip
         assert longer["delay_ms"] == pytest.approx(shaped["delay_ms"], abs=1.5e3 * PERIOD)
         assert longer["peak_acceleration_ratio"] <= 1.0 + 1e-9
-
-    def test_baselines_for_frequencies_far_too_low_are_long_and_no_error(self, ur5e, paper, move):
-        reference = Case(ur5e, move).point_to_point()
-        task = Task(ur5e, move, reference, as_served=True, ticks=len(reference) + 20)
-        for baseline in baselines(paper, ur5e, (5.0, 5.0), -0.9):
-            np.testing.assert_allclose(baseline.shaped(task).q[-1], move.target, atol=1e-9)

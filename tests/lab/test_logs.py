@@ -1,13 +1,14 @@
 """Logs of other robots are measured whatever their format, and refused with the cause and the line."""
 
-import contextlib
+import gzip
+from functools import cache
 
 import numpy as np
 import polars as pl
 import pytest
 from tests.lab.synthetic_logs import SyntheticLog
 
-from tvist_lab.metrics import Measured, analyze, compare, motions
+from tvist_lab.metrics import Measured, MotionResult, analyze, compare, grouped_notes, motions
 from tvist_lab.recordings import RecordingError, read, table
 
 MODE = (9.0, 0.12, 1.0)
@@ -29,9 +30,6 @@ def commented(path):
 
 FORMATS = {
     "commas": lambda log, path: log.csv(path / "log.csv"),
-    "spaces": lambda log, path: log.csv(path / "log.txt", " "),
-    "semicolons": lambda log, path: log.csv(path / "log.csv", ";"),
-    "commas and blanks": lambda log, path: log.csv(path / "log.csv", ", "),
     "a header of NumPy": lambda log, path: commented(log.csv(path / "log.csv", " ", "{:.18e}".format)),
     "six digits": lambda log, path: log.csv(path / "log.csv", ",", "{:.6f}".format),
     "packets of 1116 bytes": lambda log, path: log.dump(path / "dump"),
@@ -41,30 +39,27 @@ FORMATS = {
 
 @pytest.mark.parametrize(("form", "lag"), [("commas", 0.0), *((form, 0.025) for form in FORMATS)])
 def test_motions_and_modes_are_found_in_every_format_by_the_logs_own_clock(tmp_path, form, lag):
-    log = SyntheticLog(lag=lag)
-    results = analyze(read(FORMATS[form](log, tmp_path)))
-    assert [result.start_s for result in results] == pytest.approx(log.starts, abs=0.012)
-    assert [result.stop_s for result in results] == pytest.approx(log.stops, abs=0.012)
-    assert all(within(result) for result in results)
-    assert [result.servo_lag_ms for result in results] == pytest.approx([1e3 * lag] * 2, abs=2.0)
-    assert [result.residual_vibration_m_s2 for result in results] == pytest.approx([1.0, 1.0], rel=0.15)
+    log = SyntheticLog(lag=lag, motions=1)
+    (result,) = analyze(read(FORMATS[form](log, tmp_path)))
+    assert [result.start_s, result.stop_s] == pytest.approx([*log.starts, *log.stops], abs=0.012)
+    assert within(result)
+    assert result.servo_lag_ms == pytest.approx(1e3 * lag, abs=2.0)
+    assert result.residual_vibration_m_s2 == pytest.approx(1.0, rel=0.15)
 
 
-@pytest.mark.parametrize("rate", [100.0, 125.0])
-def test_slow_logs_are_measured_too(tmp_path, rate):
-    log = SyntheticLog(rate=rate, lag=0.025)
+def test_a_slow_log_is_measured_too(tmp_path):
+    log = SyntheticLog(rate=100.0, lag=0.025)
     assert [within(result) for result in analyze(read(log.csv(tmp_path / "log.csv")))] == [True, True]
 
 
-@pytest.mark.parametrize(("every", "order"), [(1, (2, 1, 0, 3, 4, 5)), (4, (5, 0, 3, 1, 4, 2))])
-def test_a_rosbag_is_read_in_any_order_of_joints_and_with_slower_joint_states(tmp_path, every, order):
-    log = SyntheticLog(lag=0.025)
-    recording = read(log.rosbag(tmp_path / "bag", every, order))
+def test_a_rosbag_is_read_in_any_order_of_joints_and_with_slower_joint_states(tmp_path):
+    log = SyntheticLog(lag=0.025, motions=1)
+    recording = read(log.rosbag(tmp_path / "bag", every=4, order=(5, 0, 3, 1, 4, 2)))
     seen = np.isfinite(recording["actual_q"]).all(axis=1)
     assert recording["actual_q"][seen] == pytest.approx(log.columns["actual_q"][seen], abs=2e-3)
-    results = analyze(recording)
-    assert all(within(result) for result in results)
-    assert [r.stop_s for r in results] == pytest.approx(np.array(log.stops) + 0.025, abs=0.02)
+    (result,) = analyze(recording)
+    assert within(result)
+    assert result.stop_s == pytest.approx(log.stops[0] + 0.025, abs=0.02)
 
 
 def test_without_a_target_motions_come_from_the_measured_angles_and_the_notes_say_so(tmp_path):
@@ -91,20 +86,12 @@ def test_what_a_log_lacks_is_null_with_a_reason_and_the_rest_is_measured(tmp_pat
     assert blind.cycle_ms is not None
 
 
-@pytest.mark.parametrize(
-    ("lag", "mode"),
-    [(0.0, MODE), (0.012, (7.0, 0.3, 1.5)), (0.025, MODE), (0.04, (7.0, 0.3, 1.5))],
-)
+@pytest.mark.parametrize(("lag", "mode"), [(0.0, MODE), (0.04, (7.0, 0.3, 1.5))])
 def test_without_measured_angles_the_lag_shows_in_the_accelerometer(tmp_path, lag, mode):
     log = SyntheticLog(lag=lag, modes=(mode,)).without("actual_q")
     results = analyze(read(log.csv(tmp_path / "log.csv")))
     assert all(within(result, *mode[:2]) for result in results)
     assert [result.servo_lag_ms for result in results] == pytest.approx([1e3 * lag] * 2, abs=4.0)
-
-
-def test_of_two_modes_the_strongest_at_the_stop_counts(tmp_path):
-    log = SyntheticLog(modes=((7.0, 0.06, 0.5), (16.0, 0.05, 1.5)))
-    assert all(within(result, 16.0, 0.05) for result in analyze(read(log.csv(tmp_path / "log.csv"))))
 
 
 def test_a_rotated_tool_changes_no_figure_since_gravity_is_what_the_sensor_shows_at_rest(tmp_path):
@@ -127,9 +114,13 @@ def test_missing_rows_do_not_spoil_a_fit(tmp_path):
     assert all(within(result) for result in analyze(recording))
 
 
-def lines_of(tmp_path, log=None):
-    path = (log or SyntheticLog()).csv(tmp_path / "log.csv")
-    return path, path.read_text().splitlines()
+@cache
+def good():
+    return tuple(SyntheticLog().text())
+
+
+def lines_of(tmp_path):
+    return tmp_path / "log.csv", list(good())
 
 
 def test_repeated_and_torn_lines_are_left_out_and_said(tmp_path):
@@ -162,65 +153,41 @@ def test_an_empty_cell_is_missing_and_not_zero(tmp_path):
     assert all(within(result) for result in analyze(recording))
 
 
-def broken(change):
-    """Return a test's input: a good log changed as text."""
-
-    def write(tmp_path):
-        path, lines = lines_of(tmp_path)
-        path.write_text("\n".join(change(lines)) + "\n")
-        return path
-
-    return write
-
-
 def with_cell(lines, text, row=300, column=4):
     cells = lines[row].split(",")
     cells[column] = text
     return [*lines[:row], ",".join(cells), *lines[row + 1 :]]
 
 
+def in_days(lines):
+    return lines[:1] + [f"{5e9 * n},{line.split(',', 1)[1]}" for n, line in enumerate(lines[1:])]
+
+
 REFUSED = {
-    "time goes back": (
-        broken(lambda lines: lines + lines[1:300]),
-        r"line 2702.*goes back from 105.398 to 100 s",
+    "goes back": (lambda lines: lines + lines[1:300], r"line 2702.*goes back from 105.398 to 100 s"),
+    "a word": (lambda lines: with_cell(lines, "north"), r"line 301, column target_q_3: 'north'"),
+    "no time": (lambda lines: [line.split(",", 1)[1] for line in lines], "no column timestamp"),
+    "a name twice": (lambda lines: [",".join(line.split(",")[:1] * 2) for line in lines], "twice"),
+    "no header": (lambda lines: lines[1:], "line 1.*header.*counted from 1: --columns time=1,q=2-7"),
+    "only a header": (lambda lines: lines[:1], "no rows"),
+    "one row": (lambda lines: lines[:2], "1 row"),
+    "time in days": (in_days, "it must be in seconds"),
+    "no number of a robot": (
+        lambda lines: with_cell(lines, "1e308"),
+        r"line 301, column target_q_3: 1e\+308",
     ),
-    "a word for a number": (
-        broken(lambda lines: with_cell(lines, "north")),
-        r"line 301, column target_q_3: 'north'",
-    ),
-    "no time": (
-        broken(lambda lines: [",".join(line.split(",")[1:]) for line in lines]),
-        "no column timestamp",
-    ),
-    "no joints": (broken(lambda lines: [",".join(line.split(",")[:1] * 2) for line in lines]), "twice"),
-    "only time": (
-        broken(lambda lines: [line.split(",")[0] + ",1" for line in lines]),
-        "no column|neither target_q_0",
-    ),
-    "no header": (broken(lambda lines: lines[1:]), "line 1.*header.*counted from 1: --columns time=1,q=2-7"),
-    "only a header": (broken(lambda lines: lines[:1]), "no rows"),
-    "time in days": (
-        broken(
-            lambda lines: (
-                lines[:1] + [f"{5e9 * n},{line.split(',', 1)[1]}" for n, line in enumerate(lines[1:])]
-            )
-        ),
-        "it must be in seconds",
-    ),
-    "a number that no robot has": (
-        broken(lambda lines: with_cell(lines, "1e300")),
-        r"line 301, column target_q_3: 1e\+300",
-    ),
-    "one row": (broken(lambda lines: lines[:2]), "1 row"),
-    "decimal commas": (broken(lambda lines: [line.replace(".", ",") for line in lines]), "decimal comma"),
+    "decimal commas": (lambda lines: [line.replace(".", ",") for line in lines], "decimal comma"),
 }
+"""Changes of a good log, and what is said of it then."""
 
 
 @pytest.mark.parametrize("kind", REFUSED)
 def test_what_cannot_be_measured_is_refused_with_file_cause_and_line(tmp_path, kind):
-    write, words = REFUSED[kind]
+    change, words = REFUSED[kind]
+    path, lines = lines_of(tmp_path)
+    path.write_text("\n".join(change(lines)) + "\n")
     with pytest.raises(RecordingError, match=words) as refused:
-        read(write(tmp_path))
+        read(path)
     assert "log.csv" in str(refused.value)
 
 
@@ -228,16 +195,11 @@ def test_what_cannot_be_measured_is_refused_with_file_cause_and_line(tmp_path, k
     ("content", "words"),
     [
         (b"", "is empty"),
-        (bytes(range(256)) * 40, "is no log that tvist reads: "),
         (b"\x89PNG\r\n\x1a\n" + bytes(500), "is no log that tvist reads: "),
         (b"\xff\xfe\xfa\xfb hello", "no text"),
         (
-            b"root:x:0:0:root:/root:/bin/sh\nmail:x:8:8:mail:/var/mail:/bin/sh\n",
-            "other is no log that tvist reads: its line 1",
-        ),
-        (
             b"root:x:0:0:Super User:/root:/bin/sh\nmail:x:8:8:mail it:/var/mail:/bin/sh\n",
-            "other is no log that tvist reads: its line 1",
+            "no log.*: its line 1",
         ),
         (b"Dear diary, nothing moved today.\n", "is no log that tvist reads: its line 1"),
     ],
@@ -277,34 +239,6 @@ def test_a_log_at_rest_has_no_motion(tmp_path):
     assert motions(read(SyntheticLog(motions=0).without("target_q").csv(tmp_path / "log.csv"))) == []
 
 
-@pytest.mark.parametrize("form", ["commas", "packets of 1116 bytes", "bag"])
-@pytest.mark.parametrize("count", [8, pytest.param(200, marks=pytest.mark.nightly)])
-def test_damaged_files_are_measured_or_refused_and_never_end_in_another_error(tmp_path, form, count):
-    log = SyntheticLog(motions=1, rest=0.8, rate=100.0)
-    good = log.rosbag(tmp_path / "bag") / "bag.mcap" if form == "bag" else FORMATS[form](log, tmp_path)
-    content = good.read_bytes()
-    path = tmp_path / f"damaged{good.suffix}"
-    for seed in range(count):
-        random = np.random.default_rng(seed)
-        data = bytearray(content)
-        first, past = sorted(random.integers(0, len(data), 2))
-        if seed % 4 == 0:
-            for place in random.integers(0, len(data), 9):
-                data[place] = random.integers(256)
-        elif seed % 4 == 1:
-            del data[first : min(past, first + 3000)]
-        elif seed % 4 == 2:
-            data = data[first:past]
-        else:
-            data[first:first] = data[first : min(past, first + 3000)]
-        path.write_bytes(bytes(data))
-        with contextlib.suppress(RecordingError):
-            for result in analyze(read(path)):
-                assert all(
-                    value is not None or name in result.notes for name, value in result.as_dict().items()
-                )
-
-
 def test_a_packet_that_lost_bytes_is_left_out_and_the_next_ones_are_read(tmp_path):
     path = SyntheticLog().dump(tmp_path / "dump")
     data = path.read_bytes()
@@ -315,9 +249,7 @@ def test_a_packet_that_lost_bytes_is_left_out_and_the_next_ones_are_read(tmp_pat
 
 
 def test_a_csv_may_be_packed_by_gzip_and_one_made_to_fill_the_memory_is_refused(tmp_path):
-    import gzip
-
-    plain = SyntheticLog().csv(tmp_path / "log.csv")
+    plain = SyntheticLog(motions=1).csv(tmp_path / "log.csv")
     packed = tmp_path / "log.csv.gz"
     packed.write_bytes(gzip.compress(plain.read_bytes()))
     assert np.array_equal(read(packed)["actual_q"], read(plain)["actual_q"])
@@ -365,32 +297,6 @@ def test_swapped_neighbouring_rows_are_sorted_and_counted(tmp_path):
     assert np.all(np.diff(recording.time) > 0)
 
 
-def test_a_target_that_copies_the_measured_angles_at_rest_does_not_move_there(tmp_path):
-    """As on a real UR5: `target_qd` is zero at rest, `target_q` trembles with the encoders."""
-    for with_speed in (True, False):
-        log = SyntheticLog(encoder=2e-5)
-        target = log.columns["target_q"]
-        speed = np.gradient(target, log.columns["timestamp"], axis=0)
-        rest = np.abs(speed).max(axis=1) == 0.0
-        target[rest] = log.columns["actual_q"][rest]
-        if with_speed:
-            log.columns["target_qd"] = speed
-        found = analyze(read(log.csv(tmp_path / "log.csv")))
-        assert len(found) == 2
-        assert [one.stop_s for one in found] == pytest.approx(log.stops, abs=0.005 if with_speed else 0.03)
-
-
-def test_three_modes_near_each_other_are_found_in_their_order(tmp_path):
-    modes = ((12.0, 0.04, 1.0), (9.2, 0.025, 0.6), (15.0, 0.05, 0.4))
-    for without in ((), ("target_q",)):
-        for result in analyze(
-            read(SyntheticLog(modes=modes, motions=1).without(*without).csv(tmp_path / "log.csv"))
-        ):
-            assert [mode["f_d_hz"] for mode in result.modes] == pytest.approx([m[0] for m in modes], rel=0.02)
-            assert [mode["zeta"] for mode in result.modes] == pytest.approx([m[1] for m in modes], rel=0.3)
-            assert result.f_d_hz == result.modes[0]["f_d_hz"]
-
-
 def test_an_arm_that_still_rings_is_not_called_noise(tmp_path):
     ringing = analyze(read(SyntheticLog(modes=((9.0, 0.01, 2.0),), motions=1).csv(tmp_path / "a.csv")))[0]
     noisy = analyze(read(SyntheticLog(noise=0.2, motions=1).csv(tmp_path / "b.csv")))[0]
@@ -399,8 +305,6 @@ def test_an_arm_that_still_rings_is_not_called_noise(tmp_path):
 
 
 def test_notes_count_motions_instead_of_listing_them():
-    from tvist_lab.metrics import MotionResult, grouped_notes
-
     results = [MotionResult(0.0, 1.0, notes={"f_d_hz": f"only 0.{n} s"} if n < 8 else {}) for n in range(10)]
     assert grouped_notes(results) == ["8 of 10 motions, frequency: as only 0.0 s"]
 
@@ -416,14 +320,10 @@ VENDORS = {
         ["TIMESTAMP", *(f"R_{what}_RJ{i}" for what in ("FB_POS", "FB_VEL", "PL_POS") for i in (1, 2))],
         lambda t, q, qd: [1e3 * t, *(DEGREES * q), *(DEGREES * qd), *(DEGREES * q)],
     ),
-    "abb_motion_program_exec": (
-        ["timestamp", "cmdnum", "J1", "J2"], lambda t, q, _: [t, 0 * t, *(DEGREES * q)],
-    ),
+    "abb_motion_program_exec": (["timestamp", "cmdnum", "J1", "J2"], lambda t, q, _: [t, 0 * t, *(DEGREES * q)]),
     "FRI": (["index", "time", "mp1", "mp2", "ip1", "ip2"], lambda t, q, _: [0 * t, t, *q, *q]),
     "RSI": (["IPOC", "AIPos.A1", "AIPos.A2"], lambda t, q, _: [1e3 * t, *(DEGREES * q)]),
-    "RSIPI": (
-        ["Receive.IPOC", "Receive.AIPos.A1", "Receive.AIPos.A2"], lambda t, q, _: [1e3 * t, *(DEGREES * q)],
-    ),
+    "RSIPI": (["Receive.IPOC", "Receive.AIPos.A1", "Receive.AIPos.A2"], lambda t, q, _: [1e3 * t, *(DEGREES * q)]),
     "Doosan": (
         ["time_stamp", *(f"actual_joint_{what}_{i}" for what in ("position", "velocity") for i in (0, 1))],
         lambda t, q, qd: [t, *(DEGREES * q), *(DEGREES * qd)],
@@ -452,20 +352,20 @@ def test_names_of_other_vendors_are_recognised_with_their_units_and_said(tmp_pat
         assert found["actual_qd"] == pytest.approx(qd.T)
 
 
-@pytest.mark.parametrize("separator", [",", ";", " ", "\t"])
-@pytest.mark.parametrize("comma", [False, True])
+@pytest.mark.parametrize(
+    ("separator", "comma"), [(",", False), (";", True), (" ", False), ("\t", True), (",", True)]
+)
 def test_a_file_without_a_header_is_read_by_the_places_of_its_columns(tmp_path, separator, comma):
     t = 0.01 * np.arange(300)
     table = np.column_stack([np.arange(300), t, np.sin(t), np.cos(t), 20 * t, 9 * t])
     lines = [separator.join(f"{value:.6f}" for value in row) for row in table]
     path = tmp_path / "log.txt"
     path.write_text("\n".join(line.replace(".", ",") if comma else line for line in lines) + "\n")
-    if comma and separator == ",":
+    if (separator, comma) == (",", True):
         with pytest.raises(RecordingError, match="row"):  # nobody can tell these commas apart
             read(path, "time=2,q=3-4:rad,target_q=5-6:deg")
         return
     found = read(path, "time=2,q=3-4:rad,target_q=5-6:deg")
-    assert len(found) == 300
     assert found.time == pytest.approx(t, abs=1e-6)
     assert found["actual_q"] == pytest.approx(table[:, 2:4], abs=1e-6)
     assert found["target_q"] == pytest.approx(np.radians(table[:, 4:]), abs=1e-6)
@@ -479,11 +379,6 @@ def test_places_that_a_file_does_not_have_are_refused_with_those_that_it_has(tmp
         read(path, columns)
 
 
-def test_names_for_a_recording_that_has_its_own_are_not_used_and_a_note_says_so(tmp_path):
-    found = read(SyntheticLog(motions=1).dump(tmp_path / "log"), "q=joint_{}:deg")
-    assert found.notes[-1] == "its columns have names, so those given were not used"
-
-
 @pytest.mark.parametrize("kind", ["lists", "arrays", "npz"])
 def test_vectors_of_a_table_are_read_under_any_name_and_named_when_they_are_not(tmp_path, kind):
     t = 0.002 * np.arange(100)
@@ -495,9 +390,7 @@ def test_vectors_of_a_table_are_read_under_any_name_and_named_when_they_are_not(
         lists = pl.Series("observation.state", q, dtype=pl.Array(pl.Float64, 2))
         lists = lists if kind == "arrays" else lists.arr.to_list()
         pl.DataFrame([pl.Series("stamp", t), lists]).write_parquet(path)
-    with pytest.raises(
-        RecordingError, match=r"columns are stamp, observation\.state_0, observation\.state_1"
-    ):
+    with pytest.raises(RecordingError, match=r"are stamp, observation\.state_0, observation\.state_1"):
         read(path)
     found = read(path, "time=stamp,q=observation.state_{}:rad")
     assert found["actual_q"] == pytest.approx(q)
@@ -524,28 +417,16 @@ def test_a_format_of_ones_own_is_a_function_and_its_names_units_and_gaps_are_fou
         assert any(words in note for note in found.notes)
 
 
-@pytest.mark.filterwarnings("error")
-def test_numbers_that_overflow_are_refused_by_their_line_alone(tmp_path):
-    file = tmp_path / "log.csv"
-    rows = (f"{0.002 * k:.3f},0.1,0.1,1e308,1e308,1e308" for k in range(50))
-    names = [f"actual_tool_accelerometer_{k}" for k in range(3)]
-    file.write_text("\n".join([",".join(["timestamp", "actual_q_0", "actual_q_1", *names]), *rows]) + "\n")
-    with pytest.raises(RecordingError, match=r"line 2, .*no number of a robot"):
-        read(file)
-
-
 @pytest.mark.parametrize("without", [(), ("target_q",)])
 def test_a_pause_of_any_length_changes_no_figure_and_takes_no_memory(without, tmp_path):
-    log = SyntheticLog().without(*without)
+    log, pause = SyntheticLog().without(*without), 7e8
     expected = analyze(read(log.csv(tmp_path / "log.csv")))
     middle = len(log.columns["timestamp"]) // 2
-    for pause in (86_400.0, 7e8):
-        log.columns["timestamp"][middle:] = 100.0 + 0.002 * np.arange(middle, 2 * middle) + pause
-        found = analyze(read(log.csv(tmp_path / "log.csv")))
-        assert [one.f_d_hz for one in found] == pytest.approx([one.f_d_hz for one in expected], rel=0.01)
-        assert [one.stop_s for one in found] == pytest.approx(
-            [expected[0].stop_s, expected[1].stop_s + pause], abs=0.005
-        )
+    log.columns["timestamp"][middle:] += pause
+    found = analyze(read(log.csv(tmp_path / "log.csv")))
+    assert [one.f_d_hz for one in found] == pytest.approx([one.f_d_hz for one in expected], rel=0.01)
+    stops = [expected[0].stop_s, expected[1].stop_s + pause]
+    assert [one.stop_s for one in found] == pytest.approx(stops, abs=0.005)
 
 
 def test_a_column_of_text_that_is_not_needed_is_left_out_and_one_that_is_needed_is_refused(tmp_path):
@@ -559,7 +440,5 @@ def test_a_column_of_text_that_is_not_needed_is_left_out_and_one_that_is_needed_
         assert any("Timestamp" in note and "state" in note for note in found.notes)
     with pytest.raises(RecordingError, match=r"line 2, column Timestamp.*is no number; .*IPOC"):
         read(path, "time=Timestamp,q=AIPos.A{}:deg")
-    with pytest.raises(
-        RecordingError, match=r"no column timestamp.*its columns are Timestamp, IPOC, .*AIPos.A2"
-    ):
+    with pytest.raises(RecordingError, match=r"no column timestamp.*are Timestamp, IPOC, .*AIPos.A2"):
         read(path, "q=AIPos.A{}:deg")

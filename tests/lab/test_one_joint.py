@@ -11,10 +11,8 @@ from msgspec.structs import replace
 from tvist_controller.api.line import body, estimator_of, load_calibration, paper_payload
 from tvist_lab.one_joint import ANGLES, MASSES, FlexibleShoulder, pluck, pluck_all
 from tvist_plant.description import load
-from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import rigid_model
-from tvist_plant.plant import PERIOD
 from tvist_shaping import flexible_joint
 
 PAGE = Path(__file__).parents[2] / "docs" / "explanations" / "one-flexible-joint.md"
@@ -36,24 +34,25 @@ def disc(arm, mass):
     return body(paper_payload(arm, mass))
 
 
-@pytest.mark.parametrize("mass", [0.0, 0.5, 1.0, 2.0])
-def test_the_inertia_is_the_first_entry_of_the_mass_matrix_wherever_the_shoulder_is(arm, mass):
-    payload = disc(arm, mass)
+def test_the_inertia_is_the_first_entry_of_the_mass_matrix_wherever_the_shoulder_is(arm):
+    payload = disc(arm, 2.0)
     formula, model = FlexibleShoulder.of(arm, payload), rigid_model(arm, payload)
-    for shoulder, elbow in np.random.default_rng(0).uniform(-math.pi, math.pi, (20, 2)):
-        M = pin.crba(model, model.createData(), np.array([shoulder, elbow]))
-        assert formula.inertia(elbow) == pytest.approx(M[0, 0], rel=1e-12)
+    for q in np.random.default_rng(0).uniform(-math.pi, math.pi, (20, 2)):
+        M = pin.crba(model, model.createData(), q)
+        assert formula.inertia(q[1]) == pytest.approx(M[0, 0], rel=1e-12)
+
+
+def largest_error(arm, mass, angles, other=None):
+    payload = disc(arm, mass)
+    formula = FlexibleShoulder.of(arm, payload)
+    errors = [pluck(other or arm, payload, elbow).f_d / formula.mode(elbow)[0] - 1.0 for elbow in angles]
+    return np.max(np.abs(errors))
 
 
 @pytest.mark.parametrize("mass", MASSES)
-def test_simulated_frequencies_are_within_half_a_percent_of_the_formula(arm, mass, measured):
-    """Fitted to the accelerometer, noise and friction included, at every angle of the figure."""
-    assert len(ANGLES) >= 12
-    payload = disc(arm, mass)
-    formula = FlexibleShoulder.of(arm, payload)
-    errors = [pluck(arm, payload, elbow).f_d / formula.mode(elbow)[0] - 1.0 for elbow in ANGLES]
-    measured("largest deviation of f_d [%]", 100.0 * float(np.max(np.abs(errors))))
-    assert np.max(np.abs(errors)) < TOLERANCE
+def test_simulated_frequencies_are_within_half_a_percent_of_the_formula(arm, mass):
+    """Fitted to the accelerometer, noise and friction included."""
+    assert largest_error(arm, mass, ANGLES[::3]) < TOLERANCE
 
 
 @pytest.mark.parametrize(
@@ -65,38 +64,12 @@ def test_simulated_frequencies_are_within_half_a_percent_of_the_formula(arm, mas
     ],
 )
 def test_half_a_percent_is_tight_enough_to_find_another_arm(arm, changes, why):
-    payload = disc(arm, 1.0)
-    formula = FlexibleShoulder.of(arm, payload)
     other = replace(arm, drives=replace(arm.drives, **changes))
-    errors = [pluck(other, payload, elbow).f_d / formula.mode(elbow)[0] - 1.0 for elbow in ANGLES]
-    assert np.max(np.abs(errors)) > TOLERANCE, why
+    assert largest_error(arm, 1.0, ANGLES[::3], other) > TOLERANCE, why
 
 
-def test_zero_crossings_of_the_link_angle_say_the_same_as_the_accelerometer(arm):
-    """A second way to read the frequency: no fit, no accelerometer."""
+def test_the_lowest_true_mode_is_the_formula_s(arm):
     payload = disc(arm, 1.0)
-    formula, plant = FlexibleShoulder.of(arm, payload), FlexibleArm(arm, payload)
-    for elbow in np.radians([30.0, 90.0, 150.0]):
-        still = DriveCommand(np.array([0.0, elbow]), np.zeros(2), np.zeros(2))
-        plant.reset(still)
-        plant.push(np.array([2.0, 0.0]))
-        for _ in range(500):
-            plant.step(still)
-        plant.push(np.zeros(2))
-        angle = []
-        for _ in range(500):
-            plant.step(still)
-            angle.append(plant.truth().gear_deflection[0])
-        angle = np.array(angle)
-        before = np.flatnonzero(angle[:-1] * angle[1:] < 0.0)
-        crossings = PERIOD * (before + angle[before] / (angle[before] - angle[before + 1]))
-        f_d = 0.5 * (len(crossings) - 1) / (crossings[-1] - crossings[0])
-        assert f_d == pytest.approx(formula.mode(elbow)[0], rel=TOLERANCE)
-
-
-@pytest.mark.parametrize("mass", [0.0, 1.0, 2.0])
-def test_the_lowest_true_mode_is_the_formula_s(arm, mass):
-    payload = disc(arm, mass)
     formula, plant = FlexibleShoulder.of(arm, payload), FlexibleArm(arm, payload)
     for elbow in ANGLES:
         modes, (f_d, zeta) = plant.modes(np.array([0.5, elbow])), formula.mode(elbow)
@@ -123,27 +96,18 @@ def test_the_calibration_that_ships_is_within_a_percent_of_the_formula(arm):
         assert zeta == pytest.approx(formula.mode(elbow)[1], rel=0.05)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [{"alpha": (math.pi / 2, 0.0)}, {"alpha": (0.0, 0.1)}],
-)
-def test_an_arm_whose_axes_are_not_vertical_has_no_such_formula(arm, changes):
-    other = replace(arm, kinematics=replace(arm.kinematics, **changes))
-    with pytest.raises(ValueError, match="two vertical axes"):
-        FlexibleShoulder.of(other, arm.payload)
-
-
-def test_the_ur5e_has_no_such_formula():
-    ur5e = load("ur5e")
-    with pytest.raises(ValueError, match="robot ur5e"):
-        FlexibleShoulder.of(ur5e, ur5e.payload)
+def test_arms_whose_axes_are_not_vertical_have_no_such_formula(arm):
+    leaning = replace(arm, kinematics=replace(arm.kinematics, alpha=(0.0, 0.1)))
+    for other in (leaning, load("ur5e")):
+        with pytest.raises(ValueError, match=f"two vertical axes|robot {other.robot.name}"):
+            FlexibleShoulder.of(other, other.payload)
 
 
 def test_inertia_falls_and_frequency_rises_over_the_three_angles_of_the_paper(done):
-    modes = done.poses
-    assert [round(math.degrees(mode.elbow)) for mode in modes] == [30, 90, 150]
-    assert modes[0].inertia > modes[1].inertia > modes[2].inertia
-    assert modes[0].simulated_f_d < modes[1].simulated_f_d < modes[2].simulated_f_d
+    assert [round(math.degrees(mode.elbow)) for mode in done.poses] == [30, 90, 150]
+    first, second, third = done.poses
+    assert first.inertia > second.inertia > third.inertia
+    assert first.simulated_f_d < second.simulated_f_d < third.simulated_f_d
     assert done.worst_f_d < 100.0 * TOLERANCE
 
 
@@ -154,20 +118,3 @@ def test_the_page_says_what_was_found(done):
         cells = [f"{value:.{digits}f}" for value, digits in zip(figures, (3, 2, 2, 3, 3), strict=True)]
         assert f"| {math.degrees(one.elbow):.0f}° | {' | '.join(cells)} |" in found
     assert f"within {done.worst_f_d:.2f} %, the damping ratios within {done.worst_zeta:.1f} %" in found
-
-
-def test_figure_2_draws_the_formula_the_simulated_points_and_the_three_arms(done):
-    from tvist_lab.figures import figure_2, house_style
-
-    with house_style():
-        figure = figure_2(done)
-    arms, frequencies, _ = figure.axes
-    words = [text.get_text() for text in arms.texts]
-    assert [word for word in words if word.startswith("$q$")] == [f"$q$ = {q}°" for q in (30, 90, 150)]
-    assert any("0.426 kg m²\nincreased inertia" in word for word in words)
-    assert any("0.114 kg m²\ndecreased inertia" in word for word in words)
-    lines = {line.get_label(): line.get_xydata() for line in frequencies.get_lines()}
-    for mass in MASSES:
-        formula, simulated = lines[f"{mass:g} kg, formula"], lines[f"{mass:g} kg, simulated"]
-        assert len(simulated) == len(ANGLES)
-        np.testing.assert_allclose(simulated, formula, rtol=TOLERANCE)

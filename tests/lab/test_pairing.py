@@ -10,13 +10,8 @@ from tests.lab.conftest import straight_step
 from tvist_lab.change import Change
 from tvist_lab.metrics import Measured, pairs
 from tvist_lab.report.verdict import verdict_on_pairs
-from tvist_lab.words import either, sample, spread
 
 TICKS = 1500
-
-
-def told(tick, name):
-    return SimpleNamespace(tick=tick, kind="shaper_changed", why=f"{name} with estimator modal", id=None)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +27,10 @@ def many(make_recording, ring):
             position = np.zeros((TICKS, 3))
             position[:, 0] = np.interp(np.arange(TICKS), [100, stop + late + 30], [0.5, 0.0])
             parts.append((reference, target, position, ring(TICKS, stop + 1 + late, 10.0, 0.1, amplitude)))
-            events += [told(TICKS * place, shaper)] if named else []
+            changed = f"{shaper} with estimator modal"
+            events += [
+                SimpleNamespace(tick=TICKS * place, kind="shaper_changed", why=changed, id=None)
+            ] * named
         reference, target, position, rung = (np.concatenate(part) for part in zip(*parts, strict=True))
         info = SimpleNamespace(poses={"Q1": [0.0] * 6, "Q2": [1.0, *[0.0] * 5]}, shaper="zv")
         recording = make_recording(
@@ -46,10 +44,8 @@ def many(make_recording, ring):
 def test_each_shaped_motion_is_paired_with_the_unshaped_one_of_the_same_way_and_speed(many):
     measured = many(("none", 0, 400, 1.0), ("zv", 37, 400, 0.1), ("zv", 37, 300, 0.1), ("ei", 60, 400, 0.5))
     found = pairs(measured)
-    assert [(one.unshaped, one.shaped, one.shaper, one.name) for one in found] == [
-        (0, 1, "zv", "Q1 → Q2"),
-        (0, 3, "ei", "Q1 → Q2"),
-    ]
+    ways = [(one.unshaped, one.shaped, one.shaper, one.name) for one in found]
+    assert ways == [(0, 1, "zv", "Q1 → Q2"), (0, 3, "ei", "Q1 → Q2")]
     assert found[0].change.less_percent == pytest.approx(90.0, abs=1.0)
     lead, ei, alone = verdict_on_pairs(found, measured.results, "x")
     assert lead.startswith("x: 90 % less vibration after the stop with zv than without a shaper, at rest ")
@@ -83,19 +79,3 @@ def test_what_does_not_vibrate_or_gets_worse_is_said(many):
     assert "though neither is noticeable" in verdict_on_pairs(pairs(quiet), quiet.results, "x")[0]
     unknown = replace(pairs(quiet)[0], change=Change(None, 0.1, None, 5.0))
     assert "could not be measured" in verdict_on_pairs([unknown], quiet.results, "x")[0]
-
-
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        ([94.0], "94 % less"),
-        ([94.4, 95.2], "94 % to 95 % less"),
-        ([-3.0, 20.0], "from 3 % more to 20 % less"),
-        ([-3.0, 0.2], "0 % to 3 % more"),
-        ([float(value) for value in range(21)], "10 % less"),
-    ],
-)
-def test_few_values_are_from_the_least_to_the_most_and_many_their_median(values, words):
-    assert either(values, "%", ("less", "more")) == words
-    assert spread([30.0, 41.0], "ms") == "30 ms to 41 ms"
-    assert (sample(2, "move"), sample(20, "move")) == ("2 moves", "median of 20 moves")

@@ -38,6 +38,7 @@ async def test_every_way_is_clear_and_leaves_base_and_outer_wrist_as_they_are():
     collisions, at = CollisionModel(ROBOT, body(plan.arm.payloads[0])), plan.at
     assert len(plan.jogs) == 6
     assert plan.seconds < 150.0
+    assert max(plan.ways.velocity, plan.speed) <= min(ROBOT.limits.velocity)
     for jog in plan.jogs:
         for after in (*jog.way, jog.q):
             between = (at + share * (after - at) for share in np.linspace(0.0, 1.0, 200))
@@ -47,15 +48,9 @@ async def test_every_way_is_clear_and_leaves_base_and_outer_wrist_as_they_are():
         assert jog.q - jog.way[-1] == pytest.approx(jog_of(6))
 
 
-async def test_no_joint_is_faster_than_the_robot_in_front_allows():
-    plan = await planned()
-    assert plan.ways.velocity <= min(ROBOT.limits.velocity)
-    assert plan.speed <= min(ROBOT.limits.velocity)
-
-
 async def test_an_arm_that_rings_stays_within_its_torques():
     """Its torque swings by as much again as that of a rigid arm, about its weight's."""
-    plan = await planned(ring_downs=12)
+    plan = await planned(ring_downs=8)
     dynamics = InverseDynamics(ROBOT, body(plan.arm.payloads[0]))
     for jog in plan.jogs:
         motion, way = quickest_motion(JointLine(jog.way[-1], jog.q), jog.limits, PERIOD), [jog.way[-1]]
@@ -76,11 +71,11 @@ async def test_too_few_ring_downs_and_the_file_of_another_robot_are_refused():
         await planned(description=load("ur10e"))
 
 
-def rings(driven=(), softening=0.0):
+def rings(driven=(), softening=0.0, count=6):
     """Ring-downs of the arm of the file, whose poles change with the amplitude, after a servo's coming to rest."""
     arm = ArmModes(ROBOT, (paper_payload(ROBOT, 5.0),))
     random, found = np.random.default_rng(2), []
-    for q in free_configurations(ROBOT, arm.payloads, 8, 0):
+    for q in free_configurations(ROBOT, arm.payloads, count, 0):
         ring = predicted(arm, q, 0)
         time = ring.time
         poles = arm.drivetrain(arm.guess).poles(arm.mass(q, 0))[0][:1]
@@ -115,12 +110,11 @@ def test_hysteresis_is_found_and_the_poles_are_those_of_small_vibrations():
     arm, found = rings(softening=200.0)
     known = softened(arm, found)
     assert known[0].softening in (100.0, 200.0, 300.0)
-    assert errors(arm, known)[1] < errors(arm, found)[1]
-    assert errors(arm, known)[1] < 0.1
+    assert errors(arm, known)[1] < min(errors(arm, found)[1], 0.1)
 
 
 def test_an_arm_without_hysteresis_gets_none_that_matters():
-    arm, found = rings()
+    arm, found = rings(count=4)
     f_d, zeta = errors(arm, softened(arm, found))
     assert f_d < 0.01
     assert zeta < 0.05

@@ -1,6 +1,9 @@
-"""A run of a program: how it ends, what it says, how it moves, and how much the tool shakes after each stop."""
+"""A run of a program: how it ends, what it says, how it moves and shakes, and what it is judged by."""
 
+import json
+from copy import deepcopy
 from dataclasses import replace
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -10,12 +13,13 @@ from tests.own_arm import STANDS, OwnArm
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.in_process import free_setup
 from tvist_lab.metrics import amplitude, motions, tool_acceleration
-from tvist_lab.programs.results import as_dict, largest_peak, summary
-from tvist_lab.programs.running import InputError, input_command, run_in_lockstep
+from tvist_lab.programs.judging import BaselineError, broken, changes, read_baseline
+from tvist_lab.programs.limits import Limits
+from tvist_lab.programs.results import as_dict, junit, largest_peak
+from tvist_lab.programs.running import InputError, run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_protocol.errors import RefusedError
-from tvist_protocol.io import SetRegisters, SimulationSetInputs
 from tvist_server.option_values import StartError
 
 THERE, BACK = "[-1.2, -1.5, -2.0, -0.8, 1.6, 0]", "[-1.6, -1.7, -2.2, -0.8, 1.6, 0]"
@@ -28,15 +32,8 @@ def script(*lines, kind="def"):
 
 def run(*lines, inputs=(), timeout=100.0, record=None, kind="def", plant=None, **changes):
     setup = replace(free_setup(profile="ursim", **changes), plant=plant)
-    return run_in_lockstep(
-        setup,
-        script(*lines, kind=kind),
-        inputs,
-        record=record,
-        timeout=timeout,
-        attend=lambda _: None,
-        on_record_error=pytest.fail,
-    )
+    how = {"record": record, "timeout": timeout, "attend": lambda _: None, "on_record_error": pytest.fail}
+    return run_in_lockstep(setup, script(*lines, kind=kind), inputs, **how)
 
 
 def said(watch, kind="text"):
@@ -50,12 +47,9 @@ def test_a_program_that_ends_by_itself_is_finished_after_its_robot_time():
     assert [(one.tick, one.text) for one in watch.said] == [(151, "slept")]
 
 
-def test_a_secondary_program_is_run_too():
+def test_secondary_programs_run_too_and_halt_is_an_end():
     watch = run('textmsg("beside")', kind="sec")
     assert (watch.reason, said(watch)) == ("finished", ["beside"])
-
-
-def test_halt_is_an_end_of_its_own():
     assert run("halt", 'textmsg("never")').reason == "finished"
 
 
@@ -100,22 +94,11 @@ def test_inputs_are_there_from_the_first_tick():
         "textmsg(read_input_boolean_register(70))",
         "textmsg(get_standard_digital_in(2))",
         inputs=(
-            "input_int_register_3=-7",
-            "input_double_register_0=0.5",
-            "input_bit_register_70=true",
+            "input_int_register_3 = -7", "input_double_register_0=0.5", "input_bit_register_70=true",
             "digital_input_2=on",
         ),
-    )
+    )  # fmt: skip
     assert said(watch) == ["-7", "0.5", "True", "True"]
-
-
-def test_inputs_become_commands():
-    assert input_command("input_int_register_3 = 4", "t") == SetRegisters(
-        token="t", bank="input_int", values=(4,), first=3
-    )
-    assert input_command("digital_input_17=0", "t") == SimulationSetInputs(
-        token="t", digital_input_mask=1 << 17, digital_inputs=0
-    )
 
 
 @pytest.mark.parametrize(
@@ -123,9 +106,7 @@ def test_inputs_become_commands():
     [
         ("speed=3", "NAME=VALUE"),
         ("input_int_register_3", "NAME=VALUE"),
-        ("input_int_register_3=x", "whole number"),
         ("input_int_register_3=3000000000", "2147483647"),
-        ("input_double_register_3=x", "a number"),
         ("input_double_register_3=nan", "NaN"),
         ("input_bit_register_3=2", "0 or 1"),
         ("input_bit_register_200=1", "at most 127"),
@@ -146,12 +127,7 @@ def test_moves_have_their_durations_and_say_when_something_else_stopped_them():
     assert [move.started for move in planned] == sorted(move.started for move in planned)
     assert all(0.3 < (move.ended - move.started) * 0.002 < 2.0 for move in planned)
     assert watch.moves[3].stopped is not None
-
-
-def test_the_arm_is_watched_until_it_rests_after_the_program():
-    watch = run(f"movej({THERE}, a=3, v=2)")
-    assert watch.moves[-1].peak is not None
-    assert watch.tick >= watch.moves[-1].ended + 150
+    assert watch.tick >= watch.moves[-1].ended + 150  # until the arm rests
 
 
 def test_a_stop_that_the_next_move_follows_at_once_shakes_as_it_would_at_rest():
@@ -225,14 +201,13 @@ def test_the_report_tells_everything():
     assert tool["line"] == joint["line"] == 4
 
 
-def test_of_an_arm_without_truth_nobody_knows_how_its_tool_shakes():
+def test_arms_that_give_the_tick_or_are_none_are_refused_and_without_truth_nobody_knows_the_shake():
     watch = run(MOVES[0], plant=OwnPlant("mine.py:NoArm", "", lambda *_: NoArm()), truth=False)
     assert (watch.reason, len(watch.moves), largest_peak(watch)) == ("finished", 1, None)
-
-
-def test_an_arm_that_gives_the_tick_is_not_moved_faster():
     with pytest.raises(StartError, match="the plant OwnArm gives the tick"):
         run(MOVES[0], plant=OwnPlant("mine.py:OwnArm", "", OwnArm), truth=False)
+    with pytest.raises(StartError, match="which is no plant"):
+        run(MOVES[0], plant=OwnPlant("mine.py:nothing", "", lambda *_: None), truth=False)
 
 
 def test_the_recording_begins_where_an_arm_stands(tmp_path):
@@ -244,11 +219,139 @@ def test_the_recording_begins_where_an_arm_stands(tmp_path):
     assert read(path).start["q"] == STANDS.tolist()
 
 
-def test_a_plant_that_cannot_be_made_is_an_error_of_the_configuration():
-    with pytest.raises(StartError, match="which is no plant"):
-        run(MOVES[0], plant=OwnPlant("mine.py:nothing", "", lambda *_: None), truth=False)
+UNCOMPILED = {
+    "file": "wrong.script",
+    "ok": False,
+    "exit_reason": "compile_error",
+    "error": {"line": 2, "column": 9, "text": "no x"},
+    "failures": [{"kind": "compile_error", "line": 2, "text": "no x"}],
+}
 
 
-def test_the_summary_is_a_sentence():
-    assert summary(run("sleep(0.5)")) == "prog ran for 0.500 s of robot time"
-    assert "made 1 move; after a stop the tool shook with at most 0." in summary(run(MOVES[0]))
+@pytest.fixture(scope="module")
+def watch():
+    return run('textmsg("<b>\\x01&")', *MOVES, payload=5.0)
+
+
+@pytest.fixture
+def result(watch):
+    return {"file": "a.script", "lockstep": True, "recording": None, "failures": [], **as_dict(watch)}
+
+
+def kept(path, *results):
+    path.write_text(json.dumps(results[0] if len(results) == 1 else {"programs": results}), encoding="utf-8")
+    return path
+
+
+def limits(*most):
+    return Limits(
+        **dict(zip(("max_shake", "max_seconds", "max_joint_speed", "max_tool_speed"), most, strict=True))
+    )
+
+
+def texts(found):
+    return [one.text for one in found]
+
+
+class TestLimits:
+    def test_those_that_are_kept_say_nothing(self, watch):
+        assert texts(broken(limits(10.0, 100.0, 3.2, 5.0), watch)) == []
+        assert texts(broken(Limits(), watch)) == []
+
+    def test_each_that_is_broken_says_where_and_when(self, watch):
+        found = list(broken(limits(0.3, 1.0, 0.5, 0.1), watch))
+        kinds = ["max_seconds", *["max_shake"] * 3, "max_joint_speed", "max_tool_speed"]
+        assert [one.kind for one in found] == kinds
+        assert [one.line for one in found[1:4]] == [3, 5, 6]
+        assert "s, more than 1 (--max-seconds)" in found[0].text
+        assert f"after move 2, which stopped at {watch.moves[1].rests * 0.002:.3f} s" in found[2].text
+        assert f"{watch.moves[1].peak:.3g} m/s², more than 0.3 (--max-shake)" in found[2].text
+        assert found[4].text.startswith("joint base turned with ")
+        assert found[5].text.startswith("the tool moved with ")
+
+    def test_a_shake_that_nobody_knows_breaks_its_limit(self):
+        mute = run(MOVES[0], plant=OwnPlant("mine.py:NoArm", "", lambda *_: NoArm()), truth=False)
+        (found,) = broken(Limits(max_shake=5.0), mute)
+        assert (found.line, "not known" in found.text) == (2, True)
+
+
+class TestBaseline:
+    def test_the_same_run_has_not_changed(self, result, tmp_path):
+        path = kept(tmp_path / "base.json", json.loads(json.dumps(result)))
+        before = read_baseline(path, ["a.script"])["a.script"]
+        assert texts(changes(before, result)) == []
+        result["moves"][0]["peak_after_stop_m_s2"] *= 1.0 + 1e-4  # as on another processor
+        result["moves"][0]["line"] += 7  # a comment more
+        assert texts(changes(before, result)) == []
+
+    @pytest.mark.parametrize(
+        ("change", "said"),
+        [
+            (lambda one: one.update(exit_reason="timeout"), "exit_reason is timeout, before finished"),
+            (lambda one: one.update(seconds=one["seconds"] + 0.002), "seconds is "),
+            (lambda one: one["moves"].pop(), "the number of moves is 2, before 3"),
+            (lambda one: one["moves"][1].update(stopped="by hand"), "move 2: stopped is by hand, before nothing"),
+            (lambda one: one["moves"][1].update(peak_after_stop_m_s2=None), "peak_after_stop_m_s2 is nothing, before "),
+            (lambda one: one["largest_joint_speed"].update(speed_rad_s=3.0), "largest joint speed_rad_s is 3, before "),
+            (lambda one: one["warnings"].append({"text": "hot"}), "new warning: hot"),
+        ],
+    )  # fmt: skip
+    def test_each_change_is_a_sentence(self, result, tmp_path, change, said):
+        before = read_baseline(kept(tmp_path / "base.json", result), ["a.script"])["a.script"]
+        change(now := deepcopy(result))
+        (found,) = texts(changes(before, now))
+        assert said in found
+
+    def test_a_warning_that_is_gone_and_an_error_that_is_new_are_told(self, result, tmp_path):
+        result["warnings"] = [{"text": "hot"}]
+        before = read_baseline(kept(tmp_path / "base.json", result), ["a.script"])["a.script"]
+        assert texts(changes(before, {**result, "warnings": []})) == ["no longer warned: hot"]
+        uncompiled = {**UNCOMPILED, "file": "a.script"}
+        assert texts(changes(before, uncompiled)) == ["exit_reason is compile_error, before finished"]
+
+    def test_it_may_have_several_programs_in_any_order(self, result, tmp_path):
+        found = read_baseline(kept(tmp_path / "b.json", UNCOMPILED, result), ["a.script", "wrong.script"])
+        assert found["a.script"]["seconds"] == result["seconds"]
+        assert found["wrong.script"]["exit_reason"] == "compile_error"
+
+    @pytest.mark.parametrize(
+        ("content", "word"),
+        [
+            ("", "is not what tvist run --lockstep --json prints"),
+            ("[1]", "is not what tvist run"),
+            ('{"programs": 3}', "is not what tvist run"),
+            ('{"file": "a.script", "exit_reason": "compile_error", "lockstep": false}', "in real time"),
+            ('{"file": "b.script", "exit_reason": "compile_error"}', "is of b.script, and this run is of a"),
+            ('{"file": "a.script", "exit_reason": "compile_error", "warnings": "x"}', "is not what tvist run"),
+            ('{"programs": []}', "is of nothing"),
+            ("[" * 100_000, "is not what tvist run"),
+        ],
+    )  # fmt: skip
+    def test_another_shape_is_refused_in_a_sentence(self, tmp_path, content, word):
+        (tmp_path / "base.json").write_text(content, encoding="utf-8")
+        with pytest.raises(BaselineError, match=word) as refused:
+            read_baseline(tmp_path / "base.json", ["a.script"])
+        assert "base.json" in str(refused.value)
+
+
+def test_junit_has_a_case_for_each_program_with_measures_and_sentences(result):
+    shook = {"kind": "max_shake", "line": 3, "text": "shook"}
+    result["failures"] = [shook, {"kind": "baseline", "line": None, "text": "x"}]
+    result |= {"ok": False, "warnings": [{"timestamp": 0.1, "line": 4, "text": "slow\ufffe"}]}
+    suites = ET.fromstring(junit([result, UNCOMPILED, {**result, "ok": True, "failures": []}]))  # noqa: S314  our own
+    (suite,) = suites
+    assert (suites.get("tests"), suite.get("failures")) == ("3", "2")
+    bad, wrong, good = suite
+    assert [case.get("name") for case in suite] == ["a.script", "wrong.script", "a.script"]
+    assert float(bad.get("time")) == pytest.approx(result["seconds"], abs=1e-3)
+    measures = {one.get("name"): float(one.get("value")) for one in bad.find("properties")}
+    peak = result["largest_peak_after_stop_m_s2"]
+    assert measures["largest_peak_after_stop_m_s2"] == pytest.approx(peak, rel=1e-4)
+    assert {"seconds", "moves", "largest_joint_speed_rad_s", "largest_tool_speed_m_s"} <= measures.keys()
+    failure = bad.find("failure")
+    assert (failure.get("type"), failure.get("message")) == ("max_shake", "shook; x")
+    assert failure.text == "a.script:3: shook\nx"
+    assert wrong.find("failure").text == "wrong.script:2: no x"
+    assert good.find("failure") is None
+    assert "<b>" in good.find("system-out").text
+    assert good.find("system-err").text == "a.script:4: slow\N{REPLACEMENT CHARACTER}"

@@ -3,8 +3,8 @@
 import asyncio
 from itertools import islice
 
-import msgspec
 import pytest
+from tests.lab.golden import INFO, IO, STATE, TRUTH, changed, record
 
 from tvist_cli.commands.log.replay import replay
 from tvist_cli.failure import Failure
@@ -12,28 +12,18 @@ from tvist_lab import republish
 from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.republish import Playback, PlaybackDesk, played
-from tvist_protocol import Event, Info, Io, State, Truth
+from tvist_protocol import Event, Info, State
 from tvist_protocol.codec import decode, encode
 from tvist_protocol.commands import Stop, TakeControl
-from tvist_protocol.generate import FOLDER
 from tvist_protocol.journal import Entry
-from tvist_protocol.recorded import topics
 from tvist_protocol.replies import Refused
-from tvist_server.recording.writer import RecordingWriter, heading
 
-
-def golden(kind):
-    path = FOLDER / "fixtures" / "v1" / f"{kind.__name__.lower()}.json"
-    return msgspec.json.decode(path.read_bytes(), type=kind)
-
-
-INFO, STATE, TRUTH, IO = map(golden, (Info, State, Truth, Io))
 MESSAGES = [
-    msgspec.structs.replace(IO, tick=4),
-    *(msgspec.structs.replace(STATE, tick=tick, timestamp=tick * 0.002) for tick in (4, 5)),
+    changed(IO, tick=4),
+    *(changed(STATE, tick=tick, timestamp=tick * 0.002) for tick in (4, 5)),
     Event(tick=6, kind="warning", why="a"),
-    msgspec.structs.replace(STATE, tick=6, timestamp=0.012),
-    msgspec.structs.replace(TRUTH, tick=6, timestamp=0.012),
+    changed(STATE, tick=6, timestamp=0.012),
+    changed(TRUTH, tick=6, timestamp=0.012),
 ]
 
 
@@ -58,13 +48,7 @@ class Listener:
 
 @pytest.fixture
 def path(tmp_path):
-    path = tmp_path / "run.mcap"
-    with path.open("wb") as stream:
-        writer = RecordingWriter(stream, topics(INFO.name), heading(INFO, {}))
-        for message in (*MESSAGES, Entry(tick=7, kind="missed", count=1)):
-            writer.write(message)
-        writer.finish({})
-    return path
+    return record(tmp_path / "run.mcap", [*MESSAGES, Entry(tick=7, kind="missed", count=1)])
 
 
 @pytest.fixture
@@ -95,12 +79,11 @@ def test_its_time_is_that_of_the_recording(path, network, monkeypatch):
     async def sleep(seconds):
         waited.append(seconds)
 
-    monkeypatch.setattr(asyncio, "sleep", sleep)
-
     async def run():
         asyncio.get_running_loop().time = lambda: 7.0
         await Playback(read(path), ["tcp/127.0.0.1:1"], speed=0.01).run()
 
+    monkeypatch.setattr(asyncio, "sleep", sleep)
     asyncio.run(run())
     assert waited == pytest.approx([0.0, 0.2, 0.4])
 

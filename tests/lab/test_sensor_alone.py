@@ -38,7 +38,7 @@ def swept(rate, f_d, zeta, length=40.0, highest=133.0):
     return 3.0 * lsim(([omega**2], [1.0, 2.0 * zeta * omega, omega**2]), shaken, since + 1.0)[1]
 
 
-@pytest.mark.parametrize(("rate", "f_d", "zeta"), [(500, 9.0, 0.12), (1600, 41.0, 0.04), (3200, 110.0, 0.02)])
+@pytest.mark.parametrize(("rate", "f_d", "zeta"), [(500, 9.0, 0.12), (3200, 110.0, 0.02)])
 @pytest.mark.parametrize(
     ("kind", "excited", "starts"), [("ring-down", ringing, [77, 79]), ("sweep", swept, [None])]
 )

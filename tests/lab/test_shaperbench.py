@@ -1,20 +1,17 @@
 """Shapers on the bench: honest ones are measured, dishonest and broken ones are named; the arms are what they say."""
 
-import json
-import re
 import sys
 import textwrap
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import polars as pl
 import pytest
 from tools.tables.pages import page_of
 
 from tvist_lab.metrics import best_tool_acceleration
-from tvist_lab.studies.bench import STICKING, STICKS, bend, path_error, study
+from tvist_lab.studies.bench import bend, path_error, study
 from tvist_lab.studies.causality import check_causal, inspect
 from tvist_lab.study.arms import ARMS
 from tvist_lab.study.asked import Asked
@@ -22,21 +19,13 @@ from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import some
 from tvist_lab.study.foreign import CandidateError, FromFile, load_shaper
 from tvist_lab.study.line import PAPER, ControlLine, point_to_point
-from tvist_lab.study.menus import ROWS, names
+from tvist_lab.study.menus import names
 from tvist_lab.study.method import Named, Stepping, Task
 from tvist_lab.study.moves import Move, draw_moves
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.shaping import ShaperFaultError
 from tvist_lab.study.work import Job, measure, measure_each
-from tvist_plant.arm_memory import SUBSTEPS
-from tvist_plant.description import load
-from tvist_plant.drives import DriveCommand
-from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.imperfections import Imperfections, YieldingBase
-from tvist_plant.integrator import relaxed
 from tvist_plant.plant import PERIOD
-from tvist_plant.variants import HEAVIER
-from tvist_plant.world.mujoco_arm import MujocoArm
 
 HONEST = """
     import numpy as np
@@ -86,10 +75,12 @@ class TestFromFile:
         assert 0.03 < shaped.delay <= 0.04
         assert shaped.cost is not None
 
-    def test_a_function_will_do(self, own, task):
-        candidate = own("def step(q_ref, info):\n    return q_ref")
+    def test_a_function_will_do_and_may_write_to_what_it_is_given(self, own, task):
+        candidate = own("def step(q_ref, info):\n    out = q_ref.copy()\n    q_ref[:] = 9.0\n    return out")
         check_causal(candidate, task)
-        assert candidate.shaped(task).delay == 0.0
+        shaped = candidate.shaped(task)
+        assert shaped.delay == 0.0
+        np.testing.assert_array_equal(shaped.q[len(task.reference) - 1], task.reference[-1])
 
     def test_it_is_told_what_it_may_know(self, own, task, ur5e):
         candidate = own(
@@ -103,32 +94,22 @@ class TestFromFile:
             """
         )
         candidate.shaped(task)
-        info = load_shaper_module(candidate).seen[5]
+        info = sys.modules[f"tvist_shaper_{Path(candidate.path).stem}"].seen[5]
         assert (info.period, info.joints, info.robot) == (PERIOD, 6, ur5e.robot.model)
         assert info.limits == PAPER
         assert info.payload.mass == 5.0
         assert info.f_d.shape == info.zeta.shape == (4,)
         assert 6.0 < info.f_d[0] < 8.0  # at Q1 with 5 kg
 
-    def test_it_may_write_to_what_it_is_given(self, own, task):
-        shaped = own(
-            "def step(q_ref, info):\n    out = q_ref.copy()\n    q_ref[:] = 9.0\n    return out"
-        ).shaped(task)
-        np.testing.assert_array_equal(shaped.q[len(task.reference) - 1], task.reference[-1])
-
     @pytest.mark.parametrize(
         ("body", "words"),
         [
-            (
-                "self.n += 1\n        if self.n == 8: raise KeyError('gain')\n        return q_ref",
-                ["KeyError", "tick 7"],
-            ),
+            ("self.n += 1\n        return q_ref if self.n < 8 else {}['gain']", ["KeyError", "tick 7"]),
             (
                 "self.n += 1\n        return q_ref if self.n < 8 else q_ref * float('nan')",
                 ["tick 7", "finite"],
             ),
             ("return q_ref[:5]", ["tick 0", "(5,)", "(6,)"]),
-            ("return None", ["tick 0", "(6,)"]),
             ("return 'left'", ["tick 0", "str"]),
             ("return q_ref + 1e300", ["tick 0", "1e+300", "joint 1"]),
             ("return 0.999 * q_ref", ["does not end", "rad from the target"]),
@@ -149,7 +130,6 @@ class TestFromFile:
         ("text", "words"),
         [
             ("import nowhere_to_be_found", "ModuleNotFoundError"),
-            ("x = (", "SyntaxError"),
             ("x = 1", "neither a class"),
             ("class A:\n    def step(self, q, info): ...\nclass B(A):\n    ...", "A, B"),
             (
@@ -161,10 +141,6 @@ class TestFromFile:
     def test_a_file_without_a_shaper_is_named(self, own, text, words):
         with pytest.raises(CandidateError, match=words):
             load_shaper(Path(own(text).path))
-
-
-def load_shaper_module(candidate):
-    return sys.modules[f"tvist_shaper_{Path(candidate.path).stem}"]
 
 
 PEEKING = {
@@ -180,23 +156,6 @@ PEEKING = {
                 tick = len(past[-1]) - 1
                 if len(past) > 1 and len(past[0]) > tick + 5 and (past[0][tick] == q_ref).all():
                     return past[0][tick + 5]
-                return q_ref
-    """,
-    "looks where the reference is kept": """
-        import sys
-
-        class Spy:
-            def reset(self, q):
-                self.tick = 0
-
-            def step(self, q_ref, info):
-                frame, self.tick = sys._getframe(), self.tick + 1
-                for _ in range(5):
-                    for value in list(frame.f_locals.values()):
-                        reference = getattr(value, "reference", None)
-                        if getattr(reference, "ndim", 0) == 2:
-                            return reference[min(self.tick + 9, len(reference) - 1)]
-                    frame = frame.f_back
                 return q_ref
     """,
     "looks where the target is kept": """
@@ -237,8 +196,6 @@ class TestDishonesty:
 
     def test_a_drift_after_the_end_is_caught(self, own, task):
         text = """
-            import numpy as np
-
             class Drifts:
                 def reset(self, q):
                     self.last, self.ticks = q, 0
@@ -246,7 +203,7 @@ class TestDishonesty:
                 def step(self, q_ref, info):
                     self.ticks = self.ticks + 1 if (q_ref == self.last).all() else 0
                     self.last = q_ref
-                    return q_ref + 1e-4 * np.clip((self.ticks - 50) / 100, 0, 1)
+                    return q_ref + 1e-4 * min(max((self.ticks - 50) / 100, 0.0), 1.0)
         """
         with pytest.raises(ShaperFaultError, match="hides a tail"):
             own(text).shaped(task)
@@ -289,76 +246,19 @@ class TestElastic:
 
 
 class TestOwn:
-    def test_auto_target_has_the_weights_of_the_end_from_the_start(self, ur5e, modal, task):
-        there = Recipe("auto-target", modal).make(ur5e, task.move.mass)
-        there.reset(task.move.target)
-        there.aim(task.move.target)
-        stepper = Named(Recipe("auto-target", modal), "auto-target", "").stepper(task)
-        for q in task.reference:
-            stepper.step(q)
-            assert stepper.delay == there.delay
-
     def test_the_held_product_keeps_the_limits_and_its_mean_delay(self, ur5e, modal):
         (product,) = some(["product"], ur5e, modal)
-        for move in draw_moves(ur5e, 3, 5, (0.0, 5.0)).moves:
-            reference = point_to_point(np.array(move.start), np.array(move.target))
-            # With a tenth more declared than is rated: the most that the bench does.
-            shaped = product.shaped(Task(ur5e, replace(move, mass=1.1 * ur5e.limits.payload), reference))
-            qd, qdd = (np.abs(np.diff(shaped.q, order, axis=0)).max() / PERIOD**order for order in (1, 2))
-            assert qd <= (1.0 + 1e-6) * PAPER.velocity
-            assert qdd <= 1.005 * PAPER.acceleration
-            assert 0.08 < shaped.delay < 0.15
-
-    def test_a_shaper_of_the_library_without_a_row_stands_in_the_menus_of_shapers(self, monkeypatch):
-        monkeypatch.setattr("tvist_lab.study.menus.ROWS", tuple(row for row in ROWS if row.name != "zvd"))
-        assert [menu for menu in ("bench", "lesson", "baselines") if "zvd" in names(menu)] == [
-            "bench",
-            "lesson",
-        ]
-        assert len({row.name for row in ROWS}) == len(ROWS)
-
-
-def imperfect(description, **imperfections):
-    return FlexibleArm(
-        description, description.payload, imperfections=Imperfections(**imperfections), substeps=8
-    )
+        (move,) = draw_moves(ur5e, 1, 5, (0.0, 5.0)).moves
+        reference = point_to_point(np.array(move.start), np.array(move.target))
+        # With a tenth more declared than is rated: the most that the bench does.
+        shaped = product.shaped(Task(ur5e, replace(move, mass=1.1 * ur5e.limits.payload), reference))
+        qd, qdd = (np.abs(np.diff(shaped.q, order, axis=0)).max() / PERIOD**order for order in (1, 2))
+        assert qd <= (1.0 + 1e-6) * PAPER.velocity
+        assert qdd <= 1.005 * PAPER.acceleration
+        assert 0.08 < shaped.delay < 0.15
 
 
 class TestArms:
-    @pytest.fixture
-    def q1_q3(self, ur5e):
-        start, target = (np.array(ur5e.poses[name]) for name in ("Q1", "Q3"))
-        reference = point_to_point(start, target)
-
-        def felt(arm, description=ur5e):
-            line = ControlLine(description, start, ur5e.payload)
-            return best_tool_acceleration(line.follow(reference, reference).simulate(arm, 3))
-
-        return felt
-
-    def test_a_base_that_hardly_yields_is_rigid(self, ur5e, q1_q3):
-        stiff = q1_q3(imperfect(ur5e, base=YieldingBase(stiffness=1e9)))
-        plain = q1_q3(FlexibleArm(ur5e, ur5e.payload, substeps=8))
-        np.testing.assert_allclose(
-            stiff, plain, rtol=0.0, atol=0.01
-        )  # measured 2e-3; it falls with the stiffness
-
-    def test_a_base_that_yields_lowers_every_frequency(self, ur5e):
-        arms = (FlexibleArm(ur5e, ur5e.payload), imperfect(ur5e, base=YieldingBase()))
-        q = np.array(ur5e.poses["Q3"])
-        rigid = arms[0].modes(q)
-        yields = arms[1].modes(q)
-        assert (yields.f_d[:3] < rigid.f_d[:3]).all()
-        assert (yields.f_d[:3] > 0.7 * rigid.f_d[:3]).all()
-
-    def test_mujocos_arm_rings_as_the_plant_does(self, ur5e, q1_q3):
-        """Two integrators of different order and no gear error in one: alike, not equal."""
-        peak = [
-            np.abs(q1_q3(arm)[-300:]).max()
-            for arm in (FlexibleArm(ur5e, ur5e.payload), MujocoArm(ur5e, ur5e.payload))
-        ]
-        assert peak[1] == pytest.approx(peak[0], rel=0.5, abs=0.01)
-
     @pytest.mark.parametrize("arm", ARMS, ids=lambda arm: arm.name)
     def test_every_arm_rests_where_it_is_put(self, ur5e, arm):
         start = np.array(ur5e.poses["Q3"])
@@ -368,21 +268,6 @@ class TestArms:
         alpha = best_tool_acceleration(line.follow(at_rest, at_rest).simulate(made, 1))
         assert np.abs(alpha).max() < 1e-6
 
-    def test_the_arms_whose_motors_stick_are_their_file_and_a_rougher_one(self):
-        """Four substeps are enough for them, and all that differs from the file is friction."""
-        description = load(STICKS)
-        known, rougher = (arm.make(description, description.payload, 3) for arm in STICKING)
-        assert known.description == description
-        assert known.memory[SUBSTEPS] == rougher.memory[SUBSTEPS] == 4
-        found = rougher.description
-        for name in ("stiction", "stiction_load", "stiction_speed", "stiction_stiffness"):
-            given = np.array(description.imperfections[name])
-            np.testing.assert_allclose(found.imperfections[name], given * np.array(HEAVIER[name]))
-        coulomb = np.array(description.drives.coulomb_friction) * HEAVIER["coulomb_friction"]
-        np.testing.assert_allclose(found.drives.coulomb_friction, coulomb)
-        same = msgspec.structs.replace(found.drives, coulomb_friction=description.drives.coulomb_friction)
-        assert (same, found.links) == (description.drives, description.links)
-
     def test_every_seed_scatters_stiffness_and_gains_its_own_way(self, ur5e):
         (scattered,) = (arm for arm in ARMS if arm.name == "scattered")
         first, again, other = (scattered.make(ur5e, ur5e.payload, seed).description for seed in (1, 1, 2))
@@ -390,28 +275,6 @@ class TestArms:
         for name in ("gear_stiffness", "velocity_gain", "position_gain"):
             ratio = np.divide(getattr(first.drives, name), getattr(ur5e.drives, name))
             np.testing.assert_allclose(np.abs(ratio - 1.0), 0.15)
-
-    def test_hysteresis_is_dahls(self):
-        """Against the differential equation in many small steps; and it never exceeds its bound."""
-        z, fine = 0.0, 0.0
-        stiffness, most = 8000.0, 3.0
-        for twist in (2e-4, 1e-3, -4e-4, -2e-3, 5e-5):
-            z = relaxed(z, twist, stiffness, most)
-            for _ in range(20_000):
-                fine += stiffness * (twist - abs(twist) * fine / most) / 20_000
-            assert z == pytest.approx(fine, abs=1e-3)
-            assert abs(z) <= most
-
-    def test_a_soft_gear_twists_further_under_the_same_torque(self, ur5e):
-        plain, soft = FlexibleArm(ur5e, ur5e.payload), imperfect(ur5e, soft=0.75)
-        q = np.array(ur5e.poses["Q1"])
-        command = DriveCommand(q=q, qd=np.zeros(6), torque=np.zeros(6))
-        for arm in (plain, soft):
-            arm.reset(command)
-        ours, theirs = (np.abs(arm.truth().gear_deflection) for arm in (plain, soft))
-        K, limit = ur5e.drives.gear_stiffness, ur5e.limits.torque
-        extra = 0.1 * limit[1] * (1.0 / (0.75 * K[1]) - 1.0 / K[1])  # gravity at Q1 is beyond the soft range
-        assert theirs[1] - ours[1] == pytest.approx(extra, rel=0.05)
 
 
 class TestScores:
@@ -447,15 +310,6 @@ class TestScores:
         assert "Measured on 2026-11-23" in written
         lost = {row["shaper"]: row for row in made.result(spoilt, {}).values["summary"] if not row["ranked"]}
         assert lost["double_s_as_zv"]["fault"] == "gives NaN at tick 7 (payload error +0 %)"
-
-    def test_the_published_page_says_when_it_was_made_and_what_it_lacks(self, ur5e, modal):
-        reference = Path(__file__).parents[2] / "docs" / "reference"
-        published = json.loads((reference / "leaderboard.json").read_text(encoding="utf-8"))
-        _, first, *_ = (reference / "shaperbench.md").read_text(encoding="utf-8").split("\n\n")
-        now = [one.name for one in bench(ur5e, modal)] + [arm.name for arm in (*ARMS, *STICKING)]
-        there = [row["shaper"] for row in published["summary"]] + list(published["arms"])
-        assert first.startswith("Measured on 20")
-        assert set(re.findall(r"`(\w+(?:-\w+)*)`", first)) == set(now) - set(there)
 
     def test_curved_paths_are_run_by_all_that_shape_references(self, ur5e, modal):
         none, zv, planned = bench(ur5e, modal, "zv", "double_s_as_zv")

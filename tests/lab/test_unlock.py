@@ -22,19 +22,13 @@ async def stopped(robot, arm, *faults, ticks=500):
     assert not (await look(robot)).ready
 
 
-async def test_a_protective_stop_is_unlocked(robot):
-    async with robot.control("me") as arm:
-        await stopped(robot, arm, "protective_stop")
-        assert await make_ready(robot, arm) == ["unlocked the protective stop"]
-        assert (await look(robot)).ready
-
-
-async def test_a_stop_that_is_still_on_its_way_is_waited_for(robot):
+@pytest.mark.parametrize("ticks", [500, 2])
+async def test_a_protective_stop_is_unlocked_also_while_the_arm_still_stops(robot, ticks):
     async with robot.control("me") as arm:
         await arm.move_j([1.0, -3.0, 0.0, -1.57, 0.0, 0.0], wait=False)
         await robot.advance(300)
-        await stopped(robot, arm, "protective_stop", ticks=2)
-        await make_ready(robot, arm)
+        await stopped(robot, arm, "protective_stop", ticks=ticks)
+        assert await make_ready(robot, arm) == ["unlocked the protective stop"]
         assert (await look(robot)).ready
 
 
@@ -42,10 +36,8 @@ async def test_an_arm_that_carries_too_much_stops_again_and_that_is_said(robot):
     async with robot.control("me") as arm:
         await arm.reset(payload=free_setup(payload=20.0, overload=True).payload)
         await stopped(robot, arm)
-        assert await make_ready(robot, arm) == [
-            "unlocked the protective stop",
-            "the robot stopped again at once",
-        ]
+        done = ["unlocked the protective stop", "the robot stopped again at once"]
+        assert await make_ready(robot, arm) == done
         found = await look(robot)
         assert found.stop.code == "limit_torque"
         assert "torque of joint" in found.why
@@ -66,23 +58,20 @@ async def test_the_safety_system_is_restarted_and_the_power_is_offered(robot, fa
 
 
 @pytest.mark.parametrize(
-    ("fault", "mode"),
-    [("safeguard_stop", "SAFEGUARD_STOP"), ("emergency_stop", "ROBOT_EMERGENCY_STOP")],
+    ("faults", "mode", "done"),
+    [
+        (["safeguard_stop"], "SAFEGUARD_STOP", []),
+        (["emergency_stop"], "ROBOT_EMERGENCY_STOP", []),
+        (["protective_stop", "safeguard_stop"], "SAFEGUARD_STOP", ["unlocked the protective stop"]),
+    ],
 )
-async def test_what_is_not_a_clients_to_release_remains_and_is_said(robot, fault, mode):
+async def test_what_is_not_a_clients_to_release_remains_and_is_said(robot, faults, mode, done):
     async with robot.control("me") as arm:
-        await stopped(robot, arm, fault)
-        assert await make_ready(robot, arm, power_on=True) == []
+        await stopped(robot, arm, *faults)
+        assert await make_ready(robot, arm, power_on=len(faults) == 1) == done
         found = await look(robot)
         assert (found.ready, found.safety_mode) == (False, mode)
         assert "release it" in found.next
-
-
-async def test_behind_a_protective_stop_the_safeguard_remains(robot):
-    async with robot.control("me") as arm:
-        await stopped(robot, arm, "protective_stop", "safeguard_stop")
-        assert await make_ready(robot, arm) == ["unlocked the protective stop"]
-        assert (await look(robot)).safety_mode == "SAFEGUARD_STOP"
 
 
 async def test_a_motion_that_a_safeguard_has_paused_is_not_waited_for(robot):

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from tvist_plant.description import Payload
+from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 
 from .arms import chain, hold, quiet
@@ -42,14 +44,40 @@ def test_link_angles_are_those_of_mujoco_from_Q1_to_Q3(ur5e, kind, measured):
     assert extrapolated < 1e-6  # measured 3.4e-7
 
 
+FIELDS = ("q", "qd", "moment", "accelerometer")
+
+
 def test_static_equilibrium_is_that_of_mujoco(ur5e):
-    arm = quiet(ur5e)
+    arm = ur5e.disturbed_by(["friction"])
     for pose in arm.poses.values():
         command = hold(arm, pose)
-        ours = FlexibleArm(arm, arm.payload).reset(command).q
-        np.testing.assert_allclose(
-            second_opinion(arm, arm.payload, 0.00025).reset(command).q, ours, rtol=0.0, atol=1e-12
-        )
+        ours = FlexibleArm(arm, arm.payload).reset(command)
+        theirs = second_opinion(arm, arm.payload, 0.00025).reset(command)
+        np.testing.assert_allclose(theirs.q, ours.q, rtol=0.0, atol=1e-12)
+        for name in FIELDS:
+            np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0.0, atol=1e-9)
+
+
+def test_it_carries_what_a_reset_says(ur5e):
+    arm, still = second_opinion(ur5e, ur5e.payload, 0.00025), hold(ur5e, ur5e.poses["Q1"])
+    arm.reset(still)
+    loaded = arm.truth().gear_deflection[1]
+    arm.reset(still, payload=Payload())
+    assert arm.payload == Payload()
+    assert abs(arm.truth().gear_deflection[1]) < 0.6 * abs(loaded)
+    arm.reset(still)
+    assert arm.payload == Payload()
+
+
+def test_measurements_are_the_receivers_own(ur5e):
+    arm, still = second_opinion(ur5e, ur5e.payload, 0.00025), hold(ur5e, ur5e.poses["Q1"])
+    first, truth = arm.reset(still), arm.truth()
+    held = [*(getattr(first, name) for name in FIELDS), truth.specific_force, truth.flange_rotation]
+    kept = [values.copy() for values in held]
+    for _ in range(20):
+        arm.step(DriveCommand(still.q + 0.05, still.qd, still.torque))
+    for values, before in zip(held, kept, strict=True):
+        np.testing.assert_array_equal(values, before)
 
 
 @pytest.mark.parametrize("joints", [1, 3, 7])

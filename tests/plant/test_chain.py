@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from tvist_plant import chain as module
-from tvist_plant.chain import SCRATCH, chain_of, collect_inertia, collect_torques, sweep, torques
+from tvist_plant.chain import SCRATCH, chain_of, sweep, torques
 from tvist_plant.description import Payload, load
 from tvist_plant.imperfections import YieldingBase, on_base
 from tvist_plant.model import FLANGE, flexible_model, rigid_model
@@ -106,17 +106,3 @@ def test_what_is_no_chain_of_turning_joints_is_refused():
     model.addFrame(pin.Frame("end", 2, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
     with pytest.raises(ValueError, match="must turn, after joint 1"):
         chain_of(model, model.getFrameId("end"))
-
-
-def test_a_sweep_leaves_what_the_collections_need():
-    model, end = MODELS["ur5e bending"]
-    chain, scratch = chain_of(model, end), np.zeros((11, SCRATCH))
-    q, qd, qdd = np.random.default_rng(9).uniform(-2.0, 2.0, (3, 10))
-    torque, M = np.empty(10), np.zeros((10, 10))
-    sweep(chain, q, qd, qdd, 9.81, scratch)
-    collect_torques(scratch, torque)
-    collect_inertia(scratch, M)
-    sweep(chain, q, qd, np.zeros(10), 9.81, scratch)
-    bias = np.empty(10)
-    collect_torques(scratch, bias)
-    np.testing.assert_allclose(torque, (np.triu(M) + np.triu(M, 1).T) @ qdd + bias, atol=1e-9)

@@ -1,37 +1,35 @@
 """A robot file is read, checked and refused in one sentence that names file and key."""
 
-import math
 import re
-from importlib import resources
+import tomllib
+from importlib import resources, util
+from pathlib import Path
 
 import msgspec
 import numpy as np
+import pinocchio as pin
 import pytest
+from msgspec.structs import asdict
 
 from tvist_plant.description import (
     DISTURBANCES,
     DescriptionError,
     RobotDescription,
+    fingerprint,
     is_real_body,
     load,
-    robots,
 )
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.robot_checks import check
+from tvist_plant.model import rigid_model
+from tvist_plant.robot_tables import Payload
+from tvist_plant.similar import RULE, Scale
 from tvist_plant.user_file import UserFileError
 
-from .arms import chain, hold
+from .arms import chain
 
 TEXT = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
 MASS = "mass = [3.761, 8.058, 2.846, 1.37, 1.3, 0.365]"
 NAMES = 'joints = ["base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"]'
-
-
-def test_ur5e_comes_with_the_package(ur5e):
-    assert "ur5e" in robots()
-    assert ur5e.joints == 6
-    assert {"Q1", "Q2", "Q3"} <= ur5e.poses.keys()
-    assert ur5e.payload.mass == 5.0
 
 
 def test_a_file_by_its_path_is_the_same_as_the_name(tmp_path, ur5e):
@@ -72,6 +70,10 @@ def test_a_file_by_its_path_is_the_same_as_the_name(tmp_path, ur5e):
         ),
         ("Q1 = [0.0, ", "Q1 = [", "poses.Q1"),
         ("[robot]", "[robot", "line 8"),
+        ('kinematics = "published', 'kinematic = "published', "provenance.kinematic"),
+        ('drives           = "measured:', 'drives = "guessed:', "must be one of published, measured"),
+        ("[27500.0,", "[-27500.0,", "drives.gear_stiffness[0] is -27500.0: must be more than 0"),
+        ("a     = [", "b     = [", "kinematics.b"),
     ],
 )
 def test_a_wrong_file_is_one_sentence_that_names_file_and_key(tmp_path, old, new, key):
@@ -118,12 +120,6 @@ def test_limits_in_degrees_are_refused_with_what_they_are_in_radians(tmp_path, k
     assert "degrees.toml" in str(refused.value)
 
 
-def test_ten_turns_either_way_and_eight_a_second_are_limits_in_radians(ur5e):
-    replace = msgspec.structs.replace
-    most = replace(ur5e.limits, position=(20.0 * math.pi,) * 6, velocity=(16.0 * math.pi,) * 6)
-    check(replace(ur5e, limits=most))
-
-
 def test_a_body_of_points_is_real_and_one_with_a_too_large_moment_is_not():
     assert is_real_body((0.0,) * 6)
     assert is_real_body((1.0, 0.0, 0.0, 1.0, 0.0, 2.0))  # a thin disc: the limit
@@ -143,34 +139,6 @@ def test_disturbances_can_be_kept_one_by_one(ur5e):
         ur5e.disturbed_by(["gear", "wind"])
 
 
-def test_clean_takes_away_what_is_not_linear(ur5e):
-    clean = ur5e.clean()
-    assert clean.drives.linear_friction
-    assert clean.drives.gear_error_amplitude == clean.sensors.accelerometer_noise == 0.0
-    assert clean.drives.coulomb_friction == ur5e.drives.coulomb_friction
-    assert msgspec.structs.replace(clean, drives=ur5e.drives, sensors=ur5e.sensors) == ur5e
-
-
-@pytest.mark.parametrize("joints", [1, 2, 3, 7])
-def test_arms_of_other_sizes_stand_still_and_move(joints):
-    arm = chain(joints)
-    assert isinstance(arm, RobotDescription)
-    plant = FlexibleArm(arm, arm.payload)
-    command = hold(arm, np.linspace(0.3, -0.4, joints))
-    first = plant.reset(command, seed=3)
-    place = plant.truth().flange_position
-    for _ in range(500):
-        measured = plant.step(command)
-    assert measured.q.shape == measured.qd.shape == measured.moment.shape == (joints,)
-    np.testing.assert_allclose(measured.q, first.q, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(plant.truth().flange_position, place, rtol=0.0, atol=1e-9)
-    target = hold(arm, command.q + 0.001)
-    for _ in range(500):
-        measured = plant.step(target)
-    assert np.isfinite(measured.accelerometer).all()
-    np.testing.assert_allclose(measured.q, plant.reset(target, seed=3).q, rtol=0.0, atol=1e-4)
-
-
 def test_modes_are_found_for_any_number_of_joints():
     for joints in (1, 2, 3, 7):
         arm = chain(joints)
@@ -178,3 +146,196 @@ def test_modes_are_found_for_any_number_of_joints():
         assert len(found.f_d) >= 1
         assert np.all(np.diff(found.f_d) >= 0.0)
         assert np.all((found.zeta > 0.0) & (found.zeta < 1.0))
+
+
+UR5E = load("ur5e")
+REPLACE = msgspec.structs.replace
+
+
+def changed(table: str, **values) -> RobotDescription:
+    return REPLACE(UR5E, **{table: REPLACE(getattr(UR5E, table), **values)})
+
+
+def scaled(table: str, key: str, factor: float = 1.001) -> RobotDescription:
+    values = getattr(getattr(UR5E, table), key)
+    return changed(table, **{key: (values[0] * factor, *values[1:])})
+
+
+@pytest.mark.parametrize(
+    "description",
+    [
+        scaled("drives", "gear_stiffness"),
+        scaled("drives", "gear_damping"),
+        scaled("drives", "rotor_inertia"),
+        scaled("drives", "velocity_gain"),
+        scaled("drives", "position_gain"),
+        scaled("drives", "integral_gain"),
+        scaled("drives", "coulomb_friction"),
+        scaled("links", "mass"),
+        scaled("link_flexibility", "stiffness"),
+        changed("link_flexibility", links=(), stiffness=()),
+        changed("kinematics", a=(0.0, -0.5, -0.4, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_another_arm_has_another_one(description):
+    assert fingerprint(description) != fingerprint(UR5E)
+
+
+@pytest.mark.parametrize("description", [
+    changed("robot", name="left", model="Other"), scaled("limits", "position"), scaled("limits", "torque"),
+    changed("payload", mass=1.0), changed("sensors", accelerometer_noise=1.0),
+    changed("drives", gear_error_amplitude=0.0), changed("drives", friction_feedforward=0.0),
+    REPLACE(UR5E, poses={}), UR5E.clean(), UR5E.quiet(),
+])  # fmt: skip
+def test_the_same_arm_under_another_name_with_other_limits_has_the_same(description):
+    assert fingerprint(description) == fingerprint(UR5E)
+
+
+UR = ("ur3e", "ur10e", "ur16e", "ur20", "ur30")
+
+
+def file_of(name):
+    return (resources.files("tvist_plant") / "robots" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def test_the_ur5e_is_similar_to_itself():
+    scale = Scale(UR5E.kinematics, UR5E.limits.torque)
+    assert {
+        key: list(value) if isinstance(value, tuple) else value for key, value in asdict(UR5E.drives).items()
+    } == {key: list(value) if isinstance(value, tuple) else value for key, value in scale.drives().items()}
+    links = scale.link_flexibility(UR5E.kinematics)
+    assert (tuple(links["links"]), tuple(links["stiffness"])) == (
+        UR5E.link_flexibility.links,
+        UR5E.link_flexibility.stiffness,
+    )
+
+
+@pytest.mark.parametrize("name", UR)
+def test_a_file_leaves_springs_and_drives_to_the_rule_and_says_so(name):
+    assert not {"drives", "link_flexibility"} & set(tomllib.loads(file_of(name)))
+    arm = load(name)
+    assert arm.provenance["drives"] == arm.provenance["link_flexibility"] == RULE
+
+
+@pytest.mark.parametrize("name", UR)
+def test_a_gear_twists_by_the_ur5e_s_angle_at_its_largest_torque(name):
+    arm = load(name)
+    twist = np.divide(arm.limits.torque, arm.drives.gear_stiffness)
+    np.testing.assert_allclose(twist, np.divide(UR5E.limits.torque, UR5E.drives.gear_stiffness), rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", UR)
+def test_a_loaded_arm_is_damped_like_the_ur5e_and_slower_if_it_is_longer(name, measured):
+    arm = load(name)
+    found, own = (FlexibleArm(a, a.payload).modes(np.array(a.poses["Q1"])) for a in (arm, UR5E))
+    measured(f"{name}: f_d at Q1 [Hz]", found.f_d[0])
+    assert found.zeta[0] == pytest.approx(own.zeta[0], rel=0.1)
+    scale = Scale(arm.kinematics, arm.limits.torque)
+    assert bool(found.f_d[0] < own.f_d[0]) == (scale.length > 1.0)
+
+
+SEVEN = Path(__file__).parent / "urdf" / "seven.urdf"
+
+
+def examples():
+    """URDFs of the package example-robot-data, if it is installed."""
+    found = util.find_spec("cmeel")
+    if found is None or found.origin is None:
+        return []
+    folder = (
+        Path(found.origin).parents[1] / "cmeel.prefix/share/example-robot-data/robots/ur_description/urdf"
+    )
+    return [path for name in ("ur3", "ur5", "ur10") if (path := folder / f"{name}_robot.urdf").exists()]
+
+
+ARMS = [
+    pytest.param(SEVEN, "base", id="seven"),
+    *(pytest.param(path, "base_link", id=path.stem) for path in examples()),
+]
+
+
+@pytest.mark.parametrize(("path", "base"), ARMS)
+def test_torques_and_the_flange_are_those_of_pinocchio_s_reader(path, base):
+    own, other = rigid_model(load(path), Payload()), pin.buildModelFromUrdf(str(path))
+    own_data, data = own.createData(), other.createData()
+    placed = other.frames[other.getFrameId(base)].placement.translation
+    random = np.random.default_rng(0)
+    for _ in range(5):
+        q, qd, qdd = random.uniform(-2.0, 2.0, (3, own.nq))
+        expected = pin.rnea(other, data, q, qd, qdd)
+        np.testing.assert_allclose(pin.rnea(own, own_data, q, qd, qdd), expected, rtol=1e-8, atol=1e-8)
+        pin.framesForwardKinematics(own, own_data, q)
+        pin.framesForwardKinematics(other, data, q)
+        flange, tool = own_data.oMf[own.getFrameId("flange")], data.oMf[other.getFrameId("tool0")]
+        np.testing.assert_allclose(flange.rotation, tool.rotation, atol=1e-9)
+        np.testing.assert_allclose(flange.translation[:2], tool.translation[:2] - placed[:2], atol=1e-9)
+        np.testing.assert_allclose(flange.translation[2], tool.translation[2], atol=1e-9)
+
+
+@pytest.mark.parametrize(("path", "base"), ARMS)
+def test_it_vibrates_and_says_what_was_assumed(path, base):
+    arm = load(path)
+    found = FlexibleArm(arm, arm.payload).modes(np.array(arm.poses["Q2"]))
+    assert 1.0 < found.f_d[0] < 40.0
+    assert 0.05 < found.zeta[0] < 0.6
+    assert arm.provenance["drives"].startswith("assumed")
+    assert arm.provenance["kinematics"].startswith("given")
+
+
+BRANCH = '<link name="x"/><joint name="jx" type="{}"><parent link="elbow"/><child link="x"/><limit effort="1" velocity="1" lower="0" upper="1"/></joint></robot>'  # noqa: E501
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('<mass value="2.7"/>', '<mass value="0"/>', "link elbow has no <inertial> with a mass"),
+        (
+            "</robot>",
+            BRANCH.format("revolute"),
+            "the chain branches after link elbow, into the joints j5, jx",
+        ),
+        (
+            'name="j5" type="revolute"',
+            'name="j5" type="prismatic"',
+            "joint j5 is prismatic: must be revolute",
+        ),
+        ('effort="60" velocity="2.4"', 'effort="0" velocity="2.4"', "joint j5: <limit> has effort 0"),
+        ('lower="-3.05" upper="3.05"', 'lower="3" upper="-3"', "joint j7: <limit> has lower 3 and upper -3"),
+        ('xyz="0 0 0.16"', 'xyz="0 0 up"', "joint j1: xyz is '0 0 up': must be 3 numbers"),
+        ('<parent link="wrist"/>', '<parent link="wirst"/>', "joint j7: there is no link 'wirst'"),
+        ('<parent link="base"/>', '<parent link="tool0"/>', "in a circle"),
+        ('rpy="0 0 0.4"', 'rpy="1.5 0 0"', "the axis of joint j1 must point straight up"),
+        ('ixx="0.03"', 'ixx="3.0"', "no body can have this"),
+        ('<joint name="j7"', '<joint name="j5"', "two of joint j5: give each a name of its own"),
+        ('<robot name="seven">', "<!DOCTYPE x><robot>", "it has a document type"),
+        ('<robot name="seven">', '<robot name="seven"', "it is not valid XML"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused_in_a_sentence(old, new, said, tmp_path):
+    text = SEVEN.read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "mine.urdf"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(DescriptionError) as error:
+        load(path)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_limits_that_are_not_symmetric_are_widened_and_told(tmp_path):
+    path = tmp_path / "mine.urdf"
+    text = SEVEN.read_text(encoding="utf-8")
+    path.write_text(text.replace('lower="-3.05" upper="3.05"', 'lower="-1" upper="3.05"'), encoding="utf-8")
+    arm = load(path)
+    assert arm.limits.position[-1] == 3.05
+    assert arm.provenance["limits.position"] == "assumed: j7 -1 to 3.05 rad in the URDF, here ±3.05"
+
+
+def test_numbers_are_read_whatever_blanks_stand_around_them(tmp_path):
+    """pinocchio's parser alone would leave the whole body out."""
+    path, text = tmp_path / "seven.urdf", SEVEN.read_text(encoding="utf-8")
+    for old, new in (('mass value="2.7"', 'mass value=" 2.7 "'), ('ixx="0.03"', 'ixx=" 0.03 "')):
+        assert old in text
+        text = text.replace(old, new, 1)
+    path.write_text(text, encoding="utf-8")
+    assert load(path).links == load(SEVEN).links

@@ -1,13 +1,22 @@
 """Arms that have more than their description says; without that they are the described arm."""
 
+import math
+
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from tvist_plant.arm_memory import GRAVITY, LAST, NOW
+from tvist_plant.description import load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.imperfections import Imperfections, YieldingBase
+from tvist_plant.imperfections import GearLaw, Imperfections, YieldingBase
+from tvist_plant.integrator import rows
+from tvist_plant.model import flexible_model, rigid_model
+from tvist_plant.robot_tables import Payload
+from tvist_plant.stiction import relaxed, stiction_after
 
-from .arms import hold
+from .arms import changed, conservative, hold, quiet
 from .reference import commands
 
 IMPERFECT = {
@@ -81,18 +90,300 @@ def test_numbers_without_sense_are_refused(make, numbers, said):
         make(**numbers)
 
 
-def test_an_imperfect_arm_can_be_pushed(ur5e):
-    """It gives way as far as its gears let it, the described arm's way in the mean."""
-    turned = {}
-    for name, imperfections in {"described": None, **IMPERFECT}.items():
-        arm = FlexibleArm(ur5e, ur5e.payload, imperfections=imperfections)
-        command = DriveCommand(np.array(ur5e.poses["Q3"]), np.zeros(6), np.zeros(6))
-        start = arm.reset(command).q
-        arm.push(np.array([30.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
-        for _ in range(100):
-            measured = arm.step(command)
-        turned[name] = measured.q[0] - start[0]
-    assert turned["described"] > 1e-4
-    for way in turned.values():
-        assert way == pytest.approx(turned["described"], rel=0.6)
-    assert turned["soft"] > turned["described"]
+STICKS = load("ur5e_stiction")
+LAW = Imperfections.of(STICKS)
+
+
+def stiction_of(arm):
+    """The stiction of the motors, and its stiffness before it breaks away."""
+    return rows(arm._arm.state, arm.description.joints).d, arm._law.stiction_stiffness
+
+
+@pytest.mark.parametrize("start", [-1.0, 0.4, 3.0])
+@pytest.mark.parametrize("way", [-2e-5, 1e-7])
+def test_one_step_equals_many_and_the_differential_equation(start, way):
+    """Beyond the break-away torque, too, where stiction is for a moment after it has fallen."""
+    stiffness, most, parts = 7e5, 1.2, 200_000
+    small = integrated = start
+    for _ in range(parts):
+        small = relaxed(small, way / parts, stiffness, most)
+        integrated += stiffness * (1.0 - integrated * math.copysign(1.0, way) / most) * way / parts
+    once = relaxed(start, way, stiffness, most)
+    assert once == pytest.approx(small, abs=1e-9)
+    assert once == pytest.approx(integrated, abs=1e-3)
+
+
+@pytest.mark.parametrize("turn", [1e-7, 1e-5, 1e-3], ids=["held", "breaking away", "sliding"])
+def test_random_turns_under_random_loads_take_more_than_they_give_back(turn):
+    """With the plant's scheme: the torque after half of the turn acts over all of it."""
+    random, d, taken, stiffness = np.random.default_rng(5), 0.0, 0.0, 7e5
+    for _ in range(20_000):
+        way, speed, load = turn * random.normal(), 0.05 * random.normal(), 100.0 * random.normal()
+        law = speed, load, 0.5, 0.015, 0.03, stiffness
+        before = 0.5 * d * d / stiffness
+        work = way * stiction_after(d, 0.5 * way, *law)
+        d = stiction_after(d, way, *law)
+        taken += work
+        assert work >= 0.5 * d * d / stiffness - before - 1e-18
+    assert taken > 0.0
+
+
+@pytest.mark.parametrize(
+    ("mass", "pose", "speed", "factor"),
+    [(0.0, "Q1", 1e-4, 10.0), (5.0, "Q3", 1e-3, 1.0), (5.0, "Q1", 1e-2, 10.0), (0.0, "Q3", 0.1, 1.0)],
+)
+def test_an_arm_that_rings_without_drives_only_loses_energy_to_stiction(pose, mass, speed, factor, measured):
+    """An undamped arm is struck while its motors hang on springs, and turns back hundreds of times."""
+    arm, spring = conservative(STICKS), 5e3
+    arm = changed(arm, "payload", mass=mass) if mass else arm
+    arm = changed(arm, "drives", gear_error_amplitude=0.0)
+    sticks = Imperfections(
+        stiction=tuple(factor * value for value in LAW.stiction), stiction_load=factor * LAW.stiction_load
+    )
+    plant = FlexibleArm(arm, arm.payload if mass else Payload(), imperfections=sticks)
+    plant._flexible.model.gravity.linear = np.zeros(3)
+    plant.memory[GRAVITY] = 0.0
+    start = np.array(arm.poses[pose])
+    command = DriveCommand(start, np.zeros(6), np.zeros(6))
+    plant.reset(command)
+    links, random = len(plant._q), np.random.default_rng(1)
+    plant._arm.springs[0, links:] += spring
+    plant._arm.joints[2] = spring  # the position gains, which are springs without a damper
+    plant._qd[:], plant._speed[:] = speed * random.normal(size=links), speed * random.normal(size=6)
+    plant._evaluate()
+    plant._arm.dynamics[LAST] = plant._arm.dynamics[NOW]
+    d, stiffness = stiction_of(plant)
+    energy = []
+    for _ in range(1000):
+        held = 0.5 * np.sum(d**2 / stiffness) + 0.5 * spring * np.sum((plant._motor - start) ** 2)
+        energy.append(plant.energy() + held)
+        plant.step(command)
+    risen = np.max(energy - np.minimum.accumulate(energy)) / energy[0]
+    measured("largest rise and what is left, over the energy at the start", (risen, energy[-1] / energy[0]))
+    assert risen < 5e-5  # of an arm without stiction: up to 6e-4, by the integrator
+    assert energy[-1] < 0.3 * energy[0]
+
+
+def test_a_motor_is_held_for_a_minute_by_half_its_stiction_and_springs_back():
+    """The base alone has no drive. It turns as a spring that gives way, and back by what is elastic of that."""
+    gains = {
+        name: (0.0, *getattr(STICKS.drives, name)[1:])
+        for name in ("velocity_gain", "position_gain", "integral_gain")
+    }
+    arm = changed(STICKS, "drives", gear_error_amplitude=0.0, **gains)
+    plant = FlexibleArm(arm, arm.payload)
+    command = DriveCommand(np.array(arm.poses["Q1"]), np.zeros(6), np.zeros(6))
+    plant.reset(command)
+    _, stiffness = stiction_of(plant)
+    most = LAW.stiction[0]
+    start, scale = plant._motor[0], most / stiffness[0]
+
+    def turned(ticks, share, before):
+        """Angles while a push goes within 2 s to a share of the stiction; a sudden one would swing beyond it."""
+        for tick in range(ticks):
+            way = math.sin(0.5 * math.pi * min(tick / 1000, 1.0)) ** 2
+            plant.push(most * (before + way * (share - before)) * np.eye(6)[0])
+            plant.step(command)
+            yield plant._motor[0] - start
+
+    held = list(turned(31_000, 0.5, 0.0))
+    assert held[1000] == pytest.approx(math.log(2.0) * scale, rel=0.02)  # 0.5 µrad
+    assert max(held) - held[1000] < 0.02 * scale
+    *_, back = turned(5000, 0.0, 0.5)
+    assert held[-1] - back == pytest.approx(math.log(1.5) * scale, rel=0.02)
+
+
+def test_four_substeps_are_enough():
+    drive = commands(STICKS, STICKS.poses["Q1"], STICKS.poses["Q3"], 700)
+
+    def felt(substeps):
+        arm = FlexibleArm(
+            changed(STICKS, "sensors", accelerometer_noise=0.0), STICKS.payload, substeps=substeps
+        )
+        arm.reset(drive[0], seed=3)
+        return np.array([arm.step(command).accelerometer for command in drive[1:]])
+
+    usual, fine = felt(None), felt(64)
+    assert FlexibleArm(STICKS, STICKS.payload)._substeps == 4
+    assert np.abs(usual - fine).max() < 0.03
+    assert np.abs(felt(16) - fine).max() < 0.25 * np.abs(usual - fine).max()
+
+
+TORSION, PLAY, TILT = 2.0e4, 1.0e-4, 0.05
+
+
+def imperfect(arm, **numbers):
+    return FlexibleArm(arm, arm.payload, imperfections=Imperfections(**numbers), substeps=8)
+
+
+def rested(arm, command, ticks=600):
+    for _ in range(ticks):
+        measured = arm.step(command)
+    return measured
+
+
+@pytest.fixture
+def stretched(ur5e):
+    """The arm stretched out along the upper arm's x axis: a moment about it twists upper arm and forearm alike."""
+    arm = quiet(ur5e)
+    return arm, hold(arm, [0.3, -0.4, 0.0, 0.2, 0.3, 0.0])
+
+
+def test_a_moment_twists_both_links_by_as_much_as_their_springs_say(stretched):
+    """Against the arm whose links do not twist, the flange turns about the links by 2 M/k more."""
+    arm, command = stretched
+    turned = []
+    for numbers in ({}, {"torsion": TORSION}):
+        one = imperfect(arm, **numbers)
+        one.reset(command)
+        before = one.truth().flange_rotation
+        axis = rigid_frames(arm, command.q)[2][:, 0]  # the forearm's x axis, and the upper arm's
+        one.push_body("flange", moment=tuple(20.0 * axis))
+        rested(one, command)
+        turned.append(pin.log3(one.truth().flange_rotation @ before.T) @ axis)
+    assert turned[1] - turned[0] == pytest.approx(2.0 * 20.0 / TORSION, rel=0.02)
+
+
+def rigid_frames(arm, q):
+    model = rigid_model(arm, arm.payload)
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    return [data.oMi[number + 1].rotation for number in range(model.njoints - 1)]
+
+
+def test_a_twisting_link_rings_at_the_frequency_of_its_spring_and_what_hangs_on_it(ur5e):
+    """With everything else stiff and no feed-back of gravity, f = √(k/J)/2π of the inertia beyond the spring."""
+    rigid = tuple(1e3 * value for value in ur5e.drives.gear_stiffness)
+    arm = changed(
+        changed(quiet(ur5e), "drives", gear_stiffness=rigid, rotor_inertia=(1e4,) * 6),
+        "link_flexibility", links=(2,), stiffness=(1e7,), damping_time=0.0,
+    )  # fmt: skip
+    q = np.array([0.0, -1.2, 0.8, 0.0, 0.4, 0.0])
+    one = imperfect(arm, torsion=TORSION)
+    model = flexible_model(arm, arm.payload, TORSION).model
+    names = list(model.names)
+    at = names.index("elbow_torsion") - 1
+    full = np.zeros(model.nv)
+    full[[names.index(joint) - 1 for joint in arm.robot.joints]] = q
+    inertia = pin.crba(model, model.createData(), full)[at, at]
+    by_hand = np.sqrt(TORSION / inertia) / (2.0 * np.pi)
+    assert np.abs(one.modes(q).f_d / by_hand - 1.0).min() < 0.01
+    # The same inertia without the model: all bodies beyond the spring about the forearm's axis.
+    assert inertia == pytest.approx(beyond_the_elbow(arm, q), rel=1e-9)
+
+
+def beyond_the_elbow(arm, q):
+    """Moment of inertia of the far half of the forearm, the wrist and the payload about the forearm's centre line."""
+    model = rigid_model(arm, arm.payload)
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    elbow = data.oMi[3]
+    line = np.array([0.0, *arm.links.com[2][1:]])  # the forearm's frames at both ends have the same axes
+    total = 0.5 * arm.links.inertia[2][0]
+    for joint in (4, 5, 6):
+        moved = (elbow.inverse() * data.oMi[joint]).act(model.inertias[joint])
+        total += moved.inertia[0, 0] + moved.mass * np.sum((moved.lever - line)[1:] ** 2)
+    return total
+
+
+def test_a_gear_with_backlash_turns_freely_by_its_width_and_then_as_its_spring_says(ur5e):
+    """A slow reversal of the torque at the base, which gravity does not load, moves the link by 2 (b + τ/K)."""
+    arm = changed(quiet(ur5e), "drives", windup_feedforward=(0.0,) * 6)
+    one = imperfect(arm, backlash=(PLAY,) * 6)
+    command = hold(arm, arm.poses["Q3"])
+    one.reset(command)
+    torque, K = 5.0, arm.drives.gear_stiffness[0]
+    found = []
+    for share in (1.0, 0.5, 0.0, -0.5, -1.0):
+        one.push(np.array([share * torque, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        rested(one, command, 300)
+        found.append(one.truth().gear_deflection[0])
+    assert found[0] - found[-1] == pytest.approx(2.0 * (PLAY + torque / K), rel=1e-3)
+    # Still loaded, it has given way as a spring beyond the gap; between the flanks it transmits nothing.
+    assert found[0] - found[1] == pytest.approx(0.5 * torque / K, rel=1e-3)
+    assert abs(found[2]) <= PLAY * (1.0 + 1e-6)
+    assert found[1] == pytest.approx(PLAY + 0.5 * torque / K, rel=1e-3)
+
+
+def test_backlash_and_a_soft_gear_obey_their_law_at_rest_and_in_the_kernel_alike(ur5e):
+    """The twist under gravity that a reset computes is where the integrator stays, and it is the law's."""
+    numbers = {"backlash": (PLAY,) * 6, "soft": 0.75}
+    law = GearLaw.of(Imperfections(**numbers), ur5e)
+    one = imperfect(quiet(ur5e), **numbers)
+    command = hold(ur5e, ur5e.poses["Q1"])
+    one.reset(command)
+    start = one.truth().gear_deflection
+    rested(one, command, 500)
+    np.testing.assert_allclose(one.truth().gear_deflection, start, atol=1e-8)
+    twist = law.twist(np.array([0.0, 30.0, -30.0, 1.0, -1.0, 0.0]))
+    K, limit = np.array(ur5e.drives.gear_stiffness), np.array(ur5e.limits.torque)
+    assert twist[1] == pytest.approx(PLAY + 0.1 * limit[1] / (0.75 * K[1]) + (30.0 - 0.1 * limit[1]) / K[1])
+    assert twist[2] == pytest.approx(-twist[1])
+    assert twist[3] == pytest.approx(PLAY + 1.0 / (0.75 * K[3]))
+    assert twist[0] == 0.0
+
+
+def test_backlash_gives_no_energy_and_takes_less_the_shorter_the_period(ur5e):
+    """Without drives and dampers, a falling arm keeps its energy, counted with springs that begin at the flanks."""
+    arm = conservative(ur5e)
+    K, drift = np.array(arm.drives.gear_stiffness), []
+    for period in (2e-3, 1e-3):
+        one = FlexibleArm(
+            arm, arm.payload, imperfections=Imperfections(backlash=(PLAY,) * 6), period=period, substeps=8
+        )
+        one.reset(hold(arm, [0.0, -1.2, 1.4, -0.3, 0.5, 0.0]))
+        limp, energies = DriveCommand(np.zeros(6), np.zeros(6), np.zeros(6)), []
+        for _ in range(round(0.5 / period) + 1):
+            twist = one.truth().gear_deflection
+            beyond = np.maximum(np.abs(twist) - PLAY, 0.0)
+            energies.append(one.energy() + 0.5 * float(K @ (beyond**2 - twist**2)))
+            one.step(limp)
+        model = one._flexible.model
+        kinetic = pin.computeKineticEnergy(model, model.createData(), one._q, one._qd)
+        assert kinetic > 40.0
+        assert max(energies) - energies[0] < 1e-4 * kinetic
+        drift.append(energies[0] - min(energies))
+        assert drift[-1] < 3e-3 * kinetic
+    assert drift[0] > 2.5 * drift[1]
+
+
+def test_a_leaning_arm_carries_a_leaning_weight(ur5e):
+    """Its drives hold the torques of gravity turned the other way, and its accelerometer sees that direction."""
+    arm = quiet(ur5e)
+    one = imperfect(arm, tilt=TILT)
+    q = np.array([0.4, -1.0, 1.2, -0.5, 0.3, 0.2])
+    measured = one.reset(DriveCommand(q, np.zeros(6), np.zeros(6)))
+    model = rigid_model(arm, arm.payload)
+    down = np.array([0.0, -9.81 * np.sin(TILT), -9.81 * np.cos(TILT)])
+    model.gravity.linear = down
+    data = model.createData()
+    # The arm sags by some mrad, which moves the weight a little.
+    np.testing.assert_allclose(measured.moment, pin.computeGeneralizedGravity(model, data, q), atol=0.3)
+    assert abs(measured.moment[0]) > 0.5  # the first axis is no longer vertical
+    pin.framesForwardKinematics(model, data, q)
+    flange = data.oMf[model.getFrameId("flange")].rotation
+    np.testing.assert_allclose(measured.accelerometer, -flange.T @ down, atol=0.1)
+    # In the world, whose vertical the truth is given in, what is felt at rest points up.
+    truth = one.truth()
+    np.testing.assert_allclose(truth.flange_rotation @ truth.specific_force, [0.0, 0.0, 9.81], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ({"torsion": 0.0}, "torsion is 0.0: must be above 0"),
+        ({"backlash": (0.1, -1e-4)}, r"backlash\[1\] is -0.0001: must be at least 0"),
+        ({"tilt": 1.0}, "tilt is 1.0: must be at least -0.523599 and at most 0.523599"),
+    ],
+)
+def test_a_torsion_backlash_or_tilt_without_sense_is_refused(numbers, said):
+    with pytest.raises(ValueError, match=said):
+        Imperfections(**numbers)
+
+
+def test_an_arm_without_what_is_to_give_way_is_refused(ur5e):
+    with pytest.raises(ValueError, match="backlash has 2 values: must have 6, one per joint"):
+        imperfect(ur5e, backlash=(1e-4, 1e-4))
+    stiff = changed(ur5e, "link_flexibility", links=(), stiffness=())
+    with pytest.raises(ValueError, match="torsion is 20000 N m/rad, but no link of the UR5e bends"):
+        imperfect(stiff, torsion=TORSION)

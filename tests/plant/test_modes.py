@@ -105,12 +105,6 @@ def test_turning_the_base_changes_no_mode(plant):
         np.testing.assert_allclose(getattr(straight, name), getattr(turned, name), rtol=1e-6)
 
 
-def test_the_sign_of_the_elbow_at_Q3_changes_no_mode(ur5e, plant):
-    q = np.array(ur5e.poses["Q3"])
-    one, other = modes(plant, q), modes(plant, q * [1, 1, -1, 1, 1, 1])
-    np.testing.assert_allclose(one.f_d[:3], other.f_d[:3], rtol=0.02)
-
-
 def test_a_heavier_payload_lowers_every_pose(ur5e):
     poses = np.random.default_rng(3).uniform(-np.pi, np.pi, (10, 6))
     lowest = []
@@ -118,15 +112,6 @@ def test_a_heavier_payload_lowers_every_pose(ur5e):
         plant = FlexibleArm(ur5e, Payload(mass=mass, com=ur5e.payload.com))
         lowest.append([modes(plant, q).f_d[0] for q in poses])
     assert np.all(np.diff(lowest, axis=0) < 0.0)
-
-
-def test_modes_come_in_order_and_take_part(plant):
-    for q in np.random.default_rng(4).uniform(-np.pi, np.pi, (10, 6)):
-        found = modes(plant, q)
-        assert np.all(np.diff(found.f_d) >= 0.0)
-        assert np.all((found.zeta > 0.0) & (found.zeta < 1.0))
-        assert np.all(found.participation > 0.0)
-        assert found.f_d.shape == found.zeta.shape == found.participation.shape
 
 
 def test_without_a_pose_the_modes_are_those_where_the_arm_is(ur5e, plant):

@@ -9,7 +9,6 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.model import flexible_model
 from tvist_plant.outside import Outside
-from tvist_plant.plant import Plant
 
 from .arms import chain, hold, quiet
 
@@ -58,23 +57,6 @@ def test_a_wrench_on_any_body_is_what_pinocchio_makes_of_it(joints):
         free = pin.rnea(flexible.model, data, q, still, still).copy()
         expected = free - pin.rnea(flexible.model, data, q, still, still, forces)
         np.testing.assert_allclose(outside.generalized_force(q), expected, rtol=0.0, atol=1e-11)
-
-
-def test_the_power_of_a_force_is_force_times_speed_of_its_point(ur5e):
-    flexible = flexible_model(ur5e, ur5e.payload)
-    outside = Outside(flexible)
-    random = np.random.default_rng(2)
-    for body in outside.bodies:
-        q, qd = random.uniform(-1.0, 1.0, (2, flexible.model.nv))
-        outside.clear()
-        outside.push_body(body, FORCE, (0.0, 0.0, 0.0), POINT)
-        places = []
-        for share in (-1e-5, 1e-5):
-            data = placed(flexible, q + share * qd)
-            joint, placement = where(flexible, body)
-            places.append((data.oMi[joint] * placement).act(np.array(POINT)))
-        speed = (places[1] - places[0]) / 2e-5
-        assert outside.generalized_force(q) @ qd == pytest.approx(speed @ FORCE, rel=1e-7, abs=1e-7)
 
 
 def test_a_weight_hung_on_the_flange_bends_the_arm_as_a_payload_does(arm):
@@ -155,8 +137,3 @@ def test_a_wrench_without_sense_is_refused(ur5e, arguments, said):
 def test_torques_without_sense_are_refused(ur5e, torque):
     with pytest.raises(ValueError, match=r"torque is .*: must be 6 finite numbers"):
         FlexibleArm(ur5e, ur5e.payload).push(torque)
-
-
-def test_the_flexible_arm_can_be_pushed_and_broken_and_knows_its_modes(ur5e):
-    for ability in (Plant.push, Plant.make_nan, Plant.modes):
-        assert FlexibleArm(ur5e, ur5e.payload).can(ability)

@@ -1,10 +1,23 @@
 """Plants by name are what their names say, for the arm, for what it carries, and for any number of joints."""
 
+import msgspec
 import numpy as np
 import pytest
 
 from tvist_plant.description import Payload, load
-from tvist_plant.variants import BACKLASH, TORSION, VARIANTS, hidden, hidden_payload, variant
+from tvist_plant.robot_checks import is_real_body
+from tvist_plant.variants import (
+    BACKLASH,
+    CENTRE,
+    DRIVES,
+    LINKS,
+    MASS,
+    TORSION,
+    VARIANTS,
+    hidden,
+    hidden_payload,
+    variant,
+)
 
 from .arms import chain, hold
 
@@ -66,14 +79,6 @@ def test_what_is_carried_is_never_what_was_said(ur5e, name):
     assert carried() == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_hidden_plant_is_the_hidden_robot_of_its_seed_whatever_the_seed_of_the_case(ur5e):
-    """Its name has the only seed that counts."""
-    for seed in (0, 9):
-        arm = variant("hidden-21").make(ur5e, ur5e.payload, seed)
-        assert arm.description == hidden(ur5e, 21)
-        assert arm._carries(ur5e.payload) == hidden_payload(ur5e.payload, 21)
-
-
 def test_other_arms_have_backlash_like_the_joints_of_a_ur5e():
     """Seven joints, and a chain of three, get a width for each joint; an arm with rigid links cannot twist."""
     for joints in (3, 7):
@@ -87,3 +92,43 @@ def test_other_arms_have_backlash_like_the_joints_of_a_ur5e():
 def test_an_unknown_plant_is_refused_with_the_names_there_are(name):
     with pytest.raises(ValueError, match=r"must be hidden-SEED or one of calibrated, coulomb"):
         variant(name)
+
+
+UR5E = load("ur5e")
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "one-joint"])
+def test_a_hidden_robot_differs_from_its_file_within_the_shares_and_nowhere_else(robot: str) -> None:
+    """All drawn values are within their shares over many seeds, reach both halves, and nothing else changes."""
+    known = load(robot)
+    assert hidden(known, 11) == hidden(known, 11) != hidden(known, 12)
+    ratios: dict[str, list[float]] = {name: [] for name in (*DRIVES, *LINKS)}
+    for seed in range(60):
+        found = hidden(known, seed)
+        for table, shares in (("drives", DRIVES), ("link_flexibility", LINKS)):
+            for name, share in shares.items():
+                before, after = (np.atleast_1d(getattr(getattr(one, table), name)) for one in (known, found))
+                assert np.all(np.abs(after - before) <= share * before * (1.0 + 1e-12))
+                ratios[name] += (after[before > 0.0] / before[before > 0.0]).tolist()
+        back = {
+            table: msgspec.structs.replace(
+                getattr(found, table), **{name: getattr(getattr(known, table), name) for name in shares}
+            )
+            for table, shares in (("drives", DRIVES), ("link_flexibility", LINKS))
+        }
+        assert msgspec.structs.replace(found, **back) == known
+    for name, share in (DRIVES | LINKS).items():
+        if ratios[name]:
+            assert min(ratios[name]) < 1.0 - 0.8 * share
+            assert max(ratios[name]) > 1.0 + 0.8 * share
+
+
+def test_what_is_carried_is_a_real_body_near_the_declared_one() -> None:
+    """Mass and centre are within their limits, no payload stays none, and inertia grows with the mass."""
+    for seed in range(60):
+        carried = hidden_payload(UR5E.payload, seed)
+        assert abs(carried.mass / UR5E.payload.mass - 1.0) <= MASS
+        assert np.max(np.abs(np.array(carried.com) - UR5E.payload.com)) <= CENTRE
+        assert is_real_body(carried.inertia)
+        assert carried.inertia[0] / UR5E.payload.inertia[0] == pytest.approx(carried.mass / UR5E.payload.mass)
+        assert hidden_payload(Payload(), seed) == Payload()

@@ -1,7 +1,6 @@
 """The arm in a world: what it touches pushes back as the scene says, and a gripper holds by friction."""
 
 import os
-from hashlib import sha256
 
 import mujoco
 import numpy as np
@@ -99,8 +98,7 @@ def test_noise_and_offset_are_the_files_and_follow_the_seed(tmp_path):
     np.testing.assert_allclose(rows[0].std(axis=0), [0.5] * 3 + [0.02] * 3, rtol=0.2)
 
 
-@pytest.mark.parametrize("loaded", [None, 0.0, 5.0])
-@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5])
+@pytest.mark.parametrize(("stiffness", "loaded"), [(1e3, 5.0), (1e5, None), (1e5, 0.0)])
 def test_pressed_a_surface_yields_by_the_stiffness_it_has_whatever_the_arm_carries(
     tmp_path, stiffness, loaded
 ):
@@ -128,17 +126,11 @@ def test_pressed_a_surface_yields_by_the_stiffness_it_has_whatever_the_arm_carri
     assert upward[2] == pytest.approx(force[2], rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("shape", "turned"),
-    [
-        ('euler="90 0 0" pos="0 0 0.1"', True),
-        ('axisangle="1 0 0 90" pos="0 0 0.1"', True),
-        ('xyaxes="1 0 0 0 0 1" pos="0 0 0.1"', True),
-        ('zaxis="0 1 0" pos="0 0 0.1"', True),
-        ('fromto="0 -0.05 0.1 0 0.05 0.1"', True),
-        ('pos="0 0 0.1"', False),
-    ],
-)
+@pytest.mark.parametrize(("shape", "turned"), [
+    ('euler="90 0 0" pos="0 0 0.1"', True), ('axisangle="1 0 0 90" pos="0 0 0.1"', True),
+    ('xyaxes="1 0 0 0 0 1" pos="0 0 0.1"', True), ('zaxis="0 1 0" pos="0 0 0.1"', True),
+    ('fromto="0 -0.05 0.1 0 0.05 0.1"', True), ('pos="0 0 0.1"', False),
+])  # fmt: skip
 def test_a_tool_is_turned_as_the_scene_says(tmp_path, shape, turned):
     """A capsule across the flange is as wide as it is long, in its own frame and in that of its body."""
     tool = f'<geom type="capsule" size="0.01 0.05" {shape}/>'
@@ -149,17 +141,6 @@ def test_a_tool_is_turned_as_the_scene_says(tmp_path, shape, turned):
         assert found.pose[:3] == pytest.approx((0.0, 0.0, 0.1))
         axis = pin.exp3(np.array(found.pose[3:]))[:, 2]
         np.testing.assert_allclose(np.abs(axis), [0.0, 1.0, 0.0] if turned else [0.0, 0.0, 1.0], atol=1e-9)
-
-
-def test_the_pose_of_a_tools_body_and_the_units_of_the_scene_hold(tmp_path):
-    text = (
-        '<mujoco><compiler angle="radian" eulerseq="zyx"/><worldbody><body name="tool" pos="0 0 0.02" '
-        'euler="0 0 1.5707963267948966"><geom type="capsule" size="0.01 0.05" pos="0 0.03 0"/></body></worldbody>'
-        "</mujoco>"
-    )
-    (found,) = world(tmp_path, text).things().shapes
-    assert found.pose[:3] == pytest.approx((0.0, 0.0, 0.05))
-    np.testing.assert_allclose(pin.exp3(np.array(found.pose[3:]))[:, 2], [0.0, -1.0, 0.0], atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -184,16 +165,6 @@ def test_a_tool_touches_what_its_masks_say_and_the_arm_all_that_is_solid(tmp_pat
     assert frozenset(("arm forearm", "world/ground")) in pairs
 
 
-def test_a_tools_margin_is_the_pairs(tmp_path):
-    text = (
-        '<mujoco><worldbody><body name="tool"><geom name="tip" size="0.02" margin="0.003"/></body>'
-        '<geom name="ground" type="plane" size="1 1 1" pos="0 0 -1"/></worldbody></mujoco>'
-    )
-    model = world(tmp_path, text)._world.model
-    tips = (model.pair_geom1 == model.geom("tip").id) | (model.pair_geom2 == model.geom("tip").id)
-    np.testing.assert_array_equal(model.pair_margin[tips], 0.003)
-
-
 def test_what_a_reset_would_stand_in_is_known_before_and_asking_changes_nothing(tmp_path, ur5e):
     clear, low = np.array([[-2.7, -1.8, -1.8, -1.1, 1.57, 0.0], [-2.7, -2.2, -1.8, -0.7, 1.57, 0.0]])
     for payload in (None, Payload(mass=5.0, com=(0.0, 0.0, 0.05))):
@@ -211,7 +182,7 @@ def test_what_a_reset_would_stand_in_is_known_before_and_asking_changes_nothing(
             np.testing.assert_array_equal(one, two)
 
 
-@pytest.mark.parametrize("off", [0.0, 1e-6, 1e-3])
+@pytest.mark.parametrize("off", [0.0, 1e-3])
 def test_what_only_turns_about_its_centre_of_mass_is_touched_as_stiffly_as_anything_else(tmp_path, off):
     """A beam is turned against a post with a constant force."""
     force, lever, k = 20.0, 0.12, 5e4
@@ -229,7 +200,7 @@ def test_what_only_turns_about_its_centre_of_mass_is_touched_as_stiffly_as_anyth
     assert -touch.dist == pytest.approx(force / k, rel=0.01)
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.3, 0.7])
+@pytest.mark.parametrize("phase", [0.0, 0.7])
 def test_an_elastic_impact_has_the_peak_of_v_sqrt_k_m_and_gains_no_energy(tmp_path, phase, measured):
     """The one-joint arm without damping, friction and drives that yield, stretched out, against a wall."""
     k, v, reach, radius = 1e5, 0.2, 0.55, 0.04
@@ -446,8 +417,3 @@ def test_the_hash_of_a_scene_covers_all_files_that_it_names(tmp_path):
     assert len(found) == 4
     with pytest.raises(SceneError, match=r"part\.xml"):
         world(tmp_path, files["scene.xml"])
-
-
-def test_a_scene_that_names_one_file_only_has_its_hash():
-    scene = find_scene("table")
-    assert scene.sha256 == sha256(scene.path.read_bytes()).hexdigest()

@@ -13,7 +13,7 @@ import pytest
 from tvist_protocol import CODE_MEANINGS, EVENT_MEANINGS, Code, EventKind
 from tvist_protocol.channels import COMMANDS, MESSAGES, tag
 from tvist_protocol.commands import Setpoint
-from tvist_protocol.generate import FOLDER, filled, generated, golden, stray
+from tvist_protocol.generate import FOLDER, generated, golden, stray
 from tvist_protocol.info import CalibrationInfo, Limits, StopReason
 from tvist_protocol.io import Registers
 from tvist_protocol.schema import field_docs, json_schema
@@ -31,18 +31,6 @@ def test_every_generated_file_is_up_to_date():
     ]
     assert not stale, f"run `python -m tvist_protocol.generate`: {stale}"
     assert not stray(FOLDER, files)
-
-
-def test_a_part_without_markers_is_an_error():
-    with pytest.raises(ValueError, match="markers"):
-        filled("no markers", {"keys": "table"})
-
-
-def test_a_part_is_filled_in_between_its_markers():
-    text = "a\n<!-- generated: keys -->\nold\n<!-- end -->\nb\n"
-    once = filled(text, {"keys": "new"})
-    assert once == "a\n<!-- generated: keys -->\n\nnew\n\n<!-- end -->\nb\n"
-    assert filled(once, {"keys": "new"}) == once
 
 
 @pytest.mark.parametrize("kind", STRUCTS, ids=lambda kind: kind.__name__)

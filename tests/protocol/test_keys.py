@@ -11,11 +11,6 @@ from tvist_protocol.channels import CHANNELS
 LEAVES = [leaf for leaf in get_args(keys.Leaf) if leaf != "client"]
 
 
-@pytest.mark.parametrize("leaf", LEAVES)
-def test_a_robots_keys(leaf):
-    assert keys.key("ur5e", leaf) == f"tvist/ur5e/{leaf}"
-
-
 def test_a_clients_key_and_its_name_back():
     key = keys.client("ur5e", "palletizer 2")
     assert key == "tvist/ur5e/client/palletizer 2"

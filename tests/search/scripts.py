@@ -175,27 +175,13 @@ def _indented(lines):
 
 
 _MOVING: tuple[tuple[float, Callable[[Author], list[str]]], ...] = (
-    (5.0, Author.movej),
-    (4.0, Author.movel),
-    (2.0, Author.movep),
-    (2.0, Author.movec),
-    (2.0, Author.path),
-    (3.0, Author.servoj),
-    (2.0, Author.servoc),
-    (3.0, Author.speedj),
-    (3.0, Author.speedl),
-    (2.0, Author.stopj),
-    (1.0, Author.stopl),
-)
+    (5.0, Author.movej), (4.0, Author.movel), (2.0, Author.movep), (2.0, Author.movec), (2.0, Author.path),
+    (3.0, Author.servoj), (2.0, Author.servoc), (3.0, Author.speedj), (3.0, Author.speedl),
+    (2.0, Author.stopj), (1.0, Author.stopl),
+)  # fmt: skip
 """Statements that move the arm, and their relative frequencies."""
 _STILL: tuple[tuple[float, Callable[[Author], list[str]]], ...] = (
-    (2.0, Author.write),
-    (3.0, Author.sleep),
-    (1.0, Author.payload),
-    (0.5, Author.tool),
-    (0.5, Author.protective_stop),
-    (0.3, Author.endless),
-    (0.3, Author.halt),
-    (0.5, Author.critical),
-)
+    (2.0, Author.write), (3.0, Author.sleep), (1.0, Author.payload), (0.5, Author.tool),
+    (0.5, Author.protective_stop), (0.3, Author.endless), (0.3, Author.halt), (0.5, Author.critical),
+)  # fmt: skip
 """Statements that do not move the arm, and their relative frequencies."""

@@ -2,15 +2,15 @@
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from tests.search import draws, space
 from tests.search.changes import far_payload
 from tests.search.draws import WITHIN
 from tests.search.subject import CLIENT, SESSION, Subject, speeds
-from tests.search.undisturbed import ROUNDING, Undisturbed
 
-from tvist_controller.api.line import CLEARANCE, CollisionModel, body, paper_payload
+from tvist_controller.api.line import CLEARANCE, STILL, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_protocol import commands as c
 from tvist_protocol.faults import FAULTS as FAULT_FIELDS
@@ -40,6 +40,39 @@ DIP = 1e-4
 Ways are checked at places up to 4 mm apart, and a curved one may be some 0.03 mm nearer in between. Sequences find such
 places, since they often begin where a motion before was stopped at the clearance.
 """
+
+
+ROUNDING = 1e-9
+"""Differences between positions below this are rounding errors [rad]."""
+
+
+@dataclass
+class Undisturbed:
+    """Future references if no command comes, which no stop may get ahead of."""
+
+    references: Floats
+    """References from that moment on, one per tick, shape (k, n) [rad]."""
+    since: int
+    """Tick of that moment."""
+
+    def breach(self, tick, q, *, resting):
+        """Return in which way a stop is off the line, ahead of the motion, or later at rest; None if it is not."""
+        references = self.references
+        way = references[-1] - references[0]
+        length = float(np.linalg.norm(way))
+        if length < ROUNDING:
+            return None
+        along = way / length
+        reached, there = (q - references[0]) @ along, references[min(tick, len(references) - 1)]
+        # Changes below 1e-7 rad per tick count as rest, so the filter's tail still creeps.
+        creeps = 10.0 * STILL if tick >= len(references) else 0.0
+        if reached > (there - references[0]) @ along + ROUNDING + creeps:
+            return "a stop is ahead of what the motion would have done"
+        if np.abs(q - references[0] - reached * along).max() > ROUNDING:
+            return "a stop leaves the line"
+        if tick > len(references) + 1 and not resting:
+            return "a stop lasts longer than the motion would have"
+        return None
 
 
 class BrokenError(AssertionError):

@@ -10,7 +10,6 @@ from tvist_protocol import motions as m
 from tvist_protocol.replies import Reply
 
 Random = np.random.Generator
-Pose = tuple[float, float, float, float, float, float]
 
 NEAR, TURN = 0.2, 0.6
 """Largest distance [m] and turn [rad] of a random pose from the present one, along and about each axis."""

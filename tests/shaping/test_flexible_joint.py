@@ -57,17 +57,10 @@ def test_a_filter_takes_its_delay_from_the_inertia_at_the_shaped_reference():
         assert tvist.delay == pytest.approx(0.5 / f_d, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "field"),
-    [
-        ((0.0, 1.0, 0.0), "inertia"),
-        ((math.nan, 1.0, 0.0), "inertia"),
-        ((1.0, -1.0, 0.0), "stiffness"),
-        ((1.0, math.inf, 0.0), "stiffness"),
-        ((1.0, 1.0, -0.1), "damping"),
-        ((1.0, 1.0, 2.0), "damping"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "field"), [
+    ((0.0, 1.0, 0.0), "inertia"), ((math.nan, 1.0, 0.0), "inertia"), ((1.0, -1.0, 0.0), "stiffness"),
+    ((1.0, math.inf, 0.0), "stiffness"), ((1.0, 1.0, -0.1), "damping"), ((1.0, 1.0, 2.0), "damping"),
+])  # fmt: skip
 def test_what_does_not_vibrate_is_refused_with_the_field(arguments, field):
     with pytest.raises(EstimatorError) as caught:
         flexible_joint(*arguments)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_lab.study.recipes import FrequencyError
-from tvist_shaping import Fade, Fixed, Polynomial, TvistFilter, shaper
+from tvist_shaping import Fade, Fixed, Polynomial, ShapingError, TvistFilter, shaper
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 from tvist_shaping.fir import FirDesign
@@ -115,18 +115,18 @@ def check(make, runs, seen):
         for column, make in enumerate(ESTIMATORS)
     ],
 )
-def test_a_filter(kind, estimator, ticks):
+def test_a_fork_of_a_filter_repeats_it_to_the_bit_and_leaves_it_alone(kind, estimator, ticks):
     check(lambda: FILTERS[kind](ESTIMATORS[estimator]), (ticks, 150), said)
 
 
-def test_a_filter_of_several_modes():
+def test_a_fork_of_a_filter_of_several_modes_does_the_same():
     for make in (fixed, modal, mistaken):
         check(lambda make=make: TvistFilter(shaper("zv"), make(2), joints=JOINTS), (200, 100), said)
         check(lambda make=make: SteadyFilter(product(3), make(3), joints=JOINTS), (200, 100), said)
         check(lambda make=make: SteadyFilter(short(2), make(2), joints=JOINTS), (200, 100), said)
 
 
-def test_an_aimed_filter_that_has_been_told_its_end():
+def test_a_fork_of_an_aimed_filter_goes_on_to_the_end_that_was_told():
     def make():
         tvist = AimedFilter(short(1), modal(1), joints=JOINTS)
         tvist.aim([1.0, 0.5])
@@ -136,7 +136,7 @@ def test_an_aimed_filter_that_has_been_told_its_end():
 
 
 @pytest.mark.parametrize(("estimator", "ticks"), [*zip(ESTIMATORS, (0, 1, 100, 400), strict=True)])
-def test_a_fade(estimator, ticks):
+def test_a_fork_of_a_fade_repeats_it_to_the_bit(estimator, ticks):
     """In its first tick, under way, and finished; also where both filters ask one estimator."""
 
     def make(shared):
@@ -159,44 +159,91 @@ def test_a_fade(estimator, ticks):
     assert ticks != 100 or 0.0 < shares[0] < 1.0
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_an_estimator(estimator):
-    whole = path(1, 400)
-    never, forked = (ESTIMATORS[estimator](1) for _ in range(2))
-    for q in whole[:200]:
-        kept = never.estimate(q)
-        forked.estimate(q)
-    one, other = forked.fork(), forked.fork()
-    other.estimate(np.array([2.0, -9.0]))
-    assert forked.clipped == never.clipped
-    assert one.modes == never.modes
-    for q in whole[199:]:
-        kept = np.copy(never.estimate(q))
-        np.testing.assert_array_equal(one.estimate(q), kept)
-        np.testing.assert_array_equal(forked.estimate(q), kept)
-        other.estimate(q[::-1].copy())
+LIMITS = {"velocity": 7.0, "acceleration": 34.0, "jerk": 600.0}
 
 
-def test_a_modal_estimator_keeps_following_a_mode_that_is_no_longer_the_lowest():
-    """The copy follows what the original followed; one made anew takes the lowest."""
-    two = Drivetrain((9e3, 9e3), (0.3, 0.3), (150.0, 150.0), (15.0, 15.0))
-    followed = Modal(lambda x: np.diag([1.0 + x[0], 2.0]), two, modes=1)
-    for x in np.linspace(0.0, 2.0, 200):
-        followed.poles(np.array([x]))
-    further = np.array([2.001])
-    ahead, anew = followed.fork().poles(further), Modal(followed._mass_matrix, two, modes=1).poles(further)
-    assert ahead == followed.poles(further)
-    assert ahead.imag > 1.05 * anew.imag
+def parameter(ticks: int = 500) -> np.ndarray:
+    """From 0 to 2, smoothly, and at rest there for a while, shape (ticks, 1)."""
+    share = np.clip(np.arange(ticks) / (0.6 * ticks), 0.0, 1.0)
+    return 2.0 * (share**3 * (10.0 - 15.0 * share + 6.0 * share**2))[:, None]
 
 
-def test_reset_and_taking_over_are_the_copy_s_own():
-    """Neither a reset of the copy nor a filter that goes on from it touches the original."""
-    for kind, estimator in EVERY:
-        tvist = FILTERS[kind](ESTIMATORS[estimator])
-        never = FILTERS[kind](ESTIMATORS[estimator])
-        before, after = np.split(path(1, 200), [150])
-        output(tvist, before)
-        output(never, before)
-        tvist.fork().reset([1.0, -1.0])
-        tvist.fork().filter([0.3, 0.4])
-        np.testing.assert_array_equal(output(tvist, after), output(never, after))
+def straight(x):
+    return np.array([0.3, -0.2]) + np.array([1.0, -0.4]) * x
+
+
+def round_about(x):
+    return np.array([np.sin(x[0]), 1.0 - np.cos(x[0])])
+
+
+def on(kind, make, posture, start=0.0):
+    tvist = FILTERS[kind](ESTIMATORS[make])
+    tvist.reset([start], posture)
+    return tvist
+
+
+@pytest.mark.parametrize(("kind", "make"), EVERY)
+def test_on_a_straight_line_it_is_to_shape_the_joints(kind, make):
+    along, joints = on(kind, make, straight), FILTERS[kind](ESTIMATORS[make])
+    joints.reset(straight(np.zeros(1)))
+    for x in parameter():
+        np.testing.assert_allclose(straight(along.filter(x)), joints.filter(straight(x)), atol=1e-9)
+        np.testing.assert_allclose(along.f_d, joints.f_d, rtol=1e-7)
+
+
+@pytest.mark.parametrize("make", ["polynomial", "modal"])
+def test_the_modes_are_those_at_the_joints_of_the_shaped_parameter_a_tick_before(make):
+    tvist, estimator, before = on("one mode", make, round_about), ESTIMATORS[make](1), np.zeros(1)
+    estimator.settle(round_about(before))
+    for x in parameter()[:300]:
+        shaped = tvist.filter(x)
+        np.testing.assert_allclose(tvist.f_d, estimator.estimate(round_about(before))[0], rtol=1e-9)
+        before = shaped
+
+
+def test_an_aimed_filter_has_the_modes_where_the_parameter_ends():
+    tvist, other = on("aimed", "polynomial", round_about), FILTERS["aimed"](ESTIMATORS["polynomial"])
+    tvist.aim([2.0])
+    other.aim(round_about([2.0]))
+    assert said(tvist) == said(other)
+
+
+@pytest.mark.parametrize(("kind", "make"), EVERY)
+def test_a_fork_gives_the_same_bits_and_changes_nothing(kind, make):
+    tvist, x = on(kind, make, round_about), parameter()
+    output(tvist, x[:200])
+    fork = tvist.fork()
+    ahead = output(fork, x[200:])
+    assert (ahead == output(tvist, x[200:])).all()
+
+
+@pytest.mark.parametrize("kind", FILTERS)
+def test_a_fade_goes_on_with_the_parameter_of_the_filter_before(kind):
+    old, new, x = on("one mode", "fixed", round_about), FILTERS[kind](ESTIMATORS["polynomial"]), parameter()
+    output(old, x[:150])
+    fade = Fade(old, new, **LIMITS)
+    assert new.width == 1
+    shaped = output(fade, [*x[150:], *[x[-1]] * 400])
+    assert fade.finished
+    assert (shaped[-1] == x[-1]).all()
+    assert (np.abs(np.diff(shaped[:, 0], 2)) <= LIMITS["acceleration"] * 0.002**2).all()
+
+
+@pytest.mark.parametrize(("kind", "make"), EVERY)
+def test_put_back_to_the_joints_it_is_as_it_was(kind, make):
+    tvist, fresh = on(kind, make, round_about), FILTERS[kind](ESTIMATORS[make])
+    output(tvist, parameter()[:100])
+    q = np.ones(JOINTS)
+    tvist.reset(q)
+    fresh.reset(q)
+    samples = q + parameter()
+    assert (output(tvist, samples) == output(fresh, samples)).all()
+    assert said(tvist) == said(fresh)
+
+
+def test_samples_of_another_width_are_refused():
+    tvist = on("one mode", "fixed", round_about)
+    with pytest.raises(ShapingError, match="shape"):
+        tvist.filter(np.zeros(JOINTS))
+    with pytest.raises(ShapingError, match="shape"):
+        tvist.reset([0.0])

@@ -1,20 +1,33 @@
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 from tvist_shaping import (
     SHAPERS,
+    Fixed,
     ImpulseError,
     Impulses,
     ShaperRangeError,
+    ShapingError,
+    TvistFilter,
+    UnknownShaperError,
+    band,
+    ei,
     product,
     residual,
+    shaper,
+    um_zv,
+    um_zvd,
     zv,
     zvd,
 )
+from tvist_shaping.errors import DesignError
+from tvist_shaping.named import BUILT_IN, SMOOTHINGS, make_filter
 
 frequencies = st.floats(1e-6, 1e6)
 shares = st.floats(0.0, 1.0, exclude_max=True)
@@ -59,23 +72,18 @@ def test_the_duration_that_the_catalogue_says_is_reached(name):
 
 
 @pytest.mark.parametrize("name", SHAPERS)
-@pytest.mark.parametrize("f_d", [0.0, -1.0, math.nan, math.inf, 1e-7, 1e7])
-def test_a_bad_frequency_is_named_with_its_value_and_limit(name, f_d):
-    with pytest.raises(ShaperRangeError, match=r"f_d is .* must be 1e-06 to 1e\+06 Hz") as error:
-        SHAPERS[name].function(f_d, 0.1)
-    assert error.value.field == "f_d"
-    assert error.value.value == pytest.approx(f_d, nan_ok=True)
-    assert "1e-06" in error.value.limit
-
-
-@pytest.mark.parametrize("name", SHAPERS)
-@pytest.mark.parametrize("zeta", [-0.01, 1.0, 2.0, math.nan, math.inf])
-def test_a_bad_damping_is_named_with_its_value_and_limit(name, zeta):
-    with pytest.raises(ShaperRangeError, match=r"zeta is .* must be at least 0 and less than") as error:
-        SHAPERS[name].function(10.0, zeta)
-    assert error.value.field == "zeta"
-    assert error.value.value == pytest.approx(zeta, nan_ok=True)
-    assert f"less than {SHAPERS[name].zeta_max:g}" in error.value.limit
+def test_a_bad_mode_is_named_with_its_value_and_limit(name):
+    entry = SHAPERS[name]
+    for f_d in (0.0, -1.0, math.nan, math.inf, 1e-7, 1e7):
+        with pytest.raises(ShaperRangeError) as error:
+            entry.function(f_d, 0.1)
+        assert (error.value.field, "1e-06" in error.value.limit) == ("f_d", True)
+        assert error.value.value == pytest.approx(f_d, nan_ok=True)
+    for zeta in (-0.01, 1.0, 2.0, math.nan, math.inf):
+        with pytest.raises(ShaperRangeError) as error:
+            entry.function(10.0, zeta)
+        assert (error.value.field, f"less than {entry.zeta_max:g}" in error.value.limit) == ("zeta", True)
+        assert error.value.value == pytest.approx(zeta, nan_ok=True)
 
 
 @pytest.mark.parametrize("name", [name for name, entry in SHAPERS.items() if entry.zeta_max < 1.0])
@@ -86,19 +94,12 @@ def test_a_damping_beyond_a_shapers_validity_is_refused_with_what_to_take(name):
         entry.function(10.0, entry.zeta_max)
 
 
-@pytest.mark.parametrize(
-    ("A", "tau", "why"),
-    [
-        ([0.5, 0.5], [0.0], "shape"),
-        ([], [], "shape"),
-        ([[1.0]], [[0.0]], "shape"),
-        ([0.5, math.nan], [0.0, 1.0], "A is .* finite"),
-        ([0.5, 0.5], [0.0, math.inf], "tau is .* finite"),
-        ([0.5, 0.5], [0.1, 1.0], "ascend from 0"),
-        ([0.4, 0.3, 0.3], [0.0, 1.0, 0.5], "ascend from 0"),
-        ([0.5, 0.5 + 2e-9], [0.0, 1.0], "sum to 1"),
-    ],
-)
+@pytest.mark.parametrize(("A", "tau", "why"), [
+    ([0.5, 0.5], [0.0], "shape"), ([], [], "shape"), ([[1.0]], [[0.0]], "shape"),
+    ([0.5, math.nan], [0.0, 1.0], "A is .* finite"), ([0.5, 0.5], [0.0, math.inf], "tau is .* finite"),
+    ([0.5, 0.5], [0.1, 1.0], "ascend from 0"), ([0.4, 0.3, 0.3], [0.0, 1.0, 0.5], "ascend from 0"),
+    ([0.5, 0.5 + 2e-9], [0.0, 1.0], "sum to 1"),
+])  # fmt: skip
 def test_what_is_no_train_of_impulses_is_refused(A, tau, why):
     with pytest.raises(ImpulseError, match=why):
         Impulses(A, tau)
@@ -117,19 +118,6 @@ def test_impulses_are_read_only_and_their_own():
             train.A = A
 
 
-def test_mean_delay_is_the_centroid():
-    assert zv(10.0, 0.0).mean_delay == pytest.approx(0.025)
-    assert zvd(10.0, 0.0).mean_delay == pytest.approx(0.05)
-
-
-def test_a_product_suppresses_each_of_its_modes():
-    both = product([zv(7.0, 0.3), zv(19.0, 0.1)])
-    Impulses(both.A, both.tau)
-    assert both.duration == pytest.approx(0.5 / 7.0 + 0.5 / 19.0)
-    assert residual(7.0, 0.3, both) < 1e-15
-    assert residual(19.0, 0.1, both) < 1e-15
-
-
 def test_a_product_is_the_convolution():
     three = product([zv(7.0, 0.3), zvd(7.0, 0.3), zv(19.0, 0.1)])
     Impulses(three.A, three.tau)
@@ -143,8 +131,241 @@ def test_a_product_is_the_convolution():
     np.testing.assert_allclose(spectrum(three), factors, atol=1e-14)
 
 
-def test_a_product_of_one_is_itself_and_of_none_an_error():
-    train = zv(7.0, 0.3)
-    np.testing.assert_array_equal(product([train]).A, train.A)
-    with pytest.raises(ImpulseError, match="at least one"):
-        product([])
+def test_a_shaper_is_found_by_its_name():
+    for name in SHAPERS:
+        assert shaper(name).name == name
+
+
+def test_the_catalogue_stands_shortest_first():
+    durations = [entry.duration_periods for entry in SHAPERS.values()]
+    assert durations == sorted(durations)
+
+
+def test_an_unknown_name_lists_those_there_are_and_the_nearest():
+    with pytest.raises(
+        UnknownShaperError, match=r"did you mean 'zvddd'.*there are none, um_zv, zv, mzv"
+    ) as error:
+        shaper("zvdddd")
+    assert error.value.name == "zvdddd"
+    assert error.value.known == tuple(SHAPERS)
+    assert error.value.nearest == "zvddd"
+
+
+def test_what_is_left_at_the_design_equals_the_golden_values(golden):
+    for entry in golden["shapers"]:
+        impulses = SHAPERS[entry["name"]].function(entry["f_d"], entry["zeta"])
+        left = residual(entry["f_d"], entry["zeta"], impulses)
+        assert left == pytest.approx(entry["V_at_design"], abs=5e-5), entry
+
+
+def test_figure_4_comes_out_to_a_two_hundredth_of_a_percent(golden):
+    for name, row in golden["sensitivity_undamped_10_5_hz"].items():
+        f = np.array([float(f) for f in row])
+        percent = 100.0 * residual(f, 0.0, SHAPERS[name].function(10.5, 0.0))
+        np.testing.assert_allclose(percent, list(row.values()), rtol=0, atol=0.00501, err_msg=name)
+
+
+@given(st.floats(0.0, 40.0))
+def test_the_undamped_curves_equal_their_closed_forms(f):
+    r = np.pi * f / 10.0
+    assert residual(f, 0.0, zv(10.0, 0.0)) == pytest.approx(abs(math.cos(r / 2.0)), abs=1e-13)
+    assert residual(f, 0.0, zvd(10.0, 0.0)) == pytest.approx(math.cos(r / 2.0) ** 2, abs=1e-13)
+    assert residual(f, 0.0, ei(10.0, 0.0)) == pytest.approx(abs(0.475 + 0.525 * math.cos(r)), abs=1e-13)
+
+
+@pytest.mark.parametrize("name", ["zv", "mzv", "zvd", "ei", "zvdd", "ei2", "zvddd", "ei3"])
+@pytest.mark.parametrize("percent", [5, 10])
+def test_the_bands_are_those_of_the_golden_table(name, percent, golden):
+    low, high = golden["bands_undamped"][name][str(percent)]
+    impulses = SHAPERS[name].function(8.0, 0.0)
+    assert band(impulses, 8.0, 0.0, percent / 100) == pytest.approx((8.0 * low, 8.0 * high), abs=1e-3)
+    assert SHAPERS[name].band(percent / 100) == pytest.approx((low, high), abs=1e-4)
+
+
+def test_bad_input_is_named():
+    train = zv(1.0, 0.0)
+    for f in (-1.0, math.nan, math.inf):
+        with pytest.raises(ShaperRangeError, match="f is"):
+            residual(f, 0.0, train)
+        with pytest.raises(ShaperRangeError, match="f_d is"):
+            band(train, f, 0.0, 0.05)
+    for zeta in (-0.1, 1.0, math.nan):
+        with pytest.raises(ShaperRangeError, match="zeta is"):
+            residual(1.0, zeta, train)
+    for V in (0.0, 1.0, math.nan):
+        with pytest.raises(ShapingError, match="V is"):
+            band(train, 1.0, 0.0, V)
+
+
+ZERO_AT_THE_DESIGN = ["zv", "mzv", "zvd", "zvdd", "zvddd", "ei2", "ei2_exact", "um_zv", "um_zvd"]
+MODES = [
+    (6.7, 0.34), (15.0, 0.14), (10.5, 0.0), (10.0, 0.1), (8.0, 0.19), (7.0, 0.3), (9.0, 0.48), (3.0, 0.7),
+]  # fmt: skip
+
+
+def angular(f_d, zeta):
+    omega_d = 2.0 * np.pi * f_d
+    return omega_d, omega_d / np.sqrt(1.0 - zeta**2)
+
+
+def amplitude(deflection, velocity, f_d, zeta):
+    """Amplitude of the free oscillation from a state."""
+    omega_d, omega_n = angular(f_d, zeta)
+    return np.hypot(deflection, (velocity + zeta * omega_n * deflection) / omega_d)
+
+
+def amplitude_after_steps(impulses, f_d, zeta):
+    """Amplitude left by a step of the reference at each impulse: closed-form step responses, superposed."""
+    omega_d, omega_n = angular(f_d, zeta)
+    late = impulses.tau[-1] - impulses.tau
+    envelope = impulses.A * np.exp(-zeta * omega_n * late)
+    deflection = -(
+        envelope * (np.cos(omega_d * late) + zeta * omega_n / omega_d * np.sin(omega_d * late))
+    ).sum()
+    velocity = (envelope * omega_n**2 / omega_d * np.sin(omega_d * late)).sum()
+    return amplitude(deflection, velocity, f_d, zeta)
+
+
+def amplitude_by_propagation(impulses, f_d, zeta):
+    """The same by the matrix exponential of ẍ = ω_n²(r - x) - 2ζω_n ẋ, from one impulse to the next."""
+    _, omega_n = angular(f_d, zeta)
+    system = np.array([[0.0, 1.0], [-(omega_n**2), -2.0 * zeta * omega_n]])
+    state, reference = np.zeros(2), 0.0
+    for A, wait in zip(impulses.A, np.append(np.diff(impulses.tau), 0.0), strict=True):
+        reference += A
+        rest = np.array([reference, 0.0])
+        state = rest + expm(system * wait) @ (state - rest)
+    return amplitude(state[0] - 1.0, state[1], f_d, zeta)
+
+
+def valid(names):
+    """Each with every mode that it is for."""
+    return [(name, *mode) for name in names for mode in MODES if mode[1] < SHAPERS[name].zeta_max]
+
+
+@pytest.mark.parametrize(("name", "f_d", "zeta"), valid(ZERO_AT_THE_DESIGN))
+def test_a_shaped_step_leaves_the_designed_mode_at_rest(name, f_d, zeta):
+    impulses = SHAPERS[name].function(f_d, zeta)
+    limit = 1e-7 if name == "ei2_exact" else 1e-9
+    assert residual(f_d, zeta, impulses) < limit
+    assert amplitude_after_steps(impulses, f_d, zeta) < limit
+    assert amplitude_by_propagation(impulses, f_d, zeta) < limit
+
+
+@pytest.mark.parametrize("name", SHAPERS)
+@pytest.mark.parametrize(("f", "zeta"), [(5.0, 0.0), (7.1, 0.2), (14.0, 0.14), (9.0, 0.6)])
+def test_the_sensitivity_formula_is_what_an_oscillator_of_another_mode_keeps(name, f, zeta):
+    impulses = SHAPERS[name].function(9.0, 0.1)
+    one_step = amplitude_after_steps(SHAPERS["none"].function(f, zeta), f, zeta)
+    left = residual(f, zeta, impulses) * one_step
+    assert amplitude_after_steps(impulses, f, zeta) == pytest.approx(left, abs=1e-12)
+    assert amplitude_by_propagation(impulses, f, zeta) == pytest.approx(left, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", [name for name in ZERO_AT_THE_DESIGN if SHAPERS[name].peak == 1.0])
+@pytest.mark.parametrize(("f_d", "zeta"), [(6.7, 0.02), (15.0, 0.14), (7.93, 0.05)])
+def test_the_sampled_filter_brings_the_oscillator_to_rest_after_a_motion(name, f_d, zeta):
+    """The reference between two ticks is a straight line, for which the oscillator is solved exactly."""
+    h = 0.002
+    _, omega_n = angular(f_d, zeta)
+    t = np.clip(h * np.arange(500) / 0.1, 0.0, 1.0)  # a motion of 0.1 s: about a period, it rings
+    reference = t**4 * (35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3)
+    system = np.zeros((4, 4))  # state x, ẋ, r, ṙ
+    system[0, 1] = system[2, 3] = 1.0
+    system[1] = [-(omega_n**2), -2.0 * zeta * omega_n, omega_n**2, 0.0]
+    tick = expm(system * h)
+
+    def left(reference, ticks):
+        x = np.zeros(2)
+        for now, then in pairwise(reference[: ticks + 1]):
+            x = (tick @ np.array([*x, now, (then - now) / h]))[:2]
+        return amplitude(x[0] - 1.0, x[1], f_d, zeta)
+
+    tvist = TvistFilter(shaper(name), Fixed([f_d], [zeta]), joints=1, period=h)
+    shaped = np.array([tvist.filter([x])[0] for x in reference])
+    end = int(np.ceil((0.1 + tvist.delay) / h)) + 2
+    assert shaped[end] == 1.0
+    assert left(shaped, end) < 1e-4 * left(reference, 50)
+
+
+dampings = st.floats(0.0, 0.4999)
+
+
+def test_the_damped_times_are_the_golden_ones(golden):
+    for entry in golden["um_zv"]:
+        zeta = entry["zeta"]
+        in_undamped_periods = um_zv(1.0, zeta).tau / math.sqrt(1.0 - zeta**2)
+        np.testing.assert_allclose(in_undamped_periods, entry["undamped_periods"], atol=6e-6)
+    np.testing.assert_allclose(um_zvd(1.0, 0.0).tau, [0.0, 0.08951, 0.36623, 0.64296, 0.73247], atol=6e-6)
+
+
+@given(dampings, st.floats(0.5, 50.0))
+def test_nothing_is_left_and_with_a_derivative_nothing_near_either(zeta, f_d):
+    one, two = um_zv(f_d, zeta), um_zvd(f_d, zeta)
+    assert residual(f_d, zeta, one) < 1e-9
+    assert residual(f_d, zeta, two) < 1e-9
+    near = f_d * (1.0 + 1e-4 * np.array([-1.0, 1.0]))
+    slope, none = (residual(near, zeta, train) / 1e-4 for train in (one, two))
+    assert slope.min() > 0.5
+    assert none.max() < 0.1
+
+
+@given(dampings)
+def test_every_impulse_is_of_one_size_and_comes_after_the_last(zeta):
+    for train in (um_zv(1.0, zeta), um_zvd(1.0, zeta)):
+        np.testing.assert_allclose(np.abs(train.A), 1.0, atol=1e-12)
+        assert np.diff(train.tau).min() > 0.005
+
+
+@pytest.mark.parametrize("name", ["um_zv", "um_zvd", "zv", "ei3"])
+def test_the_peak_in_the_catalogue_bounds_what_a_filter_makes_of_an_acceleration_and_is_reached(name):
+    tvist = TvistFilter(shaper(name), Fixed([2.0], [0.0]), joints=1)
+    # The acceleration turns round with the impulses: the worst there is.
+    impulses = tvist.impulses
+    t = 0.002 * np.arange(1500)
+    end = 2.0 + impulses.duration
+    acceleration = np.zeros(t.size)
+    for A, tau in zip(impulses.A, impulses.tau, strict=True):
+        late = np.clip((t - (end - tau)) / 0.02, -1.0, 1.0)
+        acceleration += np.sign(A) * np.cos(0.5 * np.pi * late) ** 2
+    reference = np.cumsum(np.cumsum(acceleration)) * 0.002**2
+    shaped = np.array([tvist.filter([x])[0] for x in reference])
+    peak = np.abs(np.diff(shaped, 2)).max() / 0.002**2
+    assert peak <= SHAPERS[name].peak * 1.01
+    assert peak >= SHAPERS[name].peak * 0.95
+
+
+MODE = Fixed([10.0], [0.1])
+
+
+@pytest.mark.parametrize("kind", ["elastic", "elastic-position"])
+@pytest.mark.parametrize("length", SMOOTHINGS)
+def test_the_length_is_that_of_the_name(kind, length):
+    smooth = make_filter(f"{kind}-{length}", MODE, joints=1)
+    assert (smooth.name, smooth.feed_forward) == (f"{kind}-{length}", kind)
+    assert smooth.delay == pytest.approx(length / 1000.0)
+    weights = smooth.filter_all(np.eye(1, length // 2 + 1).T)
+    assert weights.sum() == pytest.approx(1.0)
+    assert (weights > 0.0).all()
+    assert weights == pytest.approx(weights[::-1])
+
+
+def test_without_a_length_it_is_40_ms():
+    reference = np.cumsum(np.random.default_rng(1).normal(size=(200, 1)), axis=0)
+    short, long = (make_filter(name, MODE, joints=1) for name in ("elastic", "elastic-40"))
+    assert np.array_equal(short.filter_all(reference), long.filter_all(reference))
+
+
+@pytest.mark.parametrize("name", ["elastic-7", "elastic-6", "elastic-62", "elastic-position-9", "elastic-0"])
+def test_a_length_that_no_filter_has_is_refused_with_the_lengths_that_there_are(name):
+    with pytest.raises(DesignError, match=r"even, from 8 to 60 ms, as in elastic(-position)?-16"):
+        BUILT_IN.check(name)
+
+
+@pytest.mark.parametrize("name", [
+    "elastic-", "elastic-x", "elastic-16-16", "auto-16", "zv-16", "elastic-016", "elastic-\uff11\uff16",
+    f"elastic-{'9' * 5000}",
+])  # fmt: skip
+def test_any_other_name_is_unknown(name):
+    with pytest.raises(UnknownShaperError):
+        BUILT_IN.check(name)

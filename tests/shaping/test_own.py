@@ -21,7 +21,6 @@ from tvist_shaping import (
     check_shaper,
     custom,
     make_filter,
-    shaper,
     shaper_of,
     zv,
 )
@@ -180,24 +179,17 @@ def test_a_shaper_that_declares_less_than_it_does_is_refused(field, declared):
 @pytest.mark.parametrize(
     "changes", [{"taps": 0}, {"taps": 501}, {"modes": 0}, {"peak": 0.5}, {"period": 0.0}]
 )
-def test_a_fir_shaper_checks_what_it_declares(changes):
+def test_a_fir_shaper_that_declares_what_cannot_be_is_refused(changes):
     with pytest.raises(DesignError, match=next(iter(changes))):
         FirShaper(**({"name": "mine", "description": "", "function": zv, "taps": 20} | changes))
 
 
-@pytest.mark.parametrize(
-    ("field", "declared"),
-    [
-        ("duration_periods", "0.5"),
-        ("duration_periods", np.nan),
-        ("zeta_max", 1.5),
-        ("zeta_max", 0),
-        ("peak", 0.5),
-    ],
-)
-def test_a_shaper_that_declares_what_cannot_be_is_refused(field, declared):
-    values = {"name": "mine", "description": "", "function": zv, "duration_periods": 0.5} | {field: declared}
-    with pytest.raises(DesignError, match=field):
+@pytest.mark.parametrize("changes", [
+    {"duration_periods": "0.5"}, {"duration_periods": np.nan}, {"zeta_max": 1.5}, {"zeta_max": 0}, {"peak": 0.5},
+])  # fmt: skip
+def test_a_shaper_that_declares_what_cannot_be_is_refused(changes):
+    values = {"name": "mine", "description": "", "function": zv, "duration_periods": 0.5} | changes
+    with pytest.raises(DesignError, match=next(iter(changes))):
         check_shaper(Shaper(**values))
 
 
@@ -290,10 +282,3 @@ class TestRegistry:
     def test_an_unknown_name_lists_the_own_ones_too(self):
         with pytest.raises(UnknownShaperError, match=r"did you mean 'mean'.* elastic-position, mean"):
             Registry([mean()]).check("meen")
-
-    def test_it_cannot_be_changed(self):
-        with pytest.raises(TypeError):
-            Registry([mean()]).own["other"] = mean()
-
-    def test_a_shaper_of_the_catalogue_is_taken_as_it_is(self):
-        assert make_filter(shaper("ei"), Fixed([7.0], [0.1]), joints=1).name == "ei"

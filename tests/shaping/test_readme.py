@@ -18,8 +18,8 @@ def test_the_examples_print_what_they_say():
 def row(shaper):
     impulses = shaper.function(1.0, 0.0)
     low, high = band(impulses, 1.0, 0.0, 0.05)
-    span = "–" if math.isnan(low) else f"{low:.3f} – {high:.3f}"
-    times = f"{impulses.duration:.3g} T | {impulses.mean_delay:.3g} T"
+    span = "–" if math.isnan(low) else f"{low:.3f}–{high:.3f}"
+    times = f"{impulses.duration:.3g} | {impulses.mean_delay:.3g}"
     cells = f"{shaper.description} | {times} | {span} | {shaper.zeta_max:g}"
     return f"| `{shaper.name}` | {cells} |"
 

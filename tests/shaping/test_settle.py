@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_shaping import DelayLine, Fixed, TvistFilter, shaper
+from tvist_shaping import TvistFilter, shaper
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 from tvist_shaping.steady import ProductDesign, SteadyFilter
@@ -125,35 +125,3 @@ def test_a_filter_begins_with_the_lowest_mode_wherever_its_estimator_was_before(
         else:
             tvist.take_over(tvist.fork())
         assert tvist.f_d[0] == lowest(tvist._q_star) < 0.95 * before
-
-
-@pytest.mark.parametrize("capacity", [4, 9, 30])
-def test_a_line_counts_the_samples_that_are_the_same(capacity):
-    random = np.random.default_rng(capacity)
-    line, pushed, q = DelayLine(2, capacity), [], np.ones(2)
-    assert line.still >= capacity
-    for _ in range(300):
-        if random.random() < 0.1:
-            q = random.choice([0.0, 1.0, np.nextafter(1.0, 2.0)], 2)
-        line.push(q)
-        pushed.append(q)
-        same = (np.array(pushed) == q).all(axis=1)
-        whole = same.all()
-        expected = len(pushed) if whole else np.argmin(same[::-1])
-        assert line.still == expected or (whole and line.still >= capacity and (q == 0.0).all())
-        for other in (DelayLine(2, 6), DelayLine(2, 50)):
-            other.take_over(line)
-            held = other.newest(other.capacity)
-            equal = (held == q).all(axis=1)
-            assert min(other.still, other.capacity) == (
-                other.capacity if equal.all() else np.argmin(equal[::-1])
-            )
-    line.fill([3.0, 4.0])
-    assert line.still >= capacity
-    line.push([3.0, 4.0])
-    assert line.still > capacity
-
-
-def test_an_estimator_that_follows_nothing_settles_as_it_estimates():
-    fixed = Fixed([7.0], [0.1])
-    np.testing.assert_array_equal(fixed.settle(np.zeros(1)), fixed.estimate(np.zeros(1)))

@@ -2,13 +2,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from tvist_shaping import SHAPERS, Estimator, Fade, FilterError, Fixed, ShapingError, TvistFilter, residual
+from tvist_shaping import SHAPERS, Estimator, Fade, FilterError, Fixed, TvistFilter, product, residual, zv
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.impulse_train import Impulses
-from tvist_shaping.steady import AimedFilter, ProductDesign, ShortDesign, SteadyFilter
-from tvist_shaping.taps import mean_delay
+from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
+from tvist_shaping.taps import average, length, mean_delay, product_taps
 
 H = 0.002
 F_D, ZETA = (6.7, 8.0, 18.0, 35.0), (0.3, 0.3, 0.1, 0.1)
@@ -72,7 +74,7 @@ def double_s(stroke, joints=1):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_reference_at_rest_passes_bit_for_bit_whatever_the_modes_do(kind, seed):
     q = np.random.default_rng(seed).uniform(-7.0, 7.0, 3)
     tvist = a_filter(kind, Jumping(3 if kind == "product" else 4, seed), joints=3)
@@ -82,7 +84,7 @@ def test_a_reference_at_rest_passes_bit_for_bit_whatever_the_modes_do(kind, seed
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_end_of_a_motion_is_reached_bit_for_bit(kind, seed):
     random = np.random.default_rng(seed)
     tvist = a_filter(kind, Jumping(3 if kind == "product" else 4, seed), joints=2)
@@ -93,7 +95,7 @@ def test_the_end_of_a_motion_is_reached_bit_for_bit(kind, seed):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_constant_velocity_stays_what_it_is_whatever_the_modes_do(kind, seed):
     """The mean delay is the same at every tick: a ramp comes out as itself, that much later."""
     tvist = a_filter(kind, Jumping(3 if kind == "product" else 4, seed))
@@ -105,15 +107,8 @@ def test_a_constant_velocity_stays_what_it_is_whatever_the_modes_do(kind, seed):
     assert not tvist.clipped
 
 
-def test_without_a_constant_mean_delay_it_does_not():
-    """The foil: the paper's filter on the same ramp and arm."""
-    ramp = VELOCITY * H * np.arange(2000.0)[:, None]
-    paper = shaped_by(TvistFilter(SHAPERS["zv"], Arm(1), joints=1), ramp)
-    assert np.abs(np.diff(paper[150:], axis=0) / H).max() > 1.01 * VELOCITY
-
-
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("stroke", [0.3, 1.5, 3.0])
+@pytest.mark.parametrize("stroke", [0.3, 3.0])
 def test_a_move_at_the_limits_stays_within_them(kind, stroke):
     reference = double_s(stroke)
     limits = [np.abs(np.diff(reference, order, axis=0)).max() / H**order for order in (1, 2)]
@@ -182,24 +177,6 @@ def test_a_mode_comes_to_rest_after_a_move(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_it_can_be_read_and_printed(kind):
-    tvist = a_filter(kind)
-    assert tvist.name == kind
-    np.testing.assert_array_equal(tvist.f_d, F_D[: tvist.design.modes])
-    assert 0.05 < tvist.delay < 0.25
-    assert f"{kind.capitalize()}Design" in repr(tvist)
-    assert f"{MEAN[kind]:g}" in repr(tvist)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_reset_forgets_the_motion(kind):
-    tvist = a_filter(kind, joints=2)
-    shaped_by(tvist, np.random.default_rng(0).normal(size=(100, 2)))
-    tvist.reset([1.0, 2.0])
-    np.testing.assert_array_equal(tvist.filter([1.0, 2.0]), [1.0, 2.0])
-
-
-@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("steady_first", [True, False])
 def test_a_fade_between_it_and_the_papers_filter_has_no_step(kind, steady_first):
     reference = double_s(2.0)
@@ -215,19 +192,6 @@ def test_a_fade_between_it_and_the_papers_filter_has_no_step(kind, steady_first)
     np.testing.assert_array_equal(output[-1], slow[-1])
     assert np.abs(np.diff(output, axis=0)).max() / H <= VELOCITY
     assert np.abs(np.diff(output, 2, axis=0)).max() / H**2 <= ACCELERATION * 1.005
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_taking_over_in_motion_starts_where_the_other_is(kind):
-    reference = double_s(2.0)
-    old, new = TvistFilter(SHAPERS["zv"], Arm(1), joints=1), a_filter(kind)
-    for q in reference[:600]:
-        last = old.filter(q)
-    new.take_over(old)
-    np.testing.assert_array_equal(new._q_star, last)
-    np.testing.assert_allclose(new.filter(reference[600]), reference[600] - VELOCITY * MEAN[kind], atol=2e-2)
-    with pytest.raises(ShapingError, match="2 joints cannot go on from one of 1"):
-        a_filter(kind, joints=2).take_over(old)
 
 
 def test_a_product_that_does_not_fit_is_said_to_be_clipped_and_no_longer_when_it_does():
@@ -282,23 +246,6 @@ def test_a_mode_that_is_held_is_said_though_the_design_has_room_for_it(kind):
     assert tvist.clipped
 
 
-def test_an_aimed_filter_says_of_the_end_it_is_told_whether_it_is_clipped():
-    tvist = AimedFilter(design("short"), Falling(4), joints=1)
-    tvist.aim([2.0])
-    assert tvist.clipped
-    tvist.aim([0.5])
-    assert not tvist.clipped
-
-
-def test_a_programme_that_would_have_to_be_longer_than_it_may_is_said_to_be_clipped():
-    wanted = FirDesign(longest=0.06)
-    tight = SteadyFilter(ShortDesign(MEAN["short"], wanted=wanted), Arm(4), joints=1)
-    assert tight.clipped
-    tight.filter([0.1])
-    assert tight.clipped
-    assert not a_filter("short").clipped
-
-
 def test_where_the_programme_is_not_solved_the_old_taps_stand_and_it_is_said():
     tvist = a_filter("short")
     before = tvist._designed.copy()
@@ -312,18 +259,6 @@ def test_where_the_programme_is_not_solved_the_old_taps_stand_and_it_is_said():
     for _ in range(8):
         tvist.filter([0.0])
     assert not tvist.clipped
-
-
-def test_a_short_design_gets_longer_and_shorter_with_the_arm_and_no_faster_than_it_may():
-    tvist = a_filter("short")
-    lengths = []
-    for q in np.concatenate([np.linspace(0.0, 2.2, 1500), np.linspace(2.2, 0.0, 1500)]):
-        tvist.filter([q])
-        lengths.append(tvist.design._length)
-    lengths = np.array(lengths)
-    assert lengths[1500:1800].min() < 0.85 * lengths[0]
-    assert lengths[-1] == pytest.approx(lengths[0], rel=0.1)
-    assert np.abs(np.diff(lengths)).max() <= 0.15 * 4 * H * (1 + 1e-9)
 
 
 @pytest.mark.parametrize(
@@ -351,17 +286,10 @@ def test_what_does_not_fit_is_refused_by_name(make, field):
     assert error.value.field == field
 
 
-def test_a_sample_of_another_size_is_refused():
-    tvist = a_filter("product", joints=2)
-    for wrong in (0.0, [0.0], [0.0] * 3):
-        with pytest.raises(ShapingError, match="shape"):
-            tvist.filter(wrong)
-
-
 @pytest.mark.parametrize("kind", KINDS)
-def test_after_a_hundred_thousand_ticks_the_taps_are_what_they_would_be_anew(kind):
+def test_after_twenty_thousand_ticks_the_taps_are_what_they_would_be_anew(kind):
     tvist = a_filter(kind)
-    for i in range(100_000):
+    for i in range(20_000):
         tvist.filter([2.0 * np.sin(1e-3 * i)])
     for _ in range(6000):
         tvist.filter([0.5])
@@ -371,3 +299,85 @@ def test_after_a_hundred_thousand_ticks_the_taps_are_what_they_would_be_anew(kin
     anew.reset([0.5])
     # The length's servo stops where no more is left than may be; halving finds the same to a 4096th.
     np.testing.assert_allclose(tvist._taps, anew._taps, atol=1e-12 if kind == "product" else 1e-3)
+
+
+N = 140
+modes = st.lists(st.tuples(st.floats(4.0, 60.0), st.floats(0.0, 0.9)), min_size=1, max_size=4)
+
+
+def arrays(modes):
+    f_d, zeta = np.array(modes, dtype=float).T.copy()
+    return f_d, zeta
+
+
+def tapped(modes, mean, taps=N):
+    out = np.empty(taps)
+    fits = product_taps(*arrays(modes), mean, H, out)
+    return out, fits
+
+
+@given(modes)
+def test_the_mean_delay_is_that_of_the_product_of_the_impulses(modes):
+    impulses = product([zv(*mode) for mode in modes])
+    assert mean_delay(*arrays(modes)) == pytest.approx(impulses.mean_delay, rel=1e-12)
+
+
+@given(modes, st.floats(0.0, 0.05))
+def test_taps_sum_to_one_and_have_the_mean_delay_asked_for(modes, more):
+    wanted = mean_delay(*arrays(modes)) + more
+    taps, fits = tapped(modes, wanted, 400)
+    assert fits
+    assert taps.sum() == pytest.approx(1.0, abs=1e-12)
+    assert H * np.arange(400) @ taps == pytest.approx(wanted, abs=1e-12)
+
+
+@given(modes, st.floats(0.0, 0.05), st.floats(0.0, 1e4))
+def test_taps_do_to_a_cubic_what_the_impulses_do(modes, more, seed):
+    """Lagrange's cubic is exact for it: the same number as with delays between the ticks."""
+    impulses = product([zv(*mode) for mode in modes])
+    taps, _ = tapped(modes, impulses.mean_delay + more, 400)
+    cubic = np.random.default_rng(int(seed)).normal(size=4)
+    assert np.polyval(cubic, H * np.arange(400)) @ taps == pytest.approx(
+        np.polyval(cubic, impulses.tau + more) @ impulses.A, abs=1e-10
+    )
+
+
+@given(modes, st.floats(0.0, 0.05))
+def test_taps_leave_next_to_nothing_of_any_of_their_modes(modes, more):
+    """What a cubic loses between two ticks grows with (f h)^4: 2 % of a mode of 60 Hz, nothing of a slow one."""
+    taps, _ = tapped(modes, mean_delay(*arrays(modes)) + more, 400)
+    last = length(taps)
+    for f_d, zeta in modes:
+        s = 2.0 * np.pi * f_d * (zeta / np.sqrt(1.0 - zeta**2) + 1j)
+        waves = np.exp((s * np.arange(400) - s.real * last) * H)[: last + 1] * taps[: last + 1]
+        assert abs(waves.sum()) < 0.05 * (abs(s) * H / 0.75) ** 4 + 1e-12
+
+
+def test_a_product_that_lasts_longer_on_average_stands_and_says_so():
+    taps, fits = tapped([(5.0, 0.0)], 0.04)
+    assert not fits
+    assert H * np.arange(N) @ taps == pytest.approx(0.05, abs=1e-12)
+    assert taps.sum() == pytest.approx(1.0, abs=1e-12)
+
+
+def test_an_impulse_beyond_the_last_tap_is_put_on_it_and_says_so():
+    taps, fits = tapped([(2.0, 0.0)], 0.125, 60)
+    assert not fits
+    assert taps.sum() == pytest.approx(1.0, abs=1e-12)
+    assert taps[0] == pytest.approx(0.5)
+    assert taps[57] == pytest.approx(0.5)
+
+
+@given(st.integers(1, 12), st.integers(0, 2**32 - 1))
+def test_three_running_means_are_a_convolution_with_three_boxes(ticks, seed):
+    random = np.random.default_rng(seed)
+    vectors = random.dirichlet(np.ones(5), size=80)
+    start = vectors[0]
+    past, sums, out = np.tile(start, (3, ticks, 1)), np.tile(ticks * start, (3, 1)), np.empty(5)
+    box = np.ones(ticks) / ticks
+    kernel = np.convolve(np.convolve(box, box), box)
+    padded = np.vstack([np.tile(start, (kernel.size, 1)), vectors])
+    for i, vector in enumerate(vectors):
+        average(vector, past, sums, i % ticks, out)
+        end = kernel.size + i + 1
+        np.testing.assert_allclose(out, kernel[::-1] @ padded[end - kernel.size : end], atol=1e-13)

@@ -1,7 +1,7 @@
-"""System calls of a served process made to misbehave: a wall clock that is set, a disk that does not answer.
+"""A wall clock of a served process that is set.
 
 A small library is compiled and loaded into the process before its own (LD_PRELOAD); a file that both sides map
-says what is wrong at present. Where there is no C compiler the tests that need it are skipped, and say so.
+says by how much it is wrong at present. Where there is no C compiler the test is skipped, and says so.
 """
 
 import mmap
@@ -18,15 +18,13 @@ SOURCE = r"""
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <sys/time.h>
 #include <time.h>
 #include <unistd.h>
 
-struct wrong { volatile int64_t wall_s; volatile int64_t disk_stands; volatile int64_t writes_held; };
+struct wrong { volatile int64_t wall_s; };
 static struct wrong none, *wrong = &none;
 
 __attribute__((constructor)) static void look(void) {
@@ -62,20 +60,6 @@ time_t time(time_t *where) {
     return now.tv_sec;
 }
 
-ssize_t write(int file, const void *data, size_t size) {
-    static ssize_t (*real)(int, const void *, size_t);
-    if (!real) real = dlsym(RTLD_NEXT, "write");
-    if (wrong->disk_stands) {
-        char link[64], path[512];
-        snprintf(link, sizeof link, "/proc/self/fd/%d", file);
-        ssize_t length = readlink(link, path, sizeof path - 1);
-        if (length > 5 && !strncmp(path + length - 5, ".mcap", 5)) {
-            wrong->writes_held++;
-            while (wrong->disk_stands) usleep(10000);
-        }
-    }
-    return real(file, data, size);
-}
 """
 
 
@@ -89,27 +73,14 @@ class Interposed:
         source, library, shared = folder / "interposed.c", folder / "interposed.so", folder / "wrong"
         source.write_text(SOURCE, encoding="ascii")
         subprocess.run([compiler, "-O1", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
-        shared.write_bytes(bytes(24))
+        shared.write_bytes(bytes(8))
         with shared.open("r+b") as file:
-            self._wrong = mmap.mmap(file.fileno(), 24)
+            self._wrong = mmap.mmap(file.fileno(), 8)
         self.environment = {"LD_PRELOAD": str(library), "INTERPOSED": str(shared)}
 
     def set_wall_clock(self, seconds):
         """Set the wall clock this far from where it ought to be [s]."""
         self._wrong[0:8] = struct.pack("=q", seconds)
-
-    def stop_disk(self):
-        """Let no write of a recording come to an end."""
-        self._wrong[8:16] = struct.pack("=q", 1)
-
-    def release_disk(self):
-        """Let them."""
-        self._wrong[8:16] = struct.pack("=q", 0)
-
-    @property
-    def writes_held(self):
-        """How many writes the disk has kept waiting."""
-        return struct.unpack("=q", self._wrong[16:24])[0]
 
     def in_force(self, pid):
         """Whether a process has the library."""

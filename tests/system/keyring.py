@@ -8,7 +8,8 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
-from tests.conformance.served import finished, free_endpoint
+from tests.places import free_endpoint
+from tests.system.shell import tvist
 
 TLS = "transport/link/tls/"
 
@@ -17,14 +18,10 @@ def free_tls_endpoint():
     return free_endpoint().replace("tcp/", "tls/")
 
 
-def tvist(*arguments):
-    return finished("-m", "tvist_cli", *arguments)
-
-
 def made(folder, *options):
     """A folder of keys for a robot on this machine."""
-    ended = tvist("keys", folder, "--robot", "ur5e", "--host", "127.0.0.1", "--host", "localhost", *options)
-    assert ended.returncode == 0, ended.stderr
+    robot = ("--robot", "ur5e", "--host", "127.0.0.1", "--host", "localhost")
+    tvist("keys", folder, *robot, *options).assert_done()
     return folder
 
 

@@ -16,24 +16,15 @@ PATHS = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.en
 CASES = {
     "tvist che": {"check"},
     "tvist log an": {"analyze"},
-    "tvist run --lo": {"--lockstep"},
     "tvist run wave.script --input digital_input_1=1 --prof": {"--profile"},
     "tvist serve --no-f": {"--no-floor"},
-    "tvist completion f": {"fish"},
     "tvist run wav": {"wave.script"},
-    "tvist run --check one.script wav": {"wave.script"},
     "tvist serve --shaper zvd": {"zvd", "zvdd", "zvddd"},
     "tvist serve --shaper ow": {"own.py"},
     "tvist serve --robot ur5": {"ur5-light", "ur5e", "ur5e_stiction"},
     "tvist serve --robot a": {"arm.toml"},
-    "tvist serve --profile u": {"ursim"},
     "tvist move Q": {"Q1", "Q2", "Q3"},
     "tvist study moves --shapers zvd": {"zvd", "zvdd", "zvddd"},
-    "tvist study b": {"bench"},
-    "tvist study a": {"arm.toml"},
-    "tvist study bench --shapers zvd": {"zvd", "zvdd", "zvddd"},
-    "tvist identify wa": {"wave.script"},
-    "tvist move Q1 --shaper el": {"elastic", "elastic-auto", "elastic-position"},
 }
 """Typed lines with what completes their last word."""
 

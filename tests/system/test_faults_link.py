@@ -2,13 +2,9 @@
 
 import random
 import socket
-import subprocess
-import sys
-from contextlib import contextmanager
 from itertools import pairwise
 
 import pytest
-from tests import forked
 from tests.conformance.served import PATIENCE, free_endpoint
 from tests.conformance.wire import Q1, STOPPED, TICK, Wire
 
@@ -20,8 +16,15 @@ from .proxy import Proxy
 pytestmark = pytest.mark.realtime
 
 FAR = [2.0, *Q1[1:]]
-DOWN = 1500
-"""Ticks for which a link is down: 3 s."""
+DOWN = 750
+"""Ticks for which a link is down: 1.5 s."""
+
+
+def missing(wire):
+    """How many states have not come; the others are in their order."""
+    ticks = [state["tick"] for state in wire.received["state"]]
+    assert all(later > earlier for earlier, later in pairwise(ticks))
+    return ticks[-1] - ticks[0] + 1 - len(ticks)
 
 
 @pytest.fixture
@@ -30,7 +33,7 @@ def proxy(realtime):
         yield proxy
 
 
-def test_a_link_cut_for_3_s_ends_control_and_motion_at_once_and_the_client_is_back_by_itself(
+def test_a_link_that_is_cut_ends_control_and_motion_at_once_and_the_client_is_back_by_itself(
     proxy, bystander, measured
 ):
     with Wire(proxy.endpoint) as wire:
@@ -104,7 +107,7 @@ def test_a_link_that_stands_still_ends_the_stream_and_loses_states_but_no_event(
         played = min(state["tick"] for state in arrived if state["setpoint_sequence"] == newest)
         assert 0 < stopped["tick"] - played <= 130
         at = bystander.next("state", lambda state: state["runtime_state"] == STOPPED)["target_q"]
-        before = bystander.until(held + DOWN // 3) and bystander.next("telemetry")
+        before = bystander.until(held + DOWN) and bystander.next("telemetry")
         proxy.flow()
         # The same session and the same lease; events that waited are told late, and set-points move nothing.
         assert wire.command("keep_alive", token=token) == {"type": "done"}
@@ -116,66 +119,44 @@ def test_a_link_that_stands_still_ends_the_stream_and_loses_states_but_no_event(
         )
         assert bystander.until_later()["target_q"] == at
         wire.until(refused["tick"])
-        ticks = [state["tick"] for state in wire.received["state"]]
-        assert all(later > earlier for earlier, later in pairwise(ticks))
-        measured("states missing", ticks[-1] - ticks[0] + 1 - len(ticks))
+        measured("states missing", missing(wire))
         assert wire.command("release_control", token=token) == {"type": "done"}
     assert proxy.connections == 1
     bystander.assert_undisturbed()
 
 
 ROUTER = """
-import json, sys, threading, zenoh
-config = zenoh.Config()
-for path, value in {
-    "mode": "router",
-    "connect/endpoints": [sys.argv[1]],
-    "listen/endpoints": [sys.argv[2]],
-    "scouting/delay": 0,
-    "scouting/multicast/enabled": False,
-}.items():
-    config.insert_json5(path, json.dumps(value))
-session = zenoh.open(config)
-print("routes", flush=True)
+import sys, threading
+from tests.conformance.session import plain_session
+session = plain_session(sys.argv[1], {"mode": "router", "listen/endpoints": [sys.argv[2]], "scouting/delay": 0})
+print("under way", flush=True)
 threading.Event().wait()
 """
 
 
-@contextmanager
-def router(robot, endpoint):
-    """A Zenoh router of its own between clients and a robot; it is killed at the end."""
-    process = forked.Popen([sys.executable, "-c", ROUTER, robot, endpoint], stdout=subprocess.PIPE)
-    try:
-        assert process.stdout.readline() == b"routes\n"
-        yield process
-    finally:
-        process.kill()
-        process.wait(PATIENCE)
-        process.stdout.close()
-
-
 def test_a_router_in_the_middle_that_is_killed_ends_control_and_the_next_one_brings_the_client_back(
-    realtime, bystander, measured
+    realtime, bystander, start, measured
 ):
     middle = free_endpoint()
-    with router(realtime.endpoint, middle):
-        wire = Wire(middle)
+    router = start("-c", ROUTER, realtime.endpoint, middle)
+    with Wire(middle) as wire:
         wire.listen("event").state()
         wire.announce("far")
         token = wire.command("take_control", client="far")["token"]
         motion = wire.command("move_j", token=token, q=FAR)["id"]
         killed = bystander.next("state", lambda state: state["target_qd"][0] > 0.2)["tick"]
-    with wire:
+        router.kill()
+        router.wait(PATIENCE)
         lost = bystander.event("lease_lost")
         assert bystander.event("motion_stopped")["id"] == motion
         measured("from the router's end to lease_lost [s of tick time]", (lost["tick"] - killed) * TICK)
-        with router(realtime.endpoint, middle):
-            began = bystander.until_later()["tick"]
-            wire.wait("state", lambda state: state["tick"] >= began)
-            assert wire.command("keep_alive", token=token)["code"] == "no_control"
-            with wire.control("far"):
-                pass
-            bystander.assert_undisturbed()
+        start("-c", ROUTER, realtime.endpoint, middle)
+        began = bystander.until_later()["tick"]
+        wire.wait("state", lambda state: state["tick"] >= began)
+        assert wire.command("keep_alive", token=token)["code"] == "no_control"
+        with wire.control("far"):
+            pass
+        bystander.assert_undisturbed()
 
 
 def test_a_link_of_50_ms_each_way_brings_everything_50_ms_late(proxy, bystander, measured):
@@ -187,9 +168,7 @@ def test_a_link_of_50_ms_each_way_brings_everything_50_ms_late(proxy, bystander,
             done = wire.wait("event", lambda event: event["kind"] == "motion_done")
             assert done["id"] == motion
             wire.until(done["tick"] + 50)
-        ticks = [state["tick"] for state in wire.received["state"]]
-        assert all(later > earlier for earlier, later in pairwise(ticks))
-        measured("states missing", ticks[-1] - ticks[0] + 1 - len(ticks))
+        measured("states missing", missing(wire))
     bystander.assert_undisturbed()
 
 
@@ -200,10 +179,10 @@ def test_on_a_link_for_two_fifths_of_the_states_the_others_are_dropped_and_answe
         wire.listen("state", "event")
         with wire.control("far", lease_s=60.0) as token:
             proxy.rate = 200_000  # bytes a second; the states need half a million
-            began = bystander.until_later(1500)["tick"]
+            began = bystander.until_later(1000)["tick"]
             motion = wire.command("move_j", token=token, q=[0.1, *Q1[1:]])["id"]
             assert wire.wait("event", lambda event: event["kind"] == "motion_done")["id"] == motion
-            bystander.until(began + 1500)
+            bystander.until(began + 1000)
             asked = bystander.until_later()["tick"]
             assert wire.command("keep_alive", token=token) == {"type": "done"}
             newest, came = bystander.received["state"][-1]["tick"], len(wire.received["state"])
@@ -215,17 +194,15 @@ def test_on_a_link_for_two_fifths_of_the_states_the_others_are_dropped_and_answe
             wire.until(bystander.until_later()["tick"])
             under_way = sum(state["tick"] <= newest for state in wire.received["state"][came:])
             measured("states under way", under_way)
-            assert under_way < 1000  # were nothing dropped, there would be 1800, and more from tick to tick
-        ticks = [state["tick"] for state in wire.received["state"]]
-        assert all(later > earlier for earlier, later in pairwise(ticks))
-        measured("states dropped for this client", ticks[-1] - ticks[0] + 1 - len(ticks))
+            assert under_way < 1000  # were nothing dropped, there would be 1200, and more from tick to tick
+        measured("states dropped for this client", missing(wire))
     bystander.assert_undisturbed()
 
 
 def test_garbage_on_the_port_is_ignored_and_those_who_send_it_are_dropped(realtime, bystander):
     rng = random.Random(0)
     host, port = realtime.endpoint.partition("/")[2].split(":")
-    connections = [socket.create_connection((host, int(port))) for _ in range(100)]
+    connections = [socket.create_connection((host, int(port))) for _ in range(50)]
     for number, connection in enumerate(connections):
         garbage = rng.randbytes(rng.randrange(1, 5000))
         if number % 2:  # Zenoh begins each batch by its length

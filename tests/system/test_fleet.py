@@ -4,24 +4,23 @@ import asyncio
 import json
 import shutil
 import signal
-import sys
 from collections import Counter
 from queue import Queue
 
 import pytest
 import zenoh
-from tests.conformance.served import PATIENCE, Served, finished, free_endpoint
+from tests.conformance.served import PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Q1, Wire
 from zenoh.handlers import Callback
 
-from tvist_cli import main
 from tvist_client.across import ManyStates, Place
-from tvist_client.check import check
 from tvist_client.fleet import Fleet
 from tvist_server.gateways import network
 
 from .keyring import forge, free_tls_endpoint, made
 from .routed import Router, far
+from .shell import begun, tvist
+from .test_wrong_invocations import assert_said
 
 LOCKSTEP = ("--clock", "lockstep")
 MOST_ROUNDS = 50_000
@@ -47,11 +46,6 @@ def robots(router):
 ALL = [Place("", "ur5e-1"), Place("", "ur5e-2"), Place("hall-3/line-1", "ur5e-1")]
 
 
-def tvist(*arguments):
-    done = finished("-m", "tvist_cli", *arguments)
-    return done.returncode, done.stdout, done.stderr
-
-
 def test_all_are_found_and_each_is_known_by_its_namespace(router, robots):
     async def look(namespace):
         async with Fleet(router.endpoint, namespace=namespace) as fleet:
@@ -74,20 +68,13 @@ def test_robots_of_one_name_in_two_namespaces_never_meet(router, robots):
         assert here.command("move_j", token=other, q=Q1)["code"] == "stale_token"
 
 
-def test_check_moves_and_the_rest_reach_a_robot_in_a_namespace(router, robots):
-    report = check(router.endpoint, "ur5e-1", namespace="hall-3/line-1")
-    assert report.ok, report
-    assert report.robots == ["ur5e-1"]
-
-
 def test_stop_reaches_all_and_a_robot_that_is_not_there_is_no_success(router, robots):
-    code, out, _ = tvist("stop", "--all", "--endpoint", router.endpoint, "--json")
-    assert code == 0
-    assert [report["ok"] for report in json.loads(out)["robots"]] == [True] * 3
-    code, out, _ = tvist("stop", "--all", "--namespace", "hall-3", "--endpoint", router.endpoint)
-    assert (code, out.splitlines()) == (0, ["hall-3/line-1/ur5e-1: stopped"])
-    code, _, err = tvist("stop", "--all", "--namespace", "hall-4", "--endpoint", router.endpoint)
-    assert (code, err) == (1, "tvist: there are no robots, so none was stopped\n")
+    at = ("--endpoint", router.endpoint)
+    stopped = tvist("stop", "--all", *at, "--json").assert_done().json["robots"]
+    assert [report["ok"] for report in stopped] == [True] * 3
+    said = tvist("stop", "--all", "--namespace", "hall-3", *at).assert_done().out
+    assert said.splitlines() == ["hall-3/line-1/ur5e-1: stopped"]
+    tvist("stop", "--all", "--namespace", "hall-4", *at).assert_failed(1, "there are no robots, so none")
 
     async def stop():
         async with Fleet(router.endpoint) as fleet:
@@ -98,12 +85,15 @@ def test_stop_reaches_all_and_a_robot_that_is_not_there_is_no_success(router, ro
 
 
 def test_watch_shows_all_robots_and_of_one_its_states(router, robots):
-    code, out, _ = tvist("watch", router.endpoint, "--seconds", "4", "--json")
-    first = json.loads(out.splitlines()[0])["robots"]
-    assert (code, [Place(one["namespace"], one["name"]) for one in first]) == (0, ALL)
-    assert {one["safety_mode"] for one in first} == {"NORMAL"}
-    code, out, _ = tvist("watch", router.endpoint, "--namespace", "hall-3", "--seconds", "4", "--json")
-    assert (code, json.loads(out.splitlines()[0])["type"]) == (0, "state")
+    def first_line(*options):
+        process = begun("watch", router.endpoint, *options, "--json")
+        line = process.stdout.readline()
+        process.kill()
+        process.communicate(timeout=PATIENCE)
+        return json.loads(line)
+
+    assert [Place(one["namespace"], one["name"]) for one in first_line()["robots"]] == ALL
+    assert first_line("--namespace", "hall-3")["type"] == "state"
 
 
 def test_states_of_many_come_by_one_key(router, robots):
@@ -165,38 +155,17 @@ def test_a_reduced_rate_holds_for_each_listed_robot_and_leaves_events_alone():
     assert all(3 <= got[f"tvist/{name}/state"] < rounds for name in names), (rounds, got)
 
 
-@pytest.fixture
-def serve(monkeypatch, capfd):
-    """Start `tvist serve` in this process, which gives up after a fifth of a second; exit code and stderr."""
-    monkeypatch.setattr(signal, "signal", lambda *_: None)
+def test_a_router_that_is_not_there_or_whose_certificate_has_expired_is_said_in_one_sentence(
+    called, monkeypatch, tmp_path
+):
     monkeypatch.setitem(network.CONNECT, "connect/timeout_ms", 200)
-
-    def serve(*options):
-        monkeypatch.setattr(sys, "argv", ["tvist", "serve", "--clock", "lockstep", *map(str, options)])
-        with pytest.raises(SystemExit) as ended:
-            main.main()
-        return ended.value.code, capfd.readouterr().err
-
-    return serve
-
-
-def test_a_router_that_is_not_there_is_said_in_one_sentence(serve):
     nowhere = free_endpoint()
-    code, said = serve("--connect", nowhere)
-    assert code == 1
-    assert said.startswith(f"tvist: no connection to {nowhere}: no router answers within 10 s")
-    assert said.count("\n") == 1
-
-
-def test_a_certificate_that_has_expired_is_said_in_one_sentence(serve, tmp_path):
+    said = f"tvist: no connection to {nowhere}: no router answers within 10 s"
+    assert_said(called("serve", *LOCKSTEP, "--connect", nowhere), 1, [said])
     ring = made(tmp_path / "keys", "--member", "hall-3")
-    expired = forge(
-        tmp_path / "old", "hall-3", issuer=(ring / "authority.pem", ring / "authority.key"), days=-1
-    )
+    issuer = (ring / "authority.pem", ring / "authority.key")
+    expired = forge(tmp_path / "old", "hall-3", issuer=issuer, days=-1)
     shutil.copy(ring / "authority.pem", expired)
     with Router("--security", str(ring), endpoint=free_tls_endpoint()) as router:
-        code, said = serve("--connect", router.endpoint, "--security", expired)
-    assert code == 1
-    assert "certificate" in said
-    assert "expired" in said
-    assert said.count("\n") == 1
+        ended = called("serve", *LOCKSTEP, "--connect", router.endpoint, "--security", str(expired))
+    assert_said(ended, 1, ["certificate", "expired"])

@@ -5,18 +5,12 @@ from pathlib import Path
 
 import pytest
 from tests.conformance.served import Served
-from tests.system.test_command_line import tvist
+from tests.system.shell import tvist
 
 from tvist_plant.description import fingerprint, load
 from tvist_protocol.calibration import calibration_from_json
 
 KEYS = {"configurations", "ring_downs", "error_f_d_percent", "error_zeta_percent"}
-
-
-def test_too_few_measurements_are_a_sentence_and_no_file(tmp_path):
-    ended = tvist("identify", "--ring-downs", "3", "--output", tmp_path / "never.json", "--json")
-    assert ended.assert_failed(1, "at least 4").out == ""
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_few_ring_downs_make_a_calibration(tmp_path):
@@ -32,16 +26,6 @@ def test_a_few_ring_downs_make_a_calibration(tmp_path):
     assert [mode["measured_at_m_s2"] > 0.1 for mode in said["modes"]] == [True] * 3
     assert calibration.provenance.command.startswith("tvist identify --ring-downs 5 --output")
     assert calibration.provenance.arm == fingerprint(load("ur5e"))
-
-
-@pytest.mark.nightly
-def test_people_get_tables_of_springs_and_of_errors(tmp_path):
-    options = ("--ring-downs", 4, "--payload", "5", "--figures", "maps")
-    ended = tvist("identify", *options, cwd=tmp_path).assert_done()
-    for words in ("gear stiffness", "breakaway", "95 %", "true modes", "calibration.json"):
-        assert words in ended.out
-    drawn = {path.name for path in (tmp_path / "maps").iterdir()}
-    assert drawn == {"identification.png", "map_f_d.png", "map_zeta.png"}
 
 
 @pytest.mark.nightly
@@ -101,35 +85,6 @@ def test_a_twin_of_a_recording_can_be_served(day, tmp_path, monkeypatch):
     with Served("--robot", path, "--clock", "lockstep") as robot:
         assert robot.endpoint
     tvist("identify", day, "--twin").assert_failed(1, "robot.toml exists already", "--output")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (("tcp/127.0.0.1:7447", "x.mcap"), "give one robot, or logs alone"),
-        (("--columns", "time=t"), "columns is for logs"),
-        (("--twin",), "twin is for logs"),
-        (("x.mcap", "--payload", "0,5"), "payload is several masses"),
-        (("x.mcap", "--twin", "--payload=-1"), "payload is -1"),
-    ],
-)
-def test_logs_and_robots_are_not_mixed(arguments, named, tmp_path):
-    tvist("identify", *arguments, cwd=tmp_path).assert_failed(2, named)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (("ur://127.0.0.1:1",), "give --yes"),
-        (("ur://", "--yes"), "must be ur://ADDRESS"),
-        (("ur://127.0.0.1:1", "x.mcap", "--yes"), "give one robot, or logs alone"),
-        (("ur://127.0.0.1:1", "--yes", "--robot", "none-such"), "none-such"),
-        (("--yes",), "yes is for a robot at ur://"),
-    ],
-)
-def test_a_robot_is_not_moved_without_a_word_or_from_elsewhere(arguments, named, tmp_path):
-    tvist("identify", *arguments, cwd=tmp_path).assert_failed(2, named)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_robot_that_is_not_there_is_a_sentence(tmp_path):

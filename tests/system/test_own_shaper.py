@@ -1,9 +1,10 @@
 """A shaper of one's own from a shell: served, evaluated, refused in a sentence, and stopped when it fails."""
 
 import pytest
-from tests.conformance.served import Served, refused_to_start
+from tests.conformance.served import Served
 from tests.conformance.wire import Wire
-from tests.system.test_command_line import tvist
+from tests.system.shell import tvist
+from tests.system.test_wrong_invocations import assert_said
 
 MINE = '''
 from pathlib import Path
@@ -27,14 +28,6 @@ def unequal(f_d, zeta):
 LONG = custom("long", [0.5, 0.5], [0.0, 9.0])
 MEAN = FirShaper("mean", "the mean of 40 ms", lambda f_d, zeta: np.full(20, 0.05), taps=20)
 '''
-WRONG = {
-    "mine.py": "the name of the shaper is missing",
-    "mine.py:nobody": "mine.py does not contain nobody; it contains mine, unequal, LONG, MEAN",
-    "mine.py:unequal": "mine.py:unequal raises ImpulseError: A sums to 0.9, but must sum to 1 within 1e-9",
-    "mine.py:np": "np is of type module",
-    "mine.py:LONG": "at most max_delay = 1 s; shaper 'long' lasts 9 periods",
-    "other.py:mine": "other.py cannot be read: No such file or directory",
-}
 
 
 @pytest.fixture
@@ -43,21 +36,14 @@ def folder(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("place", list(WRONG))
-def test_one_that_cannot_be_loaded_does_not_start_a_server(folder, place, monkeypatch):
-    monkeypatch.chdir(folder)
-    code, said = refused_to_start("--shaper", place)
-    assert (code, WRONG[place] in said) == (2, True), said
-
-
-@pytest.mark.parametrize("command", [("shapers", "--shaper"), ("study", "moves", "--moves", 1, "--shapers")])
-@pytest.mark.parametrize("place", ["mine.py:nobody", "mine.py:unequal"])
-def test_every_command_refuses_it_alike(folder, command, place):
-    tvist(*command, place, cwd=folder).assert_failed(2, WRONG[place])
-
-
-def test_a_replay_takes_a_file_alone(folder):
-    tvist("log", "replay", "none.mcap", "--shaper", "zv", cwd=folder).assert_failed(2, "must be FILE.py:NAME")
+def test_one_that_cannot_be_loaded_is_refused_by_every_command_alike(folder, called):
+    said = "mine.py:unequal raises ImpulseError: A sums to 0.9, but must sum to 1 within 1e-9"
+    for command in (
+        ("shapers", "--shaper"),
+        ("study", "moves", "--moves", "1", "--shapers"),
+        ("serve", "--shaper"),
+    ):
+        assert_said(called(*command, "mine.py:unequal"), 2, [said])
 
 
 def test_it_stands_in_the_table_and_the_json_of_shapers(folder):
@@ -72,7 +58,7 @@ def test_it_stands_in_the_table_and_the_json_of_shapers(folder):
 
 def test_processes_that_share_the_work_load_it_again(folder):
     """Ten motions and more are shared among processes; the shaper travels there as its file."""
-    same = ("--moves", 10, "--clean", "--json")
+    same = ("--robot", "one-joint", "--payload", 1, "--moves", 10, "--clean", "--json")
     mine = tvist("study", "moves", "--shapers", "mine.py:mine", *same, cwd=folder).assert_done().json
     assert [one["name"] for one in mine["methods"]] == ["mine", "waiting"]
     theirs = tvist("study", "moves", "--shapers", "zv", *same).assert_done().json
@@ -96,19 +82,6 @@ def later(f_d, zeta):
 
 
 class TestServed:
-    def test_a_client_names_it_and_no_file(self, folder, monkeypatch):
-        monkeypatch.chdir(folder)
-        how = ("--clock", "lockstep", "--shaper", "mine.py:mine")
-        with Served(*how) as served, Wire(served.endpoint) as wire, wire.control() as token:
-            info = wire.info()
-            assert info["shaper"] == "mine"
-            assert "mean" not in info["shapers"]
-            for name in ("mine.py:MEAN", "mean", "./mine.py:mine"):
-                refused = wire.command("set_shaper", token=token, name=name)
-                assert (refused["type"], refused["code"]) == ("refused", "unknown_shaper")
-            for name in ("zv", "mine"):
-                assert wire.command("set_shaper", token=token, name=name)["type"] == "done"
-
     @pytest.mark.realtime
     def test_one_that_fails_stops_the_arm_and_leaves_the_server(self, folder, monkeypatch):
         monkeypatch.chdir(folder)

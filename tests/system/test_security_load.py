@@ -14,8 +14,6 @@ from .keyring import free_tls_endpoint, made, shown
 
 pytestmark = pytest.mark.realtime
 
-LONG = {"transport/unicast/open_timeout": 30_000}
-
 
 @pytest.fixture(scope="module")
 def ring(tmp_path_factory):
@@ -56,7 +54,7 @@ def test_a_hundred_idle_connections_lock_nobody_out(served, operator, ring):
 
 
 @pytest.mark.nightly
-def test_nor_do_they_where_there_is_no_security():
+def test_a_hundred_idle_connections_lock_nobody_out_where_there_is_no_security():
     with Served() as plain:
         idle = idle_connections(plain.endpoint)
         with Wire(plain.endpoint) as wire:
@@ -68,7 +66,7 @@ def test_nor_do_they_where_there_is_no_security():
 
 
 @pytest.mark.nightly
-def test_a_hundred_that_shake_hands_half_way_lock_nobody_out_either(served, ring):
+def test_a_hundred_that_shake_hands_half_way_lock_nobody_out(served, ring):
     hello, nothing = ssl.MemoryBIO(), ssl.MemoryBIO()
     half = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).wrap_bio(nothing, hello, server_hostname="localhost")
     with pytest.raises(ssl.SSLWantReadError):
@@ -81,20 +79,17 @@ def test_a_hundred_that_shake_hands_half_way_lock_nobody_out_either(served, ring
         assert wire.info()["type"] == "info"
     for connection in idle:
         connection.close()
-    # Those that come next wait until this has been got over.
-    with Wire(served.endpoint, settings={**shown(ring / "anna"), **LONG}) as wire:
-        assert wire.info()["type"] == "info"
 
 
 def test_a_message_above_the_cap_does_not_pass_and_the_next_one_does(served, operator):
     tick = operator.info()["tick"]
     began = operator.wait("telemetry", lambda telemetry: telemetry["tick"] > tick)
-    for size in (4 * MAX_BYTES, 20 * MAX_BYTES):
-        operator.put(bytes(size))
-        for ask in ({"payload": bytes(size)}, {"payload": b"", "attachment": bytes(size)}):
-            replies = list(operator.session.get(operator.key("command"), timeout=1.0, **ask))
-            # It came to nothing: the server never had it whole.
-            assert [reply.err.payload.to_bytes() for reply in replies] == [b"Timeout"]
+    too_large = bytes(4 * MAX_BYTES)
+    operator.put(too_large)
+    for ask in ({"payload": too_large}, {"payload": b"", "attachment": too_large}):
+        replies = list(operator.session.get(operator.key("command"), timeout=0.5, **ask))
+        # It came to nothing: the server never had it whole.
+        assert [reply.err.payload.to_bytes() for reply in replies] == [b"Timeout"]
     assert operator.raw(bytes(MAX_BYTES + 1))["limit"] == MAX_BYTES
     until = operator.info()["tick"]
     after = operator.wait("telemetry", lambda telemetry: telemetry["tick"] > until)

@@ -6,10 +6,9 @@ import msgpack
 import pytest
 from tests.conformance.served import Served
 from tests.conformance.session import plain_session
-from tests.system.test_sweep import wait_until
+from tests.system.waiting import eventually
 
 from tvist_client.check import check
-from tvist_client.errors import NotConnectedError
 from tvist_client.robot import Robot
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import TakeControl
@@ -29,7 +28,6 @@ main()
 """
 """`tvist serve` with a step of compiling that is as far as a pipe says, and over when it ends."""
 ONE = ("--clock", "lockstep")
-SEVERAL = (*ONE, "--robots", "ur5e*3")
 
 
 class SlowlyServed(Served):
@@ -46,10 +44,12 @@ def asked(endpoint, key):
 @pytest.mark.parametrize(
     ("options", "names", "place"),
     [
-        pytest.param((*ONE, "--namespace", "hall-3"), ["ur5e"], "hall-3"),
-        pytest.param((*SEVERAL, "--workers", "2"), ["ur5e-1", "ur5e-2", "ur5e-3"], ""),
-        (SEVERAL, ["ur5e-1", "ur5e-2", "ur5e-3"], ""),
-        ((*SEVERAL, "--workers", "2", "--namespace", "hall-3"), ["ur5e-1", "ur5e-2", "ur5e-3"], "hall-3"),
+        (ONE, ["ur5e"], ""),
+        (
+            (*ONE, "--robots", "ur5e*2", "--workers", "2", "--namespace", "hall-3"),
+            ["ur5e-1", "ur5e-2"],
+            "hall-3",
+        ),
     ],
 )
 async def test_all_queries_are_answered_with_the_share_until_the_robots_are_ready(
@@ -58,7 +58,7 @@ async def test_all_queries_are_answered_with_the_share_until_the_robots_are_read
     pipe = tmp_path / "progress"
     os.mkfifo(pipe)
     monkeypatch.setenv("PROGRESS", str(pipe))
-    served = SlowlyServed(*options, name=None if "--robots" in options else "ur5e", cold=True)
+    served = SlowlyServed(*options, name=None if "--robots" in options else "ur5e")
     within = f"{place}/tvist" if place else "tvist"
     keys = [f"{within}/{name}/{leaf}" for name in names for leaf in ("command", "info")]
 
@@ -69,13 +69,11 @@ async def test_all_queries_are_answered_with_the_share_until_the_robots_are_read
         with pipe.open("w", buffering=1) as progress:  # the server reads: its network is open
             for done in (3, 5):
                 progress.write(f"{done} 7\n")
-                wait_until(lambda done=done: says(f"the robot is starting: {done} of 7 kernels are compiled"))
+                eventually(lambda done=done: says(f"the robot is starting: {done} of 7 kernels are compiled"))
             for key in keys:
                 assert [answer["code"] for answer in asked(served.endpoint, key)] == ["starting"]
             with pytest.raises(RefusedError, match="starting: the robot is starting: 5 of 7"):
                 await Robot.connect(served.endpoint, names[0], namespace=place)
-            with pytest.raises(NotConnectedError, match="none answered in 3 s"):
-                await Robot.connect(served.endpoint, "other", namespace=place)
             assert "listens" not in served.said
         served.wait_until_ready()
         for name in names:

@@ -1,75 +1,33 @@
-"""Clients of UR robots, unmodified, beside a client on Zenoh: what they read is what the robot tells."""
+"""ur-rtde, unmodified: what it reads is what the robot tells, and what it does is done."""
 
-import json
 import math
 import struct
-import time
-from types import SimpleNamespace
 
 import msgspec
 import pytest
-from tests.conformance.served import PATIENCE, Served
-from tests.conformance.wire import Q1, Wire
+from tests.conformance.served import Served
+from tests.conformance.wire import Wire
 from tests.places import own_address
-from tests.system.ur_object import Client, started
+from tests.system.ur_object import Client
+from tests.system.waiting import eventually
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_lab.recordings.mcap_file import read
 from tvist_plant.description import load
-from tvist_protocol.io import Io
+from tvist_protocol import Io, State
 
-pytestmark = pytest.mark.realtime
+from .test_ur_lockstep import begin_step, lockstep, take_clock
 
-pytest.importorskip("rtde_receive")
+rtde_receive = pytest.importorskip("rtde_receive")
 
+Q1 = [0.0, -math.pi, 0.0, -math.pi / 2, 0.0, 0.0]
 FAR = [0.6, -2.9, 0.3, -1.4, 0.2, 0.4]
+HOME = [-1.60, -1.727, -2.203, -0.808, 1.595, -0.031]
 TICK, BOOTED = 0.002, 40.0
 OF_STATE = {
-    "getActualQ": "actual_q",
-    "getActualQd": "actual_qd",
-    "getActualTCPPose": "actual_TCP_pose",
-    "getActualTCPSpeed": "actual_TCP_speed",
-    "getActualToolAccelerometer": "actual_tool_accelerometer",
-    "getRobotMode": "robot_mode",
-    "getSafetyMode": "safety_mode",
-    "getRuntimeState": "runtime_state",
-}
-"""Getters whose values `state` carries."""
-OF_INSTRUMENTS = {
-    "getSpeedScaling": "speed_scaling",
-    "getTargetQ": "target_q",
-    "getTargetQd": "target_qd",
-    "getTargetQdd": "target_qdd",
-    "getTargetMoment": "target_moment",
-    "getActualCurrent": "actual_current",
-    "getActualDigitalInputBits": "actual_digital_input_bits",
-    "getActualDigitalOutputBits": "actual_digital_output_bits",
-    "getActualExecutionTime": "actual_execution_time",
-    "getActualJointVoltage": "actual_joint_voltage",
-    "getActualMainVoltage": "actual_main_voltage",
-    "getActualMomentum": "actual_momentum",
-    "getActualRobotCurrent": "actual_robot_current",
-    "getActualRobotVoltage": "actual_robot_voltage",
-    "getActualTCPForce": "actual_TCP_force",
-    "getFtRawWrench": "ft_raw_wrench",
-    "getJointControlOutput": "joint_control_output",
-    "getJointMode": "joint_mode",
-    "getJointTemperatures": "joint_temperatures",
-    "getPayload": "payload",
-    "getPayloadCog": "payload_cog",
-    "getPayloadInertia": "payload_inertia",
-    "getRobotStatus": "robot_status_bits",
-    "getSafetyStatusBits": "safety_status_bits",
-    "getStandardAnalogInput0": "standard_analog_input0",
-    "getStandardAnalogInput1": "standard_analog_input1",
-    "getStandardAnalogOutput0": "standard_analog_output0",
-    "getStandardAnalogOutput1": "standard_analog_output1",
-    "getTargetCurrent": "target_current",
-    "getTargetSpeedFraction": "target_speed_fraction",
-    "getTargetTCPPose": "target_TCP_pose",
-    "getTargetTCPSpeed": "target_TCP_speed",
-}
-"""Getters whose values are computed, and RTDE's names of them."""
+    "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_speed", "actual_tool_accelerometer", "robot_mode",
+    "safety_mode", "runtime_state",
+}  # fmt: skip
+"""Variables that `state` carries; the instruments compute the others."""
 MADE_BY_THE_CLIENT = {
     "getDigitalInState": lambda of: [bool(of.actual_digital_input_bits >> bit & 1) for bit in range(18)],
     "getDigitalOutState": lambda of: [bool(of.actual_digital_output_bits >> bit & 1) for bit in range(18)],
@@ -82,11 +40,13 @@ MADE_BY_THE_CLIENT = {
 """Getters whose values the client makes of several."""
 
 
-def until(call, wanted):
-    """Ask until the answer is the wanted one."""
-    deadline = time.monotonic() + PATIENCE
-    while (found := call()) != wanted:
-        assert time.monotonic() < deadline, f"{found}, not {wanted}"
+SEVERAL = {
+    "getDigitalInState": range(18),
+    "getDigitalOutState": range(18),
+    "getOutputIntRegister": range(12, 20),
+    "getOutputDoubleRegister": range(12, 20),
+}
+"""Getters that are asked for one of several, and which."""
 
 
 def bits(value):
@@ -96,137 +56,105 @@ def bits(value):
     return struct.pack(">d", value) if isinstance(value, float) else value
 
 
-def live(wire, token):
-    """Move, switch, write: so that hardly any value stays what it was."""
-    wire.listen("event")
-    motion = wire.command("move_j", token=token, q=FAR)["id"]
-    wire.command("set_io", token=token, digital_output_mask=0x2A55A, digital_outputs=0x2A55A)
-    wire.command("set_tcp", token=token, offset=[0.01, -0.02, 0.15, 0.1, 0.2, -0.3])
-    wire.command("set_registers", token=token, bank="output_int", first=12, values=[*range(-4, 4)])
-    wire.command(
-        "set_registers", token=token, bank="output_double", first=12, values=[math.pi**k for k in range(8)]
+def read(robot, getters, tick):
+    """The value of every getter at a tick, once its sample has come."""
+    eventually(lambda: robot.getTimestamp() == BOOTED + tick * TICK)
+    return {
+        name: [getattr(robot, name)(number) for number in SEVERAL[name]]
+        if name in SEVERAL
+        else getattr(robot, name)()
+        for name in getters
+    }
+
+
+def variable(getter, snapshot):
+    """RTDE's name of what a getter tells: getTargetTCPPose tells target_TCP_pose."""
+    if getter == "getRobotStatus":
+        return "robot_status_bits"
+    (name,) = (
+        name
+        for name in {*OF_STATE, *dir(snapshot)}
+        if f"get{name.replace('_', '')}".lower() == getter.lower()
     )
-    wire.command("simulation.set_inputs", token=token, digital_input_mask=0x15A5A, digital_inputs=0x15A5A,
-                 standard_analog_input=[2.5, 0.0125], analog_input_types=1)  # fmt: skip
-    wire.wait("event", lambda event: event["kind"] == "motion_done" and event["id"] == motion)
-    wire.command("set_speed", token=token, fraction=0.7)
-    motion = wire.command("move_j", token=token, q=Q1)["id"]
-    wire.wait("event", lambda event: event["kind"] == "motion_done" and event["id"] == motion)
+    return name
 
 
-@pytest.fixture(scope="module")
-def session(tmp_path_factory):
-    """What a client read while another one moved the robot; and the states, and inputs and outputs, of that time.
+def assert_told(found, snapshot):
+    for getter, value in found.items():
+        if getter in MADE_BY_THE_CLIENT:
+            assert value == MADE_BY_THE_CLIENT[getter](snapshot), getter
+        else:
+            name = variable(getter, snapshot)
+            told = getattr(snapshot.state if name in OF_STATE else snapshot, name)
+            assert bits(value) == bits(told), getter
 
-    At half the speed: the client has to read all of a tick before the next one comes.
-    """
-    path = tmp_path_factory.mktemp("recorded") / "all.mcap"
-    options = (
-        "--profile",
-        "real",
-        "--start",
-        "Q1",
-        "--ur-address",
-        own_address(1),
-        "--record",
-        str(path),
-        "--speed",
-        "0.5",
-    )
-    with Served(*options) as served:
-        with Wire(served.endpoint) as wire, wire.control() as token:
-            wire.listen("io")
-            wire.wait("io")
-            with started("ur_reader.py", own_address(1)) as reader:
-                assert reader.stdout.readline() == "reading\n"
-                live(wire, token)
-                out, _ = reader.communicate(timeout=PATIENCE)
-            assert reader.returncode == 0
-            wire.until(wire.state()["tick"])
-            ios = [msgspec.convert(io, Io) for io in wire.received["io"]]
+
+def test_every_getter_tells_what_the_robot_does_to_the_last_bit(tmp_path):
+    of_the_client = dir(rtde_receive.RTDEReceiveInterface)
+    getters = [name for name in of_the_client if name.startswith(("get", "is")) and name != "isConnected"]
+    assert len(getters) > 45
+    instruments, found = Instruments(load("ur5e")), []
+    with lockstep(11, tmp_path / "run.mcap") as (served, host), Wire(served.endpoint) as wire:
+        wire.listen("state", "io")
+        token = wire.command("take_control", client="wire")["token"]
+        told = 0
+
+        def step(ticks):
+            """Let time pass; what the instruments make of the last tick."""
+            nonlocal told
+            last = wire.step(token, ticks)["tick"]
+            ios = sorted(wire.received["io"], key=lambda io: io["tick"])
+            for state in wire.received["state"][told:]:
+                io = next((io for io in reversed(ios) if io["tick"] <= state["tick"]), ios[0])
+                snapshot = instruments.snapshot(msgspec.convert(state, State), msgspec.convert(io, Io))
+            told = len(wire.received["state"])
+            return last, snapshot
+
+        step(1)
+        with Client("rtde_receive", "RTDEReceiveInterface", host, "500.0") as robot:
+            wire.command("move_j", token=token, q=FAR)
+            for ticks in (150, 100, 2000):
+                last, snapshot = step(ticks)
+                found.append(read(robot, getters, last))
+                assert_told(found[-1], snapshot)
+                wire.command("set_io", token=token, digital_output_mask=0x2A55A, digital_outputs=0x2A55A)
+                wire.command("set_tcp", token=token, offset=[0.01, -0.02, 0.15, 0.1, 0.2, -0.3])
+                numbers = {"output_int": [*range(-4, 4)], "output_double": [math.pi**k for k in range(8)]}
+                for bank, values in numbers.items():
+                    wire.command("set_registers", token=token, bank=bank, first=12, values=values)
+                inputs = {"digital_input_mask": 0x15A5A, "digital_inputs": 0x15A5A}
+                analog = {"standard_analog_input": [2.5, 0.0125], "analog_input_types": 1}
+                wire.command("simulation.set_inputs", token=token, **inputs, **analog)
+                wire.command("set_speed", token=token, fraction=0.7)
+            assert robot.isConnected()
         assert served.end() == 0
-    recorded = read(path)
-    assert recorded.complete
-    assert not any(recorded.dropped.values())
-    instruments, snapshots, pending = Instruments(load("ur5e")), {}, sorted(ios, key=lambda io: io.tick)
-    now = pending[0]
-    for state in recorded.states:
-        while pending and pending[0].tick <= state.tick:
-            now = pending.pop(0)
-        snapshots[state.tick] = instruments.snapshot(state, now)
-    return SimpleNamespace(
-        **json.loads(out),
-        at={snapshot.timestamp: snapshot for snapshot in snapshots.values()},
-        first=ios[0].tick,
-    )
+    for name in (
+        "getActualQ", "getTargetMoment", "getActualTCPForce", "getJointTemperatures", "getRuntimeState",
+        "getOutputIntRegister", "getDigitalOutState", "getDigitalInState", "getSpeedScalingCombined",
+    ):  # fmt: skip
+        assert found[0][name] != found[-1][name]
 
 
 @pytest.fixture(scope="module")
-def pairs(session):
-    """What was read at a tick, and the tick itself."""
-    return [(read, session.at[read["getTimestamp"]]) for read in session.read]
+def alone():
+    """A robot whose time passes by itself, as fast as it computes: a session of who lets it, and its address."""
+    host = own_address(12)
+    options = ("--clock", "lockstep", "--profile", "real", "--start", "Q1", "--ur-address", host)
+    with Served(*options) as served, Wire(served.endpoint) as wire:
+        clock = take_clock(wire)
+        wire.step(clock, 1)
+        _steps = [begin_step(wire, clock, 100_000) for _ in range(50)]
+        yield wire, host
+        assert served.end() == 0
 
 
-def test_the_client_stays_and_reads_one_tick_after_another(session, pairs, measured):
-    assert session.connected
-    measured("ticks read with every getter", len(pairs))
-    stamps = [found["getTimestamp"] for found, _ in pairs]
-    assert stamps == sorted(set(stamps))
-    assert len(stamps) > 1
-    assert all(snapshot.state.tick >= session.first for _, snapshot in pairs)
-
-
-def test_every_getter_is_looked_at(pairs):
-    assert set(pairs[0][0]) == {"getTimestamp", *OF_STATE, *OF_INSTRUMENTS, *MADE_BY_THE_CLIENT}
-
-
-@pytest.mark.parametrize(
-    "getter",
-    ["getActualQ", "getTargetMoment", "getActualTCPForce", "getJointTemperatures", "getRuntimeState",
-     "getOutputIntRegister", "getDigitalOutState", "getDigitalInState"],
-)  # fmt: skip
-def test_something_was_going_on(pairs, getter):
-    assert len({json.dumps(found[getter]) for found, _ in pairs}) > 1
-
-
-def test_time_is_the_ticks_forty_seconds_on(pairs):
-    for found, snapshot in pairs:
-        assert found["getTimestamp"] == BOOTED + snapshot.state.timestamp
-        assert snapshot.state.timestamp == snapshot.state.tick * TICK
-
-
-@pytest.mark.parametrize("getter", OF_STATE)
-def test_a_getter_tells_what_state_does_to_the_last_bit(pairs, getter):
-    for found, snapshot in pairs:
-        assert bits(found[getter]) == bits(getattr(snapshot.state, OF_STATE[getter])), snapshot.state.tick
-
-
-@pytest.mark.parametrize("getter", OF_INSTRUMENTS)
-def test_a_getter_tells_what_the_instruments_compute_from_state_and_io(pairs, getter):
-    for found, snapshot in pairs:
-        assert bits(found[getter]) == bits(getattr(snapshot, OF_INSTRUMENTS[getter])), snapshot.state.tick
-
-
-@pytest.mark.parametrize("getter", MADE_BY_THE_CLIENT)
-def test_a_getter_tells_what_its_variables_say(pairs, getter):
-    for found, snapshot in pairs:
-        assert found[getter] == MADE_BY_THE_CLIENT[getter](snapshot), snapshot.state.tick
-
-
-@pytest.fixture(scope="module")
-def quiet():
-    """A robot for clients that set."""
-    with Served("--ur", "--ur-address", own_address(2)) as served:
-        yield served
-
-
-def test_everything_that_can_be_set_is_and_zenoh_shows_it(quiet):
+def test_everything_that_can_be_set_is_and_zenoh_shows_it(alone):
+    wire, host = alone
+    wire.listen("io")
     with (
-        Wire(quiet.endpoint) as wire,
-        Client("rtde_io", "RTDEIOInterface", own_address(2)) as setter,
-        Client("rtde_receive", "RTDEReceiveInterface", own_address(2)) as robot,
+        Client("rtde_io", "RTDEIOInterface", host) as setter,
+        Client("rtde_receive", "RTDEReceiveInterface", host) as seen,
     ):
-        wire.listen("io")
         for call, first, count in (
             ("setStandardDigitalOut", 0, 8),
             ("setConfigurableDigitalOut", 8, 8),
@@ -234,16 +162,14 @@ def test_everything_that_can_be_set_is_and_zenoh_shows_it(quiet):
         ):
             for number in range(count):
                 assert getattr(setter, call)(number, True)
-                until(lambda bit=first + number: robot.getDigitalOutState(bit), True)
+                eventually(lambda bit=first + number: seen.getDigitalOutState(bit))
             assert getattr(setter, call)(0, False)
-            until(lambda bit=first: robot.getDigitalOutState(bit), False)
-        assert wire.info()["control"] == "ur-127.0.0.1"
+            eventually(lambda bit=first: not seen.getDigitalOutState(bit))
         assert setter.setSpeedSlider(0.5)
-        until(robot.getTargetSpeedFraction, 0.5)
         assert setter.setAnalogOutputVoltage(0, 0.4)
-        until(robot.getStandardAnalogOutput0, 4.0)
+        eventually(lambda: seen.getStandardAnalogOutput0() == 4.0)
         assert setter.setAnalogOutputCurrent(1, 0.25)
-        until(robot.getStandardAnalogOutput1, 0.008)
+        eventually(lambda: seen.getStandardAnalogOutput1() == 0.008)
         for number in range(18, 23):
             assert setter.setInputIntRegister(number, -number)
             assert setter.setInputDoubleRegister(number, number / 7)
@@ -253,100 +179,141 @@ def test_everything_that_can_be_set_is_and_zenoh_shows_it(quiet):
         assert io["actual_digital_output_bits"] == 0x2FEFE
         assert io["standard_analog_output"] == [4.0, 0.008]
         assert io["target_speed_fraction"] == 0.5
-        assert setter.isConnected()
-        assert setter.setSpeedSlider(1.0)
-        until(robot.getTargetSpeedFraction, 1.0)
-
-
-def test_of_two_clients_the_second_is_told_that_its_variables_are_in_use(quiet):
-    with Client("rtde_io", "RTDEIOInterface", own_address(2)) as first:
-        assert first.setInputIntRegister(18, 1)
         with (
             pytest.raises(AssertionError, match="already in use"),
-            Client("rtde_io", "RTDEIOInterface", own_address(2)),
+            Client("rtde_io", "RTDEIOInterface", host),
         ):
             pass
-        assert first.setInputIntRegister(18, 2)
-    with Client("rtde_io", "RTDEIOInterface", own_address(2)) as second:
-        assert second.setInputIntRegister(18, 3)
+        assert setter.setSpeedSlider(1.0)
+        eventually(lambda: seen.getTargetSpeedFraction() == 1.0)
+
+
+def test_the_dashboard_says_what_the_robot_is_switches_it_and_plays_a_program(alone):
+    with Client("dashboard_client", "DashboardClient", alone[1]) as dashboard:
+        dashboard.connect()
+        assert dashboard.polyscopeVersion().startswith("5.22.")
+        assert dashboard.getRobotModel() == "UR5"
+        assert dashboard.getSerialNumber().isdecimal()
+        assert (dashboard.safetymode(), dashboard.isInRemoteControl()) == ("Safetymode: NORMAL", True)
+        for call in (dashboard.popup, dashboard.addToLog):
+            call("words")
+        dashboard.closePopup()
+        dashboard.powerOff()
+        eventually(lambda: dashboard.robotmode() == "Robotmode: POWER_OFF")
+        with pytest.raises(AssertionError, match="Failed to execute: play"):
+            dashboard.play()
+        dashboard.powerOn()
+        eventually(lambda: dashboard.robotmode() == "Robotmode: IDLE")
+        dashboard.brakeRelease()
+        eventually(lambda: dashboard.robotmode() == "Robotmode: RUNNING")
+        with pytest.raises(AssertionError, match=r"File not found: missing\.urp"):
+            dashboard.loadURP("missing.urp")
+        dashboard.loadURP("paper.urp")
+        assert dashboard.getLoadedProgram() == "Loaded program: /programs/paper.urp"
+        dashboard.play()
+        eventually(dashboard.running)
+        dashboard.stop()
+        eventually(lambda: dashboard.programState() == "STOPPED paper.urp")
+
+
+@pytest.fixture(scope="module")
+def live():
+    """Address of a robot in real time."""
+    with Served("--ur", "--ur-address", own_address(13)):
+        yield own_address(13)
 
 
 @pytest.fixture
-def dashboard(quiet):
-    with Client("dashboard_client", "DashboardClient", own_address(2)) as dashboard:
+def seen(live):
+    with Client("rtde_receive", "RTDEReceiveInterface", live) as seen:
+        yield seen
+
+
+@pytest.fixture
+def arm(live):
+    """Steered by registers, by the client's own program; it waits for what the robot does by the wall clock."""
+    with Client("rtde_control", "RTDEControlInterface", live) as arm:
+        yield arm
+        arm.stopScript()
+
+
+def beside(*changes):
+    """Joint positions beside HOME: pairs of a joint and its change."""
+    q = list(HOME)
+    for joint, change in changes:
+        q[joint] += change
+    return q
+
+
+@pytest.mark.realtime
+def test_moves_servoing_and_speeds_end_where_they_should(arm, seen):
+    assert arm.moveJ(beside((0, 0.2), (2, 0.1)), 1.0, 1.5)
+    eventually(lambda: seen.getActualQ() == pytest.approx(beside((0, 0.2), (2, 0.1)), abs=1e-3))
+    assert arm.moveJ(HOME, 1.0, 1.5)
+    pose = seen.getActualTCPPose()
+    corner = [pose[0], pose[1], pose[2] + 0.1, *pose[3:]]
+    end = [pose[0], pose[1] - 0.1, pose[2] + 0.1, *pose[3:]]
+    assert arm.moveL([[*corner, 0.2, 0.8, 0.03], [*end, 0.2, 0.8, 0.0]], True)
+    eventually(lambda: arm.getAsyncOperationProgress() < 0)
+    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(end[:3], abs=1e-3))
+    assert arm.moveL(corner, 0.5, 1.5)
+    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(corner[:3], abs=1e-3))
+    assert arm.moveJ_IK(pose, 1.0, 1.5)
+    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(pose[:3], abs=1e-3))
+    for _ in range(200):
+        assert arm.servoJ(beside((0, 0.02)), 0.0, 0.0, 0.002, 0.03, 1000.0)
+    eventually(lambda: abs(seen.getActualQ()[0] - HOME[0] - 0.02) < 1e-3)
+    assert arm.servoStop(2.0)
+    assert arm.speedJ([0.0, 0.0, 0.0, 0.0, 0.0, 0.1], 1.0, 0.5)
+    assert arm.speedStop(2.0)
+    eventually(lambda: max(map(abs, seen.getTargetQd())) < 1e-6)
+    assert seen.getTargetQ()[5] > HOME[5] + 0.01
+
+
+@pytest.mark.realtime
+def test_kinematics_payload_and_tool_are_those_of_the_robot(arm, seen):
+    assert arm.moveJ(HOME, 1.0, 1.5)
+    pose = seen.getTargetTCPPose()
+    q = arm.getInverseKinematics(pose)
+    assert q == pytest.approx(HOME, abs=1e-3)
+    tool = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]
+    assert math.dist(arm.getForwardKinematics(q, tool)[:3], pose[:3]) == pytest.approx(0.1, abs=1e-6)
+    assert not arm.getInverseKinematicsHasSolution([9.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert arm.setTcp(tool)
+    assert arm.getTCPOffset() == tool
+    assert arm.setTcp([0.0] * 6)
+    assert arm.setPayload(1.0, [0.0, 0.0, 0.05])
+    eventually(lambda: seen.getPayload() == 1.0)
+    assert arm.setPayload(0.0, [0.0, 0.0, 0.0])
+
+
+@pytest.mark.realtime
+def test_force_mode_freedrive_contacts_and_a_script_of_the_users_own(arm, seen):
+    before = seen.getActualTCPPose()
+    arm.forceMode([0.0] * 6, [0, 0, 1, 0, 0, 0], [0, 0, -10.0, 0, 0, 0], 2, [2, 2, 1.5, 1, 1, 1])
+    eventually(lambda: seen.getActualTCPPose()[2] < before[2] - 0.001)
+    assert arm.forceModeStop() is True
+    assert arm.freedriveMode([1, 1, 1, 0, 0, 0], [0.0] * 6) is True
+    assert arm.getFreedriveStatus() == 0
+    assert arm.endFreedriveMode() is True
+    assert arm.teachMode() is True
+    assert arm.endTeachMode() is True
+    assert arm.startContactDetection([0, 0, -1, 0, 0, 0]) is True
+    assert arm.stopContactDetection() is False  # nothing was touched
+    assert arm.sendCustomScriptFunction("mine", "write_output_integer_register(12, 4711)\n")
+    eventually(lambda: seen.getOutputIntRegister(12) == 4711)
+    eventually(arm.isProgramRunning)  # the client has sent its own program again
+
+
+@pytest.mark.realtime
+def test_a_protective_stop_ends_a_move_and_the_next_program_moves_again(live, arm, seen):
+    arm.triggerProtectiveStop()  # False: the program is suspended before it can report that it is done
+    eventually(seen.isProtectiveStopped)
+    with Client("dashboard_client", "DashboardClient", live) as dashboard:
         dashboard.connect()
-        dashboard.brakeRelease()
-        until(dashboard.robotmode, "Robotmode: RUNNING")
-        yield dashboard
-
-
-def test_the_dashboard_says_what_the_robot_is(dashboard):
-    assert dashboard.isConnected()
-    assert dashboard.polyscopeVersion().startswith("5.22.")
-    assert dashboard.getRobotModel() == "UR5"
-    assert dashboard.getSerialNumber().isdecimal()
-    assert dashboard.isInRemoteControl()
-    assert (dashboard.safetymode(), dashboard.safetystatus()) == (
-        "Safetymode: NORMAL",
-        "Safetystatus: NORMAL",
-    )
-    for call in (dashboard.popup, dashboard.addToLog):
-        call("words")
-    for call in (dashboard.closePopup, dashboard.closeSafetyPopup):
-        call()
-    dashboard.send("robotmode\n")
-    assert dashboard.receive() == "Robotmode: RUNNING"
-    dashboard.quit()
-    dashboard.disconnect()
-    assert not dashboard.isConnected()
-
-
-def test_the_dashboard_switches_the_power(dashboard):
-    dashboard.powerOff()
-    until(dashboard.robotmode, "Robotmode: POWER_OFF")
-    with pytest.raises(AssertionError, match="Failed to execute: play"):
-        dashboard.play()
-    dashboard.powerOn()
-    until(dashboard.robotmode, "Robotmode: IDLE")
-    dashboard.brakeRelease()
-    until(dashboard.robotmode, "Robotmode: RUNNING")
-    dashboard.restartSafety()
-    until(dashboard.robotmode, "Robotmode: POWER_OFF")
-
-
-def test_the_dashboard_plays_pauses_and_stops_a_program(dashboard):
-    with pytest.raises(AssertionError, match=r"File not found: missing\.urp"):
-        dashboard.loadURP("missing.urp")
-    dashboard.loadURP("paper.urp")
-    assert dashboard.getLoadedProgram() == "Loaded program: /programs/paper.urp"
-    assert dashboard.programState() == "STOPPED paper.urp"
-    assert not dashboard.running()
-    dashboard.play()
-    until(dashboard.running, wanted=True)
-    dashboard.pause()
-    until(dashboard.programState, "PAUSED paper.urp")
-    dashboard.play()
-    until(dashboard.programState, "PLAYING paper.urp")
-    dashboard.stop()
-    until(dashboard.programState, "STOPPED paper.urp")
-
-
-def test_a_protective_stop_is_seen_and_unlocked(quiet, dashboard):
-    with (
-        Wire(quiet.endpoint) as wire,
-        Client("rtde_receive", "RTDEReceiveInterface", own_address(2)) as robot,
-    ):
-        dashboard.disconnect()  # and with it goes its control
-        until(lambda: wire.info()["control"], None)
-        dashboard.connect()
-        token = wire.command("take_control", client="wire")["token"]
-        assert not dashboard.isInRemoteControl()
-        wire.command("simulation.inject", token=token, fault="protective_stop")
-        until(robot.isProtectiveStopped, wanted=True)
         assert dashboard.safetymode() == "Safetymode: PROTECTIVE_STOP"
-        with pytest.raises(AssertionError):  # somebody else has control
-            dashboard.unlockProtectiveStop()
-        wire.command("release_control", token=token)
         dashboard.unlockProtectiveStop()
-        until(robot.isProtectiveStopped, wanted=False)
-        assert dashboard.safetymode() == "Safetymode: NORMAL"
+    eventually(lambda: not seen.isProtectiveStopped())
+    assert arm.reuploadScript()
+    eventually(arm.isProgramRunning)
+    assert arm.moveJ(HOME, 1.0, 1.5)

@@ -3,6 +3,7 @@
 import socket
 import struct
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import msgpack
 import pytest
@@ -15,7 +16,9 @@ from tvist_controller.programs.compiling import PAPER, built_in
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_plant.description import load
+from tvist_server.ur_ports import WITHOUT_JOINTS, UrPorts
 
+SEVEN = Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf"
 BOOTED, TICK = 40.0, 0.002
 FAR = [0.6, -2.9, 0.3, -1.4, 0.2, 0.4]
 REALTIME_BYTES = 1220
@@ -29,8 +32,9 @@ def timestamps(ticks):
 class Connection:
     """A connection to one of a robot's ports."""
 
-    def __init__(self, host, port):
-        self.socket = socket.create_connection((host, port), PATIENCE)
+    def __init__(self, host, port, source=None):
+        address = None if source is None else (source, 0)
+        self.socket = socket.create_connection((host, port), PATIENCE, source_address=address)
         self._bytes = b""
 
     def __enter__(self):
@@ -67,8 +71,8 @@ class Connection:
         return said.decode().strip()
 
 
-def dashboard(host):
-    interface = Connection(host, 29999)
+def dashboard(host, source=None):
+    interface = Connection(host, 29999, source)
     assert interface.line().startswith("Connected")
     return interface
 
@@ -87,10 +91,6 @@ def rtde(host):
     return interface
 
 
-def samples(interface, count):
-    return [rtde_client.decoded(interface.package(">H"), READ) for _ in range(count)]
-
-
 def robot_states(interface, until):
     """Time [s] and measured angles of the robot states, to the first one at a time or after it."""
     found = []
@@ -104,19 +104,9 @@ def robot_states(interface, until):
 
 
 @contextmanager
-def lockstep(last, path):
-    with Served(
-        "--clock",
-        "lockstep",
-        "--profile",
-        "real",
-        "--start",
-        "Q1",
-        "--ur-address",
-        own_address(last),
-        "--record",
-        str(path),
-    ) as served:
+def lockstep(last, path, *options, start="Q1"):
+    how = ("--clock", "lockstep", "--profile", "real", "--start", start, "--ur-address", own_address(last))
+    with Served(*how, "--record", str(path), *options) as served:
         yield served, own_address(last)
 
 
@@ -172,7 +162,7 @@ def test_rtde_and_the_real_time_interface_have_every_tick_once_in_order_as_zenoh
                 stepper.step(clock, number)
             states = {state["tick"]: state for state in stepper.received["state"]}
             assert sorted(states) == list(range(1, ticks + 1))
-            received = samples(receive, ticks)
+            received = [rtde_client.decoded(receive.package(">H"), READ) for _ in range(ticks)]
             assert [sample["timestamp"] for sample in received] == timestamps(range(1, ticks + 1))
             for tick, sample in enumerate(received, 1):
                 for name in READ[1:]:
@@ -190,34 +180,30 @@ def test_rtde_and_the_real_time_interface_have_every_tick_once_in_order_as_zenoh
     replayed(tmp_path / "run.mcap")
 
 
-@pytest.mark.parametrize("port", [30001, 30002, 30011, 30012])
-def test_primary_and_secondary_tell_the_time_of_the_ticks_ten_times_a_second(port, ur_lockstep):
-    wire, clock, host, first = ur_lockstep
-    with Connection(host, port) as interface:
-        assert decoders.message(interface.package(">i")).values["name"] == "URControl"
-        wire.step(clock, 1000)
-        last = wire.received["state"][-1]["tick"]
-        of = {round(state["timestamp"], 3): state for state in wire.received["state"]}
-        found = robot_states(interface, BOOTED + last // 50 * 50 * TICK)
-        times = [round(time - BOOTED, 3) for time, _ in found]
-        # At once where the last tick is told again while no time passes, then at every fiftieth tick.
-        begun = round(times[0] / TICK)
-        assert first <= begun
-        assert times[1:] == [round(tick * TICK, 3) for tick in range((begun // 50 + 1) * 50, last + 1, 50)]
-        assert all(angles == of[time]["actual_q"] for time, (_, angles) in zip(times, found, strict=True))
-
-
-@pytest.fixture(scope="module")
-def ur_lockstep(tmp_path_factory):
-    """A stepper's session, its token, and the address of a robot that moves."""
-    with ExitStack() as stack:
-        path = tmp_path_factory.mktemp("recorded") / "run.mcap"
-        served, host = stack.enter_context(lockstep(2, path))
-        wire, mover = (stack.enter_context(Wire(served.endpoint)) for _ in range(2))
+def test_the_primary_interface_tells_the_time_of_the_ticks_ten_times_a_second(tmp_path):
+    with (
+        lockstep(2, tmp_path / "run.mcap") as (served, host),
+        Wire(served.endpoint) as wire,
+        Wire(served.endpoint) as mover,
+    ):
         wire.listen("state")
         clock, token = take_clock(wire), mover.command("take_control", client="mover")["token"]
         assert mover.command("move_j", token=token, q=FAR, velocity=0.2)["type"] == "accepted"
-        yield wire, clock, host, wire.step(clock, 10)["tick"]
+        first = wire.step(clock, 10)["tick"]
+        for port in (30001, 30012):
+            with Connection(host, port) as interface:
+                assert decoders.message(interface.package(">i")).values["name"] == "URControl"
+                wire.step(clock, 500)
+                last = wire.received["state"][-1]["tick"]
+                of = {round(state["timestamp"], 3): state for state in wire.received["state"]}
+                found = robot_states(interface, BOOTED + last // 50 * 50 * TICK)
+            times = [round(time - BOOTED, 3) for time, _ in found]
+            # At once where the last tick is told again while no time passes, then at every fiftieth tick.
+            begun = round(times[0] / TICK)
+            assert first <= begun
+            due = range((begun // 50 + 1) * 50, last + 1, 50)
+            assert times[1:] == [round(tick * TICK, 3) for tick in due]
+            assert all(angles == of[time]["actual_q"] for time, (_, angles) in zip(times, found, strict=True))
 
 
 def test_a_program_of_the_dashboard_reaches_its_end_within_one_step_of_another_client(tmp_path):
@@ -243,99 +229,120 @@ def test_a_program_of_the_dashboard_reaches_its_end_within_one_step_of_another_c
         while interface.ask("running") != "Program running: false":
             pass
         assert served.end() == 0
-    told = [entry for entry in replayed(tmp_path / "run.mcap").journal if entry.kind == "command"]
-    assert [entry.tick for entry in told if entry.message["type"] == "simulation.step"] == [1, 2]
-    assert [entry.tick for entry in told if entry.message["type"] == "program.play"] == [2]
-    assert "move_j" not in {
-        entry.message["type"] for entry in told
-    }  # a replay makes the program's moves again
+    journal = replayed(tmp_path / "run.mcap").journal
+    told = [(entry.tick, entry.message["type"]) for entry in journal if entry.kind == "command"]
+    assert [tick for tick, kind in told if kind == "simulation.step"] == [1, 2]
+    assert [tick for tick, kind in told if kind == "program.play"] == [2]
+    assert "move_j" not in {kind for _, kind in told}  # a replay makes the program's moves again
     started = [event["tick"] for event in stepper.received["event"] if event["kind"] == "motion_started"]
     assert started[0] == 2
     assert len(set(started)) == moves
 
 
-def test_the_dashboard_pauses_resumes_and_stops_within_a_step(tmp_path):
+def test_a_script_of_a_client_is_told_and_moves_the_arm_and_what_replaces_it_ends_it(tmp_path):
     with (
-        lockstep(4, tmp_path / "run.mcap") as (served, host),
+        lockstep(6, tmp_path / "run.mcap") as (served, host),
         Wire(served.endpoint) as stepper,
-        Wire(served.endpoint) as other,
-        dashboard(host) as interface,
+        Connection(host, 30001) as listener,
+        Connection(host, 30002) as sender,
     ):
-        clock = take_clock(stepper)
-        other.listen("state", "event")
-        stepper.step(clock, 1)
-        running(interface)
-        assert interface.ask(f"load {PAPER}") == f"Loading program: {PAPER}"
-        answers = begin_step(stepper, clock, 100_000)
-        other.until(10)  # what is asked now is asked within the step
-        assert interface.ask("play") == "Starting program"
-        other.wait("event", lambda event: event["kind"] == "motion_started")
-        assert interface.ask("pause") == "Pausing program"
-        assert interface.ask("programState") == f"PAUSED {PAPER}"
-        assert interface.ask("play") == "Starting program"
-        assert interface.ask("programState") == f"PLAYING {PAPER}"
-        assert interface.ask("stop") == "Stopped"
-        assert interface.ask("programState") == f"STOPPED {PAPER}"
-        assert answers.try_recv() is None
-        assert served.end() == 0
-    content = replayed(tmp_path / "run.mcap")
-    told = [(entry.tick, entry.message["type"]) for entry in content.journal if entry.kind == "command"]
-    within = [kind for tick, kind in told if 2 < tick < 100_000]
-    asked = [kind for kind in within if kind.startswith("program.")]
-    assert asked == [f"program.{command}" for command in ("play", "pause", "play", "stop")]
-    assert "simulation.step" not in within
 
+        def keys(count):
+            """The next key messages in short, without what comes between them."""
+            found = []
+            while len(found) < count:
+                package = listener.package(">i")
+                told = decoders.message(package) if package[4] == 20 else None
+                if told is not None and told.kind == 7:
+                    title = told.values["title"].removeprefix("PROGRAM_XXX_")
+                    found.append(f"{title} {told.values['text']}")
+            return found
 
-def test_the_going_of_the_stepping_client_ends_its_step_and_another_one_s_takes_the_program_to_its_end(
-    tmp_path,
-):
-    with lockstep(5, tmp_path / "run.mcap") as (served, host):
-        with Wire(served.endpoint) as other, dashboard(host) as interface:
-            other.listen("state", "event")
-            with Wire(served.endpoint) as stepper:
-                clock = take_clock(stepper)
-                stepper.step(clock, 1)
-                running(interface)
-                assert interface.ask("load Q2.urp") == "Loading program: Q2.urp"
-                assert interface.ask("play") == "Starting program"
-                begin_step(stepper, clock, 100_000)
-                other.until(100)
-            while (info := other.info())["stepper"] is not None:
-                pass
-            assert info["control"].startswith("ur-")
-            assert other.info()["tick"] == info["tick"] < 100_000
-            clock = other.command("take_clock", client="other")["token"]
-            other.step(clock, 3000)
-            other.wait("event", lambda event: event["kind"] == "motion_done")
-        assert served.end() == 0
-    journal = replayed(tmp_path / "run.mcap").journal
-    assert next(entry.client for entry in journal if entry.kind == "client_gone") == "stepper"
-
-
-def test_unmodified_clients_of_ur_rtde_live_by_the_steps_of_another_client(tmp_path):
-    pytest.importorskip("rtde_receive")
-    from tests.system.test_ur_clients import Client, until
-
-    path = tmp_path / "run.mcap"
-    with lockstep(6, path) as (served, host), Wire(served.endpoint) as stepper:
         clock = take_clock(stepper)
         stepper.step(clock, 1)
         begin_step(stepper, clock, 100_000)
-        with (
-            Client("rtde_receive", "RTDEReceiveInterface", host) as receive,
-            Client("rtde_io", "RTDEIOInterface", host) as setter,
-            Client("dashboard_client", "DashboardClient", host) as interface,
-        ):
-            interface.connect()
-            interface.loadURP(PAPER)
-            interface.play()
-            assert interface.running()
-            interface.stop()
-            until(interface.programState, f"STOPPED {PAPER}")
-            assert setter.setStandardDigitalOut(1, True)
-            until(lambda: receive.getDigitalOutState(1), wanted=True)
-            assert receive.isConnected()
-            assert served.end() == 0
-    told = [entry.message["type"] for entry in replayed(path).journal if entry.kind == "command"]
-    assert {"program.play", "program.stop", "set_io"} <= set(told)
-    assert told.count("simulation.step") == 2
+        sender.send(b"def one():\n  sleep(100)\nend\ndef two():\n  movej([0.1, -3, 0, -1.6, 0, 0])\nend\n")
+        assert keys(4) == ["STARTED one", "STOPPED one", "STARTED two", "STOPPED two"]
+        sender.send(b"def bad():\n  calldoesntexist()\nend\n")
+        served.wait_until_said("line 2, column 3: compile_error_name_not_found:calldoesntexist:")
+        assert served.end() == 0
+    content = replayed(tmp_path / "run.mcap")
+    (motion,) = (event for event in content.events if event.kind == "motion_done")
+    (state,) = (state for state in content.states if state.tick == motion.tick)
+    assert (state.unshaped_q or state.target_q) == pytest.approx([0.1, -3, 0, -1.6, 0, 0], abs=1e-6)
+
+
+INTERPRETED = """def main():
+  global n = 1
+  interpreter_mode(clearQueueOnEnter=False)
+  write_output_integer_register(2, n)
+end
+"""
+
+
+def test_statements_of_a_client_move_the_arm_what_is_skipped_does_nothing_and_a_replay_is_equal(tmp_path):
+    with (
+        lockstep(7, tmp_path / "run.mcap") as (served, host),
+        Wire(served.endpoint) as stepper,
+        Connection(host, 30003) as script,
+        Connection(host, 30020) as interpreter,
+    ):
+
+        def say(line):
+            """Send a line; the first word of its answer, and the number in it."""
+            kind, _, rest = interpreter.ask(line).partition(":")
+            return kind, int(rest.split(":")[0]) if rest.split(":")[0].strip().isdecimal() else None
+
+        clock = take_clock(stepper)
+        stepper.step(clock, 1)
+        begin_step(stepper, clock, 100_000)
+        stepper.listen("event")
+        script.send(INTERPRETED.encode())
+        while say("sync()")[0] == "discard":
+            pass
+        near, far = ([angle + offset for angle in FAR] for offset in (0.0, 0.3))
+        kind, number = say(f"def there(q): movej(q, a=3, v=2) n = n + 1 end there({near})")
+        assert (kind, number) == ("ack", 2)
+        while (say("statelastexecuted")[1] or 0) < number:
+            pass
+        say(f"movej({far}, a=0.1, v=0.01)")
+        stepper.wait("event", lambda event: event["kind"] == "motion_started" and event["id"] == 2)
+        say("write_output_integer_register(1, 99)")
+        say("skipbuffer")
+        say("abort")
+        say("end_interpreter()")
+        while stepper.info()["control"] is not None:
+            pass
+        assert served.end() == 0
+    content = replayed(tmp_path / "run.mcap")
+    started = [event for event in content.events if event.kind == "motion_started"]
+    assert len(started) == 2
+    assert any(event.kind == "motion_stopped" and event.id == started[1].id for event in content.events)
+    assert not [event for event in content.events if event.line is not None]
+
+
+def test_each_of_several_robots_has_interfaces_of_its_own_and_no_client_keeps_them_from_ending():
+    options = ("--robots", "ur5e*2", "--clock", "lockstep", "--ur", "--ur-address", own_address(8))
+    with Served(*options, name=None) as served, ExitStack() as stack:
+        first, second = (stack.enter_context(dashboard(own_address(last))) for last in (8, 9))
+        assert first.ask("get serial number") != second.ask("get serial number")
+        assert served.end() == 0
+
+
+def test_an_arm_with_seven_joints_has_the_dashboard_and_the_interpreter_alone():
+    limited = [interface for interface in UrPorts().open() if interface not in WITHOUT_JOINTS]
+    shut = [word for interface in limited for word in ("--ur-port", f"{interface}=off")]
+    arm = ("--robot", str(SEVEN), "--calibration", "none", "--clock", "lockstep", "--profile", "real")
+    options = (*arm, "--ur", "--ur-address", own_address(25))
+    with (
+        Served(*options, *shut, name="seven") as served,
+        Wire(served.endpoint, "seven") as wire,
+        dashboard(own_address(25)) as interface,
+    ):
+        clock = take_clock(wire)
+        wire.step(clock, 5)
+        running(interface)
+        assert interface.ask("load Q2.urp") == "Loading program: Q2.urp"
+        assert interface.ask("play") == "Starting program"
+        state = wire.step(clock, 5000)
+        assert state["actual_q"] == pytest.approx([0.5] * 7, abs=0.01)

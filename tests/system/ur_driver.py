@@ -71,9 +71,7 @@ def jump(stream):
 
 
 MANNERS = {
-    "ends": lambda stream: stream.shutdown(socket.SHUT_RDWR),
     "cut": cut,
-    "killed": lambda _: os.kill(os.getpid(), signal.SIGKILL),
     "frozen": lambda _: os.kill(os.getpid(), signal.SIGSTOP),
     "torn": lambda stream: (stream.sendall(b"\1\2\3\4\5"), time.sleep(1.0)),
     "absurd": lambda stream: (stream.sendall(struct.pack(">6i", *[2**31 - 1] * 6)), time.sleep(0.5)),

@@ -17,8 +17,8 @@ def started(program, *arguments):
 class Client:
     """An object of ur-rtde: has its methods. What it raises is an AssertionError."""
 
-    def __init__(self, module, kind, host):
-        self.process = started("ur_caller.py", module, kind, host)
+    def __init__(self, module, kind, host, *numbers):
+        self.process = started("ur_caller.py", module, kind, host, *numbers)
 
     def __enter__(self):
         try:

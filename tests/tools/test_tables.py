@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_the_published_page_of_robustness_is_that_of_its_published_result():
-    result = json.loads((ROOT / "docs/reference/robustness.json").read_text(encoding="utf-8"))
+    result = json.loads((ROOT / "docs/results/robustness.json").read_text(encoding="utf-8"))
     assert result["command"] == PAGES["robustness"].command
     assert page_of("robustness", result) == (ROOT / PAGES["robustness"].path).read_text(encoding="utf-8")
 

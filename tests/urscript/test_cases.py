@@ -5,11 +5,16 @@ A table of a file of `cases/` is a subject, each of its entries a case: `prog` i
 """
 
 import tomllib
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
-from .dry_run import dry_run
+from tvist_urscript.compiler import compile_script
+from tvist_urscript.errors import ScriptError
+from tvist_urscript.machine import Machine
+
+from .dry_functions import Memory
 
 CASES = [
     pytest.param(case, id=f"{path.stem}, {subject}: {name}")
@@ -19,6 +24,42 @@ CASES = [
 ]
 KNOWN = {"prog", "script", "says", "error", "ticks", "inputs", "calls"}
 REGISTERS = {"int_registers": "int", "double_registers": "double", "bit_registers": "bit"}
+
+
+BUDGET = 20_000
+"""Evaluations of a tick: many more than beside a robot, as nothing else has to run in it."""
+LONGEST_RUN = 2_000
+"""Ticks after which a run is given up."""
+
+
+@dataclass
+class DryRun:
+    """What a script has done without a robot."""
+
+    memory: Memory = field(default_factory=Memory)
+    ticks: int = 0
+    ended: bool = False
+    error: ScriptError | None = None
+
+
+def dry_run(text, inputs):
+    """Run a script; `inputs` are the contents of the input registers from 0 on, by kind."""
+    run = DryRun()
+    for kind, values in (inputs or {}).items():
+        run.memory.inputs[kind].update(enumerate(values))
+    table = run.memory.functions()
+    try:
+        script = compile_script(text, {name: entry[0] for name, entry in table.items()})
+        machine = Machine(script, {name: entry[1] for name, entry in table.items()})
+        while machine.running and run.ticks < LONGEST_RUN:
+            run.ticks += 1
+            machine.resume(BUDGET)
+    except ScriptError as error:
+        run.error = error
+        return run
+    run.ended = not machine.running
+    machine.end()
+    return run
 
 
 def script_of(case):

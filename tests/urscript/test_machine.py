@@ -1,24 +1,17 @@
 """The machine: ticks, budget, threads, critical sections, and what its user gives it."""
 
-from collections.abc import Generator
-
 import pytest
 
 from tvist_urscript import (
     EVALUATIONS,
     Fault,
     Machine,
-    Pose,
     ScriptError,
     Signature,
     compile_script,
-    costs,
     parameters,
-    signature,
-    signatures,
     to_str,
 )
-from tvist_urscript.expressions import START
 from tvist_urscript.machine import OVERDRAFT, PATIENCE
 from tvist_urscript.statements import PIECE
 from tvist_urscript.threads import MOST_THREADS
@@ -88,18 +81,6 @@ def test_a_fault_gets_the_position_of_its_call():
     assert not robot.machine.running
 
 
-def test_a_fault_after_some_ticks_has_the_position_of_its_call_too():
-    def failing():
-        yield
-        raise Fault("later")
-
-    script = compile_script("x = 1 +\n  wait()", {"wait": Signature((), blocks=True)})
-    machine = Machine(script, {"wait": failing})
-    machine.resume()
-    with pytest.raises(ScriptError, match="line 2, column 3: later"):
-        machine.resume()
-
-
 def test_the_end_of_a_machine_reaches_the_functions_that_wait():
     robot = Robot("thread t():\n move(1)\nend\nrun t()\nmove(2)")
     robot.ticks(2)
@@ -146,28 +127,6 @@ def test_any_exception_of_a_built_in_is_an_error_at_its_call(kind):
     assert not machine.running
 
 
-def test_all_threads_end_where_one_fails_at_its_end():
-    closed = []
-
-    def hold(value):
-        try:
-            yield
-        finally:
-            closed.append(value)
-            raise KeyError(value)
-
-    script = compile_script(
-        "def p():\nthread t():\n hold(1)\nend\nrun t()\nhold(2)\nend",
-        {"hold": Signature(parameters("v"), blocks=True)},
-    )
-    machine = Machine(script, {"hold": hold})
-    machine.resume()
-    with pytest.raises(ScriptError, match="line 3, column 2: internal error: KeyError"):
-        machine.end()
-    assert sorted(closed) == [1, 2]
-    assert not machine.running
-
-
 def test_a_thread_finishes_before_it_waits_for_another():
     order = []
 
@@ -187,31 +146,6 @@ def test_a_thread_finishes_before_it_waits_for_another():
         assert order[0] == ("finish", 0), waiting
 
 
-def test_a_join_of_a_thread_that_has_ended_does_not_finish():
-    finished = []
-
-    def finish():
-        finished.append(robot.machine.thread)
-        yield
-
-    robot = Robot("thread t():\nend\nh = run t()\nsync()\nsync()\njoin h\nsync()\nsync()", finish=finish)
-    robot.ticks(4)
-    assert finished == [1]
-
-
-def test_a_thread_that_restarts_itself_keeps_nothing():
-    robot = Robot("thread t():\n run t()\nend\nrun t()\nwhile True:\n sync()\nend")
-    starts = []
-    for _ in range(50):
-        before = robot.machine._started
-        robot.ticks(1)
-        starts.append(robot.machine._started - before)
-        assert len(robot.machine.living) <= 3
-    assert 1 <= max(starts) <= EVALUATIONS // START
-    youngest = robot.machine._threads[-1]
-    assert youngest.parent is None or youngest.parent.number == 0
-
-
 def test_kill_reaches_threads_whose_parent_has_ended():
     robot = Robot(
         "thread c():\n move(7)\nend\nthread b():\n run c()\nend\nthread a():\n run b()\n move(1)\nend\n"
@@ -220,11 +154,6 @@ def test_kill_reaches_threads_whose_parent_has_ended():
     robot.ticks(2)
     assert sorted(robot.closed) == [1, 7]
     assert robot.machine.living == [0]
-
-
-def test_a_function_that_is_not_given_is_told_at_once():
-    with pytest.raises(ValueError, match="say"):
-        Machine(compile_script("say(1)", SIGNATURES), {})
 
 
 def test_each_thread_finishes_before_it_ends_but_no_killed_one():
@@ -247,32 +176,6 @@ def test_each_thread_finishes_before_it_ends_but_no_killed_one():
     assert not robot.machine.running
 
 
-def test_halt_does_not_finish():
-    def finish():
-        pytest.fail("halt is no regular end")
-        yield
-
-    robot = Robot("halt", finish=finish)
-    robot.ticks(1)
-    assert not robot.machine.running
-
-
-def test_the_number_of_the_running_thread_is_known():
-    numbers = []
-    script = compile_script(
-        "def program():\nthread t():\n note()\n sync()\n note()\nend\nnote()\nrun t()\nrun t()\nsync()\nsync()\nend",
-        {"note": Signature(()), "sync": Signature((), blocks=True)},
-    )
-
-    def sync():
-        yield
-
-    machine = Machine(script, {"note": lambda: numbers.append(machine.thread), "sync": sync})
-    for _ in range(3):
-        machine.resume()
-    assert numbers == [0, 1, 2, 1, 2]
-
-
 def test_the_line_of_the_main_thread_is_known():
     robot = Robot("def f():\n  sync()\n  sync()\nend\n\nf()\nsync()")
     lines = []
@@ -280,20 +183,6 @@ def test_the_line_of_the_main_thread_is_known():
         robot.ticks(1)
         lines.append(robot.machine.line)
     assert lines == [2, 3, 7]
-
-
-def test_a_script_runs_on_several_machines():
-    script = compile_script("x = 0\nwhile True:\n  x = x + 1\n  say(x)\n  sync()\nend", SIGNATURES)
-    said = [], []
-
-    def sync():
-        yield
-
-    machines = [Machine(script, {"say": own.append, "sync": sync}) for own in said]
-    for count, machine in zip((2, 5), machines, strict=True):
-        for _ in range(count):
-            machine.resume()
-    assert said == ([1, 2], [1, 2, 3, 4, 5])
 
 
 LOOP = "i = 0\nwhile i < 300:\n  i = i + 1\nend\nsay(i)"
@@ -352,20 +241,6 @@ def test_a_long_computation_goes_on_over_ticks_none_of_which_does_more_than_its_
     assert min(left) > -PIECE
 
 
-def test_evaluations_count_for_each_thread_alone_and_anew_after_each_wait():
-    robot = Robot("thread t():\n  while True:\n    sync()\n  end\nend\nrun t()\nwhile True:\n  x = 1\nend")
-    robot.ticks(PATIENCE // EVALUATIONS)
-    assert robot.machine.running
-    with pytest.raises(ScriptError, match="endless loop"):
-        robot.ticks(PATIENCE // EVALUATIONS // 50)
-
-
-def test_a_loop_that_waits_may_run_for_ever():
-    robot = Robot("while True:\n  i = 0\n  while i < 300:\n    i = i + 1\n  end\n  sync()\nend")
-    robot.ticks(2 * PATIENCE // EVALUATIONS)
-    assert robot.machine.running
-
-
 def test_an_endless_recursion_of_threads_is_an_error():
     robot = Robot("thread t():\n run t()\n run t()\n sync()\nend\nrun t()\nwhile True:\n sync()\nend")
     with pytest.raises(ScriptError, match=f"at most {MOST_THREADS} threads"):
@@ -379,16 +254,6 @@ def test_work_on_long_lists_counts_by_their_length():
         robot = Robot(prepared + work)
         robot.ticks(1, budget=10_000)
         assert robot.machine.left <= alone - 900, work
-
-
-def test_many_statements_that_work_on_lists_take_their_ticks():
-    robot = Robot("a = make_list(1000, 1)\n" + "a = a + a\n" * 30 + "say(a[0])")
-    ticks = 0
-    while robot.machine.running:
-        robot.ticks(1)
-        assert robot.machine.left >= -1200
-        ticks += 1
-    assert ticks >= 15
 
 
 def test_one_statement_cannot_work_on_lists_for_long():
@@ -405,43 +270,6 @@ def test_a_spent_thread_keeps_its_critical_section_and_a_waiting_one_gives_it_up
     )
     robot.ticks(20, budget=100)
     assert robot.said == ["1", "2", "3"]
-
-
-def test_values_of_functions_can_be_lists_and_poses():
-    script = compile_script(
-        "a = read()\na[0] = 5\nsay(a)\nsay(read())", {**SIGNATURES, "read": Signature(())}
-    )
-    said = []
-    Machine(script, {"say": lambda v: said.append(to_str(v)), "read": lambda: Pose(range(6))}).resume()
-    assert said == ["p[5, 1, 2, 3, 4, 5]", "p[0, 1, 2, 3, 4, 5]"]
-
-
-class Functions:
-    """A class of functions that scripts may call."""
-
-    @costs(180)
-    def movej(
-        self, q: object, a: object = 1.4, name: object = "x", on: object = True
-    ) -> Generator[None, None, object]:
-        yield
-        return q, a, name, on
-
-    def read(self):
-        return 0
-
-    def wait(self):
-        yield
-
-    def _private(self):
-        pass
-
-
-def test_a_signature_is_that_of_the_method():
-    known = signatures(Functions)
-    assert list(known) == ["movej", "read", "wait"]
-    assert known["movej"] == Signature(parameters("q", a=1.4, name="x", on=True), blocks=True, cost=180)
-    assert known["movej"] == signature(Functions().movej)
-    assert (known["movej"].required, known["read"].blocks, known["wait"].blocks) == (1, False, True)
 
 
 def test_arguments_are_computed_in_the_order_of_the_text():

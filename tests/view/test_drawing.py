@@ -23,7 +23,7 @@ from tvist_view.track import Shown, Track
 from .browser import browser
 
 SEVEN = "tests/plant/urdf/seven.urdf"
-ARMS = ("one-joint", "ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30", SEVEN)
+ARMS = ("one-joint", "ur5e", SEVEN)
 UR5E = load("ur5e")
 
 

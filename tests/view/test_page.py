@@ -182,6 +182,7 @@ def in_sight(page):
     assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", SIZES)
 def test_the_first_screen_has_the_arm_the_state_stop_and_a_plot(chromium, view, name):
     width, height = SIZES[name]
@@ -194,6 +195,7 @@ def test_the_first_screen_has_the_arm_the_state_stop_and_a_plot(chromium, view, 
     page.close()
 
 
+@pytest.mark.nightly
 def test_a_b_makes_the_motion_twice_and_says_what_log_analyze_says(tmp_path, chromium):
     file = tmp_path / "ab.mcap"
     with (
@@ -229,6 +231,7 @@ def test_of_several_robots_one_is_picked(chromium):
         page.close()
 
 
+@pytest.mark.nightly
 def test_where_there_is_no_robot_the_page_and_the_terminal_say_so_and_wait(chromium):
     endpoint = free_endpoint()
     with Page(endpoint) as view:

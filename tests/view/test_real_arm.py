@@ -71,6 +71,7 @@ def test_the_cap_and_why_it_is_not_held_are_said(info):
     assert "0.5 rad/s" in steps[2][1]
 
 
+@pytest.mark.nightly
 @pytest.mark.realtime
 def test_the_page_leads_and_offers_nothing_that_does_nothing():
     host, endpoint = own_address(73), free_endpoint()

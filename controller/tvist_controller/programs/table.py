@@ -1,4 +1,4 @@
-"""`python -m tvist_controller.programs.table`: prints docs/reference/urscript-functions.md."""
+"""`python -m tvist_controller.programs.table`: prints docs/reference/generated/urscript-functions.md."""
 
 from collections.abc import Sequence
 from inspect import getdoc
@@ -7,25 +7,27 @@ from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import FAMILIES, known_signatures
 from tvist_urscript import METHOD, REQUIRED, Signature, signatures
 
-HEAD = """# Functions of programs
+HEAD = """# URScript functions
 
-For whoever writes programs in URScript: what they can call, besides [the functions of the language](urscript.md).
-Made by `python -m tvist_controller.programs.table > docs/reference/urscript-functions.md`. Lengths are metres, angles
-radians, times seconds; poses are of the tool centre point in the base frame. Parameters with a default may be left out,
-and any may be given by name. A function that *waits* lets time pass; all others return in the same tick. Bad arguments
-end the program with an error at the place of the call.
+The functions that programs can call, besides [those of the language](../urscript.md#3-functions). Printed by
+`python -m tvist_controller.programs.table`.
 
-A move with a radius (`r`) is blended into the next one. The call then returns at once, and the program runs on to that
-next move; what it writes to outputs, registers and the log on the way is done when the arm begins the blend. What it
-reads is of the present. A function that waits ends the path: the arm then stops at the point of the last move.
+- Units are metres, radians and seconds. Poses are those of the tool centre point in the base frame.
+- Parameters with a default may be left out; any parameter may be given by name.
+- A function that *waits* lets time pass. All others return in the same tick.
+- A bad argument ends the program with an error at the position of the call.
+- A move with a radius `r` is blended into the next move. The call returns at once, and the program runs on to that
+  next move. Outputs, registers and log texts that it writes on the way take effect when the arm begins the blend;
+  values that it reads are those of the present. A function that waits ends the path: the arm stops at the target of the
+  last move.
 """
-COSTS = """Evaluations that a call takes from [the budget](urscript.md#5-threads), in proportion to its time; all others
-take one. Inverse kinematics takes 900 more where a joint is free, since it then searches a curve of postures, or where
-an arm has no closed form."""
+COSTS = """Evaluations that a call takes from [the budget](../urscript.md#5-threads). All other functions take one.
+Inverse kinematics takes 900 more for an arm without a closed form, or with a free joint, for which it searches a curve
+of postures."""
 
 
 def page() -> str:
-    """Return the page of reference that lists all functions."""
+    """Return the reference page of all functions."""
     parts = [HEAD]
     for functions in FAMILIES:
         rows = [
@@ -48,14 +50,13 @@ def page() -> str:
         if name != METHOD
     ]
     parts.append(
-        "## Not simulated\n\nThese, and methods such as `handle.call()`, end the program with an error that says so."
+        "## Not simulated\n\nThese, and methods such as `handle.call()`, end the program with an error that names them."
         f"\n\n{_table(('function', 'subject'), missing)}\n"
     )
     return "\n".join(parts)
 
 
 def _call(name: str, one: Signature) -> str:
-    """A call with its parameters and their defaults."""
     parameters = [
         parameter.name if parameter.default is REQUIRED else f"{parameter.name}={_shown(parameter.default)}"
         for parameter in one.parameters
@@ -68,7 +69,6 @@ def _shown(value: object) -> str:
 
 
 def _what(functions: type, name: str) -> str:
-    """First paragraph of a function's description."""
     text = getdoc(getattr(functions, name)) or ""
     return " ".join(text.partition("\n\n")[0].split())
 

@@ -239,6 +239,7 @@ def attack(house, interface, random, packages):
     last.session.receive(b"stop\n")
     last.go()
     house.answer()
+    house.kinds.clear()  # the desk's own list, which would count as memory that is lost
 
 
 @pytest.mark.parametrize(

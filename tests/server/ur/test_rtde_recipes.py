@@ -18,7 +18,7 @@ from tvist_server.rtde.wire import Wire
 
 from . import rtde_client as client
 
-PAGE = Path(__file__).parents[3] / "docs" / "reference" / "rtde-variables.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "generated" / "rtde-variables.md"
 names_of_outputs = st.lists(st.sampled_from(sorted(client.OUTPUT_TYPES)), min_size=1, max_size=60)
 NUMBERS = {
     "BOOL": st.booleans(),

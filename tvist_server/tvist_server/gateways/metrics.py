@@ -1,4 +1,7 @@
-"""Figures of the robots for Prometheus, over HTTP; they can be read and nothing can be changed."""
+"""Prometheus figures of the robots over HTTP, read-only.
+
+`python -m tvist_server.gateways.metrics > docs/reference/generated/metrics.md` writes the page that lists them.
+"""
 
 import contextlib
 import socket
@@ -14,17 +17,14 @@ if TYPE_CHECKING:
     from prometheus_client.metrics_core import Metric
     from prometheus_client.registry import Collector
 else:
-    Collector = object  # the library is imported when figures are asked for
+    Collector = object  # the library is imported when figures are requested
 
 LABELS = ("namespace", "robot")
 MICRO = 1e-6
 
 
 class MetricsGateway(Gateway):
-    """Keeps a robot's newest messages for whoever asks; it takes no input.
-
-    `newest` returns the robot's newest state when somebody asks, from any thread.
-    """
+    """Keeps a robot's newest messages for Prometheus; `newest` returns the newest state, from any thread."""
 
     setpoints_refused = 0
     takes: Collection[Topic] = frozenset[Topic]({"event", "telemetry"})
@@ -33,13 +33,11 @@ class MetricsGateway(Gateway):
         self.labels = (namespace, robot)
         self._newest = newest
         self.state: State | None = None
-        """Newest state."""
         self.telemetry: Telemetry | None = None
-        """Newest telemetry."""
         self.events: Counter[str] = Counter()
-        """Number of events of each kind."""
+        """Number of events by kind."""
         self.warnings: Counter[str] = Counter()
-        """Number of warnings of each code; empty for those that have none."""
+        """Number of warnings by code; empty: no code."""
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
         if isinstance(message, Telemetry):
@@ -48,13 +46,12 @@ class MetricsGateway(Gateway):
             self.count(message)
 
     def count(self, event: Event) -> None:
-        """Count an event."""
         self.events[event.kind] += 1
         if event.kind == "warning":
             self.warnings[event.code or ""] += 1
 
     def look(self) -> None:
-        """Take the newest state; before the figures are read."""
+        """Fetch the newest state, before the figures are read."""
         self.state = self._newest() or self.state
 
     def close(self) -> None:
@@ -62,11 +59,7 @@ class MetricsGateway(Gateway):
 
 
 class Metrics(Collector):
-    """An HTTP server for Prometheus; `collect` computes the figures when somebody asks. Port 0 takes any.
-
-    Raises:
-        GatewayError: The server cannot listen there, or prometheus_client is not installed.
-    """
+    """HTTP server for Prometheus, which computes figures on request; GatewayError if it cannot listen at `address`."""
 
     def __init__(self, address: str) -> None:
         host, port = place(address)
@@ -84,35 +77,39 @@ class Metrics(Collector):
         except (OSError, socket.gaierror) as error:
             raise GatewayError(f"cannot publish metrics on {address}: {error.strerror or error}") from error
         self.page = f"http://{f'[{host}]' if ':' in host else host}:{self._server.server_port}/metrics"
-        """Address of the page with the figures."""
+        """URL of the page with the figures."""
 
     def gateway(self, namespace: str, robot: str, newest: Callable[[], State | None]) -> MetricsGateway:
-        """Create the gateway of a robot; arguments as for the gateway."""
+        """Create the gateway of a robot; arguments as for `MetricsGateway`."""
         gateway = MetricsGateway(namespace, robot, newest)
         self.add(gateway)
         return gateway
 
     def add(self, gateway: MetricsGateway) -> None:
-        """Publish the figures of one more robot."""
         self._robots.append(gateway)
 
     def close(self) -> None:
-        """Stop publishing the page."""
         with contextlib.suppress(OSError):
             self._server.shutdown()
             self._server.server_close()
 
     def collect(self) -> "Iterator[Metric]":
-        """Yield the figures of all robots; robots that have sent no telemetry yet have only those of their states."""
+        """Yield the figures of all robots; a robot without telemetry has only those of its state."""
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
         for robot in self._robots:
             robot.look()
         states = [(robot.labels, robot.state) for robot in self._robots if robot.state is not None]
         told = [(robot.labels, robot.telemetry) for robot in self._robots if robot.telemetry is not None]
-        ticks = CounterMetricFamily("tvist_ticks", "Control periods since the start.", labels=LABELS)
-        robot_mode = GaugeMetricFamily("tvist_robot_mode", "Robot mode, as RTDE numbers it.", labels=LABELS)
-        safety = GaugeMetricFamily("tvist_safety_mode", "Safety mode, as RTDE numbers it.", labels=LABELS)
+        ticks = CounterMetricFamily(
+            "tvist_ticks", "Control periods begun. If it stands still, the robot does.", labels=LABELS
+        )
+        robot_mode = GaugeMetricFamily(
+            "tvist_robot_mode", "Robot mode as in RTDE: 7 is RUNNING.", labels=LABELS
+        )
+        safety = GaugeMetricFamily(
+            "tvist_safety_mode", "Safety mode as in RTDE: 1 is NORMAL, 3 is PROTECTIVE_STOP.", labels=LABELS
+        )
         for labels, state in states:
             ticks.add_metric(labels, state.tick)
             robot_mode.add_metric(labels, state.robot_mode)
@@ -120,7 +117,7 @@ class Metrics(Collector):
         yield from (ticks, robot_mode, safety)
         late = GaugeMetricFamily(
             "tvist_tick_lateness_seconds",
-            "Lateness of ticks in the last second.",
+            "Lateness of the ticks of the last second, by `quantile`: 0.5, 0.99, and 1 for the largest.",
             labels=(*LABELS, "quantile"),
         )
         for labels, telemetry in told:
@@ -139,11 +136,13 @@ class Metrics(Collector):
                 for labels, value in [one for one in values if one[1] is not None]:
                     family.add_metric(labels, value)
                 yield family
-        yield self._counted("tvist_events", "Events of each kind.", "kind")
-        yield self._counted("tvist_warnings", "Warnings of each code.", "code")
+        yield self._counted("tvist_events", "Events, by `kind`.", "kind")
+        yield self._counted(
+            "tvist_warnings", "Warnings, by `code`, which is empty for those without one.", "code"
+        )
 
     def _counted(self, name: str, what: str, label: str) -> "Metric":
-        """Return how many events or warnings there were of each kind or code."""
+        """Return the number of events or warnings for each kind or code."""
         from prometheus_client.core import CounterMetricFamily
 
         family = CounterMetricFamily(name, what, labels=(*LABELS, label))
@@ -155,40 +154,87 @@ class Metrics(Collector):
 
 
 GAUGES = (
-    ("tvist_ticks_per_second", "Control periods begun in the last second.", "ticks_per_second"),
-    ("tvist_load_ratio", "Share of the last second that ticks of this robot took.", "load"),
-    ("tvist_overloaded", "1 if the robot is overloaded, or 0.", "overloaded"),
+    (
+        "tvist_ticks_per_second",
+        "Control periods begun in the last second: 500 at full rate.",
+        "ticks_per_second",
+    ),
+    (
+        "tvist_load_ratio",
+        "Share of the last second that the ticks of this robot took; missing in lockstep.",
+        "load",
+    ),
+    ("tvist_overloaded", "1 while the robot is overloaded, otherwise 0.", "overloaded"),
 )
 """Gauges of the telemetry: name, meaning, field."""
 COUNTERS = (
-    ("tvist_due_ticks", "Control periods that were due: those begun, and those left out.", "due_ticks"),
+    (
+        "tvist_due_ticks",
+        "Control periods that were due: those begun and those left out; missing in lockstep.",
+        "due_ticks",
+    ),
     (
         "tvist_missed_ticks",
-        "Of these, those that began a period late or more, or were left out.",
+        "Of the due control periods, those that began a period late or more, or were left out.",
         "missed_ticks",
     ),
     ("tvist_commands", "Commands received.", "commands"),
     ("tvist_commands_refused", "Commands refused.", "refused"),
     ("tvist_setpoints_received", "Set-points received.", "setpoints_received"),
-    ("tvist_setpoints_refused", "Set-points of no stream, or that are no posture.", "setpoints_refused"),
-    ("tvist_setpoints_late", "Set-points dropped since a newer one was played.", "setpoints_late"),
-    ("tvist_setpoints_lost", "Set-points that had not come when their turn came.", "setpoints_lost"),
-    ("tvist_setpoints_limited", "Set-points that exceeded a limit.", "setpoints_limited"),
-    ("tvist_states_dropped", "States that the network could not take in time.", "dropped_states"),
-    ("tvist_recorder_dropped", "Messages that the recorder had no room for.", "recorder_dropped"),
+    (
+        "tvist_setpoints_refused",
+        "Set-points that belonged to no stream or were no posture of the arm.",
+        "setpoints_refused",
+    ),
+    ("tvist_setpoints_late", "Set-points dropped because a newer one had been played.", "setpoints_late"),
+    ("tvist_setpoints_lost", "Set-points that had not arrived when they were due.", "setpoints_lost"),
+    ("tvist_setpoints_limited", "Set-points that exceeded a limit and were limited.", "setpoints_limited"),
+    (
+        "tvist_states_dropped",
+        "States dropped because the network did not take them in time.",
+        "dropped_states",
+    ),
+    ("tvist_recorder_dropped", "Messages dropped because the recorder's queue was full.", "recorder_dropped"),
 )
 """Counters of the telemetry: name, meaning, field."""
 
 
 def place(address: str) -> tuple[str, int]:
-    """Split `ADDRESS:PORT`; without an address it is the loopback interface.
-
-    Raises:
-        GatewayError: It is neither.
-    """
+    """Split `ADDRESS:PORT`, or `PORT` of the loopback interface; raise GatewayError if it is neither."""
     host, _, port = address.rpartition(":")
     if not (port.isascii() and port.isdigit() and len(port) < 6 and int(port) < 65536):
         raise GatewayError(
             f"metrics is {address!r}: must be ADDRESS:PORT, or PORT for 127.0.0.1, such as 9447"
         )
     return host.removeprefix("[").removesuffix("]") or "127.0.0.1", int(port)
+
+
+PAGE = """\
+# Metrics
+
+`tvist serve --metrics 9447` publishes these figures for Prometheus on `http://127.0.0.1:9447/metrics`. With an address,
+as in `--metrics 0.0.0.0:9447`, other machines can read them, too. The page is not encrypted; nothing can be changed
+through it.
+
+Each figure has the labels `namespace`, which may be empty, and `robot`. Counters count from the start of the server.
+The number of ticks and the modes are read when you ask, events and warnings are counted as they occur, and all others
+change once a second. [Operate many robots](../../how-to/operate-many-robots.md#what-the-words-mean) says what *due*,
+*missed*, *load* and *overloaded* mean. This page is made by `python -m tvist_server.gateways.metrics`.
+
+| figure | type | meaning |
+|---|---|---|
+"""
+
+
+def page() -> str:
+    """Return the reference page that lists all figures."""
+    metrics = Metrics("0")
+    families = list(metrics.collect())
+    metrics.close()
+    names = (f"{one.name}_total" if one.type == "counter" else one.name for one in families)
+    rows = zip(names, families, strict=True)
+    return PAGE + "".join(f"| `{name}` | {one.type} | {one.documentation} |\n" for name, one in rows)
+
+
+if __name__ == "__main__":
+    print(page(), end="")  # noqa: T201  its purpose

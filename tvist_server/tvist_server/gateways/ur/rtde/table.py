@@ -1,4 +1,4 @@
-"""`python -m tvist_server.gateways.ur.rtde.table`: prints docs/reference/rtde-variables.md."""
+"""`python -m tvist_server.gateways.ur.rtde.table`: prints docs/reference/generated/rtde-variables.md."""
 
 from collections.abc import Iterable
 
@@ -7,24 +7,23 @@ from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
 from tvist_server.rtde.wire import Wire
 
 HEAD = """\
-# RTDE's variables
+# RTDE variables
 
-For whoever reads or writes variables of RTDE, and asks where a value comes from. Nothing here was measured on a robot.
-Made by `python -m tvist_server.gateways.ur.rtde.table > docs/reference/rtde-variables.md`. Each output has one of four
-sources:
+All variables of RTDE, and where their values come from. Printed by `python -m tvist_server.gateways.ur.rtde.table`.
+An output has one of four sources:
 
-- **state**: the value that every client gets in [`state`](../../protocol/README.md#state), equal to the last bit;
-- **io**: terminals, registers and the setup of the tool;
-- **computed**: computed from state and io, as the last column says, when a client asks for it;
-- **constant**: takes the place of something that is not simulated.
+- **state**: the value in [`state`](protocol.md#state) at the same tick, equal to the last bit;
+- **io**: terminals, registers, payload and tool centre point;
+- **computed**: computed from state and io, as the last column describes;
+- **constant**: stands in for something that is not simulated.
 
-Torque constants, resistances and thermal parameters of the motors are guesses of the right size for a UR5e, which has
-two sizes of joint: 10 and 7.9 N m/A on the joint's side. Temperatures and energies are integrated from the first tick
-on, even if no client reads them.
+No value was measured on a robot. Torque constants, resistances and thermal parameters of the motors are estimates for
+the two joint sizes of a UR5e (10 and 7.9 N m/A on the joint's side). Temperatures and energies are integrated from the
+first tick on, even if no client reads them.
 
-Vectors of joints have six entries: an arm with fewer joints has zeros in the rest, and one with more
-[has no RTDE](../how-to/connect-ur-clients.md#arms-with-more-than-six-joints).
-All variables are offered, including those that a controller of the reported version would not have yet.
+Joint vectors have six entries. An arm with fewer joints fills the rest with zeros; an arm with more
+[has no RTDE](../../how-to/connect-ur-clients.md#arms-with-more-than-six-joints). All variables are offered, including
+those that software of the reported version does not have yet.
 """
 REGISTER_ROWS = (
     ("{bank}_bit_registers0_to_31", Wire.UINT32, "bits 0–31"),
@@ -36,7 +35,7 @@ REGISTER_ROWS = (
 
 
 def page() -> str:
-    """Return the page of reference that lists all variables."""
+    """Return the reference page that lists all variables."""
     outputs = _table(("variable", "type", "source", "what"), _outputs())
     inputs = _table(("variable", "type", "what"), _inputs())
     return f"""{HEAD}
@@ -46,16 +45,16 @@ def page() -> str:
 
 ## Inputs
 
-A variable belongs to the first connection that asked for it until that connection is closed; for all others it is
-`IN_USE`. The speed slider and the outputs are also `IN_USE` while another client has control. A value is passed on only
-if it has changed.
+A variable belongs to the first connection that requests it, until that connection is closed; all others get `IN_USE`.
+The speed slider and the outputs are also `IN_USE` while another client has control. A value takes effect only if it has
+changed.
 
 {inputs}
 """
 
 
 def describe(name: str) -> str:
-    """Return what an output variable is; an empty text if there is none of this name."""
+    """Return the description of an output variable; empty if there is none of this name."""
     return VARIABLES[name].what if name in VARIABLES else ""
 
 

@@ -1,0 +1,45 @@
+"""The golden messages of the protocol, and recordings that are made of them."""
+
+import random
+
+import msgspec
+
+from tvist_protocol import Info, Io, State, Truth
+from tvist_protocol.generate import FOLDER
+from tvist_protocol.recorded import topics
+from tvist_server.recording.writer import RecordingWriter, heading
+
+
+def golden(kind):
+    path = FOLDER / "fixtures" / "v1" / f"{kind.__name__.lower()}.json"
+    return msgspec.json.decode(path.read_bytes(), type=kind)
+
+
+INFO, STATE, TRUTH, IO = map(golden, (Info, State, Truth, Io))
+START = {"seed": 3, "q": [0.1 + 0.2, -0.0, 5e-324, 1e300]}
+HARD_FLOATS = [5e-324, -0.0, 0.1 + 0.2, 1e300, -1e-300, 2.0**53 + 2]
+
+
+def changed(message, **fields):
+    return msgspec.structs.replace(message, **fields)
+
+
+def states(count):
+    """States with random angles."""
+    noise = random.Random(0)
+    for tick in range(1, count + 1):
+        q = [noise.gauss(0.0, 1.0) for _ in range(6)]
+        yield changed(
+            STATE, tick=tick, timestamp=tick * 0.002, setpoint_sequence=None, actual_q=q, target_q=q[::-1]
+        )
+
+
+def record(path, messages, *, finish=True, dropped=None):
+    """Write messages as the server does."""
+    with path.open("wb") as stream:
+        writer = RecordingWriter(stream, topics(INFO.name), heading(INFO, START))
+        for message in messages:
+            writer.write(message)
+        if finish:
+            writer.finish(dropped or {})
+    return path

@@ -1,0 +1,51 @@
+"""The `tvist` program, and what it said when it ended."""
+
+import json
+import subprocess
+import sys
+
+from tests import forked
+from tests.conformance.served import NOISE, finished
+
+
+class Ended:
+    """A program that has ended: its exit code, and what it said."""
+
+    def __init__(self, code, out, err):
+        self.code, self.out, self.err = code, out, err
+
+    @property
+    def json(self):
+        """The one JSON object on stdout."""
+        (line,) = self.out.splitlines()
+        value = json.loads(line)
+        assert isinstance(value, dict)
+        return value
+
+    def assert_failed(self, code, *words):
+        """With this exit code and one sentence on stderr in which these words stand."""
+        assert self.code == code, self.err
+        assert self.err.startswith("tvist: ")
+        assert self.err.count("\n") == 1, self.err
+        assert all(word in self.err for word in words), self.err
+        return self
+
+    def assert_done(self):
+        assert self.code == 0, self.err
+        assert not [word for word in NOISE if word in self.err], self.err
+        return self
+
+
+def python(*arguments, **options):
+    done = finished(*arguments, **options)
+    return Ended(done.returncode, done.stdout, done.stderr)
+
+
+def tvist(*arguments, **options):
+    return python("-m", "tvist_cli", *arguments, **options)
+
+
+def begun(*arguments):
+    """The program, which goes on until it is interrupted."""
+    words = [sys.executable, "-m", "tvist_cli", *map(str, arguments)]
+    return forked.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
