@@ -246,7 +246,7 @@ class WatchedRobot(RealArm):
         return sight
 
     def _lose(self, error: LostError | RtdeError) -> None:
-        """Close the connection and report it in a tick of its own, once for each reason, and not if it is a retry."""
+        """Close the connection and report the loss in a tick of its own, once per reason; failed retries are not reported."""
         self.close()
         now, why = time.monotonic(), str(error)
         self._retry_at = now + RETRY
