@@ -246,7 +246,7 @@ class WatchedRobot(RealArm):
         return sight
 
     def _lose(self, error: LostError | RtdeError) -> None:
-        """Close the connection and report the loss in a tick of its own, once per reason, but not for failed retries."""
+        """Close the connection and report the loss in a tick of its own, once per reason, not for failed retries."""
         self.close()
         now, why = time.monotonic(), str(error)
         self._retry_at = now + RETRY
