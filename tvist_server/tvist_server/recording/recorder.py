@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 QUEUE_SIZE = 8192
 """Number of messages that may wait: 30 MB, five seconds at 1500 messages/s, as a file system's commit may take."""
 PAUSE = 0.02
-"""Time between two checks of the queue [s]; waking the writer would cost the tick a system call and the lock."""
+"""Time between two checks of the queue [s]; waking the writer would cost a system call and the interpreter's lock."""
 LOOK = 1.0
 """Time between two checks whether the file was moved or deleted [s]."""
 

@@ -32,7 +32,7 @@ RETRY = 1.0
 TELL_EVERY = 1.0
 """Shortest time between two reports about missing rows [s]."""
 OTHER = 0.03
-"""Least tool distance from the robot file's pose that means another model [m]; calibration shifts it by mm."""
+"""Smallest distance of the tool that indicates another model [m]; a calibration shifts it by some millimetres."""
 
 
 class WatchedRobot(RealArm):
@@ -246,7 +246,7 @@ class WatchedRobot(RealArm):
         return sight
 
     def _lose(self, error: LostError | RtdeError) -> None:
-        """Close the connection and report it in a tick of its own, once for each reason, and not if it is a retry."""
+        """Close the connection and report the loss in a tick of its own, once per reason, not for failed retries."""
         self.close()
         now, why = time.monotonic(), str(error)
         self._retry_at = now + RETRY

@@ -186,7 +186,7 @@ class RtdeSession(PortSession):
 
 
 def ticks_between(frequency: float) -> int:
-    """Return 500 Hz over a frequency, rounded down; the frequency is clipped to 1 to 500, invalid ones count as 500."""
+    """Return the ticks between two packages at a frequency [Hz], clipped to 1 to 500; 500 if it is not positive."""
     if not frequency > 0.0:
         return 1
     # 500 / (500 / 15) is 14.999999999999998, but a client that wants every 15th tick must get it.
