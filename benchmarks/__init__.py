@@ -1,1 +1,1 @@
-"""Speed, each figure beside a reference from the same run; part of no distribution."""
+"""Benchmarks of speed, each with a reference from the same run; in no distribution."""

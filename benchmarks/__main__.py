@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: speed on this machine, each figure beside a reference from the same run; see README.md."""
+"""`python -m benchmarks`: measure speed, each figure with a reference from the same run; see README.md."""
 
 import argparse
 import asyncio
@@ -23,28 +23,28 @@ from tvist_server.ending import end_like_interrupted
 COMPUTED: Mapping[str, Callable[[Tell], dict[str, Figure]]] = {
     "line": line, "streams": streams, "programs": programs,
 }  # fmt: skip
-"""The parts that serve no robot."""
+"""Parts that serve no robot."""
 SERVED: Mapping[str, Callable[[float, Tell], Coroutine[Any, Any, dict[str, Any]]]] = {
     "served": one_robot, "robots": robots, "reader": reader, "rtde": rtde, "lateness": lateness, "bridge": bridge,
 }  # fmt: skip
-"""The parts that serve robots in real time, besides `start`."""
+"""Parts that serve robots in real time, besides `start`."""
 PARTS = (*COMPUTED, "start", *SERVED)
 HEADS = ("figure", "value", "unit", "reference", "value", "ratio", "95 %", "n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure what the arguments say, and print it."""
-    # Matrices here are small: threads for them would only slow down each other.
+    """Run the measurements that the arguments select, and print the results."""
+    # Matrices here are small, so threads would only slow each other down.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument(
-        "--only", nargs="+", metavar="PART", choices=PARTS, help=f"Parts: {' '.join(PARTS)} [all]."
+        "--only", nargs="+", metavar="PART", choices=PARTS, help=f"Run these parts: {' '.join(PARTS)} [all]."
     )
     parser.add_argument(
         "--seconds",
         type=float,
         default=10.0,
-        help="Time of each measurement in real time; 0 serves no robot [10].",
+        help="Measure for this long in real time [s]; 0 skips the parts that serve robots [10].",
     )
     parser.add_argument("--json", action="store_true", help="Print one JSON object.")
     given = parser.parse_args(arguments)
@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def measure(seconds: float, tell: Tell, only: Sequence[str]) -> dict[str, Any]:
-    """Measure some parts, those that serve robots for so many seconds each."""
+    """Run some parts; those that serve robots take this many seconds each."""
     found: dict[str, Any] = {}
     machine = msgspec.to_builtins(this_machine())
     for name in only:
@@ -75,7 +75,7 @@ def measure(seconds: float, tell: Tell, only: Sequence[str]) -> dict[str, Any]:
 
 
 def show(result: dict[str, Any]) -> None:
-    """Print the figures with references as a table, and the others."""
+    """Print the figures with references as a table, then the others."""
     figures = result["figures"]
     others = {key: value for key, value in result.items() if key not in {*figures, "figures"}}
     print(markdown_table(HEADS, [_row(one) for one in figures.values()]), end="\n\n")

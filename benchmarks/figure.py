@@ -1,4 +1,4 @@
-"""A figure beside its reference from the same run, compared by medians over repetitions in alternating order."""
+"""A figure and its reference from the same run, compared by medians over repetitions in alternating order."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -11,7 +11,7 @@ from tvist_lab.recordings import Floats
 
 CONFIDENCE = 0.95
 Tell = Callable[[str], None]
-"""Takes a description of each measurement before it starts."""
+"""Receives a description of each measurement before it starts."""
 
 
 class Figure(Struct, frozen=True, kw_only=True):
@@ -22,7 +22,7 @@ class Figure(Struct, frozen=True, kw_only=True):
     """Median over the repetitions."""
     unit: str
     reference: str
-    """What it is compared with."""
+    """Name of what it is compared with."""
     reference_value: float
     """Median of the reference over the same repetitions."""
     compared: float | None
@@ -31,13 +31,13 @@ class Figure(Struct, frozen=True, kw_only=True):
     high: float | None
     """Ends of its 95 % interval; None after one repetition."""
     repetitions: int
-    """Number of repetitions, in each of which both were measured."""
+    """Number of repetitions; each measured both."""
 
 
 def figure(
     what: str, unit: str, values: Sequence[float], reference: str, references: Sequence[float]
 ) -> Figure:
-    """Compare what several repetitions gave."""
+    """Compare the results of several repetitions."""
     ours, theirs = np.array(values, dtype=float), np.array(references, dtype=float)
     compared, low, high = median_interval(ours / theirs) if np.all(theirs > 0.0) else (None, None, None)
     return Figure(
@@ -50,8 +50,8 @@ def figure(
 def median_interval(values: Floats) -> tuple[float, float | None, float | None]:
     """Return the median of independent values and its 95 % interval, which holds for any distribution.
 
-    Its ends are the k-th smallest and largest value, with the largest k for which a binomial variable of n trials with
-    probability 1/2 is below k with at most 2.5 %; for fewer than six values k is 1.
+    Its ends are the k-th smallest and largest value, with the largest k for which a binomial variable of n
+    trials with probability 1/2 is below k with at most 2.5 %; for fewer than six values k is 1.
     """
     ordered = np.sort(values)
     count = len(ordered)
@@ -63,9 +63,9 @@ def median_interval(values: Floats) -> tuple[float, float | None, float | None]:
 
 
 def in_alternation(runs: Mapping[str, Run], repetitions: int) -> dict[str, list[float]]:
-    """Measure several things in turn, forwards and backwards, so that a machine whose speed drifts decides nothing.
+    """Measure several things in turn, forwards and backwards, so that a drift of the machine's speed cancels out.
 
-    Each runs once before, for what happens only at first.
+    Each runs once beforehand, to exclude one-time costs.
     """
     names = list(runs)
     for run in runs.values():

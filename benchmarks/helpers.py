@@ -1,8 +1,8 @@
-"""Helpers of measurements in processes of their own, which end with their stdin.
+"""Helper processes for measurements; they end when their stdin closes.
 
     python -m benchmarks.helpers NAME ARGUMENT…
 
-A line on stdout says that one is ready. Some then do what each further line on stdin says, and answer with a line.
+A line on stdout reports that one is ready. Some then carry out each line on stdin, and answer with a line.
 """
 
 import ctypes
@@ -32,16 +32,16 @@ from tvist_server.rtde.codec import PackageKind, PackageReader, package
 from tvist_server.schedule import Schedule
 
 ROBOT = "bare"
-"""Name of the robot of whose states `bare_tick` publishes the bytes."""
+"""Name of the robot whose states `bare_tick` publishes."""
 SET_TIMER_SLACK = 29
-"""Option of prctl for the largest delay with which this thread may be woken [ns]; a served robot sets it, too."""
+"""prctl option for the largest delay of this thread's wake-ups [ns]; a served robot sets it, too."""
 
 
 @asynccontextmanager
 async def helper(name: str, *arguments: str) -> AsyncIterator[Process]:
-    """Run a function of this module, which is then ready, and end it by the end of its stdin."""
+    """Run a function of this module until the block ends; it is ready when the block starts."""
     command = [sys.executable, "-m", "benchmarks.helpers", name, *arguments]
-    # In a session of its own, Control+C leaves it to whoever measures.
+    # In its own session it does not receive Control+C.
     process = await create_subprocess_exec(*command, stdin=PIPE, stdout=PIPE, start_new_session=True)
     assert process.stdout is not None
     try:
@@ -56,7 +56,7 @@ async def helper(name: str, *arguments: str) -> AsyncIterator[Process]:
 
 
 async def asked(process: Process, words: str) -> float:
-    """Let a helper do what some words say, and return the figure with which it answers."""
+    """Send a line to a helper, and return the figure that it answers."""
     assert process.stdin is not None
     assert process.stdout is not None
     process.stdin.write(f"{words}\n".encode())
@@ -64,7 +64,7 @@ async def asked(process: Process, words: str) -> float:
 
 
 def observers(endpoint: str, robot: str, count: str) -> None:
-    """Read every state of a robot, or of all (`*`), each observer over a connection of its own."""
+    """Read every state of a robot, or of all (`*`), with a separate connection for each observer."""
     sessions = [open_session(endpoint) for _ in range(int(count))]
 
     def read(sample: zenoh.Sample) -> None:
@@ -72,7 +72,7 @@ def observers(endpoint: str, robot: str, count: str) -> None:
 
     for session in sessions:
         session.declare_subscriber(f"{keys.PREFIX}/{robot}/state", Callback(read, indirect=False))
-        list(session.get(f"{keys.PREFIX}/{robot}/info"))  # goes the same way as the subscription
+        list(session.get(f"{keys.PREFIX}/{robot}/info"))  # the answer comes after the subscription is active
     print("ready", flush=True)
     sys.stdin.read()
     for session in sessions:
@@ -115,7 +115,7 @@ def _set_up(client: socket.socket, names: list[str]) -> None:
 
 
 def _read(clients: list[socket.socket]) -> None:
-    """Read until stdin ends; be ready when each has received something."""
+    """Read until stdin ends; report ready when each client has received something."""
     selector = selectors.DefaultSelector()
     selector.register(sys.stdin, selectors.EVENT_READ)
     for client in clients:
@@ -130,7 +130,7 @@ def _read(clients: list[socket.socket]) -> None:
 
 
 def bare_send(address: str, port: str) -> None:
-    """Send each client a package every 2 ms by one `send()`: the least that RTDE's packages can cost."""
+    """Send each client a package every 2 ms by one `send()`, the minimal cost of RTDE's packages."""
     listening, selector = socket.create_server((address, int(port))), selectors.DefaultSelector()
     selector.register(listening, selectors.EVENT_READ)
     selector.register(sys.stdin, selectors.EVENT_READ)
@@ -149,7 +149,7 @@ def bare_send(address: str, port: str) -> None:
             for client, data in list(packages.items()):
                 try:
                     client.send(data)
-                except OSError:  # it has gone
+                except OSError:  # the client is gone
                     del packages[client]
 
 
@@ -189,9 +189,9 @@ def _paced(part: Callable[[], object], seconds: float) -> float:
 
 
 def bare_thread() -> None:
-    """Sleep to the deadlines of a robot's ticks for some seconds, and do nothing else.
+    """Only sleep to the deadlines of a robot's ticks for some seconds.
 
-    The answer is the share of the ticks that were missed, counted as a served robot does [%].
+    The answer is the share of missed ticks, counted as in a served robot [%].
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)

@@ -1,4 +1,4 @@
-"""Missed ticks of a served robot beside those of a bare thread that sleeps to the same deadlines, in turn."""
+"""Compare the missed ticks of a served robot with those of a bare thread that sleeps to the same deadlines, in turn."""
 
 import os
 import signal
@@ -16,14 +16,14 @@ from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
 
 SEGMENT = 4.0
-"""Longest segment [s]; a robot that is halted for one gives a sign of life before Zenoh's lease of 10 s ends."""
+"""Longest segment [s]; a robot that is halted for one responds before Zenoh's lease of 10 s expires."""
 SETTLE_TICKS = 200
-"""Ticks after a halt that are not counted, as the robot makes up for some of the time."""
+"""Ticks after a halt that do not count, since the robot makes up for some of the time."""
 STUDIES = {"alone": 0, "ten_clients": 10}
 
 
 async def lateness(seconds: float, tell: Tell) -> dict[str, dict[str, dict[str, float]]]:
-    """Measure a served robot, whose process is halted while the bare thread runs, alone and with ten clients."""
+    """Measure a served robot alone and with ten clients; its process is halted while the bare thread runs."""
     found, segment = {}, min(SEGMENT, max(2.0, seconds))
     for name, clients in STUDIES.items():
         tell(f"ticks that a robot misses, {name}, beside a bare thread's")
@@ -49,8 +49,8 @@ async def _robot(server: Served, segment: float) -> float:
 
 
 async def _thread(server: Served, bare: Process, segment: float) -> float:
-    """Return the same of the bare thread, while the robot is halted."""
-    # Two halts in a row would outlast the lease: between them the robot reads what has come.
+    """Return the same for the bare thread, while the robot is halted."""
+    # Two halts in a row would outlast the lease, so the robot reads its messages between them.
     await server.robot.advance(SETTLE_TICKS)
     os.kill(server.pid, signal.SIGSTOP)
     try:
@@ -60,7 +60,7 @@ async def _thread(server: Served, bare: Process, segment: float) -> float:
 
 
 def compared(pairs: Sequence[tuple[float, float]], segment: float) -> dict[str, float]:
-    """Return the means over pairs of a robot's and a thread's missed ticks [%], and the difference's interval."""
+    """Return mean missed ticks of robot and thread over pairs [%], and the interval of their difference."""
     robot, bare = np.array(pairs).T
     low, high = mean_interval(robot - bare, least=100.0 * PERIOD / segment)
     return {
@@ -74,10 +74,11 @@ def compared(pairs: Sequence[tuple[float, float]], segment: float) -> dict[str, 
 
 
 def mean_interval(values: Sequence[float], least: float) -> tuple[float, float]:
-    """Return the 95 % interval of the mean of independent values most of which are zero, by resampling.
+    """Return the 95 % interval, by resampling, of the mean of independent values most of which are zero.
 
-    What was too rare to happen is in no resample. So for each end the sample has one further value, the farthest on
-    that side, at least `least` from zero. Of n zeros the end is then `least` times 3 / n, as the rule of three says.
+    No resample contains events too rare to have occurred. So for each end the sample gets one further value,
+    the farthest on that side, at least `least` from zero. For n zeros the end is then `least` times 3 / n
+    (the rule of three).
     """
     sample, chance = np.array(values), np.random.default_rng(0)
     tail = (1.0 - CONFIDENCE) / 2.0

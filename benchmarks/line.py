@@ -1,4 +1,4 @@
-"""Processor time of ticks beside MuJoCo's: of plant, filter, Figure 6 and the whole line."""
+"""Processor time of a tick of plant, filter, Figure 6 and the whole line, compared with MuJoCo's."""
 
 from collections.abc import Mapping
 
@@ -14,7 +14,7 @@ REPETITIONS = 20
 
 
 class _Mujoco(MujocoArm):
-    """MuJoCo's arm, which here only moves: what it measures is no part of its tick."""
+    """MuJoCo's arm without its measurements, which are not part of a tick here."""
 
     step = MujocoArm.move  # type: ignore[assignment]
 
@@ -37,7 +37,7 @@ def line(tell: Tell) -> dict[str, Figure]:
 
 
 def streams(tell: Tell) -> dict[str, Figure]:
-    """Measure the line while it is fed with set-points."""
+    """Measure the line while it receives set-points."""
     tell("streams of set-points beside MuJoCo")
     parts = {
         f"stream_{rate}_hz": (

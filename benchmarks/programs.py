@@ -1,4 +1,4 @@
-"""Cost of programs in URScript: of a client library's idle loop in each tick, and of compiling a long program."""
+"""Cost of URScript programs: a client library's idle loop in each tick, and compiling a long program."""
 
 import gc
 import time
@@ -14,9 +14,9 @@ from tvist_protocol.programs import ProgramRun
 from tvist_protocol.simulation import SimulationStep
 
 CASES, LINES = 60, 1200
-"""Number of commands that the idle loop distinguishes, and of lines of the long program."""
+"""Number of commands that the idle loop distinguishes, and lines of the long program."""
 TICKS, PAIRS, COMPILED = 250, 40, 10
-"""Number of ticks of a run, of pairs of runs, and of times that the long program is compiled."""
+"""Ticks of a run, pairs of runs, and repetitions of compiling the long program."""
 
 
 PART = """  def part_{0}(count):
@@ -35,7 +35,7 @@ PART = """  def part_{0}(count):
 
 
 def idle_loop() -> str:
-    """Return a program like those of client libraries: it looks for a command in a register once a tick."""
+    """Return a program like those of client libraries, which look for a command in a register once per tick."""
     cases = "".join(f"elif command == {case}:\n    done = {case}\n" for case in range(1, CASES + 1))
     return f"""def idle_loop():
   done = 0
@@ -52,7 +52,7 @@ end
 
 
 def long_program() -> str:
-    """Return a program of `LINES` lines: functions with branches, moves and registers."""
+    """Return a program of `LINES` lines with functions, branches, moves and registers."""
     parts = range((LINES - 3) // (PART.count("\n") + 1))
     functions = "".join(PART.format(number, number % 24) for number in parts)
     calls = "".join(f"  n = part_{number}(n)\n" for number in parts)
@@ -61,7 +61,7 @@ def long_program() -> str:
 
 
 def programs(tell: Tell) -> dict[str, Figure]:
-    """Measure the idle loop beside an empty tick, and compiling the long program beside Python's own compiler."""
+    """Measure the idle loop against an empty tick, and compiling the long program against Python's compiler."""
     tell("a program's idle loop")
     ticks = in_alternation({"empty": _ticks(None), "loop": _ticks(idle_loop())}, PAIRS)
     idle = figure(
@@ -74,7 +74,7 @@ def programs(tell: Tell) -> dict[str, Figure]:
 
 
 def _ticks(text: str | None) -> Run:
-    """Return what runs a robot at rest, with a program or without, and returns the processor time of a tick [µs]."""
+    """Return a function that runs a robot at rest, perhaps with a program, and returns the time of a tick [µs]."""
     host = LoopbackHost(free_setup(truth=False))
     host.subscribe("state", len)
     host.subscribe("io", len)
@@ -98,20 +98,19 @@ def _ticks(text: str | None) -> Run:
 def _our_compiler() -> Run:
     description = free_setup().description
     command = ProgramRun(token="bench", text=long_program())  # noqa: S106  no secret
-    return lambda: _took(
-        lambda: ScriptCompiler(description).compile(command)
-    )  # it keeps what it has compiled
+    # A new compiler each time, since it caches its results.
+    return lambda: _took(lambda: ScriptCompiler(description).compile(command))
 
 
 def _python_compiler() -> Run:
-    """Python's compiler of the same program, which is Python but for the ends of its blocks and the poses."""
+    """Use Python's compiler on the same program, which is Python except for poses and the ends of blocks."""
     lines = [line for line in long_program().splitlines() if line.strip() != "end"]
     text = "\n".join(lines).replace(" p[", " [")
     return lambda: _took(lambda: compile(text, "long_program", "exec"))
 
 
 def _took(work: Callable[[], object]) -> float:
-    """Time that something takes [ms]."""
+    """Return the time that a call takes [ms]."""
     gc.collect()
     began = time.perf_counter()
     work()

@@ -1,4 +1,4 @@
-"""Served robots: what one costs with a client or with clients of RTDE, among others, and behind a bridge."""
+"""Cost of served robots: with a client, with clients of RTDE, among other robots, and behind a bridge."""
 
 import asyncio
 import time
@@ -16,7 +16,7 @@ from tvist_server.ur_ports import UrPorts
 
 IN_PROCESS = "the line in process"
 SHORTEST = 2.0
-"""Shortest time of a measurement [s]: telemetry comes once a second."""
+"""Shortest time of a measurement [s]; telemetry comes once per second."""
 OF_READER, OF_RTDE = 7, 5
 """Number of rounds of measurements."""
 READER = {
@@ -24,36 +24,36 @@ READER = {
     "paced_line": "the line alone, once every 2 ms",
     "bare_put": "a bare put() of a state to one client, once every 2 ms",
 }
-"""What is measured in each round of the part `reader`."""
+"""Measurements in each round of the part `reader`."""
 CLIENTS = 10
 """Number of RTDE clients at 500 Hz."""
 KINDS = (
     ("rtde_us_per_client_and_tick", CLIENTS, "ten with different recipes"),
     ("rtde_us_per_client_of_one_recipe", 1, "ten with the same recipe"),
 )
-"""Figures: key, number of recipes, and who reads."""
+"""Figures: key, number of recipes, and description of the clients."""
 ADDRESS, BRIDGED = "127.0.0.1", "127.42.7.1"
-"""Addresses of the robot that clients of RTDE read, and of one before which a bridge stands."""
+"""Addresses of the robot that RTDE clients read, and of the robot behind a bridge."""
 OF_MANY = 0.4
-"""Time for which each number of robots is measured, as a share of the time for one robot [-]."""
+"""Time for each number of robots, as a share of the time for one robot [-]."""
 SEVERAL, SLOWER = 8, 0.25
-"""Number of robots of a process, and their speed relative to real time, so that none is late."""
+"""Number of robots in a process, and their speed relative to real time, at which none is late."""
 
 
 def in_process() -> float:
-    """Return the processor time of a tick of the line [µs]; the least of some, since other load only adds to it."""
+    """Return the processor time of a tick of the line [µs]: the minimum, since other load only adds to it."""
     run = line_tick("zv")
     run()
     return min(run() for _ in range(5))
 
 
 async def reader(seconds: float, tell: Tell) -> dict[str, Figure]:
-    """Measure a robot whose client reads each state, and in another process the line, and puts of as many bytes."""
+    """Measure a robot whose client reads each state; in another process, the line, and puts of as many bytes."""
     part, endpoint = max(SHORTEST, seconds / OF_READER), free_endpoint()
     found: dict[str, list[float]] = {name: [] for name in READER}
     lines: list[float] = []
     async with served([]) as server, helper("bare_tick", endpoint) as bare:
-        await server.robot.state()  # its client reads from now on
+        await server.robot.state()  # subscribes its client
         for number in range(OF_READER):
             tell(f"round {number + 1} of {OF_READER}: a robot that one client reads, its line, and bare puts")
             lines.append(in_process())
@@ -68,7 +68,7 @@ async def reader(seconds: float, tell: Tell) -> dict[str, Figure]:
 
 
 async def rtde(seconds: float, tell: Tell) -> dict[str, Figure]:
-    """Measure a robot without and with ten clients that read every tick, and in turn a process that only sends."""
+    """Measure a robot without and with ten clients that read every tick, in turn with a process that only sends."""
     port, bare_port = str(free_port()), str(free_port())
     options = ["--profile", "real", "--ur-address", ADDRESS]
     for interface in UrPorts().open():
@@ -97,14 +97,13 @@ async def rtde(seconds: float, tell: Tell) -> dict[str, Figure]:
 
 
 async def _share(pid: int, seconds: float) -> float:
-    """Share of a core that a process uses."""
     used, began = cpu_seconds(pid), time.monotonic()
     await asyncio.sleep(seconds)
     return (cpu_seconds(pid) - used) / (time.monotonic() - began)
 
 
 async def robots(seconds: float, tell: Tell) -> dict[str, Any]:
-    """Measure what a robot costs among others, and how many a core computes."""
+    """Measure the cost of a robot among others, and how many robots one core computes."""
     tell("the line of one robot")
     line = in_process()
     one = await _us_per_robot_and_tick(OF_MANY * seconds, tell)
@@ -119,7 +118,7 @@ async def robots(seconds: float, tell: Tell) -> dict[str, Any]:
 
 
 async def _us_per_robot_and_tick(seconds: float, tell: Tell) -> float:
-    """Processor time of a process with `SEVERAL` robots, all read by a client, for each of their ticks [µs]."""
+    """Return the processor time per tick of each of `SEVERAL` robots of a process, all read by a client [µs]."""
     tell(f"{SEVERAL} robots at speed {SLOWER:g} for {seconds:g} s")
     options = ["--robots", f"ur5e*{SEVERAL}", "--speed", str(SLOWER)]
     async with (
@@ -134,7 +133,7 @@ async def _us_per_robot_and_tick(seconds: float, tell: Tell) -> float:
 
 
 async def bridge(seconds: float, tell: Tell) -> dict[str, Any]:
-    """Measure a bridge that holds a robot, and the periods in which the robot's program had no set-point."""
+    """Measure a bridge that holds a robot, and in how many periods the robot's program had no set-point."""
     line = in_process()
     tell(f"a bridge to a robot for {seconds:g} s")
     arm = ["--ur", "--ur-address", BRIDGED, "--profile", "real", "--shaper", "none"]

@@ -1,4 +1,4 @@
-"""Starts of programs, beside bare interpreters that import what these need."""
+"""Starts of programs, compared with bare interpreters that import the same libraries."""
 
 import asyncio
 import os
@@ -14,9 +14,9 @@ from tvist_lab.served import served
 
 REPETITIONS = 7
 LIBRARIES = "import numba, numpy, pinocchio, ruckig, msgspec, zenoh"
-"""What a served robot needs of others."""
+"""Libraries of a served robot."""
 SMALL = "import msgspec, zenoh"
-"""What a client needs of others."""
+"""Libraries of a client."""
 
 
 def start(tell: Tell) -> dict[str, Figure]:
@@ -31,7 +31,7 @@ def start(tell: Tell) -> dict[str, Figure]:
         "from tvist_client import Robot": _interpreter("-c", "from tvist_client import Robot"),
         small: _interpreter("-c", SMALL),
     }
-    # An installation has its bytecode on disk, whether or not this process writes any.
+    # An installation has bytecode on disk, even if this process writes none.
     with TemporaryDirectory() as bytecode, patch.dict(os.environ, {"PYTHONPYCACHEPREFIX": bytecode}):
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
         found = in_alternation(runs, REPETITIONS)

@@ -1,1 +1,1 @@
-"""What maintains the project and is part of no distribution: code that is made, the documentation's site, releases."""
+"""Maintenance of the project, in no distribution: generated code, the documentation site, releases."""

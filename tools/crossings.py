@@ -1,6 +1,7 @@
 """Count the objects that a set-point and a `move_j` cross in the controller: `python -m tools.crossings [--list]`.
 
-An object is a class of the product of which a method runs, in a robot that is stepped. Compiled kernels have none.
+An object is a class of the product of which a method runs while a robot is stepped. Compiled kernels do not
+count.
 """
 
 import math
@@ -20,7 +21,7 @@ Q = (0.0, -3.1, 0.0, -1.57, 0.0, 0.0)
 
 
 class Hand:
-    """The client in control of a UR5e in lockstep."""
+    """A client in control of a UR5e in lockstep."""
 
     def __init__(self) -> None:
         self.host = LoopbackHost(free_setup(clock="lockstep", start="Q1", shaper="auto"))
@@ -33,12 +34,12 @@ class Hand:
         return reply
 
     def step(self, ticks: int) -> None:
-        """Let time pass."""
+        """Advance time."""
         self.do(SimulationStep(token=self.token, ticks=ticks))
 
 
 def crossed(run: Callable[[], object]) -> set[str]:
-    """Return the classes of the controller, the plant and the shapers of which a call runs methods."""
+    """Return the classes of the controller, plant and shapers whose methods a call runs."""
     found = set()
 
     def note(frame: FrameType, event: str, _: Any) -> None:
@@ -84,7 +85,7 @@ def of_move() -> set[str]:
 
 
 def main() -> None:
-    """Print the numbers, and with `--list` the classes."""
+    """Print the numbers and, with `--list`, the classes."""
     for name, found in (("set-point", of_set_point()), ("move_j", of_move())):
         print(f"{name}: {len(found)}")
         if "--list" in sys.argv:

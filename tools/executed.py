@@ -1,6 +1,6 @@
-"""Which test executes which line of the product: `python -m tools.executed FOLDER [ARGUMENT OF PYTEST ...]`.
+"""Record which test executes which line: `python -m tools.executed FOLDER [ARGUMENT OF PYTEST ...]`.
 
-Needs `pip install pytest-cov`. It runs tests side by side, and notes what they and the programs that they start run.
+It needs `pip install pytest-cov`, runs tests in parallel, and includes the programs that they start.
 """
 
 import json
@@ -30,11 +30,11 @@ if "tests.nursery" in sys.orig_argv:
 elif "PYTEST_CURRENT_TEST" in os.environ:
     begin()
 """
-"""What a program of a test does first, or when it has been forked; a variable names the test."""
+"""Code that a program of a test runs first, or after a fork; an environment variable names the test."""
 
 
 def cover(folder: Path, arguments: list[str]) -> None:
-    """Run tests, and keep in a folder what they execute."""
+    """Run tests, and store in a folder which lines they execute."""
     folder.mkdir(parents=True, exist_ok=True)
     data, rc = str(folder / "coverage"), str(folder / "rc")
     quiet = "disable_warnings = no-data-collected, module-not-imported"
@@ -51,7 +51,7 @@ def cover(folder: Path, arguments: list[str]) -> None:
 
 @cache
 def executed(folder: Path, file: str) -> dict[int, set[str]]:
-    """Return the tests, or files of tests, that execute the lines of a file, by the line."""
+    """Return for each line of a file the tests, or test files, that execute it."""
     data = import_module("coverage").CoverageData(str(folder.resolve() / "coverage"))
     data.read()
     lines: dict[int, list[str]] = data.contexts_by_lineno(str(ROOT / file))
@@ -61,7 +61,7 @@ def executed(folder: Path, file: str) -> dict[int, set[str]]:
 
 
 def shortest(tests: set[str], together: float) -> list[str]:
-    """Return the tests that take a time together by `durations.json`, the shortest first."""
+    """Return the shortest tests that together take at most a time [s] according to `durations.json`."""
     kept = json.loads((ROOT / "tests" / "durations.json").read_text(encoding="utf-8"))
     cases = Counter(one.partition("[")[0] for one in tests)
 

@@ -1,7 +1,7 @@
-"""`python -m tools.figures`: draws `elastic.png`, `mean_delay.png` and `tails.png`, three figures of the documents.
+"""`python -m tools.figures`: draw `elastic.png`, `mean_delay.png` and `tails.png` for the documentation.
 
-Two show a motion of a UR5e through several filters: elastic feed-forward, and a varying mean delay. The third shows how
-both arms of the paper's experiment settle.
+Two show a motion of a UR5e through several filters: elastic feed-forward, and a varying mean delay. The third
+shows how both arms of the paper's experiment settle.
 """
 
 from pathlib import Path
@@ -54,13 +54,13 @@ SHOWN = (-0.12, 0.4)
 MODES = 3
 """Number of modes in the product of zero-vibration shapers."""
 TICKS_AFTER = 100
-"""Number of ticks shown after the reference has stopped."""
+"""Ticks shown after the stop of the reference."""
 
 
 def elastic_figure() -> Figure:
-    """A clean UR5e with 5 kg comes to rest after a move from Q1 to Q2, with three shapers.
+    """A UR5e without noise, carrying 5 kg, comes to rest after a move from Q1 to Q2, with three shapers.
 
-    Top: the tool's acceleration. Bottom: reference before and after the filter, which all have the same end.
+    Top: the tool's acceleration. Bottom: reference before and after the filter; all have the same end.
     """
     figure, (forces, references) = panels(2, 4.2)
     styles = {"none": OF_UNSHAPED, "auto": OF_THIRD, "elastic": OF_SHAPED}
@@ -76,7 +76,7 @@ def elastic_figure() -> Figure:
 
 
 def _stop(name: str) -> tuple[Floats, Floats, Floats]:
-    """Time [ms], true acceleration of the tool [m/s²] and angle left of the first joint [mrad] around the stop."""
+    """Time [ms], true acceleration of the tool [m/s²] and remaining angle of the first joint [mrad] around the stop."""
     description = load("ur5e").clean()
     payload, calibration = paper_payload(description), load_calibration("ur5e_modal")
     start, end = (np.array(description.poses[pose]) for pose in ("Q1", "Q2"))
@@ -137,7 +137,7 @@ def mean_delay_figure() -> Figure:
 def tails_figure() -> Figure:
     """Both arms of the paper's experiment come to rest: E after the stop, unshaped above, shaped below.
 
-    A thick line lasts from t_enter to t_cycle in the paper's Table 2, a dotted one is at its overshoot.
+    A thick line lasts from t_enter to t_cycle of the paper's Table 2; a dotted one marks its overshoot.
     """
     figure, axes = panels(2, 4.8, columns=len(MOTIONS), share_y=True)
     places = [(motion, kind) for kind in ("unshaped", "shaped") for motion in MOTIONS]
@@ -169,7 +169,7 @@ def tails_figure() -> Figure:
 
 
 def main() -> None:
-    """Write all files."""
+    """Write all figures."""
     with house_style():
         for name, draw in (
             ("elastic", elastic_figure),

@@ -1,6 +1,6 @@
-"""`python -m tools.film`: makes the film at the top of the README, light and dark.
+"""`python -m tools.film`: make the film at the top of the README, in light and dark.
 
-It is the scene of `tvist view --compare none zv`, drawn picture by picture by a browser.
+It shows the scene of `tvist view --compare none zv`, drawn frame by frame by a browser.
 """
 
 import asyncio
@@ -25,11 +25,11 @@ IMAGES = Path(__file__).parents[1] / "docs" / "images"
 SIZE = (1200, 760)
 """Width and height of the film [px]."""
 RATE = 25
-"""Pictures a second."""
+"""Frames per second."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 FLAGS = (
     "--headless=new",
-    "--no-sandbox",  # containers have no user namespaces; the page is our own
+    "--no-sandbox",  # containers have no user namespaces, and the page is trusted
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
@@ -40,17 +40,17 @@ FLAGS = (
     "--no-first-run",
 )
 FIRST_S, NEXT_S = 120.0, 60.0
-"""Time that the browser may take for the first picture, and for each later one [s]."""
+"""Time limits of the browser for the first frame and for each later one [s]."""
 SLOW, SLOW_S = 5, 0.4
-"""After a stop everything is this much slower, for this long [s]: the arm rings for a few tenths of a second."""
+"""Factor of slow motion after a stop, and its duration [s]: the arm vibrates for a few tenths of a second."""
 REST_S = 1.0
-"""Time after a stop that is looked at, unless the next motion begins before [s]."""
+"""Time shown after a stop, unless the next motion starts earlier [s]."""
 LEAD_S = 0.25
-"""Of a single motion the plot begins this long before the stop: there it matters [s]."""
+"""The plot of a single motion starts this long before the stop [s]."""
 HOLD_S = 2.0
-"""Time for which the last picture stays [s]."""
+"""Time for which the last frame stays [s]."""
 QUALITY = 76
-"""Of its pictures, of 100."""
+"""Quality of the frames, of 100."""
 SHAPERS = ("none", "zv")
 """Shapers that the film compares."""
 
@@ -60,7 +60,7 @@ class FilmError(RuntimeError):
 
 
 class Film:
-    """Pictures of runs, whose times are those of one clock, with what their comparison says, if anything."""
+    """Frames of runs with a common clock, and the result of their comparison, if there is one."""
 
     def __init__(
         self,
@@ -95,7 +95,7 @@ class Film:
         }
 
     def times(self) -> list[float]:
-        """Simulation times of the pictures: in slow motion after each stop [s]."""
+        """Return the simulation times of the frames, in slow motion after each stop [s]."""
         found = [self.start]
         while found[-1] < self.end:
             found.append(found[-1] + 1.0 / (RATE * (SLOW if self._slow(found[-1]) else 1)))
@@ -105,13 +105,13 @@ class Film:
         return any(at - BRAKES_S <= time < at + SLOW_S for at in self._stops[0])
 
     async def pictures(self, times: Sequence[float]) -> list[Image.Image]:
-        """Draw the pictures at simulation times [s]; a FilmError says that no browser draws them."""
+        """Draw the frames at simulation times [s]; raise FilmError if no browser draws them."""
         tabs: asyncio.Queue[Tab] = asyncio.Queue()
         drawn = asyncio.Event()
 
         async def meet(tab: Tab) -> None:
             tabs.put_nowait(tab)
-            await drawn.wait()  # its connection ends with this
+            await drawn.wait()  # the connection ends when this returns
 
         async with open_stage(page(self._boot), meet, "127.0.0.1", 0) as url, _browser(url) as process:
             found: list[Image.Image] = []
@@ -126,7 +126,7 @@ class Film:
                         content = {"time": time - self.start, "slow": SLOW if self._slow(time) else 1}
                         await tab.send("draw", content)
                         picture = await asyncio.wait_for(anext(told), NEXT_S if found else FIRST_S)
-                        assert isinstance(picture, bytes)  # as our page sends it
+                        assert isinstance(picture, bytes)  # the page sends only pictures
                         found.append(Image.open(io.BytesIO(picture)).convert("RGB"))
                         advance(1, None)
             except (TimeoutError, StopAsyncIteration, ConnectionClosed):
@@ -137,13 +137,12 @@ class Film:
 
 
 def browser() -> str | None:
-    """Path of a browser that draws films; None if there is none."""
+    """Return the path of a browser that can draw films; None if there is none."""
     return next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
 @asynccontextmanager
 async def _browser(url: str) -> AsyncIterator[asyncio.subprocess.Process]:
-    """A headless browser that shows a page."""
     program = browser()
     if program is None:
         raise FilmError("films are drawn by Chromium, and there is none: apt-get install chromium")

@@ -1,10 +1,11 @@
-"""Small faults in the product, drawn at random, and whether its tests find them; all of the last commit.
+"""Draw small random faults in the product, and check whether its tests find them; all refers to the last commit.
 
-    python -m tools.mutants draw LIST.json COUNT SEED           mutants; of a LIST that is there those that are gone
-    python -m tools.mutants run LIST.json FOLDER [NUMBER ...]    write into LIST what became of them, or of some
+    python -m tools.mutants draw LIST.json COUNT SEED           draw mutants, or replace those of LIST that are gone
+    python -m tools.mutants run LIST.json FOLDER [NUMBER ...]    run all or some, and write the outcomes into LIST
 
-FOLDER is what `tools.executed` wrote. That sees neither kernels nor who needs what is computed at an import: the tests
-of such a line are those that execute a line which mentions the kernel or the name, or else any line of the file.
+FOLDER is the output of `tools.executed`. That records neither kernels nor uses of values computed at import.
+The tests of such a line are those that execute a line which mentions the kernel or the name, or else any line
+of the file.
 """
 
 import json
@@ -23,13 +24,13 @@ from tools.executed import ROOT, executed, shortest
 from tools.mutations import SOURCES, Mutant, product
 
 LIMIT, HANGS, COMPILING = 60.0, 20, 400.0
-"""Seconds that pytest has, that one test has, and that the kernels have to be compiled before."""
+"""Time limits of a run of pytest, of one test in it, and of compiling the kernels beforehand [s]."""
 SAME = ("file", "owner", "text", "kind", "before", "after")
-"""What tells that a mutant is still there, wherever its line is."""
+"""Fields by which a mutant is found again when its line has moved."""
 
 
 def draw(path: Path, count: int, seed: int) -> list[Mutant]:
-    """Keep the mutants of a list whose line is still there, and draw the others."""
+    """Keep the mutants of a list whose line still exists, and draw the others."""
     listed = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
     mutants, chosen, drawn = product()[0], random.Random(seed + len(listed)), []  # noqa: S311
     for old in listed:
@@ -48,7 +49,7 @@ def tests_of(mutant: Mutant, folder: Path) -> set[str]:
     lines, span = executed(folder, mutant["file"]), range(mutant["span"][0], mutant["span"][1] + 1)
     found = {one for line in span for one in lines.get(line, ()) if not mutant["hidden"]}
     waiting = [] if found else [mutant["owner"]]
-    for name in waiting:  # which grows
+    for name in waiting:  # it grows in the loop
         for place in product()[1][name]:
             if not place["hidden"]:
                 found |= executed(folder, place["file"]).get(place["line"], set())
@@ -58,7 +59,7 @@ def tests_of(mutant: Mutant, folder: Path) -> set[str]:
 
 
 def ran(where: Path, tests: list[str]) -> tuple[int | None, str]:
-    """Compile the kernels that have changed, and run tests until one fails; see `ended`."""
+    """Compile changed kernels, and run tests until one fails; return the result of `ended`."""
     for kernel in (one for source in SOURCES for one in (ROOT / source).rglob("*.kernel")):
         (where / kernel.relative_to(ROOT).parent).mkdir(exist_ok=True)
         shutil.copy2(kernel, where / kernel.relative_to(ROOT))
@@ -71,8 +72,8 @@ def ran(where: Path, tests: list[str]) -> tuple[int | None, str]:
 
 
 def ended(where: Path, limit: float, *words: str) -> tuple[int | None, str]:
-    """Run a program of the copy: its exit code, None if it had to be killed, and what it said."""
-    paths = os.pathsep.join(str(where / one) for one in ["", *SOURCES])  # before those of the checkout
+    """Run a program of the copy; return its exit code (None if it had to be killed) and its output."""
+    paths = os.pathsep.join(str(where / one) for one in ["", *SOURCES])  # they precede the checkout's
     around = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}
     with tempfile.TemporaryFile() as out:
         process = subprocess.Popen(
@@ -88,7 +89,7 @@ def ended(where: Path, limit: float, *words: str) -> tuple[int | None, str]:
 
 
 def judged(mutant: Mutant, where: Path, folder: Path) -> Mutant:
-    """Run a mutant's tests; one that fails without it, too, does not count."""
+    """Run a mutant's tests; a test that fails without the mutant, too, does not count."""
     there, tests, file = tests_of(mutant, folder), [], where / mutant["file"]
     whole, before, start = file.read_bytes(), mutant["before"].encode(), time.monotonic()
     at = sum(map(len, whole.splitlines(keepends=True)[: mutant["line"] - 1])) + mutant["column"]

@@ -1,4 +1,4 @@
-"""What can be changed in the product to see whether its tests find it: one operator, constant or branch each."""
+"""Mutations of the product for checks of its tests: each changes one operator, constant or branch."""
 
 import ast
 import copy
@@ -20,15 +20,15 @@ PAIRS = (
     "Lt LtE", "Gt GtE", "Eq NotEq", "Is IsNot", "In NotIn", "And Or", "Add Sub", "Mult Div", "FloorDiv Mult",
     "Mod Mult", "Pow Mult", "USub UAdd",
 )  # fmt: skip
-"""Operators that replace each other. `|` and `&` are left out, as they are types' more often than numbers'."""
+"""Operators that replace each other. `|` and `&` are left out, since they mostly occur in types."""
 OTHER = {new: old for old, new in map(str.split, PAIRS[:8])} | dict(map(str.split, PAIRS))
 Mutant = dict[str, Any]
 
 
 def walk(node: ast.AST, owner: str, hidden: bool, span: tuple[int, int]) -> Iterator[tuple[ast.AST, Mutant]]:
-    """All that runs, with the name it belongs to, whether coverage misses it, and the lines of its statement."""
+    """Yield all executed nodes: the name each belongs to, whether coverage misses it, and its statement's lines."""
     if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.If) and "TYPE_CH" in ast.unparse(node.test)):
-        return  # places in f-strings are wrong before Python 3.12
+        return  # positions in f-strings are wrong before Python 3.12
     if isinstance(node, ast.stmt):
         body = getattr(node, "body", None)
         span = node.lineno, max(node.lineno, body[0].lineno - 1 if body else node.end_lineno or 0)
@@ -45,7 +45,7 @@ def walk(node: ast.AST, owner: str, hidden: bool, span: tuple[int, int]) -> Iter
 
 
 def changes(node: ast.AST) -> Iterator[tuple[str, Any, str]]:
-    """Yield each mutant of a node: its kind, what it replaces, and by what."""
+    """Yield the mutants of a node: kind, the replaced node, and its replacement."""
     if isinstance(node, ast.If | ast.While | ast.IfExp) and not isinstance(node.test, ast.Constant):
         yield "branch", node.test, f"(not ({ast.unparse(node.test)}))"
     elif isinstance(node, ast.Constant) and isinstance(node.value, bool | int | float):
@@ -67,7 +67,7 @@ def changes(node: ast.AST) -> Iterator[tuple[str, Any, str]]:
 
 @cache
 def product() -> tuple[list[Mutant], dict[str, list[Mutant]]]:
-    """All mutants, and by each name the places that mention it."""
+    """Return all mutants, and for each name the places that mention it."""
     listed = subprocess.run(
         ["git", "ls-files", *SOURCES], cwd=ROOT, capture_output=True, text=True, check=True
     )

@@ -1,7 +1,7 @@
-"""`python -m tools.stubs [FOLDER]`: writes what editors and type checkers read of methods that exist only at run time.
+"""`python -m tools.stubs [FOLDER]`: write stubs of methods that exist only at run time, for editors and type checkers.
 
-These are the commands of the client, and its classes without `await`. With FOLDER, writes a copy of the client there
-that contains them with their descriptions, for the site of the documents. Runs in a checkout.
+These are the client's commands and its blocking classes. With FOLDER, write a copy of the client that
+contains them with their docstrings, for the documentation site. Run it in a checkout.
 """
 
 import inspect
@@ -38,7 +38,7 @@ def generated() -> dict[Path, str]:
 
 
 def write_described(folder: Path) -> None:
-    """Write a copy of the package that can be described without running it."""
+    """Write a copy of the package whose documentation can be extracted without running it."""
     copy = folder / PACKAGE.name
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("*.pyi", "__pycache__"))
     for module in MODULES:
@@ -59,7 +59,7 @@ def _stub(module: ModuleType, *, described: bool = False) -> str:
 
 
 def _parts(kind: type) -> Iterator[tuple[str, str]]:
-    """Yield the head of a class, then its members, each with its description."""
+    """Yield the header of a class, then its members, each with its docstring."""
     bases = [f"{base.__module__}.{base.__qualname__}" for base in kind.__bases__ if base is not object]
     yield f"class {kind.__name__}({', '.join(bases)}):".replace("()", ""), kind.__doc__ or ""
     for name, member in vars(kind).items():
@@ -75,7 +75,7 @@ def _parts(kind: type) -> Iterator[tuple[str, str]]:
 
 
 def _written(head: str, doc: str | None) -> str:
-    """Return the head of a class or a method, or an attribute, broken before parameters, and its description."""
+    """Format the header of a class or method, or an attribute, wrapped before parameters, with its docstring."""
     is_class, is_method = head.startswith("class "), head.endswith(":") and head.startswith(" ")
     whole = re.sub(r"(?<!,) | (?!\w+: |\*,)", "\0", head + " ..." * (is_method and doc is None))
     text = "\n" * is_class + fill(whole, 110, subsequent_indent=" " * 8).replace("\0", " ") + "\n"
@@ -85,7 +85,7 @@ def _written(head: str, doc: str | None) -> str:
 
 
 def _sorted(text: str) -> str:
-    """Sort the imports, and leave out those that are not used."""
+    """Sort the imports, and remove unused ones."""
     words = "check --fix --exit-zero --quiet --select F401,I,Q000,UP007,UP045 --stdin-filename stub.pyi -"
     command = [sys.executable, "-m", "ruff", *words.split()]
     return subprocess.run(command, input=text, capture_output=True, text=True, check=True).stdout

@@ -1,7 +1,7 @@
-"""`python -m tools.try_page`: writes what the page for trying shaping takes from the packages.
+"""`python -m tools.try_page`: write the data that the interactive shaping page takes from the packages.
 
-`view/page/try/made/taken.json` becomes part of the page: the catalogue's rows, the arm with one flexible joint, and a
-UR5e's motion from Q1 to Q3. Runs in a checkout; `make page` builds the page.
+`view/page/try/made/taken.json` becomes part of the page: the catalogue's rows, the arm with one flexible
+joint, and a UR5e's motion from Q1 to Q3. Run it in a checkout; `make page` builds the page.
 """
 
 import asyncio
@@ -27,13 +27,13 @@ TAKEN = Path(__file__).parents[1] / "view" / "page" / "try" / "made" / "taken.js
 
 
 def taken() -> dict[str, Any]:
-    """What becomes part of the page."""
+    """Return the data of the page."""
     rows = [{"name": row.name, "zeta_max": row.zeta_max} for row in SHAPERS.values()]
     return {"catalogue": rows, "arm": _arm(), "ur5e": _ur5e()}
 
 
 def _arm() -> dict[str, Any]:
-    """Parameters of the arm with one flexible joint, as `arm.ts` names them."""
+    """Return parameters of the arm with one flexible joint, with the names of `arm.ts`."""
     description = load("one-joint")
     drives, shoulder = description.drives, FlexibleShoulder.of(description, description.payload)
     links, payload = description.links, description.payload
@@ -60,15 +60,15 @@ def _arm() -> dict[str, Any]:
 
 
 def _ur5e() -> dict[str, Any]:
-    """The motion from Q1 to Q3, without a shaper and with ZV that follows the arm's frequency."""
+    """Return the motion from Q1 to Q3, without a shaper and with ZV that follows the arm's frequency."""
     poses = load("ur5e").poses
     tracks = []
     for name, label in (("none", "unshaped"), ("zv", "shaped")):
         info, run = asyncio.run(run_beside(name, [poses["Q1"], poses["Q3"]]))
-        assert info.geometry is not None  # of our own server
+        assert info.geometry is not None  # this version's server sends it
         tracks.append(Track(Shown(label, Look(info.geometry, info.payload)), run.states, run.truths))
     span = moves(tracks[0].signals)
-    assert span is not None  # it is a motion of ours
+    assert span is not None  # the arm has moved
     start, stop = span[0] - 0.1, span[1]
     packed = [track.packed(start) for track in tracks]
     for one in packed:
@@ -81,7 +81,7 @@ def _ur5e() -> dict[str, Any]:
 
 
 def _largest_after_stop(track: Track) -> float:
-    """Largest acceleration of the tool once the shaped reference has come to rest [m/s²]."""
+    """Return the largest acceleration of the tool after the stop of the shaped reference [m/s²]."""
     signals = track.signals
     moving = np.flatnonzero(signals.acceleration > MOVING)
     return float(np.nan_to_num(signals.alpha[moving[-1] + 5 :]).max(initial=0.0))

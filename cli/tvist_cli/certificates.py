@@ -1,7 +1,4 @@
-"""A certificate authority and the certificates it signs, for mutual TLS between a robot and its clients.
-
-ECDSA on P-256: Zenoh takes Ed25519 as well, but the TLS of small devices often does not.
-"""
+"""Certificate authority and the certificates it signs, for mutual TLS; P-256, since many small devices lack Ed25519."""
 
 import ipaddress
 import os
@@ -16,17 +13,17 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 AUTHORITY_DAYS = 7300
-"""Validity of an authority [days]; the certificates it signs expire earlier."""
+"""Validity of an authority's own certificate [days]; the certificates it signs expire earlier."""
 SLACK = timedelta(hours=1)
-"""How far a client's or robot's clock may be behind."""
+"""How far the clock of a client or robot may be behind."""
 USAGES = {"robot": ExtendedKeyUsageOID.SERVER_AUTH, "client": ExtendedKeyUsageOID.CLIENT_AUTH}
-"""Extended key usage of each kind, so that a client's certificate cannot pass as the robot's, or the reverse."""
+"""Extended key usage of each kind: a client's certificate cannot pass as a robot's, or the reverse."""
 
 Host = x509.DNSName | x509.IPAddress
 
 
 class CertificateError(ValueError):
-    """A file contains no suitable certificate or key; the message names it."""
+    """A file contains no suitable certificate or key; the message names the file."""
 
 
 def host_of(text: str) -> Host:
@@ -51,11 +48,11 @@ class Pair:
 
     @property
     def until(self) -> datetime:
-        """When the certificate expires."""
+        """Time at which the certificate expires."""
         return self.certificate.not_valid_after_utc
 
     def write(self, certificate: Path, key: Path) -> None:
-        """Write both as PEM; only the owner may read the key."""
+        """Write both as new PEM files; only the owner can read the key."""
         form = serialization.PrivateFormat.PKCS8
         secret = self.key.private_bytes(serialization.Encoding.PEM, form, serialization.NoEncryption())
         write_new(key, secret, 0o600)
@@ -63,13 +60,13 @@ class Pair:
 
 
 class CertificateAuthority(Pair):
-    """A certificate authority, which signs certificates."""
+    """An authority that signs certificates."""
 
     @classmethod
     def make(cls) -> Self:
         """Create a new authority."""
         key = ec.generate_private_key(ec.SECP256R1())
-        # A name of its own: a client that holds certificates of two authorities can tell them apart.
+        # A unique name, so that a client with certificates of two authorities can tell them apart.
         name = f"tvist authority {x509.random_serial_number():x}"[:40]
         builder = (
             _builder(name, key, days=AUTHORITY_DAYS)
@@ -81,7 +78,7 @@ class CertificateAuthority(Pair):
 
     @classmethod
     def read(cls, certificate: Path, key: Path) -> Self:
-        """Read an existing authority."""
+        """Read an existing authority; raise CertificateError if the key does not belong to the certificate."""
         pair = cls(read_certificate(certificate), _read_key(key))
         if pair.certificate.public_key() != pair.key.public_key():
             raise CertificateError(f"{key} is not the key of {certificate}")
@@ -90,7 +87,7 @@ class CertificateAuthority(Pair):
     def issue(
         self, name: str, usage: Literal["robot", "client"], *, days: int, hosts: tuple[Host, ...] = ()
     ) -> Pair:
-        """Sign a certificate."""
+        """Sign a certificate that is valid for some days, for a robot under its host names."""
         key = ec.generate_private_key(ec.SECP256R1())
         mine = x509.SubjectKeyIdentifier.from_public_key(self.key.public_key())
         builder = (
@@ -117,13 +114,13 @@ def common_name(certificate: x509.Certificate) -> str:
 
 
 def hosts_of(certificate: x509.Certificate) -> set[Host]:
-    """Return the names and addresses for which a certificate is valid."""
+    """Return the host names and addresses for which a certificate is valid."""
     found = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName)
     return {name for name in found.value if isinstance(name, Host)}
 
 
 def read_certificate(path: Path) -> x509.Certificate:
-    """Read a certificate."""
+    """Read a PEM certificate; raise CertificateError if there is none."""
     try:
         return x509.load_pem_x509_certificate(path.read_bytes())
     except OSError as error:
@@ -133,7 +130,7 @@ def read_certificate(path: Path) -> x509.Certificate:
 
 
 def write_new(path: Path, content: bytes, mode: int) -> None:
-    """Write a new file and create it with its final permissions."""
+    """Write a new file with its final permissions from the start."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
     with open(descriptor, "wb") as file:  # noqa: PTH123  a descriptor, not a path
         file.write(content)

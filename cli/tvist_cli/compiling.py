@@ -1,4 +1,4 @@
-"""Compile what a robot computes, and show how far that is."""
+"""Compile the robot's computations and show the progress."""
 
 import time
 from collections.abc import Callable
@@ -10,11 +10,7 @@ SAY_EVERY = 10.0
 
 
 def compile_if_new(tell: Callable[[int, int], None] = lambda *_: None) -> None:
-    """Compile what is not on disk yet, on all processors, and show how far that is, since it takes long.
-
-    Args:
-        tell: Called with the number of kernels that are compiled, and of all.
-    """
+    """Compile what is not on disk yet, and show progress; `tell` receives the kernels done and in all."""
     from tvist_server.kernels import KERNELS, KernelsError, compiled
 
     done = compiled()
@@ -29,7 +25,7 @@ def compile_if_new(tell: Callable[[int, int], None] = lambda *_: None) -> None:
 
 
 def compile_shown(processes: int | None, tell: Callable[[int, int], None] = lambda *_: None) -> None:
-    """Compile ahead as `tvist_server.kernels` does, and show how far that is, as a bar or in lines."""
+    """Compile ahead like `tvist_server.kernels`, and show progress as a bar or in lines."""
     from tvist_server.kernels import KERNELS, compile_ahead
 
     said, shown = time.monotonic(), 0

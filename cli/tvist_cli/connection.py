@@ -1,4 +1,4 @@
-"""Options about where a served robot is, the same on every command that reaches one."""
+"""Options that locate a served robot, the same on every command that connects to one."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,23 +13,19 @@ from tvist_client.transports.zenoh import only_robot
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Connection:
-    """Where a robot is. A command whose first parameter this is also takes the endpoint without its option."""
+    """Where a robot is. A command that has this as its first parameter also takes the endpoint without its option."""
 
     endpoint: str = ENDPOINT
-    """Zenoh endpoint of the robot, or of a router."""
+    """Connect to the robot or router at this Zenoh endpoint."""
     name: str | None = field(default=None, kw_only=True)
-    """Name of the robot [ur5e; if there is none, the only robot at the endpoint]."""
+    """Select the robot of this name [ur5e; if there is none, the only robot at the endpoint]."""
     namespace: str = field(default="", kw_only=True)
-    """Namespace of the robot, if it is served in one."""
+    """Look for the robot in this namespace."""
     security: Path | None = field(default=None, kw_only=True)
-    """Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT."""
+    """Use this client's certificate from this folder, made by tvist keys; the endpoint is then tls/HOST:PORT."""
 
     async def robot(self) -> Robot:
-        """Connect to the robot.
-
-        Raises:
-            ClientError: It does not answer, or there are several and none was named.
-        """
+        """Connect to the robot; raise ClientError if it does not answer, or if there are several and none was named."""
         name = self.name or await only_robot(self.endpoint, NAME, self.security, self.namespace)
         return await Robot.connect(self.endpoint, name, security=self.security, namespace=self.namespace)
 
@@ -39,4 +35,3 @@ class Connection:
 
 
 LOCAL = Connection()
-"""The only robot on this machine."""

@@ -1,4 +1,4 @@
-"""How a command reports a failure: one sentence and an exit code."""
+"""How a command reports a failure: a message and an exit code."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,7 +17,7 @@ class Failure(Exception):  # noqa: N818  the plain word for it
 
 
 def interrupted(what: str) -> Failure:
-    """Return the failure for Control+C, which says what was done and what was not."""
+    """Return the failure for Control+C; `what` tells what was done and what was not."""
     return Failure(f"interrupted: {what}", code=130)
 
 
@@ -37,7 +37,7 @@ def told(*errors: type[Exception], code: int = 1) -> Iterator[None]:
 
 
 def _sentence(error: Exception) -> str:
-    """Return the message without the code that a protocol error found here carries for a remote client."""
+    """Return the message without the code that a protocol error carries for a remote client."""
     if isinstance(error, ProtocolError):
         return error.why
     if isinstance(error, FileExistsError) and error.filename is not None:

@@ -1,4 +1,4 @@
-"""Options about the files of figures, the same on every command that writes some."""
+"""Options for figure files, the same on every command that writes figures."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Save = Callable[["Figure", str], Path]
-"""Writes a figure to a file of this name, without its suffix, and returns its path."""
+"""Writes a figure to a file of this name, given without suffix, and returns its path."""
 
 
 @Parameter(name="*")
@@ -24,30 +24,24 @@ class FigureOptions:
     """How a command writes figures."""
 
     format: Literal["png", "pdf", "svg"] | None = None
-    """Format of figures: png, pdf or svg [png]."""
+    """Write figures as png, pdf or svg [png]."""
     style: list[str] | None = None
-    """Style of figures, repeatable: paper, with headings and explanations in a text beside each; slides, with larger
-    type; or a style sheet of matplotlib, FILE.mplstyle, which may also set colors, width and resolution."""
+    """Draw figures in this style, repeatable: paper, with headings and explanations in a text file beside
+    each; slides, with larger type; or a matplotlib style sheet FILE.mplstyle, which may also set colors,
+    width and resolution."""
 
     @contextmanager
     def into(self, folder: Path) -> Iterator[Save]:
-        """Set the style in which figures are drawn, and yield what writes them to a folder."""
+        """Set the style in which figures are drawn; yield the function that saves them in a folder."""
         from tvist_lab.figures import house_style, save
 
         with house_style(*self.style or ()):
             yield lambda figure, name: save(figure, folder / f"{name}.{self.format or 'png'}")
 
     def check(self, folder: Path | None, *files: Path | None, option: str = "--figures") -> None:
-        """Refuse what cannot be done, before anything is computed.
+        """Raise Failure, before anything is computed, if figures or other output files cannot be written as requested.
 
-        Args:
-            folder: Folder of the figures; None where it was not given.
-            files: Other files that will be written at the end; None for those that were not given.
-            option: Option that names the folder.
-
-        Raises:
-            Failure: There is no such style, there are no figures to which an option could apply, or a file's folder
-                does not exist.
+        `folder` is None if `option`, the option that names it, was not given; so is each of `files`.
         """
         for file in files:
             if file is not None and not file.parent.is_dir():
@@ -67,10 +61,9 @@ class FigureOptions:
 
 
 AS_USUAL = FigureOptions()
-"""Nothing was asked for."""
 
 
 def write(save: Save, figures: "Mapping[str, Figure]") -> None:
-    """Write figures, by the names of their files, and say the path of each."""
+    """Write figures under these names, without suffix, and print the path of each."""
     for name, figure in figures.items():
         say(str(save(figure, name)))

@@ -45,7 +45,7 @@ def report(
     json: bool,
     more: Mapping[str, Any] | None = None,
 ) -> None:
-    """Print what ring-downs tell, how sure it is, the jogs that would tell more, and how to serve with it."""
+    """Print the fit of the ring-downs, its uncertainty, the jogs that would improve it, and how to serve with it."""
     model, how = found.calibration.modal, found.calibration.provenance
     assert model is not None, "each calibration has springs and drives"
     crossed = list(zip(model.cross_validated_f_d_percent, model.cross_validated_zeta_percent, strict=True))
@@ -145,7 +145,6 @@ def report(
 
 
 def _lag(servo: ServoResponse | None, *, positions: bool) -> None:
-    """Print the lag of a robot that takes positions alone."""
     if servo is not None:
         low, high = (servo.lag * (1.0 + side * 1.96 * servo.errors[0]) for side in (-1.0, 1.0))
         out.print(
@@ -163,7 +162,7 @@ def _wrong(found: Found) -> str:
 
 
 def _moves(one: Jog) -> list[str]:
-    """Commands that make a proposed move: to its start, and the jog."""
+    """Return the commands for a proposed jog: the moves to its start, and the jog."""
     there = [f"tvist move {angles(at)} --shaper none" for at in one.way]
     limits = one.limits
     jog = (
@@ -173,7 +172,7 @@ def _moves(one: Jog) -> list[str]:
 
 
 def angles(q: Floats) -> str:
-    """Return angles as commands take them."""
+    """Format angles as commands take them."""
     return ",".join(f"{angle:.3f}" for angle in q.tolist())
 
 
@@ -228,7 +227,6 @@ def report_payload(found: PayloadFound, *, declared: bool, json: bool) -> None:
 
 
 def _springs(parameters: Sequence[ModalParameter]) -> None:
-    """Print springs and drives, and which of them the ring-downs do not tell."""
     own = [parameter for parameter in parameters if parameter.quantity in QUANTITIES]
     table(
         "springs and drives",
@@ -276,7 +274,7 @@ def _parameter(parameter: ModalParameter) -> tuple[str, ...]:
 
 
 def _friction(parameters: Sequence[ModalParameter]) -> list[tuple[str, ...]]:
-    """Rows of the table of friction; a dash where it was not identifiable."""
+    """Return the rows of the friction table, with a dash for what could not be identified."""
     rows: dict[int, dict[str, str]] = {}
     for parameter in parameters:
         unit = 1e3 if FRICTION[parameter.quantity].endswith("mrad/s") else 1.0
@@ -292,7 +290,7 @@ def _joints(parameter: ModalParameter) -> str:
 
 
 def report_twin(twin: Twin, output: Path, *, json: bool) -> None:
-    """Print what a twin has beside the robot file, and how well it predicts."""
+    """Print the twin's parameters beside those of the robot file, and how well the twin predicts."""
     if json:
         print_json(_twin_figures(twin, output))
         return

@@ -1,4 +1,4 @@
-"""Identify a robot from a source of ring-downs: one in this process, a served one, one at ur://, or logs."""
+"""Identify a robot from ring-downs: simulated in this process, of a served robot, of one at ur://, or from logs."""
 
 import asyncio
 import sys
@@ -38,9 +38,9 @@ from tvist_server.watching.place import place_of
 ROBOT = "ur5e"
 """Robot that is identified unless another one is named."""
 READY = 30.0
-"""Longest wait for the robot to follow [s]."""
+"""Longest wait for the robot to follow set-points [s]."""
 MOVED = 0.01
-"""Distance of a joint from where the moves were planned from, from which on they are not made [rad]."""
+"""If a joint is further than this from where the moves were planned to start, they are not made [rad]."""
 
 
 def from_logs(
@@ -56,7 +56,7 @@ def from_logs(
     twin: bool,
     json: bool,
 ) -> None:
-    """Write a calibration that stops of logs tell, or a twin that makes their motions."""
+    """Write a calibration fitted to stops in logs, or a twin that repeats their motions."""
     arm, logs = robot_logs(
         [*files, *checks], robot, None if masses is None else masses[0], columns, len(files)
     )
@@ -84,10 +84,7 @@ def _calibrated(arm: RobotDescription, measured: Measured, output: Path, step: P
 
 
 class Place:
-    """A robot that can be moved.
-
-    It is served, or at ur://, or in this process if there is no source.
-    """
+    """A robot that can be moved: served, at ur://, or in this process if there is no source."""
 
     def __init__(
         self,
@@ -129,7 +126,7 @@ class Place:
                 check_rating(self._setup.payload, self._setup.description)
 
     def weigh(self, *, declare: bool, json: bool) -> None:
-        """Find the payload, and print it."""
+        """Identify the payload and print it."""
 
         async def run(step: Progress) -> None:
             async with self._robot_and_file() as (client, arm), client.control("identify") as control:
@@ -143,7 +140,7 @@ class Place:
             asyncio.run(run(step))
 
     def identify(self, output: Path, figures: Path | None, look: FigureOptions, *, json: bool) -> None:
-        """Make jogs, write the calibration that they tell, and print how good it is."""
+        """Make jogs, write the calibration fitted to them, and print its quality."""
         picture = output.with_suffix(".moves.png")
 
         async def run(step: Progress) -> tuple[RobotDescription, Measured]:
@@ -209,7 +206,7 @@ class Place:
 def _draw(
     found: Found, look: FigureOptions, folder: Path, arm: RobotDescription, true: list[ModeErrors] | None
 ) -> None:
-    """Draw the measured modes and, where the truth is known, maps of the lowest one over the workspace."""
+    """Draw the measured modes and, if the truth is known, maps of the lowest one over the workspace."""
     from tvist_lab.figures import identified_figure, workspace_map_figure
     from tvist_lab.identification.workspace_map import QUANTITIES, workspace_map
 
@@ -233,7 +230,7 @@ def _draw(
 async def _agreed_jogs(
     client: Robot, plan: JogPlan, picture: Path, step: Progress, *, sure: bool
 ) -> Measured:
-    """Show the moves, ask and make them."""
+    """Show the moves, ask for consent, and make them."""
     from tvist_lab.figures import house_style, move_plan_figure, save
 
     with house_style():
@@ -252,7 +249,7 @@ async def _agreed_jogs(
 
 
 async def _ready(client: Robot, control: Arm, plan: JogPlan) -> None:
-    """Wait until the program on the robot follows, which shows by a move to where the arm stands."""
+    """Wait until the program on the robot follows; test this with a move to the arm's present position."""
     say("starting the program on the robot")
     deadline = asyncio.get_running_loop().time() + READY
     while True:
@@ -273,7 +270,7 @@ async def _ready(client: Robot, control: Arm, plan: JogPlan) -> None:
 
 
 def _show(plan: JogPlan, picture: Path) -> None:
-    """Print the moves on stderr, where the question stands, too."""
+    """Print the moves on stderr, where the question also appears."""
     rows = [
         (str(number), " → ".join(map(angles, jog.way)), angles(jog.q))
         for number, jog in enumerate(plan.jogs, 1)

@@ -1,4 +1,4 @@
-"""How much less a motion shakes with a shaper, by the same measure as `tvist log analyze A B`."""
+"""Measure how much a shaper reduces the vibration of a motion, as `tvist log analyze A B` does."""
 
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from tvist_view.beside import Run, Verdict
 
 MOST = 0.8
-"""Share of the ticks whose truth must have come for it to be used: a busy machine loses some [-]."""
+"""Share of ticks that must have a truth message for the truth to be used [-]; a busy machine loses some."""
 
 
 def judge(without: "Run", shaped: "Run") -> "Verdict":
-    """Measure one motion without and with a shaper, each with the rest after it; what it lacks is None."""
+    """Measure one motion without and with a shaper, each with the rest after it; missing values are None."""
     from tvist_lab.change import Change
     from tvist_lab.metrics.comparison import compare
     from tvist_lab.metrics.table import Measured
@@ -29,13 +29,13 @@ def judge(without: "Run", shaped: "Run") -> "Verdict":
 
 
 def _recording(run: "Run") -> "Recording":
-    """One motion as columns, by the truth, or by the sensor where few truths have come."""
+    """Return a motion as columns of the truth, or of the sensor if too many truth messages were lost."""
     from tvist_lab.recordings.messages import recording_of_messages
 
     truths = sorted(run.truths, key=lambda truth: truth.tick)
     if len(truths) < MOST * len(run.states):
         return recording_of_messages(run.states, run.events)
-    # At both ends a state may have come without its truth.
+    # At both ends, the truth of a state may be missing.
     states = [state for state in run.states if truths[0].tick <= state.tick <= truths[-1].tick]
     between = [truth for first, second in pairwise(truths) for truth in _between(first, second)]
     return recording_of_messages(
@@ -44,7 +44,7 @@ def _recording(run: "Run") -> "Recording":
 
 
 def _between(first: "Truth", second: "Truth") -> "Iterator[Truth]":
-    """What was lost between two truths, by a straight line: |α| falls steeply at a stop, so that a hole would show."""
+    """Interpolate the truth messages lost between two: |α| falls steeply at a stop, so a gap would show."""
     for tick in range(first.tick + 1, second.tick):
         share = (tick - first.tick) / (second.tick - first.tick)
         mixed = {

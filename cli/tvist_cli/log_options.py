@@ -1,4 +1,4 @@
-"""Options about what a log holds, the same on every command that reads one."""
+"""Options for reading logs, the same on every command that reads one."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,32 +19,27 @@ class LogOptions:
     """How to read logs."""
 
     columns: str | None = None
-    """Names of a CSV's columns if they are not known, with {} for the number of a joint or axis, and a unit after a
-    colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g; or places counted from 1: time=1,q=2-7. Also qd, gyroscope,
-    pose, target_q, target_qd."""
+    """Name the columns of a CSV with unknown names, with {} for the number of a joint or axis and a unit
+    after a colon: time=t:ms,q=joint_{}:deg,accelerometer=acc_{}:g; or give places counted from 1:
+    time=1,q=2-7. Also qd, gyroscope, pose, target_q, target_qd."""
     imu: list[Path] | None = None
-    """Log of a sensor at the tool with a clock of its own, which is put on the robot's: accelerometer and, better,
-    gyroscope, in any format of a log. Repeatable: one for each robot's log."""
+    """Read the log of a sensor at the tool that has its own clock, and align it with the robot's log:
+    accelerometer and, better, gyroscope, in any format of a log. Repeatable: one for each robot's log."""
     imu_columns: str | None = None
-    """Names of the columns of --imu, as for --columns: time=t:ms,accelerometer=a{}:g,gyroscope=w{}:deg/s."""
+    """Name the columns of --imu, as for --columns: time=t:ms,accelerometer=a{}:g,gyroscope=w{}:deg/s."""
     robot: Annotated[str | None, ROBOTS] = None
-    """Robot that moves the sensor of --imu: name of one that comes with the package, or path of a robot file [that of
-    the log, or ur5e]."""
+    """Use this robot as the one that moves the sensor of --imu: a name that comes with the package, or the
+    path of a robot file [that of the log, or ur5e]."""
 
     @property
     def given(self) -> bool:
-        """Whether anything was asked for."""
+        """Whether any option was given."""
         return self != AS_IT_IS
 
     def read(self, *files: Path, sensor: bool = False) -> "list[Recording]":
-        """Read logs, each joined with its sensor's where there is one.
+        """Read logs and join each with its sensor's log; raise Failure if a file or an option does not fit.
 
-        Args:
-            files: The logs.
-            sensor: Whether one without `--imu` may be that of an accelerometer alone.
-
-        Raises:
-            Failure: An option has nothing to act on, the numbers of files differ, or a file cannot be read or joined.
+        If `sensor` is true, a log without `--imu` may be that of an accelerometer alone.
         """
         from tvist_lab.recordings import RecordingError, read
         from tvist_lab.recordings.table import ROBOT, ROBOT_OR_SENSOR
@@ -68,4 +63,3 @@ class LogOptions:
 
 
 AS_IT_IS = LogOptions()
-"""Nothing was asked for."""

@@ -1,4 +1,4 @@
-"""Entry point of the `tvist` program and its list of commands; each command is imported when it is called."""
+"""Entry point of `tvist` and its list of commands; each command is imported only when it is called."""
 
 import gc
 import os
@@ -20,65 +20,61 @@ if TYPE_CHECKING:
     import cyclopts
 
 BEGAN = time.monotonic()
-"""When this program began, before it imported what takes long."""
+"""Start of this program, before the slow imports."""
 ABOUT = "A robot controller for a flexible arm in simulation, with time-varying input shaping."
 LOG = {
     "record": "Record a served robot as MCAP.",
-    "analyze": "Say what a recording or a log holds and measure its motions, or compare two.",
-    "advise": "Say from logs what rings, and which shaper to take.",
+    "analyze": "Show what a recording or log contains and measure its motions, or compare two.",
+    "advise": "Find in logs what rings, and recommend a shaper.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
     "export": "Write a recording as CSV or Parquet, or for Foxglove.",
     "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
 }
-"""The commands of `tvist log`."""
 GROUPS = {
     "Robots": {
         "serve": "Run a robot on the network.",
-        "run": "Run a program in URScript on a robot of its own; exit code 0 if it ends by itself.",
-        "check": "Check that a robot answers and is ready to be moved; exit code 0 if so.",
+        "run": "Run a URScript program on a new robot; exit code 0 if it ends by itself.",
+        "check": "Check that a robot answers and is ready to move; exit code 0 if so.",
         "move": "Move a served robot to a pose.",
-        "watch": "Show live what a served robot is doing, or how all robots are.",
-        "view": "Show a robot on a web page, its vibration magnified.",
-        "stop": "Stop a served robot, or all, whoever has control; exit code 0 if it is at rest.",
-        "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
-        "forget": "Undo what a served robot has learnt of its payload.",
+        "watch": "Show live what one or all served robots are doing.",
+        "view": "Show a robot on a web page, with magnified vibration.",
+        "stop": "Stop a served robot, or all, even if another client has control; exit code 0 if at rest.",
+        "unlock": "Make a stopped robot ready to move again; exit code 0 if it is.",
+        "forget": "Discard what a served robot has learnt about its payload.",
     },
     "Logs": {
-        "log": f"Recordings, and other robots' logs: {', '.join(LOG)}.",
+        "log": f"Use recordings and other robots' logs: {', '.join(LOG)}.",
     },
     "Studies": {
-        "study": "Compare shapers in simulation: on any moves, two of them, all of them, or by a study of your own.",
+        "study": "Compare shapers in simulation: on any moves, two of them, all of them, or in your own study.",
     },
     "Make and manage": {
-        "demo": "Run the paper's experiment, in real time or simulated, and print its tables beside ours.",
-        "lesson": "Open a page on which to try shaping.",
-        "identify": "Calibrate a robot by jogs or from its logs, weigh its payload, or fit a twin.",
-        "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",
-        "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
+        "demo": "Run the paper's experiment, in real time or simulated, and compare the results with the paper.",
+        "lesson": "Open a page for trying out shaping.",
+        "identify": "Calibrate a robot from jogs or logs, weigh its payload, or fit a twin.",
+        "robots": "List the arms with measured and assumed values, or measure how well auto suppresses vibration.",
+        "shapers": "List the shapers with their duration and robustness to a wrong frequency.",
         "keys": "Create TLS certificates for a robot and its clients.",
-        "router": "Run a router, through which the robots and clients of a fleet reach each other.",
+        "router": "Run a router that connects the robots and clients of a fleet.",
         "bench": "Measure how fast tvist runs on this machine.",
-        "completion": "Print the script by which a shell completes commands, options and their values.",
+        "completion": "Print the script with which a shell completes commands, options and values.",
     },
 }
 """The commands with their one-line help, in groups, in the order in which a new user meets them."""
 OF_GROUPS = {"log": LOG}
-"""Commands that have commands of their own."""
+"""Commands that have subcommands."""
 COMMANDS = {name: what for group in GROUPS.values() for name, what in group.items()}
 
 
 def program() -> None:
-    """Be the program `tvist`: see `main`."""
-    # Processes of ours import nothing from the folder that one happens to work in, which may be somebody else's.
+    """Run `tvist` as a program: see `main`."""
+    # Child processes must not import modules from the working folder, which may be somebody else's.
     os.environ["PYTHONSAFEPATH"] = "1"
     main()
 
 
 def main() -> None:
-    """Do what the command line says.
-
-    Control+C or another signal ends it at any time, with exit code 130 and without a traceback.
-    """
+    """Run the command line; Control+C or another signal ends it with exit code 130 and without a traceback."""
     try:
         _run()
     except KeyboardInterrupt:
@@ -87,18 +83,16 @@ def main() -> None:
 
 
 def _default(value: object) -> str | None:
-    """The default as a help text shows it: none for a switch that is off, or for what is empty."""
+    """Return the default as a help text shows it: None for a switch that is off, or an empty value."""
     if value in (None, False, "", ()):
         return None
     return "on" if value is True else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def application(called: Sequence[str] = ()) -> "cyclopts.App":
-    """Return the program's commands and options, as the parser knows them.
+    """Return the parser for all commands and options.
 
-    Args:
-        called: The words of the command that was called, if any: its own help is its docstring, while the list of all
-            commands has their short ones.
+    Of the command `called`, given as its words, the help is its docstring; the others have their one-line help.
     """
     from importlib.metadata import version
 
@@ -128,7 +122,7 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
 
 
 def _overview() -> str:
-    """Return the help of the program, made without the parser, which takes longer to import."""
+    """Return the help of the program without the parser, which takes longer to import."""
     indent, columns = " " * (max(map(len, COMMANDS)) + 4), min(shutil.get_terminal_size().columns, 120)
     lines = ["Usage: tvist COMMAND", "", *textwrap.wrap(ABOUT, columns), ""]
     options = {
@@ -146,7 +140,7 @@ def _overview() -> str:
 
 @cache
 def examples() -> dict[str, str]:
-    """Return a command line for each command that does something by itself, by its words such as `log analyze`."""
+    """Return an example command line for each command that can run by itself, keyed by words such as `log analyze`."""
     return tomllib.loads(Path(__file__).with_name("examples.toml").read_text(encoding="utf-8"))
 
 
@@ -155,7 +149,7 @@ def _example(command: str) -> str | None:
 
 
 def _known(chain: Sequence[str]) -> Mapping[str, str]:
-    """Return the commands among which one was sought."""
+    """Return the commands among which an unknown one was sought."""
     return OF_GROUPS.get(chain[0], COMMANDS) if chain else COMMANDS
 
 
@@ -200,7 +194,7 @@ def _run() -> None:
     from tvist_cli.misuse import readable, sentence
     from tvist_protocol.errors import harmless
 
-    # A sentence, without a line of ours.
+    # Print only the message of a warning, without a line of code.
     warnings.formatwarning = lambda message, *_, **__: harmless(f"tvist: {message}\n")
     app = application(sys.argv[1:3])
     try:

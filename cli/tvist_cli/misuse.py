@@ -1,4 +1,4 @@
-"""Explain a wrong command line in one sentence that says what to do."""
+"""Explain a wrong command line in one message with the next step."""
 
 import math
 import re
@@ -26,7 +26,7 @@ _KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "tr
 
 
 def readable(arguments: Iterable[str]) -> list[str]:
-    """Put a blank before what begins with a minus but is no option: lists of angles, and `-` for the standard input."""
+    """Put a blank before arguments that begin with a minus but are no options: angles, and `-` for standard input."""
     return [
         f" {argument}" if argument == "-" or _ANGLES.fullmatch(argument) else argument
         for argument in arguments
@@ -39,7 +39,7 @@ def lower(name: str | None) -> str | None:
 
 
 def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> None:
-    """Refuse fractions for whole numbers, which the parser would round."""
+    """Refuse fractions for whole numbers; the parser would round them."""
     for argument in arguments:
         parts = (argument.hint, *get_args(argument.hint))
         if int not in (*parts, *(one for part in parts for one in get_args(part))):
@@ -56,12 +56,7 @@ def finite(_: Any, value: Any) -> None:
 
 
 def sentence(error: CycloptsError, commands: Sequence[str]) -> str:
-    """Say what is wrong and what to do.
-
-    Args:
-        error: Error from the parser.
-        commands: Names of the commands that can stand where it went wrong.
-    """
+    """Return a message for a parser's error; `commands` are the names that were possible at its place."""
     command = " ".join(["tvist", *(error.command_chain or ())])
     seek = f"see {command} --help"
     match error:

@@ -1,7 +1,4 @@
-"""What a shell offers as the value of an option: names that come with the package, and files of its kind.
-
-A command annotates such an option with one of these, `Annotated[str, ROBOTS]`; the shell asks the program at TAB.
-"""
+"""Shell completion for the values of options, which are annotated like `Annotated[str, ROBOTS]`."""
 
 from collections.abc import Iterable
 from glob import escape, glob
@@ -13,11 +10,10 @@ if TYPE_CHECKING:
     from cyclopts.completion import CompletionContext
 
 NAMES = ("moves", "bench", "robustness", "match")
-"""Names of the studies that come with the package."""
 
 
 def _names(kind: str) -> Iterable[str]:
-    """Names of a kind; what they need is imported only when something is completed, so that help stays quick."""
+    """Return the names of a kind; modules are imported only on completion, so that help stays quick."""
     found: Iterable[str]
     match kind:
         case "robot":
@@ -71,6 +67,5 @@ PLANTS = _offered("plant", ".py")
 WORLDS = _offered("world", ".xml")
 STUDIES = _offered("study", ".toml", ".py")
 SOURCES = _offered("source", "")
-"""Logs of any format."""
 PROFILES = _offered("profile")
 POSES = _offered("pose")

@@ -22,13 +22,12 @@ if TYPE_CHECKING:
     from tvist_lab.report import Page
 
 GAP = " │ "
-"""What separates the columns of a table."""
 WIDTH = 120
 """Number of columns when the output is not a terminal."""
 
 
 class _Screen(Console):
-    """A terminal to which only the program gives commands, and no text that it shows, which may come from anywhere."""
+    """A terminal that ignores control characters in the text it shows, which may come from anywhere."""
 
     def __init__(self, stream: TextIO, *, stderr: bool = False) -> None:
         width = None if stream.isatty() else WIDTH
@@ -40,13 +39,12 @@ class _Screen(Console):
 
 
 out = _Screen(sys.stdout)
-"""Results."""
 err = _Screen(sys.stderr, stderr=True)
 """Progress and messages, on stderr so that they do not mix with `--json`."""
 
 
 def say(message: str) -> None:
-    """Print a message in one line, however long, since it may go to a log or contain a path to copy."""
+    """Print a message on one line of any length, since it may go to a log or contain a path to copy."""
     try:
         err.print(message, soft_wrap=True)
     except OSError:
@@ -55,7 +53,7 @@ def say(message: str) -> None:
 
 
 def program() -> str:
-    """Return what to type in this folder to call this program: its name if the shell finds it, or else its path."""
+    """Return what to type in this folder to call this program: its name if the shell finds it, else its path."""
     here, found = Path(sys.executable).with_name("tvist"), shutil.which("tvist")
     if not here.exists() or (found is not None and Path(found).samefile(here)):
         return "tvist"
@@ -64,7 +62,7 @@ def program() -> str:
 
 
 def typed() -> str:
-    """Return the command as it was typed, for the pages that name the command that made them."""
+    """Return the command as it was typed, for pages that name the command that made them."""
     return shlex.join(["tvist", *sys.argv[1:]])
 
 
@@ -76,7 +74,7 @@ def print_json(value: Any) -> None:
 
 @contextmanager
 def waiting(what: str) -> Iterator[Callable[[str], None]]:
-    """Show on a terminal what is waited for; the function it gives changes that."""
+    """Show on a terminal what the program waits for; yield a function that changes the text."""
     if err.is_terminal:
         with err.status(Text(what)) as status:
             yield lambda now: status.update(Text(now))
@@ -88,12 +86,9 @@ def waiting(what: str) -> Iterator[Callable[[str], None]]:
 def progress(
     total: int, what: str, kept: str = "nothing was written"
 ) -> Iterator[Callable[[int, str | None], None]]:
-    """Show a progress bar if stderr is a terminal; the function it gives advances and optionally renames the bar.
+    """Show a progress bar on a terminal; yield a function that advances and optionally renames it.
 
-    Args:
-        total: Number of steps.
-        what: Name of the steps, in the plural.
-        kept: What remains after Control+C.
+    `what` names the steps in the plural; `kept` tells what remains after Control+C.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -119,10 +114,8 @@ def progress(
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], on: Console = out) -> None:
-    """Print a table with text aligned left and numbers aligned right.
-
-    A table wider than the screen is printed in parts, one below the other, each with the first column.
-    """
+    """Print a table with text aligned left and numbers right."""
+    # A table wider than the screen is printed in parts, one below the other, each with the first column.
     from rich.table import Table
 
     on.print(Text(title, style="bold"))
@@ -137,7 +130,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], on:
 
 
 def _parts(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[int]]:
-    """Return which columns stand in each part of a table so that none is wider than the screen."""
+    """Distribute the columns over the parts of a table so that none is wider than the screen."""
     wide = [
         max(cell_len(line) for cell in cells for line in cell.split("\n")) + len(GAP)
         for cells in zip(columns, *rows, strict=True)
@@ -151,7 +144,7 @@ def _parts(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[i
 
 
 def words(meanings: Mapping[str, str]) -> None:
-    """Print words with what they mean beside them."""
+    """Print words with their meanings beside them."""
     from rich.table import Table
 
     grid = Table.grid(padding=(0, 2, 0, 0))
@@ -175,14 +168,14 @@ def write_json(path: Path, result: dict[str, Any]) -> None:
 
 
 def default_output(path: Path) -> Path:
-    """Return the default path of a file, which must not exist: only a file that was named is replaced."""
+    """Return the default path of a file; raise Failure if it exists, since only a file the user named is replaced."""
     if path.exists():
         raise Failure(f"{path} exists already: choose the file with --output, which replaces what is there")
     return path
 
 
 def write_report(path: Path, page: "Page") -> None:
-    """Write a web page, all of it or nothing, and say where it is."""
+    """Write a web page completely or not at all, and print its path."""
     from tvist_lab.report import render
     from tvist_lab.whole_file import write_whole
 

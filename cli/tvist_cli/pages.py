@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tvist_view.stage import Meet
 
 NICE = 5
-"""How much a page gives way to other programs, such as a robot's server on the same machine."""
+"""Niceness of a page's process, so that it yields to a robot's server on the same machine."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Door:
     address: str
     port: int
     insecure: bool
-    """Serve other machines, too."""
+    """Whether other machines can open the page."""
 
 
 def serve_page(
@@ -34,7 +34,7 @@ def serve_page(
     run: Callable[[], Awaitable[None]] | None = None,
     parts: Callable[[str], bytes | None] = lambda _: None,
 ) -> None:
-    """Serve a page until Control+C; `run` is done meanwhile, `parts` are what it asks for by paths."""
+    """Serve a page until Control+C while `run` runs; `parts` returns further files that the page requests by path."""
     from tvist_view.stage import StageError, open_stage
 
     logging.basicConfig(format="tvist: %(message)s", level=logging.WARNING)

@@ -1,4 +1,4 @@
-"""Print the paper's tables beside ours."""
+"""Print the paper's tables beside those of this run."""
 
 from typing import Any
 
@@ -14,13 +14,11 @@ TERMS = {
     "RV": "residual vibration: acceleration with which the tool vibrates at the end of the command",
     "impact": "change by shaping",
 }
-"""Words of Tables 1 and 2."""
 METHOD_TERMS = {
     "peak": "largest true acceleration of the tool later than 10 ms after the end of the command; less: by how much",
     "still": "last time at which it exceeds 0.1 m/s²",
     "q̈/limit": "largest acceleration of a joint over its limit",
 }
-"""Words of the tables of methods."""
 
 
 def print_paper(result: dict[str, Any]) -> None:

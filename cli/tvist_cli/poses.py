@@ -1,4 +1,4 @@
-"""Poses as users type them: a name in any case, angles, or the place of the tool."""
+"""Parse poses as users type them: a name, joint angles, or a pose of the tool."""
 
 import math
 from collections.abc import Mapping
@@ -10,13 +10,9 @@ from tvist_protocol.errors import quoted
 def pose(
     text: str, poses: Mapping[str, tuple[float, ...]], what: str, *, degrees: bool = False
 ) -> tuple[float, ...]:
-    """Return the joint angles [rad] that a text describes.
+    """Return the joint angles [rad] of a named pose, in any case, or of angles separated by commas.
 
-    Args:
-        text: Name of a pose in any case, or angles separated by commas.
-        poses: Named poses [rad].
-        what: Name of the argument, for the message.
-        degrees: Whether the angles are in degrees.
+    `what` names the argument in the message of the Failure.
     """
     for name, q in poses.items():
         if name.lower() == text.strip().lower():
@@ -31,13 +27,7 @@ def pose(
 
 
 def tool_numbers(text: str, *, by: bool, degrees: bool = False) -> tuple[float, ...]:
-    """Return the numbers of a target of the tool: a distance or position [m], or a position and rotation vector [rad].
-
-    Args:
-        text: Three numbers separated by commas, or six if it is not a distance.
-        by: Whether it is a distance.
-        degrees: Whether the rotation vector is in degrees.
-    """
+    """Parse a target of the tool: displacement or position [m], or position [m] and rotation vector [rad]."""
     numbers = _numbers(text)
     if len(numbers) not in ({3} if by else {3, 6}):
         unit = "degrees" if degrees else "rad"
@@ -50,7 +40,7 @@ def tool_numbers(text: str, *, by: bool, degrees: bool = False) -> tuple[float, 
 
 
 def _numbers(text: str) -> tuple[float, ...]:
-    """Numbers separated by commas; none if the text is anything else."""
+    """Parse numbers separated by commas; return nothing if the text is anything else."""
     try:
         numbers = tuple(float(number) for number in text.split(","))
     except ValueError:

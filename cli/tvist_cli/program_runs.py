@@ -1,4 +1,4 @@
-"""Programs in URScript: how they are read and checked, their runs one after the other, and how each ended."""
+"""Read, check and run URScript programs, and report how each ended."""
 
 import asyncio
 import sys
@@ -29,15 +29,14 @@ from tvist_server.recording import RecorderError
 from tvist_server.server import Server
 
 SHOWN_EVERY = 0.1
-"""Time between two changes of the progress line [s]."""
+"""Shortest time between two changes of the progress line [s]."""
 _CLEAR = "\r\x1b[K"
-"""Returns to the beginning of the terminal's line and clears it."""
+"""Moves to the start of the terminal's line and clears it."""
 STDIN = "-"
-"""Name that stands for the standard input."""
 
 
 def named(file: Path) -> str:
-    """Return how messages call a file."""
+    """Return a file's name for messages."""
     return "<stdin>" if _is_stdin(file) else str(file)
 
 
@@ -62,13 +61,13 @@ def read_script(file: Path) -> str:
 
 
 def placed(file: Path, finding: Finding) -> str:
-    """Return a finding as FILE:LINE:COLUMN: text, which editors understand."""
+    """Format a finding as FILE:LINE:COLUMN: text, which editors understand."""
     kind = "" if finding.level == "error" else f"{finding.level}: "
     return f"{named(file)}:{finding.line}:{finding.column}: {kind}{finding.text}"
 
 
 def check_scripts(files: Sequence[Path], *, json: bool) -> None:
-    """Print what is wrong with programs."""
+    """Print the errors and warnings of programs; raise Failure if there are errors."""
     found = [(one, finding) for one in files for finding in check_program(read_script(one))]
     errors = sum(finding.level == "error" for _, finding in found)
     if json:
@@ -87,39 +86,35 @@ def check_scripts(files: Sequence[Path], *, json: bool) -> None:
 
 
 def _is_stdin(file: Path) -> bool:
-    """Whether a file is the standard input; a blank before the name keeps it from being taken for an option."""
+    """Whether a file is the standard input; `readable` may have put a blank before its name."""
     return str(file).strip() == STDIN
 
 
 @dataclass(frozen=True)
 class Ran:
-    """What came of a program."""
+    """How a program's run ended."""
 
     result: dict[str, Any]
-    """What --json prints of it."""
+    """The program's part of what --json prints."""
     account: str = ""
-    """What it did, in a sentence."""
+    """Summary of the run."""
     failure: Failure | None = None
-    """Why it has failed; None if it has not."""
+    """Why the run failed; None if it passed."""
     server: Server | None = None
-    """Server of its robot; None in lockstep."""
+    """The robot's server; None in lockstep."""
 
 
 class Tell:
-    """Prints what a program says as it comes, and on a terminal a line with its progress.
-
-    Args:
-        quiet: Whether to print no messages, since they are part of the one JSON object.
-    """
+    """Prints a program's messages as they come, and on a terminal a progress line; `quiet` suppresses the messages."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
         self.which = ""
-        """Which of several programs it is, for the line with the progress."""
+        """Which of several programs is running, for the progress line."""
         self._shown, self._visible = 0.0, False
 
     def __call__(self, watch: ProgramWatch) -> None:
-        """Print what is new."""
+        """Print the new messages."""
         while watch.news:
             said = watch.news.popleft()
             if not self._quiet:
@@ -156,14 +151,14 @@ def _print(said: Said) -> None:
 
 @dataclass(frozen=True)
 class Runner:
-    """Runs programs, each on a robot of its own, and judges what they did."""
+    """Runs programs, each on a new robot, and judges them."""
 
     config: ServeConfig
     inputs: Sequence[str]
     timeout: float | None
     limits: Limits
     baseline: Mapping[str, Run] | None
-    """Earlier runs by the names of their programs; None if there is no baseline."""
+    """Earlier runs by program name; None if there is no baseline."""
     tell: Tell
 
     def run(self, file: Path, text: str) -> Ran:
@@ -197,7 +192,7 @@ class Runner:
         return Ran(result, summary(watch), failure, server)
 
     def _in_lockstep(self, text: str, errors: list[str]) -> ProgramWatch:
-        """Run a program in this process; `errors` are those of the recording."""
+        """Run a program in this process; errors of the recording are appended to `errors`."""
         record = self.config.record
         with told(code=2):
             setup = self.config.setup()
@@ -216,7 +211,7 @@ class Runner:
         return watch
 
     def _in_real_time(self, file: Path, text: str, errors: list[str]) -> tuple[ProgramWatch, Server]:
-        """Serve a robot that runs a program; `errors` are those of the recording."""
+        """Serve a robot that runs a program; errors of the recording are appended to `errors`."""
         config, ending = self.config, Ending()
         with ending.at_once():
             served = ProgramServer(config, text, self.inputs, ending, self.timeout, compile_if_new)
@@ -235,7 +230,7 @@ class Runner:
 
 
 def _refused(file: Path, text: str) -> Ran | None:
-    """Say what is wrong with a program before anything is started for it; None if it can run."""
+    """Print what is wrong with a program before anything starts; None if it can run."""
     findings = check_program(text)
     for finding in findings:
         say(placed(file, finding))
@@ -250,7 +245,7 @@ def _refused(file: Path, text: str) -> Ran | None:
 
 
 def _ended(watch: ProgramWatch, errors: list[str]) -> list[Shortcoming]:
-    """What failed apart from limits and baseline: the program itself, or its recording."""
+    """Return failures other than those of limits and baseline: of the program, or of its recording."""
     found = [Shortcoming("recording", error) for error in errors]
     if watch.reason != "finished":
         line = None if watch.error is None else watch.error.line
@@ -259,7 +254,6 @@ def _ended(watch: ProgramWatch, errors: list[str]) -> list[Shortcoming]:
 
 
 def _failure(file: Path, watch: ProgramWatch, errors: list[str]) -> Failure | None:
-    """Why the run itself has failed; None if it has not."""
     after = f"after {watch.seconds:.3f} s of robot time"
     match watch.reason:
         case "finished":

@@ -1,4 +1,4 @@
-"""Read the logs that a robot is identified from, and find the robot file that they belong to."""
+"""Read the logs from which a robot is identified, and find their robot file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,7 +32,7 @@ def robot_logs(
     columns: str | None,
     known: int | None = None,
 ) -> tuple[RobotDescription, list[Log]]:
-    """Return the robot's description, and the logs with what the arm carried."""
+    """Read logs; return the robot's description and the logs with their payloads."""
     with told(RecordingError):
         recordings = [read(file, columns) for file in files]
     for file, recording in zip(files, recordings, strict=True):

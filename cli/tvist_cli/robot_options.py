@@ -1,4 +1,4 @@
-"""The options of a robot: each field of `ServeOptions` is one, with its docstring as its help."""
+"""The options of a robot: one for each field of `ServeOptions`, with the field's docstring as its help."""
 
 import inspect
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -31,7 +31,7 @@ _BOXES = {
     "Network": "listen connect namespace metrics security insecure",
     "UR's interfaces": "ur ur_address ur_ports ur_allow reserve_inputs",
 }
-"""The boxes of the help, each with its fields."""
+"""Boxes of the help, each with its fields."""
 _BOX_OF = {
     field: box
     for name, inside in _BOXES.items()
@@ -40,22 +40,18 @@ _BOX_OF = {
 }
 _OFFERED = {"robot": ROBOTS, "robots": ROBOTS, "shaper": SHAPERS, "plant": PLANTS, "world": WORLDS,
             "profile": PROFILES}  # fmt: skip
-"""What a shell offers for the value of an option."""
+"""Completion of option values."""
 _IN_ANY_CASE = ("profile", "shaper", "clock")
 
 
 def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Command]:
-    """Give a command, whose last parameter is `**given`, the fields of `ServeOptions` as options.
-
-    Args:
-        only: Names of the fields, if not all of them.
-    """
+    """Give a command whose last parameter is `**given` the fields of `ServeOptions`, or `only` some, as options."""
 
     def decorate(command: Command) -> Command:
         signature = inspect.signature(command)
         *own, _ = signature.parameters.values()
         options = [_option(field) for field in fields(ServeOptions) if not only or field.name in only]
-        # The parser reads the options of a function from here.
+        # The parser reads a function's options from its signature.
         command.__signature__ = signature.replace(parameters=own + options)  # type: ignore[attr-defined]
         return command
 
@@ -63,12 +59,7 @@ def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Comman
 
 
 def configuration(given: Mapping[str, Any], file: str | None, **defaults: object) -> "ServeConfig":
-    """Return what the command line gives, beyond that what the file does, and beyond that `defaults`.
-
-    Raises:
-        Failure: A value is invalid, with exit code 2.
-        UserFileError: The file has the wrong kind of content.
-    """
+    """Merge command line, file and `defaults`, in this order of precedence; raise Failure if a value is invalid."""
     from tvist_server.config import from_mapping
 
     source = "configuration" if file is None else f"configuration {file}"
@@ -77,7 +68,7 @@ def configuration(given: Mapping[str, Any], file: str | None, **defaults: object
 
 
 def content_of(file: str | None) -> dict[str, object]:
-    """Return the unchecked content of a configuration file; nothing if there is none."""
+    """Return the unchecked content of a configuration file; empty if there is none."""
     return {} if file is None else read_start_file(file, "configuration", dict[str, object])
 
 
@@ -95,7 +86,7 @@ def _option(field: FieldInfo) -> inspect.Parameter:
         case types.VarTupleType() | types.StructType():
             read = list[str]
     name = "ur-port" if field.name == "ur_ports" else field.name.replace("_", "-")
-    # What a profile may switch on can be switched off.
+    # Options that a profile may switch on need a form that switches them off.
     negative = f"--no-{name}" if read is bool and kind is not may_be else ()
     about = Parameter(name=f"--{name}", negative=negative, help=_help(field), group=_BOX_OF[field.name])
     annotation = Annotated[read | None, _OFFERED.get(field.name, Parameter()), about]
@@ -103,7 +94,7 @@ def _option(field: FieldInfo) -> inspect.Parameter:
 
 
 def _help(field: FieldInfo) -> str:
-    """Return a field's docstring, with the default where a word can say it."""
+    """Return a field's docstring, with the default where a word can express it."""
     text, default = field_docs(ServeOptions)[field.name], field.default
     if isinstance(default, bool) or not isinstance(default, str | int | float):
         return text
@@ -112,7 +103,7 @@ def _help(field: FieldInfo) -> str:
 
 
 def _plain(given: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
-    """Return what is given as a configuration file would."""
+    """Convert options to the entries of a configuration file."""
     if not {"ur_address", "ur_ports", "reserve_inputs"}.isdisjoint(given):
         yield "ur", True
     for name, value in given.items():
@@ -123,7 +114,7 @@ def _plain(given: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
 
 
 def _ur_port(text: str) -> tuple[str, int]:
-    """Split INTERFACE=PORT; the configuration checks whether there is such an interface."""
+    """Split INTERFACE=PORT; the configuration checks the name of the interface."""
     interface, equals, port = text.partition("=")
     if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
         raise Failure(

@@ -1,4 +1,4 @@
-"""Run programs in URScript one after the other, and print how they ended."""
+"""Run URScript programs one after the other, and print how they ended."""
 
 import math
 import sys
@@ -33,7 +33,7 @@ def run_programs(
     config: str | None,
     json: bool,
 ) -> None:
-    """Do what `tvist run` does without --check."""
+    """Run programs as `tvist run` does without --check."""
     _check_files(file, lockstep=lockstep)
     if timeout is not None and not 0.0 < timeout < math.inf:
         raise Failure(f"timeout is {timeout:g} s: must be finite and more than 0", code=2)
@@ -64,7 +64,7 @@ def run_programs(
 
 
 def _leave(server: Server | None, failure: Failure | None) -> None:
-    """End the process here if the network would keep it."""
+    """End the process here if the network would keep it running."""
     if server is not None and not server.left:
         if failure is not None:
             say(f"tvist: {failure}")
@@ -72,7 +72,7 @@ def _leave(server: Server | None, failure: Failure | None) -> None:
 
 
 def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str]) -> list[Ran]:
-    """Run programs one after the other; of several, say at once how each ended."""
+    """Run programs one after the other; if there are several, print at once how each ended."""
     ran: list[Ran] = []
     for number, (file, text) in enumerate(zip(files, texts, strict=True), 1):
         if len(files) > 1:
@@ -87,7 +87,7 @@ def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str]) -> lis
 
 
 def _together(results: list[dict[str, Any]], failure: Failure | None) -> dict[str, Any]:
-    """What --json prints of several programs."""
+    """Return what --json prints of several programs."""
     return {
         "ok": failure is None,
         "failed": sum(not result["ok"] for result in results),
@@ -97,7 +97,7 @@ def _together(results: list[dict[str, Any]], failure: Failure | None) -> dict[st
 
 
 def _of_several(ran: Sequence[Ran], count: int) -> Failure | None:
-    """Why the runs of several programs have failed; None if they have not."""
+    """Return why the runs of several programs failed; None if none failed."""
     failed = [one for one in ran if one.failure is not None]
     if not failed:
         return None
@@ -110,7 +110,7 @@ def _of_several(ran: Sequence[Ran], count: int) -> Failure | None:
 
 
 def _check_files(files: Sequence[Path], *, lockstep: bool) -> None:
-    """Refuse several programs in real time, and one that cannot be told from another."""
+    """Refuse several programs in real time, and programs that messages could not tell apart."""
     if len(files) > 1 and not lockstep:
         raise Failure(
             f"tvist run runs several programs only in lockstep: give --lockstep, or --check, or leave {files[1]} out",
@@ -122,7 +122,7 @@ def _check_files(files: Sequence[Path], *, lockstep: bool) -> None:
 
 
 def _check_written(junit: Path | None, baseline: Path | None) -> None:
-    """Refuse a file that cannot be written, before anything runs."""
+    """Refuse a result file that cannot be written, before anything runs."""
     if junit is None:
         return
     if junit.is_dir() or not junit.parent.is_dir():
@@ -133,7 +133,6 @@ def _check_written(junit: Path | None, baseline: Path | None) -> None:
 
 
 def _baseline(path: Path, files: Sequence[Path], *, lockstep: bool) -> Mapping[str, Run]:
-    """The baseline's runs by the names of their programs."""
     if not lockstep:
         raise Failure(
             "--baseline needs --lockstep, in which equal programs run alike to the last bit", code=2
@@ -143,7 +142,7 @@ def _baseline(path: Path, files: Sequence[Path], *, lockstep: bool) -> Mapping[s
 
 
 def _configuration(given: dict[str, Any], file: str | None, *, lockstep: bool) -> ServeConfig:
-    """The robot's configuration: that of `tvist serve` for one robot, with the profile `ursim`."""
+    """Return the configuration of the robot, as of `tvist serve` for one robot with the profile `ursim`."""
     for name in ("listen", "ur", "ur_allow"):
         if lockstep and name in given:
             option = name.replace("_", "-")

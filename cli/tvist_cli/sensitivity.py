@@ -1,4 +1,4 @@
-"""What shapers leave of the vibration when the frequency is wrong."""
+"""Compute and print the residual vibration of shapers for a wrong frequency."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -15,9 +15,8 @@ if TYPE_CHECKING:
 STANDARD = ("zv", "zvd", "ei")
 """Shapers of the paper's Figure 4."""
 TABLED = (-0.2, -0.1, 0.0, 0.1, 0.2)
-"""Errors in the table [-]."""
+"""Frequency errors in the table [-]."""
 POINTS = 401
-"""Number of errors of a curve."""
 
 
 def print_sensitivity(
@@ -79,7 +78,7 @@ def _print(shapers: "list[Shaper]", zeta: float, curves: list[dict[str, Any]]) -
 
 
 def _about(shaper: "Shaper", zeta: float) -> dict[str, Any]:
-    """Name, delay, and the errors between which at most 5 % is left, None for no end."""
+    """Return name, delay, and the errors between which at most 5 % remains; None for no bound."""
     import math
 
     low, high = shaper.band(0.05 * (1.0 + 1e-4), zeta)  # a hump of exactly 5 % is inside

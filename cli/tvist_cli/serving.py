@@ -1,4 +1,4 @@
-"""What the commands that serve a robot have in common."""
+"""Functions shared by the commands that serve a robot."""
 
 import asyncio
 import gc
@@ -30,7 +30,7 @@ def serve_robots(config: ServeConfig) -> None:
         if config.workers > 1:
             _several(config, ending)
             return
-        # Now there is something to clean up, which an exception sees to.
+        # From here on, a signal must raise an exception, so that the server is closed.
         with told(GatewayError, RecorderError), ending.at_once():
             server = Server(config, prepare=compile_if_new)
 
@@ -53,7 +53,7 @@ def serve_robots(config: ServeConfig) -> None:
 
 
 def compile_all(processes: int | None = None) -> None:
-    """Compile ahead, in this number of processes."""
+    """Compile ahead in this number of processes."""
     if processes is not None and processes < 1:
         raise Failure(f"compile is {processes}: must be at least 1", code=2)
     with told(KernelsError):
@@ -62,7 +62,6 @@ def compile_all(processes: int | None = None) -> None:
 
 
 def _several(config: ServeConfig, ending: Ending) -> None:
-    """Serve the robots in several processes."""
     with told(WorkersError, GatewayError):
         with ending.at_once():
             workers = Workers(config, compile_if_new)
@@ -98,7 +97,7 @@ def introduction(setups: Sequence[Setup], profile: str | None) -> str:
 
 
 def say_who_can_reach(server: Server | Workers, config: ServeConfig, robots: int) -> None:
-    """Say where UR's interfaces are open, and where anyone can move the robots."""
+    """Print where UR's interfaces are open, and where anyone can move the robots."""
     for address, ports in server.ur:
         listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
         say(f"UR's interfaces are open on {address}: {listed}")
@@ -110,7 +109,7 @@ def say_who_can_reach(server: Server | Workers, config: ServeConfig, robots: int
 
 
 def say_recorded(recordings: Sequence[Recording]) -> list[str]:
-    """Say where each robot was recorded; return the errors that have ended recordings."""
+    """Print where each robot was recorded; return the errors that ended recordings."""
     for recording in recordings:
         if recording.error is None:
             note = f", {recording.dropped} messages dropped" if recording.dropped else ""
@@ -119,9 +118,7 @@ def say_recorded(recordings: Sequence[Recording]) -> list[str]:
 
 
 def leave(server: Server, code: int) -> None:
-    """End the process with an exit code if the network would keep it; all that is ours is closed.
-
-    Zenoh would wait for ten seconds, for a client that has stopped reading.
-    """
+    """End the process with an exit code if the network would keep it; everything else is closed by then."""
+    # Zenoh would wait ten seconds for a client that has stopped reading.
     if not server.left:
         os._exit(code)

@@ -1,4 +1,4 @@
-"""Load shapers that a command line names, or gives as FILE.py:NAME."""
+"""Load shapers given on the command line by name or as FILE.py:NAME."""
 
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def loaded(shaper: str) -> "tuple[str, tuple[OwnShaper, ...]]":
-    """Return the name of a shaper, and the shaper loaded from its file, if any."""
+    """Return a shaper's name and, if it comes from a file, the loaded shaper."""
     from tvist_controller.sources.own_files import is_file
 
     if not is_file(shaper):
@@ -20,7 +20,7 @@ def loaded(shaper: str) -> "tuple[str, tuple[OwnShaper, ...]]":
 
 
 def load_given(place: str) -> "OwnShaper":
-    """Load the shaper of FILE.py:NAME."""
+    """Load the shaper FILE.py:NAME."""
     from tvist_controller.sources.own_files import OwnFileError
     from tvist_controller.sources.own_shapers import load_own
 
@@ -29,7 +29,7 @@ def load_given(place: str) -> "OwnShaper":
 
 
 def of_impulses(shaper: str) -> "Shaper":
-    """Return the shaper of a name or of FILE.py:NAME; only those with impulses have a delay for each mode."""
+    """Return the impulse shaper of a name or FILE.py:NAME; others have no delay for a given mode and are refused."""
     from tvist_shaping import SHAPERS, Shaper
 
     name, own = loaded(shaper)

@@ -1,4 +1,4 @@
-"""Load what a study is made of, and check what was asked for."""
+"""Load and check the robots, shapers and moves of a requested study."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -39,11 +39,11 @@ from tvist_shaping.errors import ShapingError
 
 Shaper = str | OwnShaper
 OF_SHAPERS = (CalibrationError, RecipeError, RefusalError, ShapingError)
-"""Why a shaper cannot be made of a calibration for an arm."""
+"""Errors if a shaper cannot be made from a calibration for an arm."""
 
 
 def preset_study(name: str, options: StudyOptions) -> Study:
-    """Return a study that comes with the package, made of what was asked for."""
+    """Return a study that comes with the package, with the requested options."""
     preset = PRESETS[name]
     of_others = {one for other in PRESETS.values() for one in other.options} - preset.options
     for option in options.given:
@@ -89,7 +89,7 @@ def _check(options: StudyOptions) -> None:
 def _asked(
     preset: Preset, name: str, options: StudyOptions, other: str = "", moves: Sequence[Move] = ()
 ) -> Asked:
-    """Load what was asked for; or the same shapers and some moves for another robot, with its own calibration."""
+    """Load what the options request; for an `other` robot, with its own calibration and the given moves."""
     whole = load(other or options.robot)
     masses = _masses(options.payload, whole)
     wanted = "none" if options.clean else options.disturbances
@@ -145,7 +145,7 @@ def _asked(
 
 
 def _shaper(name: str) -> Shaper:
-    """Return a name in lower case, the path of a file that has a shaper, or a loaded shaper."""
+    """Return a shaper name in lower case, the path of a file with a shaper, or a loaded shaper."""
     if ".py:" in name:
         return load_given(name)
     if not name.endswith(".py"):
@@ -157,7 +157,7 @@ def _shaper(name: str) -> Shaper:
 def _calibration(
     given: str | None, shaper: Shaper, modes: int, description: RobotDescription, *, modal: bool
 ) -> Calibration | None:
-    """Return the calibration that was given, or the one of this robot: for several modes, a modal one."""
+    """Return the given calibration, or the robot's own: a modal one for several modes."""
     own = (shaper,) if isinstance(shaper, OwnShaper) else ()
     name = shaper.name if isinstance(shaper, OwnShaper) else shaper
     known = Registry(one.shaper for one in own)
@@ -191,7 +191,6 @@ def _calibrations(methods: Sequence[Method]) -> list[Calibration]:
 
 
 def _masses(payload: Sequence[float] | None, description: RobotDescription) -> tuple[float, float]:
-    """Return the least and the largest mass."""
     given = [0.0, description.limits.payload] if payload is None else list(payload)
     low, high = given[0], given[-1]
     if len(given) > 2 or not 0.0 <= low <= high <= 100.0:
@@ -203,7 +202,7 @@ def _masses(payload: Sequence[float] | None, description: RobotDescription) -> t
 def _moves(
     options: StudyOptions, description: RobotDescription, masses: tuple[float, float], least: int
 ) -> tuple[list[Move], float | None]:
-    """Return the moves, and the share of draws that were free of collision."""
+    """Return the moves, and the share of random draws that were free of collision."""
     if not options.moves.lstrip("-").isdigit():
         drawn = np.random.default_rng(options.seed)
         return read_moves(Path(options.moves), description, lambda: float(drawn.uniform(*masses))), None
@@ -216,7 +215,7 @@ def _moves(
 
 
 def _arms(options: StudyOptions, description: RobotDescription) -> list[Variant]:
-    """Return the plants of these names, hidden robots of these seeds, and the one with other springs."""
+    """Return the named plants, the hidden robots of these seeds, and the arm with changed springs."""
     for seed in options.hidden or ():
         check_seed(seed)
     with told(ValueError, code=2):
@@ -239,7 +238,6 @@ def _notes(
     *,
     streams: bool,
 ) -> list[str]:
-    """Return what a reader has to know of the moves."""
     found = []
     if share is None and not streams:
         found += [
@@ -260,7 +258,7 @@ def _notes(
 
 
 def _command(name: str, options: StudyOptions) -> str:
-    """Return the command that gives the same figures."""
+    """Return the command that reproduces the figures."""
     words = ["tvist study", name]
     for option, value in options.given.items():
         if option != "save_moves":
@@ -275,7 +273,7 @@ def _digest(content: object) -> str:
 
 
 def swept(path: Path) -> Study:
-    """Read a sweep's file, and load all that it names; paths in it are relative to its folder."""
+    """Read a sweep file and load all that it names; its paths are relative to its folder."""
     spec = read_spec(path)
     loaded_robots = [_robot(path, spec, place, named) for place, named in enumerate(spec.robots)]
     try:
@@ -305,7 +303,7 @@ def _robot(path: Path, spec: Spec, place: int, named: str | NamedRobot) -> Swept
 
 
 def _recipe(path: Path, spec: Spec, shaper: str, calibration: str | None, arm: RobotDescription) -> Recipe:
-    # The workers of a cluster have other working folders.
+    # A relative path would fail on the workers of a cluster, which have other working folders.
     name, own = loaded(str((path.parent / shaper).resolve()) if is_file(shaper) else shaper)
     known = _calibration(calibration, own[0] if own else name, spec.modes, arm, modal=False)
     recipe = Recipe(name, known, modes=spec.modes, own=own)

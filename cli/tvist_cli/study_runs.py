@@ -1,4 +1,4 @@
-"""Run a study, and print and write what it found."""
+"""Run a study, and print and write its results."""
 
 import logging
 import re
@@ -27,24 +27,21 @@ from tvist_lab.study.work import FAILED, TOO_WEAK
 from tvist_lab.words import counted
 
 ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s:/\[\]]+|\[[\da-fA-F:.]+\]):\d{1,5}")
-"""Address of a scheduler."""
+"""Address of a Dask scheduler."""
 PATIENCE = 10.0
-"""Time within which a scheduler has to answer, and to have a worker [s]."""
+"""Time within which a scheduler must answer and have a worker [s]."""
 LISTED = 12
-"""Largest number of motions that are printed one by one."""
+"""Largest number of motions that are listed."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """Output files and folders of a study; None writes nothing."""
+    """Output files and folders of a study, each None if not written."""
 
     rows: Path | None
-    """Folder of its rows."""
     figures: Path | None
-    """Folder of its figures."""
     look: FigureOptions
     report: Path | None
-    """Web page."""
 
 
 def run(
@@ -57,11 +54,7 @@ def run(
     *,
     json: bool,
 ) -> None:
-    """Run a study of a name or a file.
-
-    Raises:
-        Failure: An option is invalid, the study cannot be made or run, or rows of it failed.
-    """
+    """Run a study by name or from a file; raise Failure if an option is invalid, it cannot run, or rows failed."""
     executor = _executor(processes, scheduler)
     places.look.check(places.figures, places.report, options.save_moves)
     study = _study(name, file, options)
@@ -88,7 +81,7 @@ def _study(name: str, file: Path | None, options: StudyOptions) -> Study:
 def _executor(
     number: int | None, scheduler: str | None
 ) -> Callable[[], AbstractContextManager[Executor]] | None:
-    """Return what starts the executor that was asked for; None if none was."""
+    """Return a function that starts the requested executor; None if none was requested."""
     if number is not None and scheduler is not None:
         raise Failure("give either --processes or --scheduler", code=2)
     if number is not None:
@@ -101,10 +94,9 @@ def _executor(
 
 @contextmanager
 def _cluster(scheduler: str) -> Iterator[Executor]:
-    """Connect to a scheduler of Dask."""
     from distributed import Client
 
-    # What is done again when a worker dies is no reason for a warning.
+    # Dask warns about tasks that it repeats after the death of a worker; users need not know.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
@@ -128,7 +120,6 @@ def _cluster(scheduler: str) -> Iterator[Executor]:
 def _ran(
     study: Study, folder: Path | None, executor: Callable[[], AbstractContextManager[Executor]] | None
 ) -> Result:
-    """Run what is missing of a study."""
     began = time.monotonic()
     kept = (
         "nothing was kept" if folder is None else f"they are kept in {folder}, and the same command continues"
@@ -157,7 +148,7 @@ def _ran(
 
 
 def _tell(result: Result, *, json: bool) -> None:
-    """Print a study that was run: one JSON object, or its tables; and what was not measured."""
+    """Print a finished study as one JSON object or as tables, and what was not measured."""
     values, rows = result.values, result.rows
     if json:
         print_json(values)

@@ -1,4 +1,4 @@
-"""What the commands of studies share: they check numbers, work under a bar, and write and print a result."""
+"""Functions shared by commands with studies: check numbers, show progress, write and print results."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 One = TypeVar("One")
 
 Figures = Mapping[str, "Figure"]
-"""Figures by the names of their files, without suffix."""
+"""Figures by file name, without suffix."""
 
 
 def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Refuse a number, the option `name`, that is not from `low` to `high`; `unit` follows numbers, as " %" does."""
+    """Refuse an option's value that is not from `low` to `high`; `unit` follows numbers in the message, like " %"."""
     if not low <= value <= high:
         said = f"{value:g}" if isinstance(value, float) else f"{value}"
         most = f"{high:g}" if isinstance(high, float) else f"{high}"
@@ -37,19 +37,15 @@ def check_seed(seed: int, bits: int = 62) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Places:
-    """The files and folders that a command writes its result to, each None if it was not asked for."""
+    """Files and folders for a command's result, each None if not requested."""
 
     output: Path | None = None
-    """JSON file."""
     figures: Path | None = None
-    """Folder of the figures."""
     look: FigureOptions = AS_USUAL
-    """How to write them."""
     report: Path | None = None
-    """Web page."""
 
     def check(self, *others: Path | None) -> None:
-        """Refuse what cannot be written, before anything is computed; `others` are further files."""
+        """Refuse files that cannot be written, before anything is computed; `others` are further files."""
         self.look.check(self.figures, self.output, self.report, *others)
 
     def write(
@@ -59,7 +55,7 @@ class Places:
         draw: Callable[[], Figures] | None = None,
         web_page: "Callable[[Figures], Page] | None" = None,
     ) -> None:
-        """Write a result to all places; figures are drawn in the style that is set then."""
+        """Write a result to all places; figures are drawn in the present style."""
         with told(OSError):
             if self.output is not None:
                 write_json(self.output, result)
@@ -76,7 +72,7 @@ class Places:
 
 
 def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, json: bool) -> None:
-    """Print a result as one JSON object, or in words."""
+    """Print a result as one JSON object or as text."""
     if json:
         print_json(result)
     else:

@@ -1,4 +1,4 @@
-"""Recordings and simulated motions as runs that a page plays back."""
+"""Recordings and simulated motions as tracks for a page to play back."""
 
 import asyncio
 from collections.abc import Sequence
@@ -18,21 +18,20 @@ if TYPE_CHECKING:
     from tvist_view.track import Track
 
 MAGNIFY = 100.0
-"""Magnification of the bending, unless another is given [-]."""
+"""Default magnification of the bending [-]."""
 LEAD = 150
-"""Ticks at rest that are shown before a motion."""
+"""Ticks at rest shown before a motion."""
 REST = 500
-"""Ticks that are shown after it."""
+"""Ticks shown after a motion."""
 
 
 @dataclass(frozen=True)
 class Shows:
-    """Runs for a page to play back."""
+    """Tracks for a page to play back."""
 
     title: str
     tracks: "list[Track]"
     result: dict[str, Any] | None = None
-    """What the comparison of two runs says."""
 
     @property
     def lasts(self) -> float:
@@ -40,20 +39,20 @@ class Shows:
         return max(track.end for track in self.tracks) - min(track.start for track in self.tracks)
 
     def page(self, factor: float) -> str:
-        """The page that plays it back."""
+        """Return the page that plays the tracks back."""
         from tvist_view.playback import playback
 
         return playback(self.tracks, self.title, factor=factor, result=self.result)
 
     def serve(self, factor: float, door: Door) -> None:
-        """Play it back on a page until Control+C."""
+        """Serve the page until Control+C."""
         from tvist_view.playback import meet
 
         serve_page(self.page(factor), meet, door)
 
 
 def recorded(file: Path) -> Shows:
-    """The run in a recording."""
+    """Return the track of a recording."""
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read_checked
     from tvist_view.look import GeometryError
@@ -65,7 +64,7 @@ def recorded(file: Path) -> Shows:
 
 
 def repeated(file: Path) -> Shows:
-    """Of a recording, the motion without and with a shaper by which the tool is at rest the most earlier."""
+    """Return the recorded motion without and with the shaper that brings the tool to rest the most earlier."""
     import numpy as np
 
     from tvist_lab.metrics import Measured, pairs
@@ -103,7 +102,7 @@ def repeated(file: Path) -> Shows:
 
 
 def compared(shapers: Sequence[str], robot: str) -> Shows:
-    """The same motion with each shaper, simulated now."""
+    """Simulate the same motion with each shaper."""
     from tvist_controller.refusal import RefusalError
     from tvist_lab.in_process import run_beside
     from tvist_plant.description import DescriptionError, load
@@ -140,7 +139,7 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
 
 
 def _look_of(content: "RecordingFile") -> "Look":
-    """What the robot of a recording looks like: as it says, or by its robot file, which a server's recording holds."""
+    """Return the geometry of a recording's robot: as recorded, or from the robot file in a server's recording."""
     from tvist_controller.about import geometry_of
     from tvist_plant.description import RobotDescription
     from tvist_protocol.content import checked

@@ -26,7 +26,7 @@ TICK = 0.002  # the robot's control period [s]
 
 
 def ask(session: zenoh.Session, leaf: str, **message: object) -> dict[str, Any]:
-    """Query a key, with a message if there is one, and return the answer. A refusal ends the program."""
+    """Query a key, with a message if there is one; return the answer, or end the program if refused."""
     payload = msgpack.packb(message) if message else None
     for reply in session.get(f"tvist/{ROBOT}/{leaf}", payload=payload, timeout=10.0):
         if reply.ok:
@@ -34,7 +34,7 @@ def ask(session: zenoh.Session, leaf: str, **message: object) -> dict[str, Any]:
             if answer["type"] == "refused":
                 sys.exit(f"refused, {answer['code']}: {answer['why']}")
             return answer
-    # A query that reaches no one ends at once, without any reply.
+    # A query that reaches no robot ends at once without a reply.
     return sys.exit(f"no robot {ROBOT} answers at {ENDPOINT}: does the server run?")
 
 
@@ -78,11 +78,11 @@ def main() -> None:
         if info["clock"] != "realtime":
             sys.exit(f"this example needs a robot in real time; {ROBOT} is in {info['clock']}")
 
-        # Zenoh itself answers the first query, at once; the robot answers the second at the start of its next tick.
+        # Zenoh itself answers the first query at once; the robot answers the second at the start of its next tick.
         trip = median_ms(lambda: list(session.liveliness().get(f"tvist/{ROBOT}/alive")))
         answer = median_ms(lambda: ask(session, "info"))
 
-        # Zenoh calls back in its own thread, where we only fill a queue.
+        # Zenoh calls back in its own thread, so the callback only fills a queue.
         inbox: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         session.declare_subscriber(
             f"tvist/{ROBOT}/state", lambda sample: inbox.put(sample.payload.to_bytes())
@@ -92,8 +92,8 @@ def main() -> None:
             state: dict[str, Any] = msgpack.unpackb(inbox.get(timeout=5.0))
             return state
 
-        # This token tells the robot that we are present: if we die, control ends at once. The session's id
-        # distinguishes us from another program with the same client name.
+        # With this token the robot notices if this program dies, and ends its control at once. The session's id
+        # distinguishes it from another program with the same client name.
         alive = session.liveliness().declare_token(f"tvist/{ROBOT}/client/bare/{session.info.zid()}")
         token = ask(session, "command", type="take_control", client="bare", lease_s=30.0)["token"]
         q = next_state()["target_q"]

@@ -53,7 +53,7 @@ def main() -> None:
         robot = socket.create_connection((HOST, PORT), timeout=5.0)
     except OSError as error:
         sys.exit(f"nobody listens at {HOST}:{PORT} ({error}): does the server run, with --ur?")
-    # Samples that this program is too slow to read are lost; this makes room for half a second of them.
+    # If this program reads too slowly, samples are lost; this buffer holds half a second of them.
     robot.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 600_000)
     with robot, open(FILE, "w", newline="", encoding="utf-8") as file:  # noqa: PTH123  one page of plain Python
         log = csv.writer(file)

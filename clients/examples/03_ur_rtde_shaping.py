@@ -28,7 +28,7 @@ GRAVITY = 9.81
 FROM, UNTIL = -0.1, 0.3
 """First and last time that the figure shows, counted from the end of the commanded motion [s]."""
 LOUD = 0.2
-"""The tool shakes where its acceleration exceeds this, which the sensor's noise does not [m/s²]."""
+"""Acceleration above which the tool counts as vibrating, more than the sensor's noise [m/s²]."""
 
 
 def program(control: RTDEControlInterface) -> None:
@@ -40,7 +40,7 @@ def program(control: RTDEControlInterface) -> None:
 def served(shaper: str) -> Iterator[None]:
     """Serve a robot with a shaper while the block runs."""
     options = ["--ur-address", HOST, "--listen", ENDPOINT, "--profile", "real", "--shaper", shaper]
-    with subprocess.Popen(  # noqa: S603  our own program
+    with subprocess.Popen(  # noqa: S603  a trusted program
         [sys.executable, "-m", "tvist_cli", "serve", *options, "--start", START],
         stderr=subprocess.PIPE, text=True,
     ) as server:  # fmt: skip
@@ -55,7 +55,7 @@ def served(shaper: str) -> Iterator[None]:
 
 
 def log(shaper: str, file: Path) -> None:
-    """Run the program on a robot with a shaper, and log the robot into a CSV file."""
+    """Run the program on a robot with a shaper, and log the robot to a CSV file."""
     with served(shaper):
         control, receive = RTDEControlInterface(HOST), RTDEReceiveInterface(HOST, 500.0)
         names = ["timestamp", "target_qd", "actual_TCP_pose", "actual_tool_accelerometer"]
@@ -71,7 +71,7 @@ def log(shaper: str, file: Path) -> None:
 
 
 def vibration(file: Path) -> tuple[list[float], list[float]]:
-    """Times after the end of the commanded motion [s], and the tool's acceleration without gravity then [m/s²]."""
+    """Times after the end of the commanded motion [s], and the tool's acceleration without gravity [m/s²]."""
     with file.open(encoding="utf-8", newline="") as lines:
         rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(lines)]
     moving = [
@@ -91,7 +91,7 @@ def vibration(file: Path) -> tuple[list[float], list[float]]:
 
 
 def upwards(rotation: list[float]) -> list[float]:
-    """Return the direction away from gravity in the frame of the tool, whose orientation is a rotation vector."""
+    """Return the upward direction in the frame of the tool, whose orientation is a rotation vector."""
     angle = math.hypot(*rotation)
     x, y, z = (one / angle for one in rotation)
     sine, cosine = math.sin(angle), math.cos(angle)

@@ -27,7 +27,7 @@ class Gripper:
         self._socket = socket.create_connection((host, 63352), timeout=5.0)
 
     def ask(self, line: str) -> str:
-        """Send a line, and return what is answered."""
+        """Send a line, and return the answer."""
         self._socket.sendall(f"{line}\n".encode())
         return self._socket.recv(1024).decode().strip()
 

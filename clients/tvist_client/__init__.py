@@ -54,7 +54,7 @@ _NAMES = {
     "tvist_protocol.stream": "Event State Telemetry Truth",
     "tvist_protocol.values": "Payload",
 }
-"""Names by module, which is imported when one of them is first used: a program pays only for what it uses."""
+"""Names by module. A module is imported on first use of one of its names, so a program pays only for what it uses."""
 _PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 

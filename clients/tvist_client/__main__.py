@@ -1,4 +1,4 @@
-"""`python -m tvist_client check`: for a machine that has the client alone."""
+"""`python -m tvist_client check`, for machines that have only the client."""
 
 import argparse
 import math
@@ -12,7 +12,7 @@ from tvist_protocol.errors import harmless
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line; return 0 if all is well, 1 if not, 2 for incorrect arguments."""
+    """Run the command line; return 0 for success, 1 for a failed check, 2 for wrong arguments."""
     parser = argparse.ArgumentParser(prog="python -m tvist_client", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     checking = commands.add_parser(

@@ -1,4 +1,4 @@
-"""Sessions with all robots of a network, whatever their namespaces: the newest states of many, by one subscription."""
+"""Sessions with all robots of a network in any namespace; one subscription to the newest states of many robots."""
 
 import asyncio
 from abc import ABC, abstractmethod
@@ -21,7 +21,7 @@ from tvist_protocol.stream import State
 
 
 class Place(NamedTuple):
-    """A robot's namespace, which is empty if it has none, and its name."""
+    """A robot's namespace (empty: none) and name."""
 
     namespace: str
     robot: str
@@ -31,18 +31,18 @@ class Place(NamedTuple):
         return keys.within(self.namespace, self.robot)
 
     def key(self, leaf: keys.Leaf) -> str:
-        """Key of the robot that ends in `leaf`."""
+        """Return the robot's key that ends in `leaf`."""
         return keys.within(self.namespace, keys.key(self.robot, leaf))
 
 
 def place_of(text: str) -> Place:
-    """Read `NAMESPACE/NAME`, or `NAME` alone."""
+    """Parse `NAMESPACE/NAME` or `NAME`."""
     namespace, _, robot = text.rpartition("/")
     return Place(keys.check_namespace(namespace) if namespace else "", keys.check_robot_name(robot))
 
 
 class Across(ABC):
-    """A session with the robots in or below a namespace, or in all of them. Use as an asynchronous context."""
+    """A session with the robots in or below a namespace (empty: all). Use it as an asynchronous context."""
 
     def __init__(
         self, endpoint: str = ENDPOINT, *, security: Folder | None = None, namespace: str = ""
@@ -53,7 +53,6 @@ class Across(ABC):
         self._loop: asyncio.AbstractEventLoop
 
     async def __aenter__(self) -> Self:
-        """Connect and subscribe."""
         self._loop = asyncio.get_running_loop()
         self._session = await asyncio.to_thread(open_session, self._endpoint, self._security)
         await self._subscribe()
@@ -66,7 +65,7 @@ class Across(ABC):
 
     @abstractmethod
     async def _subscribe(self) -> None:
-        """Subscribe to what is to be seen; called once the session is open."""
+        """Subscribe, once the session is open."""
 
 
 class Newest(NamedTuple):
@@ -74,24 +73,16 @@ class Newest(NamedTuple):
 
     state: State
     received: int
-    """Number of its states since the last look."""
+    """Number of its states since the last call of `look`."""
     at: float
-    """Time at which it came, on the loop's clock [s]."""
+    """Time of its arrival on the loop's clock [s]."""
 
 
 class ManyStates(Across):
-    """States of all robots that a key selects. Use as an asynchronous context.
+    """Newest state of each robot that a key selects, decoded by `look`. Use it as an asynchronous context.
 
-    Only the newest state of each robot is kept, and decoded when it is looked at.
-
-    Args:
-        selector: Key with wildcards that ends in `/state`: `tvist/*/state`, or `**/tvist/*/state` for all namespaces.
-        endpoint: Endpoint of a router, or of one server.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace that precedes the key.
-
-    Raises:
-        MisuseError: The selector does not end in `/state`, or is no key.
+    `selector` is a key with wildcards that ends in `/state`, such as `tvist/*/state`, or `**/tvist/*/state` for all
+    namespaces; MisuseError if it is not. `namespace` precedes it.
     """
 
     def __init__(
@@ -118,7 +109,7 @@ class ManyStates(Across):
         for place, (data, received, at) in sorted(self._newest.items()):
             try:
                 found[place] = Newest(decode(State, data), received, at)
-            except ProtocolError:  # another version's
+            except ProtocolError:  # from another version
                 continue
             self._newest[place] = (data, 0, at)
         return found

@@ -1,7 +1,4 @@
-"""Arguments of a message: how users give the values of its fields, and their conversion to what the message holds.
-
-Both follow from the types of the fields. Ranges are checked by the robot, which knows more of them.
-"""
+"""Converts users' arguments to the fields of messages, according to the fields' types; the robot checks ranges."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -23,16 +20,16 @@ Convert = Callable[[Any, str], Any]
 
 
 class Given(NamedTuple):
-    """How users give a value."""
+    """How users pass a value."""
 
     kind: Any
     """Its type in their programs."""
     convert: Convert
-    """Converts it; the second argument is its name for error messages, such as `q[3]`."""
+    """Converts the value; the second argument is its name for error messages, such as `q[3]`."""
 
 
 class Argument(NamedTuple):
-    """A field of a message that users give."""
+    """A field of a message that users pass."""
 
     field: FieldInfo
     given: Given
@@ -40,7 +37,7 @@ class Argument(NamedTuple):
 
 @cache
 def arguments(kind: type[Struct]) -> dict[str, Argument]:
-    """Return the arguments of a message by their names."""
+    """Return the arguments of a message by name."""
     return {
         field.name: Argument(field, given(field.type))
         for field in fields(kind)
@@ -49,7 +46,7 @@ def arguments(kind: type[Struct]) -> dict[str, Argument]:
 
 
 def built(kind: type[S], values: Mapping[str, Any], place: str = "", **known: Any) -> S:
-    """Build a message, or a part of one, from users' values, whose names in error messages follow `place`."""
+    """Build a message, or a part of one, from users' values; `place` precedes their names in error messages."""
     taken = arguments(kind)
     converted = {name: taken[name].given.convert(value, place + name) for name, value in values.items()}
     return kind(**_constants(kind), **converted, **known)
@@ -70,7 +67,7 @@ def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) ->
 
 
 def given(hint: Any) -> Given:
-    """Return how users give a value of the type of a field."""
+    """Return how users pass a field of this type."""
     if hint in {Frequencies, DampingRatios}:
         return Given(float | Iterable[float], _one_or_more)
     hint, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
@@ -92,7 +89,7 @@ def given(hint: Any) -> Given:
 
 
 def _list(parts: tuple[Any, ...], meaning: str | None, bounds: Meta) -> Given:
-    """Return how users give a tuple. The robot says more of a wrong number of angles than its bounds do."""
+    """Return how users pass a tuple. The robot explains a wrong number of angles better than the type's bounds do."""
     entry = given(parts[0])
     count = None if parts[-1] is Ellipsis else len(parts)
 
@@ -110,7 +107,7 @@ def _list(parts: tuple[Any, ...], meaning: str | None, bounds: Meta) -> Given:
 
 
 def _choice(members: tuple[Any, ...]) -> Given:
-    """Return how users give a value of one of several types: as None or a word if these are among them."""
+    """Return how users pass a value of one of several types; None and words are passed as such."""
     words = {word for member in members if get_origin(member) is Literal for word in get_args(member)}
     constants = [member for member in members if member is NoneType or get_origin(member) is Literal]
     others = [given(member) for member in members if member not in constants]
@@ -129,18 +126,18 @@ def _unchanged(value: Any, _: str) -> Any:
 
 
 def _one_or_more(values: Any, where: str) -> tuple[float, ...]:
-    """Take one number for each mode, or a single one."""
+    """Convert a single number, or one number for each mode."""
     return listed(values, where, number) if isinstance(values, Iterable) else (number(values, where),)
 
 
 def _switch(value: Any, _: str) -> Any:
-    """Take 0, 1 and what numpy has for True and False, too; the robot refuses all else."""
+    """Also accept 0, 1 and numpy's True and False; the robot refuses everything else."""
     numeric = hasattr(value, "__bool__") and not hasattr(value, "__len__")
     return bool(value) if numeric and value in {0, 1} else value
 
 
 def _struct(value: Any, where: str, kinds: tuple[type[Struct], ...]) -> Struct:
-    # Neither users' types nor msgspec check what it was constructed with.
+    # A struct's constructor validates nothing.
     if not isinstance(value, kinds):
         *others, last = (kind.__name__ for kind in kinds)
         names = f"{', '.join(others)} or {last}" if others else last
@@ -156,7 +153,6 @@ def _structs(hint: Any) -> tuple[type[Struct], ...]:
 
 @cache
 def _constants(kind: type[Struct]) -> dict[str, Any]:
-    """Return the fields that have but one value."""
     return {field.name: only for field in fields(kind) if (only := _constant(field.type)) is not None}
 
 

@@ -1,4 +1,4 @@
-"""An arm under control: everything that only the client in control may do."""
+"""An arm under control, and what only the client in control may do."""
 
 import asyncio
 import contextlib
@@ -21,9 +21,7 @@ from tvist_protocol.stream import Event
 log = logging.getLogger(__name__)
 
 UNLOCKED_TICKS = 150
-"""Ticks (0.3 s) for which a robot is observed after unlocking; an overloaded drive stops within hundredths of a
-second.
-"""
+"""Ticks (0.3 s) for which a robot is observed after unlocking; an overloaded drive stops within some 10 ms."""
 LAST_DIGITAL = 17
 LAST_ANALOG = 1
 
@@ -31,8 +29,8 @@ LAST_ANALOG = 1
 class Arm(Commands):
     """The arm that `Robot.control` yields. Joint values are any sequence of numbers [rad], one for each joint.
 
-    Poses are any sequence of six numbers: x y z [m] and rotation vector [rad] of the tool centre point, in the base
-    frame or in `frame`. Every command may raise RefusedError; it has then changed nothing.
+    Poses are any sequence of six numbers: x y z [m] and rotation vector [rad] of the tool centre point, in
+    the base frame or in `frame`. Every command may raise RefusedError; it has then changed nothing.
     """
 
     robot: Connection
@@ -49,7 +47,7 @@ class Arm(Commands):
         acceleration: float = 2.0,
         jerk: float = 100.0,
     ) -> AsyncIterator[Servo]:
-        """Stream set-points for as long as the block lasts; then the stream ends and the arm comes to rest.
+        """Stream set-points within the block; at its end the stream ends and the arm comes to rest.
 
         Args:
             period: Time between two set-points [s].
@@ -66,7 +64,7 @@ class Arm(Commands):
             try:
                 yield servo
             except BaseException:
-                # The error that ends the block is more informative than a refusal to end a stream that has ended.
+                # The block's error is more informative than a refusal to end a stream that has ended.
                 with contextlib.suppress(RefusedError, ClientError):
                     await self.robot.request(ServoStop(token=self.token))
                 raise
@@ -77,8 +75,8 @@ class Arm(Commands):
     async def unlock_protective_stop(self) -> None:
         """Unlock a protective stop; the arm must be at rest.
 
-        In real time, wait for `UNLOCKED_TICKS` to see that the robot does not stop again. In lockstep and free, the
-        caller advances time: a new stop is then reported as an event, and as `stop` in `Robot.info`.
+        In real time, observe the robot for `UNLOCKED_TICKS`. In lockstep and free, the caller advances time:
+        a new stop is then reported as an event, and as `stop` in `Robot.info`.
 
         Raises:
             ProtectiveStopError: The robot has stopped again, because the cause of the stop persists.
@@ -92,7 +90,7 @@ class Arm(Commands):
             lambda event: stops.append(event) if event.kind == "protective_stop" else None
         )
         try:
-            # The event of the unlocked stop may still be on its way; its tick is the next one at the latest.
+            # The event of the unlocked stop may still be on its way; its tick is at most the next one.
             before = (await self.robot.info()).tick + 1
             await self.robot.request(unlock)
             await self.robot.advance(UNLOCKED_TICKS)
@@ -115,7 +113,7 @@ class Arm(Commands):
         Args:
             number: 0 or 1.
             share: Value as a share of the output's range [-].
-            voltage: Whether the range is 0 to 10 V; otherwise it is 4 to 20 mA.
+            voltage: True for the range 0 to 10 V, False for 4 to 20 mA.
         """
         bit = 1 << whole(number, "number", 0, LAST_ANALOG)
         ratio = number_of(share, "share")
@@ -130,21 +128,21 @@ class Arm(Commands):
         )
 
     async def set_digital_input(self, number: int, on: bool) -> None:
-        """Switch a digital input, as a device connected to it would: 0–7 standard, 8–15 configurable, 16–17 tool."""
+        """Switch a digital input, as a connected device would: 0–7 standard, 8–15 configurable, 16–17 tool."""
         bit = 1 << whole(number, "number", 0, LAST_DIGITAL)
         await self.robot.request(
             SimulationSetInputs(token=self.token, digital_input_mask=bit, digital_inputs=bit if on else 0)
         )
 
     async def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
-        """Advance time by 1 to 100000 ticks at once, in lockstep and free; `Robot.advance` takes any number.
+        """Advance time in lockstep and free with one command; `Robot.advance` takes any number of ticks.
 
         If this client also holds the clock (`Robot.clock_control`), the clock's token is used.
 
         Args:
-            ticks: Number of control periods.
-            setpoints: Set-points of a running stream, at most 1000, in order and one per tick; `Servo.step_through`
-                numbers them.
+            ticks: Number of control periods, 1 to 100000.
+            setpoints: Set-points of a running stream, at most 1000, in order and one per tick;
+                `Servo.step_through` numbers them.
 
         Returns:
             The last tick that passed; its state has arrived.

@@ -4,7 +4,7 @@
         arm.move_j(q)
 
 A call waits for its answer; Ctrl-C ends the wait. Callbacks run in the loop's thread and must not block.
-`blocking.pyi`, which `make schemas` writes, says the arguments of all methods.
+`blocking.pyi`, written by `make schemas`, has the arguments of all methods.
 """
 
 from tvist_client import arm, motion, robot, servo

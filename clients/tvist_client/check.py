@@ -1,4 +1,4 @@
-"""Check that a robot answers, works and is ready to move, with real commands rather than a port scan."""
+"""Checks that a robot answers, works and is ready to move, with real commands rather than a port scan."""
 
 import asyncio
 import time
@@ -25,13 +25,13 @@ LISTEN_S = 1.0
 TELEMETRY_S = 3.0
 """Longest wait for telemetry, which comes once a second [s]."""
 ON_TIME = 0.9
-"""Share of the states due from which on the rate is in order [-]."""
+"""Smallest share of the due states that counts as the full rate [-]."""
 TOO_SLOW = 0.5
-"""Share of the ticks due that must be seen to begin [-]: fewer are an overload whatever the telemetry says."""
+"""Share of the due ticks below which the robot is overloaded, whatever its telemetry says [-]."""
 LONG_US = 20_000.0
-"""Lateness of a tick from which on it is named, if its thread has waited for a processor as long [µs]."""
+"""Lateness of a tick that is reported if its thread has waited as long for a processor [µs]."""
 RETRY_S = 0.5
-"""Time between two tries while a robot is starting [s]."""
+"""Time between two attempts while a robot is starting [s]."""
 STALE = "check"
 """A token that belongs to no lease."""
 
@@ -46,7 +46,7 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 class CheckReport(msgspec.Struct, frozen=True):
-    """What `tvist check` has found, which is also its `--json`."""
+    """Report of `tvist check`, also printed by `--json`."""
 
     ok: bool
     """Whether everything that was checked is in order."""
@@ -68,7 +68,7 @@ class CheckReport(msgspec.Struct, frozen=True):
     safety_mode: str | None
     """RTDE name of the safety mode; null if it was not checked or is unknown."""
     stop: StopReason | None
-    """The stop that keeps the robot from moving; null if there is none, or it is not known."""
+    """The stop that keeps the robot from moving; null if there is none or it is unknown."""
     next: str | None
     """What to do to make the robot ready; null if nothing is known to be missing."""
     overloaded: bool | None = None
@@ -76,7 +76,7 @@ class CheckReport(msgspec.Struct, frozen=True):
     due_per_second: float | None = None
     """Control periods due per second [1/s]; null in lockstep, or if no state came."""
     starting: bool = False
-    """Whether the robot has answered that it is still starting; the last finding says how far it is."""
+    """Whether the robot is still starting; the last finding has the progress."""
 
 
 def check(
@@ -91,10 +91,9 @@ def check(
 ) -> CheckReport:
     """Connect to a robot, receive a state, have a command refused, and ask whether the robot may be moved.
 
-    The check changes nothing. With `alive` it only checks that the server answers and, in real time, ticks: an
-    orchestrator that uses this does not kill a robot that has stopped and is about to be unlocked. While no robot
-    answers, or it is starting, it tries again for `wait` seconds, and tells before each try what the one before has
-    found. Without a name, it is `ur5e` if that is there, otherwise the first robot at the endpoint.
+    Nothing is changed. `alive` only checks that the server answers and, in real time, ticks: an orchestrator must not
+    kill a stopped robot. While no robot answers, or it is starting, repeat this for `wait` seconds and `tell` each
+    result. Without a name, the robot is `ur5e` if present, else the first one.
     """
     deadline = time.monotonic() + wait
     while True:
@@ -120,7 +119,7 @@ class _Check:
         self.overloaded: bool | None = None
         self.missed = ""
         self.early = self.starting = False
-        """Whether the robot may be there later, and whether it has said so."""
+        """Whether the robot may appear later, and whether it has reported that it is starting."""
         self.findings: list[Finding] = []
 
     async def run(self) -> CheckReport:
@@ -166,7 +165,7 @@ class _Check:
         )
 
     def beside(self) -> str:
-        """List the other robots at the endpoint."""
+        """Return the other robots at the endpoint."""
         others = [robot for robot in self.robots if robot != self.name]
         return f"; also there: {', '.join(others)}" if others else ""
 
@@ -204,7 +203,7 @@ class _Check:
             stop()
         last = heard[-1] if heard else None
         self.due = (await robot.info()).rate_hz if last is None else last.due_per_second
-        if self.due is None:  # an older server, whose speed is not known
+        if self.due is None:  # an older server, whose speed is unknown
             return f"{self.rate:.1f} Hz"
         self.overloaded = ticks < TOO_SLOW * self.due or (last is not None and last.overloaded)
         said = f"{self.rate:.1f} Hz of {self.due:g} due"
@@ -222,8 +221,7 @@ class _Check:
         return f"{said}{self.missed}"
 
     async def refusal(self, robot: Robot) -> str:
-        # Move to the present posture: even a server that obeyed would move nothing. Before the first tick nothing
-        # moves anyway.
+        # A move to the present posture moves nothing, even if it is obeyed; nor does any before the first tick.
         info = await robot.info()
         ticks = await robot.clock() == "realtime" or info.tick > 0
         here = tuple((await robot.state()).target_q) if ticks else (0.0,) * len(info.joints)
@@ -247,7 +245,7 @@ class _Check:
         return f"robot_mode {found.robot_mode}, safety_mode {found.safety_mode}"
 
     async def load(self, robot: Robot) -> str:
-        del robot  # the state's step has measured
+        del robot  # `state` has measured it
         if self.overloaded is None:
             return "not told: a client steps the time, or the server is older"
         if self.overloaded:
@@ -259,7 +257,7 @@ class _Check:
 
 
 def _remedy(last: Telemetry | None, due: float) -> str:
-    """Say where states are lost of which too few arrive, as far as the robot tells its own rate."""
+    """Return the remedy for a low rate of states, which the robot or the network causes."""
     if last is not None and last.ticks_per_second >= ON_TIME * due:
         return (
             f": the robot itself makes {last.ticks_per_second:.0f} ticks/s; next, look at the network and at the "
@@ -279,7 +277,7 @@ def _doubt(calibration: CalibrationInfo | None) -> str:
 
 
 async def _rate(robot: Robot) -> tuple[float, float]:
-    """Return the states received and the robot's ticks, per second, between two states at least `LISTEN_S` apart."""
+    """Return received states and ticks per second, measured between two states at least `LISTEN_S` apart."""
     loop = asyncio.get_running_loop()
     seen: list[tuple[int, float]] = []
 

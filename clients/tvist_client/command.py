@@ -1,4 +1,4 @@
-"""Methods that send one command: their arguments and their descriptions are those of the message's fields."""
+"""Methods that send one command; arguments and descriptions come from the message's fields."""
 
 import inspect
 import re
@@ -25,7 +25,7 @@ TICK = 0.002
 Answer = Accepted | Done | Posture | ToolPose
 """Replies to a command that was not refused."""
 _ANSWER = re.compile(r"; (it is )?answered (as|by) [^.]*")
-"""What a message's description says about its answer, which is the method's result here."""
+"""Part of a message's description about its answer, which is the method's result."""
 
 
 class Commanded(Protocol):
@@ -47,7 +47,7 @@ class Commanded(Protocol):
 
 
 class Leased:
-    """A right on a robot, which its token proves."""
+    """A right on a robot, proved by its token."""
 
     robot: Commanded
     token: str
@@ -55,7 +55,7 @@ class Leased:
 
 
 class Described:
-    """An attribute that is a method to callers and to `help`; what it says of itself is made when it is asked for."""
+    """An attribute that is a method to callers and to `help`; its docstring is built on request."""
 
     __name__: str
 
@@ -68,31 +68,19 @@ class Described:
 
 
 class Sent(Described):
-    """A method that sends one command.
-
-    Args:
-        kind: The command. Fields without a default are positional arguments, the others go by their names.
-        carry_out: Sends it for an owner of this method. Its further arguments are arguments of the method, too, and its
-            docstring says what comes of it.
-        positional: Number of positional arguments, if some of them have a default.
-        returns: Type of the result, if `carry_out` does not say it.
-    """
+    """A method that sends one command; fields without a default are positional arguments."""
 
     def __init__(
         self,
         kind: type[Struct],
-        carry_out: Callable[..., Awaitable[Any]],
-        positional: int | None = None,
-        returns: Any = None,
+        carry_out: Callable[..., Awaitable[Any]],  # sends it; its further arguments are the method's, too
+        positional: int | None = None,  # number of positional arguments
+        returns: Any = None,  # type of the result, if `carry_out` does not annotate it
     ) -> None:
         self._kind, self._carry_out, self._positional, self._returns = kind, carry_out, positional, returns
 
     def __call__(self, owner: Any, *values: Any, **named: Any) -> Coroutine[Any, Any, Any]:
-        """Return a coroutine that sends the command, with the name of this method for Python's warnings.
-
-        Raises:
-            TypeError: The arguments are not those of the method.
-        """
+        """Return a coroutine that sends the command, named after this method for Python's warnings."""
         try:
             given = self.__signature__.bind(owner, *values, **named).arguments
         except TypeError as error:
@@ -109,7 +97,6 @@ class Sent(Described):
 
     @cached_property
     def _extra(self) -> dict[str, Parameter]:
-        """The parameters of the method that are not the message's."""
         return dict(list(inspect.signature(self._carry_out).parameters.items())[2:])
 
     @cached_property
@@ -126,7 +113,7 @@ class Sent(Described):
         return Signature([*found, *self._extra.values()], return_annotation=returned)
 
     def _description(self) -> str:
-        """Return the docstring: what the message's, those of its fields and that of `carry_out` say, and errors."""
+        """Return the docstring, from those of the message, its fields and `carry_out`, and the errors."""
         docs, taken, extra = field_docs(self._kind), arguments(self._kind), self._extra
         lines = [f"{name}: {docs[name]}" for name in taken] + [f"{name}: {_EXTRA[name]}" for name in extra]
         errors = ["RefusedError: The robot refused it, which changed nothing."]
@@ -157,12 +144,12 @@ def stopping(kind: type[Struct], positional: int | None = None) -> Sent:
 
 
 def beginning(kind: type[Struct], positional: int | None = None) -> Sent:
-    """Return a method that begins a motion, which it returns."""
+    """Return a method that starts a motion and returns it."""
     return Sent(kind, _begin, positional)
 
 
 def moving(kind: type[Struct]) -> Sent:
-    """Return a method that makes a planned motion, for whose end it can wait."""
+    """Return a method that makes a planned motion and can wait for its end."""
     return Sent(kind, _move)
 
 
@@ -188,7 +175,7 @@ _EXTRA = {
     "wait": "Whether to wait for the end; in lockstep and free, time is stepped until then.",
     "duration": "Time after which this returns [s]; None for at once. In lockstep and free, time is stepped.",
 }
-"""Descriptions of arguments that are not the message's."""
+"""Descriptions of arguments that are not fields of the message."""
 
 
 async def _send(arm: Leased, command: Command) -> None:
@@ -220,13 +207,13 @@ async def _begin(arm: Leased, command: Command) -> Motion:
 
 
 async def _move(arm: Leased, command: Command, *, wait: bool = True) -> Motion:
-    """The result is the motion; `started` and `done` are ticks once they are known."""
+    """The result is the motion; its `started` and `done` are ticks once they are known."""
     motion = await _begin(arm, command)
     return await motion.wait() if wait else motion
 
 
 async def _guide(arm: Leased, command: Command, *, duration: float | None = None) -> Motion:
-    """The arm keeps its speed, also after `duration`; such commands share one motion until it rests."""
+    """The arm keeps its speed, also after `duration`; such commands share one motion until the arm rests."""
     seconds = None if duration is None else positive(duration, "duration")
     motion = await _begin(arm, command)
     if seconds is not None:

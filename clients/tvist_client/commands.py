@@ -1,7 +1,4 @@
-"""The commands of an arm under control, and the questions to a robot; `commands.pyi` says their arguments.
-
-`make schemas` writes that file. All else of a command stands in its message in `tvist_protocol`.
-"""
+"""Commands of an arm under control, and questions to a robot; `make schemas` writes their arguments to a stub."""
 
 from tvist_client.command import Leased, asking, beginning, dating, guiding, moving, sending, stopping
 from tvist_protocol import commands, forces, io, kinematics, motions, programs, simulation
@@ -55,7 +52,7 @@ class Commands(Leased):
 
 
 class Questions:
-    """Questions to a robot about its kinematics, for which no control is needed."""
+    """Questions to a robot about its kinematics, which need no control."""
 
     inverse_kinematics = asking(kinematics.InverseKinematics, Posture)
     forward_kinematics = asking(kinematics.ForwardKinematics, ToolPose, 1)

@@ -28,13 +28,13 @@ ANSWER_S = 10.0
 STATE_S = 5.0
 """Longest pause between two states [s]; in lockstep the last one is repeated every second."""
 CHUNK = 50
-"""Ticks to step between two checks whether a motion has ended: a tenth of a second."""
+"""Ticks to step between two checks whether a motion has ended: 0.1 s."""
 MAX_STEP = 1000
-"""Largest number of set-points in one `simulation.step`, and number of ticks that every server accepts at once."""
+"""Largest number of set-points in one `simulation.step`, and of ticks that every server accepts at once."""
 LONGEST_STEP = 100_000
 """Largest number of ticks in one `simulation.step`."""
 TICK_S = 0.06
-"""Longest duration of a tick on a slow machine [s], since a server may be slower than real time."""
+"""Longest duration of a tick on a slow machine [s]; a server may be slower than real time."""
 T = TypeVar("T")
 
 
@@ -55,18 +55,16 @@ class Connection(Questions):
         self.stepper: Leased | None = None
         """The clock, while this client holds it."""
         self.motions = MotionsByNumber(self._until_ended)
-        """Motions by number, this client's and others'."""
-        # Listen before any command is sent, since an event may precede the answer.
+        """Motions of all clients by number."""
+        # Listen before sending any command, because an event may precede the answer.
         self._events.listen(self.motions.on_event)
         transport.on_lost(self._on_lost)
 
-    # ------------------------------------------------------------------ messages
-
     def states(self, buffer: int = BUFFER) -> Stream[State]:
-        """Iterate over every state from now on, one per tick. If the reader is slow, the oldest are dropped.
+        """Iterate over every state from now on, one per tick; if the reader is slow, the oldest are dropped.
 
         Args:
-            buffer: Number of messages that may wait; those dropped are counted in `Stream.dropped`.
+            buffer: Number of messages that may wait; `Stream.dropped` counts those dropped.
         """
         return self._states.stream(buffer)
 
@@ -75,7 +73,7 @@ class Connection(Questions):
         return self._events.stream(buffer)
 
     def on_state(self, callback: Callable[[State], object]) -> Callable[[], None]:
-        """Call a function, which must not block, with every state; the function returned ends that."""
+        """Call a function with every state; it must not block. The returned function ends this."""
         return self._states.listen(callback)
 
     def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
@@ -95,7 +93,7 @@ class Connection(Questions):
         return self._ios.listen(callback)
 
     async def io(self) -> Io:
-        """Return inputs, outputs, registers and tool: the latest known values, else the next ones within about 1 s.
+        """Return inputs, outputs, registers and tool: the latest values, or else the next ones, within about 1 s.
 
         Raises:
             AnswerTimeoutError: No message arrived within `STATE_S`.
@@ -103,13 +101,11 @@ class Connection(Questions):
         self._ios.subscribe()
         return self._ios.latest or await self._ios.next(lambda _: True, STATE_S)
 
-    # ------------------------------------------------------------------ description and commands
-
     async def info(self) -> Info:
         """Request the robot's description and settings.
 
         Raises:
-            RefusedError: The robot is still starting; the message says how far that is.
+            RefusedError: The robot is still starting; the message has the progress.
         """
         data = await self._transport.info()
         try:
@@ -122,7 +118,7 @@ class Connection(Questions):
         return info
 
     async def clock(self) -> Clock:
-        """What advances simulation time; requested only once."""
+        """Return what advances simulation time; it is requested only once."""
         return self._clock or (await self.info()).clock
 
     async def state(self) -> State:
@@ -132,7 +128,7 @@ class Connection(Questions):
 
         Raises:
             AnswerTimeoutError: No state arrived within `STATE_S`.
-            MisuseError: An in-process host other than this project's publishes no state before its first tick.
+            MisuseError: An in-process host other than tvist's publishes no state before its first tick.
             NotConnectedError: The connection is closed, or the robot has disconnected.
         """
         self._states.subscribe()
@@ -150,7 +146,7 @@ class Connection(Questions):
 
         Args:
             command: The command, with its token if it has one.
-            timeout_s: How long the robot may take [s].
+            timeout_s: Longest wait for the answer [s].
 
         Raises:
             RefusedError: The robot refused it, which changed nothing.
@@ -165,7 +161,7 @@ class Connection(Questions):
         return reply
 
     def watch(self) -> None:
-        """Start to receive the states, before a command causes one."""
+        """Subscribe to the states, before a command causes one."""
         self._states.subscribe()
 
     def put_setpoint(self, data: bytes) -> None:
@@ -175,8 +171,6 @@ class Connection(Questions):
     async def stop(self) -> None:
         """Bring the arm to rest now; no control is needed."""
         await self.request(Stop())
-
-    # ------------------------------------------------------------------ time
 
     @property
     def clock_token(self) -> str | None:
@@ -224,10 +218,9 @@ class Connection(Questions):
         return await self._states.next(lambda state: state.tick >= tick, STATE_S)
 
     async def rest(self) -> State:
-        """Step time until the shaped reference is at rest, or wait if another client steps; the arm may still vibrate.
+        """Step time until the shaped reference is at rest, or wait if others step; return the first such state.
 
-        Returns:
-            The first state received in which it is at rest.
+        The arm may still vibrate.
         """
         while True:
             tick = await self._let_pass(CHUNK)
@@ -270,10 +263,7 @@ class Connection(Questions):
 async def step(
     robot: Connection, token: str, ticks: int, setpoints: Sequence[StepSetpoint] | None = None
 ) -> int:
-    """Send one `simulation.step`, wait for the state of its last tick, and return that tick.
-
-    The clock's token is used instead of that of the lease if this client holds the clock.
-    """
+    """Send one `simulation.step`, with the clock's token if this client holds the clock; return its last tick."""
     robot.watch()
     ticks = whole(ticks, "ticks", 1, LONGEST_STEP)
     clock = robot.clock_token or token

@@ -1,4 +1,4 @@
-"""Errors that a client can raise, and what to do about them.
+"""Errors that a client can raise.
 
 TvistError
 ├── RefusedError             the robot refused a command, which changed nothing (of `tvist_protocol`)
@@ -12,8 +12,8 @@ TvistError
     │   ├── StreamStoppedError   the robot ended the stream of set-points
     │   └── ProtectiveStopError  an unlocked robot stopped again at once
     ├── ArgumentError        an argument is invalid; also a ValueError
-    ├── UnexpectedReplyError the answer is not one of this protocol
-    └── MisuseError          called at the wrong time
+    ├── UnexpectedReplyError the answer does not follow this protocol
+    └── MisuseError          the call is not possible now
 """
 
 from typing import ClassVar
@@ -27,7 +27,7 @@ class ClientError(TvistError):
 
 
 class NotConnectedError(ClientError, ConnectionError):
-    """There is no robot to talk to, or the connection was lost."""
+    """No robot answers, or the connection was lost."""
 
 
 class DeniedError(ClientError, PermissionError):
@@ -43,7 +43,7 @@ class UnexpectedReplyError(ClientError):
 
 
 class MisuseError(ClientError):
-    """A call that is not possible now; the message says what to do first."""
+    """The call is not possible now; the message says what to do first."""
 
 
 class ArgumentError(ClientError, ValueError):
@@ -51,7 +51,7 @@ class ArgumentError(ClientError, ValueError):
 
     Attributes:
         where: Argument at fault, such as `q[3]`.
-        why: A sentence with argument, value and what is allowed.
+        why: Message with argument, value and what is allowed.
         limit: Limit that was exceeded, in the argument's unit; None if there is none.
     """
 
@@ -66,11 +66,7 @@ class ArgumentError(ClientError, ValueError):
 
 
 class StoppedError(ClientError):
-    """The robot ended something, and reported it in an event.
-
-    Attributes:
-        event: The event.
-    """
+    """The robot ended something, and reported it in an event, which is `event`."""
 
     _what: ClassVar = "the robot stopped"
 
@@ -90,15 +86,12 @@ class MotionStoppedError(StoppedError):
 
 
 class StreamStoppedError(StoppedError):
-    """The robot ended the stream of set-points; `servo` begins a new one. The event is the robot's `stream_stopped`."""
+    """The robot ended the stream of set-points; `servo` starts a new one. The event is the robot's `stream_stopped`."""
 
     _what = "the stream of set-points was ended"
 
 
 class ProtectiveStopError(StoppedError):
-    """A robot that was unlocked stopped again at once, because the cause of the stop persists.
-
-    The event is the robot's `protective_stop`.
-    """
+    """An unlocked robot stopped again at once, because the cause persists; the event is its `protective_stop`."""
 
     _what = "the robot made another protective stop"

@@ -25,13 +25,13 @@ Item = TypeVar("Item")
 class Stream(AsyncIterator[Item], Generic[Item]):
     """Messages in order, from the creation of this iterator on.
 
-    If the reader is slower than the robot, the oldest messages are dropped and counted, so that messages are never
+    If the reader is slower than the robot, the oldest messages are dropped and counted, so that no message is
     older than the buffer. The iterator ends when the robot's connection is closed.
     """
 
     def __init__(self, size: int) -> None:
         self.dropped = 0
-        """Number of messages that were dropped because the reader was too slow."""
+        """Number of messages dropped because the reader was too slow."""
         self._waiting: deque[Item] = deque(maxlen=size)
         self._news = asyncio.Event()
         self._error: ClientError | None = None
@@ -39,11 +39,11 @@ class Stream(AsyncIterator[Item], Generic[Item]):
 
     @property
     def ready(self) -> bool:
-        """True if the next message, or the end, is there already."""
+        """Whether the next message, or the end, is there already."""
         return bool(self._waiting) or self._finished or self._error is not None
 
     def push(self, message: Item) -> None:
-        """Add a message; if the buffer is full, the oldest is dropped and counted."""
+        """Add a message; if the buffer is full, drop and count the oldest."""
         if len(self._waiting) == self._waiting.maxlen:
             self.dropped += 1
         self._waiting.append(message)
@@ -72,10 +72,7 @@ class Stream(AsyncIterator[Item], Generic[Item]):
 
 
 class Feed(Generic[M]):
-    """Messages of one topic. Subscribes with its first listener.
-
-    Where there is one message per tick (`once_a_tick`), one that is not newer than the last is dropped as a repetition.
-    """
+    """Messages of one topic. The first listener subscribes; with `once_a_tick`, repetitions of a tick are dropped."""
 
     def __init__(self, transport: Transport, topic: Topic, kind: type[M], *, once_a_tick: bool) -> None:
         self.latest: M | None = None
@@ -101,7 +98,7 @@ class Feed(Generic[M]):
             self._subscribed = True
 
     def listen(self, callback: Callable[[M], object]) -> Callable[[], None]:
-        """Call a function with every message; the function returned ends that."""
+        """Call a function with every message; the returned function ends this."""
         if not callable(callback):
             raise ArgumentError(
                 "callback", f"callback is {quoted(callback)}: must be a function of one {self._topic} message"
@@ -142,7 +139,7 @@ class Feed(Generic[M]):
                 message.set_exception(error)
 
     def finish(self) -> None:
-        """End all streams and fail all waits, since the connection was closed."""
+        """End all streams and fail all waits, because the connection was closed."""
         self._finished = True
         self.latest = None
         for stream in tuple(self._streams):
@@ -164,7 +161,7 @@ class Feed(Generic[M]):
         self.latest = message
         for listener in tuple(self._listeners):
             self._call(listener, message)
-        # Checked first, since iterating over an empty weak set takes longer than decoding a state.
+        # Checked first, because iterating over an empty weak set takes longer than decoding a state.
         if self._streams:
             for stream in tuple(self._streams):
                 stream.push(message)
@@ -176,7 +173,7 @@ class Feed(Generic[M]):
         """Call a listener; log an error in it, so that it affects neither the robot nor the other listeners."""
         try:
             listener(message)
-        except Exception as error:  # noqa: BLE001  anything may go wrong in what a user wrote
+        except Exception as error:  # noqa: BLE001  a user's function may raise anything
             asyncio.get_running_loop().call_exception_handler(
                 {"message": f"a callback for {self._topic} raised", "exception": error}
             )

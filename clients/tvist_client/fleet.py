@@ -1,8 +1,4 @@
-"""The robots of a network, found by their liveliness tokens: what they are, how they are, and how all of them stop.
-
-One session without a namespace sees the robots of all namespaces. Of each robot it gets one message a second,
-`telemetry`, whatever their number.
-"""
+"""The robots of a network, found by their liveliness tokens over one session without a namespace."""
 
 import asyncio
 from collections.abc import Collection
@@ -31,13 +27,13 @@ from tvist_protocol.stream import Telemetry
 ANSWER_S = 3.0
 """Longest wait for a robot's answer [s]."""
 SETTLE_S = 0.3
-"""Time for tokens to arrive after the session has opened [s]; over a slow network, `look` sees late ones, too."""
+"""Time for tokens to arrive after the session has opened [s]; on a slow network, `look` also sees late ones."""
 LISTEN_S = 1.3
 """Time in which every robot in real time publishes its telemetry at least once [s]."""
 
 
 class FleetRobot(msgspec.Struct, frozen=True):
-    """A robot of a fleet with its modes, as one query of `info` has found it."""
+    """A robot of a fleet, as one query of `info` has found it."""
 
     namespace: str
     name: str
@@ -46,11 +42,11 @@ class FleetRobot(msgspec.Struct, frozen=True):
     clock: str | None
     robot_mode: str | None
     safety_mode: str | None
-    """RTDE names of its modes; null if they are not known."""
+    """RTDE names of its modes; null if they are unknown."""
     control: str | None
     """Client that has control; null if there is none."""
     ready: bool
-    """True if the robot answers and may be moved."""
+    """Whether the robot answers and may be moved."""
     ticks_per_second: float | None
     """Control periods in its last second [1/s]; null for a robot that has sent no telemetry, as in lockstep."""
     silent_s: float | None
@@ -60,17 +56,17 @@ class FleetRobot(msgspec.Struct, frozen=True):
     late_p99_us: float | None
     """99th percentile of the lateness of its ticks in its last second [µs]."""
     load: float | None
-    """Share of its last second in which the thread that ticks worked for this robot [-]."""
+    """Share of its last second in which the tick thread worked for this robot [-]."""
     said: str
-    """What keeps it from being moved, or why it is not known, or that it is overloaded; empty if all is well."""
+    """Reason why it cannot be moved or is unknown, or that it is overloaded; empty if all is well."""
     due_ticks: int | None = None
-    """Control periods that were due since its start; null in lockstep, or from an older server."""
+    """Control periods due since its start; null in lockstep, or from an older server."""
     overloaded: bool | None = None
     """Whether it is overloaded, as telemetry defines it; null if it has sent none."""
 
 
 class StopReport(msgspec.Struct, frozen=True):
-    """What a robot answered to `stop`."""
+    """A robot's answer to `stop`."""
 
     namespace: str
     name: str
@@ -79,15 +75,9 @@ class StopReport(msgspec.Struct, frozen=True):
 
 
 class Fleet(Across):
-    """Robots on a network, by one session. Use as an asynchronous context.
+    """Robots on a network, over one session. Use it as an asynchronous context.
 
-    Args:
-        endpoint: Endpoint of a router, or of one server.
-        security: Folder with this client's certificate, for `tls/<host>:<port>`.
-        namespace: Namespace that the robots are in or below; empty: all namespaces.
-
-    Raises:
-        ProtocolError: The namespace is none.
+    `endpoint` is that of a router or server. The robots are in or below `namespace`; ProtocolError if it is invalid.
     """
 
     def __init__(
@@ -96,10 +86,9 @@ class Fleet(Across):
         super().__init__(endpoint, security=security, namespace=namespace)
         self._told: dict[Place, tuple[float, Telemetry]] = {}
         self.places: set[Place] = set()
-        """Robots whose liveliness tokens are there now."""
+        """Robots whose liveliness tokens are present."""
 
     async def _subscribe(self) -> None:
-        """Subscribe to tokens and telemetry, and let the tokens arrive."""
         self._session.liveliness().declare_subscriber(
             keys.within(self._within, keys.ANYWHERE_ALIVE),
             Callback(self._on_token, indirect=False),
@@ -116,22 +105,18 @@ class Fleet(Across):
         await asyncio.sleep(LISTEN_S)
 
     async def look(self) -> list[FleetRobot]:
-        """Ask every robot what it is and how it is; natural order."""
+        """Query every robot's description and condition, in natural order of their names."""
         places = sorted(self.places, key=_by_number)
         answers = await asyncio.gather(*(self._ask(place, "info", None) for place in places))
         return [self._row(place, answer) for place, answer in zip(places, answers, strict=True)]
 
     async def stop(self, places: Collection[Place]) -> list[StopReport]:
-        """Stop the motions of robots, all at once, whoever has control.
-
-        Args:
-            places: Robots, there or not.
-        """
+        """Stop the motions of the robots `places`, all at once and whichever client has control."""
         wanted, data = sorted(places, key=_by_number), encode(Stop())
         answers = await asyncio.gather(*(self._ask(place, "command", data) for place in wanted))
         return [_stopped(place, answer) for place, answer in zip(wanted, answers, strict=True)]
 
-    # ------------------------------------------------------------------ what arrives, in Zenoh's threads
+    # The following methods run in Zenoh's threads.
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         place = keys.place(str(sample.key_expr))
@@ -147,13 +132,11 @@ class Fleet(Across):
     def _hear(self, place: Place, data: bytes) -> None:
         try:
             self._told[place] = (self._loop.time(), decode(Telemetry, data))
-        except ProtocolError:  # another version's; its silence is reported
+        except ProtocolError:  # from another version; its silence is reported
             return
 
-    # ------------------------------------------------------------------ one robot
-
     async def _ask(self, place: Place, leaf: keys.Leaf, data: bytes | None) -> bytes | NotConnectedError:
-        """Return a robot's answer, or why there is none: the others are not kept waiting by an error."""
+        """Return a robot's answer, or why there is none: an error would delay the other robots."""
         answer: asyncio.Future[bytes | NotConnectedError] = self._loop.create_future()
 
         def settle(outcome: bytes | NotConnectedError) -> None:

@@ -1,4 +1,4 @@
-"""Stop one robot, whoever has control of it, and say what that has stopped."""
+"""Stops one robot, whichever client has control, and reports what was stopped."""
 
 import asyncio
 
@@ -14,7 +14,7 @@ from tvist_protocol.stream import Event, State
 
 
 class HaltReport(msgspec.Struct, frozen=True):
-    """What was stopped, and whether the arm rests."""
+    """What was stopped, and whether the arm is at rest."""
 
     ok: bool
     """Whether the arm is at rest, or in lockstep will be after the next steps."""
@@ -22,14 +22,13 @@ class HaltReport(msgspec.Struct, frozen=True):
     robot: str
     """Name of the robot."""
     stopped: list[str] | None
-    """What was stopped, in order, such as "motion 3"; empty if nothing was under way; null in lockstep, where the stop
-    begins with the next step."""
+    """What was stopped, in order, such as "motion 3"; empty if nothing; null in lockstep, where the next step stops."""
     control: str | None
-    """Client that has control, which can move the robot again; null if none has."""
+    """Client that has control and can move the robot again; null if none has."""
     runtime_state: str | None
     """RTDE name of the state afterwards; null in lockstep."""
     why: str
-    """What is wrong, as a sentence; empty if all is well."""
+    """What is wrong; empty if all is well."""
 
 
 def halt(
@@ -39,10 +38,7 @@ def halt(
     security: Folder | None = None,
     namespace: str = "",
 ) -> HaltReport:
-    """Send `stop` without control, and wait until the arm is at rest; in lockstep, a client has to step time.
-
-    Without a name, it is the only robot at the endpoint, or `ur5e`.
-    """
+    """Send `stop` without control and wait for rest; without a name, to the only robot at the endpoint, or `ur5e`."""
     return asyncio.run(_halt(endpoint, name, security, namespace))
 
 

@@ -8,22 +8,22 @@ from tvist_client.errors import ClientError, MotionStoppedError
 from tvist_protocol.stream import Event
 
 REMEMBERED = 256
-"""Number of ended motions that are remembered, since an event may precede the answer that names its motion."""
+"""Number of ended motions that are kept, because an event may precede the answer that names its motion."""
 
 
 class Motion:
     """One motion, from the robot's acceptance to its end."""
 
     id: int
-    """The robot's number for it."""
+    """The robot's number of the motion."""
     started: int | None = None
-    """Tick at which it began; None until then."""
+    """Tick at which it started; None until then."""
     done: int | None = None
     """Tick at which its shaped reference came to rest at the target; None until then, or if it never did."""
     limited: str | None = None
-    """Why it is slower than asked, or which limit it will exceed, in a sentence; None if it is as asked."""
+    """Why it is slower than requested, or which limit it will exceed; None if it is as requested."""
     stopped: Event | None = None
-    """The event that reports its end before the target; None if there is none."""
+    """Event that reports its end before the target; None if there is none."""
 
     def __init__(self, id: int, pass_time: Callable[["Motion"], Awaitable[None]]) -> None:  # noqa: A002  the wire's name
         self.id = id
@@ -51,7 +51,6 @@ class Motion:
         return self
 
     def __await__(self) -> Generator[Any, None, Self]:
-        """Make `await motion` equivalent to `await motion.wait()`."""
         return self.wait().__await__()
 
     async def wait_event(self) -> None:
@@ -77,7 +76,7 @@ class Motion:
 
 
 class MotionsByNumber:
-    """The motions of one robot by number; each is created by its answer or its first event, whichever comes first."""
+    """The motions of one robot by number, each created by its answer or first event, whichever comes first."""
 
     def __init__(self, pass_time: Callable[[Motion], Awaitable[None]]) -> None:
         self._pass_time = pass_time

@@ -15,10 +15,7 @@ T = TypeVar("T")
 
 
 class Portal:
-    """Runs an event loop in a separate thread.
-
-    The thread is a daemon, so a program that forgets to close it ends all the same.
-    """
+    """Runs an event loop in a daemon thread, so that a program that forgets to close it still ends."""
 
     def __init__(self) -> None:
         self._loop = asyncio.new_event_loop()
@@ -29,12 +26,8 @@ class Portal:
     def call(self, function: Callable[[], Awaitable[T]]) -> T:
         """Run a function on the loop and wait for its result in this thread; Ctrl-C cancels it.
 
-        An error of the client or protocol is raised as if it occurred here: its path through the loop and its cause
-        would only distract from the message.
-
-        Raises:
-            NotConnectedError: The connection is closed.
-            MisuseError: Called by a callback, which would wait for itself forever.
+        An error of the client or protocol is raised without its traceback through the loop, which would distract.
+        Raise NotConnectedError if the portal is closed, MisuseError in a callback, which would wait for itself.
         """
         if self.closed:
             raise NotConnectedError("the connection is closed: open another one")
@@ -70,7 +63,7 @@ class Portal:
             yield value
         except BaseException as error:
             if sys.is_finalizing():
-                # The interpreter discards a block that was never left; the loop's thread has ended by then.
+                # The interpreter discards a block that was never left; the loop's thread has already ended.
                 raise
             kind, raised, trace = type(error), error, error.__traceback__
             if not self.call(lambda: context.__aexit__(kind, raised, trace)):

@@ -1,4 +1,4 @@
-"""Whether a robot is ready to be moved; if not, why, and what to do about it."""
+"""Whether a robot is ready to be moved; if not, the reason and the remedy."""
 
 from enum import IntEnum
 
@@ -25,14 +25,14 @@ RELIEVE = (
     "end other programs, serve fewer robots in its process, or start it with more --workers or with "
     "--realtime-priority"
 )
-"""What to do about an overloaded robot."""
+"""Remedies for an overloaded robot."""
 _AT_THE_ROBOT = "see to it at the robot, which is only watched: nothing is sent to it from here"
 _LOST = "see that the robot is on and reached by the server's machine, which tries every second by itself to connect"
 _POWER = "run {unlock} --power-on"
 
 
 class Readiness(Struct, frozen=True):
-    """What keeps a robot from being moved, if anything does."""
+    """Whether a robot may be moved, and what prevents it."""
 
     ready: bool
     """Whether the robot has power and its safety system allows motion."""
@@ -43,9 +43,9 @@ class Readiness(Struct, frozen=True):
     stop: StopReason | None
     """The stop that keeps it from moving; null if there is none, or the robot does not report it."""
     why: str
-    """A sentence with the reason; empty if the robot is ready."""
+    """The reason; empty if the robot is ready."""
     next: str
-    """What to do about it; empty if the robot is ready."""
+    """The remedy; empty if the robot is ready."""
 
     @property
     def sentence(self) -> str:
@@ -62,7 +62,7 @@ async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
 
 
 def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> Readiness:
-    """Judge readiness from the robot's own messages; the state is for a server whose `info` lacks the modes."""
+    """Judge readiness from the robot's messages; `state` is for a server whose `info` lacks the modes."""
     robot = info.robot_mode if info.robot_mode is not None or state is None else state.robot_mode
     safety = info.safety_mode if info.safety_mode is not None or state is None else state.safety_mode
     if robot is None or safety is None:

@@ -1,4 +1,4 @@
-"""A robot over the network, and the rights on it that a client can hold: control and the clock."""
+"""A robot over the network, and the rights that a client can hold on it: control and the clock."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -39,8 +39,7 @@ class Stepper(Leased):
             ticks: Number of control periods, 1 to 100000.
 
         Returns:
-            The last tick that passed, which is earlier than requested if the clock was lost meanwhile; its state has
-            arrived.
+            The last tick that passed, earlier than requested if the clock was lost meanwhile; its state has arrived.
 
         Raises:
             RefusedError: The clock was lost; the message contains the present holder's name.
@@ -53,11 +52,7 @@ class Stepper(Leased):
 
 
 class Robot(Connection):
-    """One robot, over an open transport, which `close` closes.
-
-    Args:
-        transport: The transport.
-    """
+    """One robot, over an open transport, which `close` closes."""
 
     arm: Arm | None
     stepper: Stepper | None
@@ -78,11 +73,11 @@ class Robot(Connection):
             name: Name of the robot.
             security: Folder with this client's certificate, made by `tvist keys`; the endpoint is then
                 `tls/<host>:<port>`.
-            namespace: Namespace of the robot, if it is served in one.
+            namespace: Namespace of the robot, if it has one.
 
         Raises:
-            NotConnectedError: No server listens there, the certificate is rejected, or no robot of that name is there
-                or visible.
+            NotConnectedError: No server listens there, the certificate is rejected, or no robot of that name
+                is visible.
             RefusedError: The robot is still starting, code `starting`.
         """
         robot = cls(await ZenohTransport.open(endpoint, name, security, namespace))
@@ -117,12 +112,12 @@ class Robot(Connection):
     async def control(self, client: str, *, lease_s: float = 30.0) -> AsyncIterator[Arm]:
         """Hold control for the duration of a block.
 
-        The client's presence is announced first, so that control ends at once if it disconnects; in real time the
-        lease is renewed in the background.
+        The client's presence is announced first, so that control ends at once if it disconnects; in real time
+        the lease is renewed in the background.
 
         Args:
             client: Name of this client, shown to others.
-            lease_s: How long control lasts without renewal [s].
+            lease_s: Duration of control without renewal [s].
 
         Raises:
             RefusedError: Another client has control; the message contains its name.
@@ -153,7 +148,7 @@ class Robot(Connection):
             client: Name of this client, shown to others; the clock is released when it disconnects.
 
         Raises:
-            RefusedError: Another client holds the clock, whose name is in the message; or time passes by itself.
+            RefusedError: Another client holds the clock (the message has its name), or time passes by itself.
             ProtocolError: `client` is not a valid client name.
         """
         async with self._granted(TakeClock(client=check_client_name(client)), ReleaseClock) as (token, _):
@@ -167,10 +162,7 @@ class Robot(Connection):
     async def _granted(
         self, take: TakeControl | TakeClock, release: type[ReleaseControl | ReleaseClock]
     ) -> AsyncIterator[tuple[str, float | None]]:
-        """Hold a right for the duration of a block, and yield its token and how long it lasts without renewal [s].
-
-        The client is announced first, so that the right ends if it disconnects.
-        """
+        """Hold a right for the duration of a block; yield its token and its duration without renewal [s]."""
         await self._transport.announce(take.client)
         try:
             accepted = await self.request(take)

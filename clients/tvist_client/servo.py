@@ -15,7 +15,7 @@ from tvist_protocol.stream import Event
 
 
 class Servo:
-    """The stream that `Arm.servo` yields: numbers set-points from 0 and checks them, since a robot does not answer."""
+    """The stream that `Arm.servo` yields; it numbers and checks set-points, because a robot does not answer them."""
 
     period: float
     """Time between two set-points [s]."""
@@ -41,7 +41,7 @@ class Servo:
         self._forget()
 
     def set(self, q: Iterable[float]) -> int:
-        """Send the next set-point, without blocking; to be called once per period.
+        """Send the next set-point without blocking; call this once per period.
 
         In real time, 250 ms without a set-point end the stream; this includes the wait for the first one.
 
@@ -49,7 +49,7 @@ class Servo:
             q: Set-point, one angle per joint [rad].
 
         Returns:
-            Its number; `state.setpoint_sequence` says when it was accepted.
+            Its number; `state.setpoint_sequence` shows when it was accepted.
 
         Raises:
             ArgumentError: The number of angles is wrong, or an angle is not finite or outside its joint's range.
@@ -86,7 +86,7 @@ class Servo:
         if not setpoints:
             raise MisuseError("there are no set-points to play")
         ticks = max(1, round(self.period / TICK))
-        # One step takes one set-point per tick; if the period is longer, each set-point needs a step of its own.
+        # One step takes one set-point per tick; if the period is longer, each set-point needs its own step.
         together = MAX_STEP if ticks == 1 else 1
         tick = 0
         for first in range(0, len(setpoints), together):

@@ -1,4 +1,4 @@
-"""Make a robot that has stopped ready to move again, as far as a client can."""
+"""Makes a robot that has stopped ready to move again, as far as a client can."""
 
 import asyncio
 
@@ -31,7 +31,7 @@ class UnlockReport(msgspec.Struct, frozen=True):
     robot: str
     """Name of the robot."""
     done: list[str]
-    """What was done, in order, as sentences without a subject; empty if there was nothing to do."""
+    """What was done, in order, such as "unlocked the protective stop"; empty if there was nothing to do."""
     robot_mode: str | None
     """RTDE name of the robot mode afterwards."""
     safety_mode: str | None
@@ -39,9 +39,9 @@ class UnlockReport(msgspec.Struct, frozen=True):
     stop: StopReason | None
     """The stop that still, or again, keeps the robot from moving."""
     why: str
-    """What remains, as a sentence; empty if the robot is ready."""
+    """What remains; empty if the robot is ready."""
     next: str
-    """What to do about it; empty if the robot is ready."""
+    """The remedy; empty if the robot is ready."""
 
 
 def unlock(
@@ -54,17 +54,13 @@ def unlock(
 ) -> UnlockReport:
     """Take control, release what a client can release, and check that the robot does not stop again.
 
-    A robot that is ready is not changed. In lockstep, time advances by some hundred ticks. Without a name, it is
-    the only robot at the endpoint, or `ur5e`.
+    In lockstep, time advances by some hundred ticks. Without a name, it is the only robot at the endpoint, or `ur5e`.
     """
     return asyncio.run(_unlock(endpoint, name, security, namespace, power_on=power_on))
 
 
 async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[str]:
-    """Restart the safety system, unlock a protective stop and power on the arm, as far as needed and possible.
-
-    Returns what was done, as sentences without a subject. `readiness.look` says whether the robot is then ready.
-    """
+    """Restart the safety system, unlock a protective stop and power on the arm if needed; return what was done."""
     done: list[str] = []
     found = await look(robot)
     if found.safety_mode in _WHAT_IT_FOUND:

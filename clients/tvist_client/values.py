@@ -15,7 +15,7 @@ Joints = tuple[float, ...]
 
 
 def number(value: float, where: str) -> float:
-    """Convert a value to a float; its range is checked by the robot."""
+    """Convert a value to a float; the robot checks its range."""
     # `float` would also parse text, which cannot be intended here.
     if not isinstance(value, str | bytes):
         with contextlib.suppress(TypeError, ValueError, OverflowError):
@@ -52,7 +52,7 @@ def listed(
     count: int | None = None,
     meaning: str | None = None,
 ) -> tuple[T, ...]:
-    """Convert the entries of a sequence, whose count is checked here only if it is known, with a word for each."""
+    """Convert the entries of a sequence to a tuple, and check their number if `count` is given."""
     entries = None
     if not isinstance(values, str | bytes):
         with contextlib.suppress(TypeError):

@@ -1,7 +1,4 @@
-"""How classes without `await` are made of those with it: a call waits in the caller's thread, in a portal.
-
-Results that have a class of their own without `await` are given as that.
-"""
+"""Derives classes without `await` from those with it: calls, and their results, wait in the caller's thread."""
 
 import inspect
 from collections.abc import AsyncIterator, Iterator
@@ -24,13 +21,13 @@ M = TypeVar("M")
 
 
 class Waited(Described):
-    """A method that waits until one with `await` is done, which has the same arguments and description."""
+    """A method without `await`, with the arguments and the description of the one that it wraps."""
 
     def __init__(self, of: Any) -> None:
         self._of = of
 
     def __call__(self, owner: "Waiting", *values: Any, **named: Any) -> Any:
-        """Have the loop do the work, and wait for the result."""
+        """Run the wrapped method on the loop, and wait for the result."""
         method, portal = getattr(owner._inner, self.__name__), owner._portal  # noqa: SLF001  its methods
 
         async def called() -> Any:
@@ -81,7 +78,7 @@ class Attribute:
 
 
 _TWINS: dict[Any, Any] = {}
-"""The classes without `await` by those with it."""
+"""The classes without `await`, by those with it."""
 
 
 class Waiting:
@@ -92,7 +89,7 @@ class Waiting:
 
 
 def without_await(of: type, *internal: str, base: type[Waiting] = Waiting) -> Any:
-    """Return a class with the public members of one with `await`, without those for other modules of the client."""
+    """Return a counterpart without `await` of a class, with its public members except `internal` ones."""
     members: dict[str, Any] = {
         "__module__": "tvist_client.blocking",
         "__doc__": inspect.cleandoc(of.__doc__ or "").partition("\n\nArgs:")[0],
@@ -110,7 +107,7 @@ class Stream(Waiting, Iterator[M], Generic[M]):
 
     @property
     def dropped(self) -> int:
-        """Number of messages that were dropped because the reader was too slow."""
+        """Number of messages dropped because the reader was too slow."""
         dropped: int = self._inner.dropped
         return dropped
 
@@ -172,7 +169,6 @@ class Opened(Waiting):
 
 
 def _result(kind: Any) -> Any:
-    """Return the type without `await` of a result."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is AsyncIterator:
         return AbstractContextManager[_result(parts[0])]  # type: ignore[misc]
@@ -180,7 +176,7 @@ def _result(kind: Any) -> Any:
 
 
 def _twin(portal: Portal, result: Any) -> Any:
-    """Return a result as it is without `await`."""
+    """Return a result's counterpart without `await`."""
     if (twin := _TWINS.get(type(result))) is not None:
         return twin(portal, result)
     if isinstance(result, AbstractAsyncContextManager):

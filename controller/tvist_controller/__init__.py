@@ -1,1 +1,1 @@
-"""The robot controller: messages in, replies, states and events out. It has no clock, socket, thread or log."""
+"""The robot controller: messages in; replies, states and events out; no clock, socket, thread or log."""

@@ -11,10 +11,10 @@ __all__ = ["compiled", "compiled_for_ticks"]
 
 
 def compiled(function: F) -> F:
-    """Compile `function`, see `tvist_kernels.compiling`; it does not hold the interpreter's lock while it runs."""
+    """Compile a function so that it releases the GIL; see `tvist_kernels.compiling`."""
     return compile_function(function, nogil=True)
 
 
 def compiled_for_ticks(function: F) -> F:
-    """Compile a function that takes microseconds; it holds the interpreter's lock, which another thread might keep."""
+    """Compile a function of microseconds that keeps the GIL, which another thread might otherwise take."""
     return compile_function(function)

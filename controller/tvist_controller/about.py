@@ -1,4 +1,4 @@
-"""Description of a controller, as `info` returns it."""
+"""Description of a controller for the command `info`."""
 
 from functools import cache
 from importlib.metadata import version
@@ -20,12 +20,11 @@ from tvist_protocol.info import CalibrationInfo, Info, Limits, Stopping
 from tvist_protocol.values import PROTOCOL_VERSION
 
 SPEEDS = (0.33, 0.66, 1.0)
-"""Shares of a joint's velocity at which stops begin, as in UR's manuals [-]."""
+"""Fractions of a joint's velocity limit at which stops are computed, as in UR's manuals [-]."""
 POSTURES = 500
-"""Number of random postures searched for the one that needs most torque to hold: the arm stretched out."""
+"""Number of random postures searched for the stretched-out one, which needs most holding torque."""
 VERSION = version("tvist")
 FIELDS = {tag(kind): list(kind.__struct_fields__) for kind in COMMANDS}
-"""Fields of each command, by its type."""
 
 
 def info_of(controller: Controller) -> Info:
@@ -89,7 +88,7 @@ def info_of(controller: Controller) -> Info:
 
 
 def geometry_of(description: RobotDescription, things: Things | None = None) -> Geometry:
-    """Kinematics and shape of an arm and of what stands around it, for clients that draw it."""
+    """Return kinematics and shapes of an arm and its surroundings for clients that draw them."""
     kinematics, collision = description.kinematics, description.collision
     content = {
         **msgspec.structs.asdict(kinematics),
@@ -108,10 +107,9 @@ def geometry_of(description: RobotDescription, things: Things | None = None) -> 
 
 
 def stopping(description: RobotDescription) -> tuple[Stopping, ...]:
-    """Return the stops without payload and with the rated one, of the joint that takes the longest.
+    """Return the stops without payload and with the rated one, of the joint that takes longest.
 
-    In each stop a single joint turns, in either direction, while the others are at rest and the arm is stretched out.
-    Computing them takes as long as twenty ticks, once for each description.
+    One joint turns, either way, with the arm stretched out. This takes as long as twenty ticks, once per description.
     """
     return _found(msgspec.json.encode(description))
 
@@ -143,7 +141,7 @@ def _found(described: bytes) -> tuple[Stopping, ...]:
 
 
 def _stretched(description: RobotDescription, dynamics: InverseDynamics) -> Floats:
-    """Return the posture that needs the largest share of a joint's torque to hold."""
+    """Return the posture with the largest relative holding torque."""
     random, limits = np.random.default_rng(0), np.array(description.limits.torque)
     named = [np.array(pose) for pose in description.poses.values()]
     postures = [*named, *random.uniform(-np.pi, np.pi, (POSTURES, description.joints))]

@@ -1,4 +1,4 @@
-"""The controller: messages in, replies, states and events out. It has no clock, socket, thread or log."""
+"""The controller: messages in; replies, states and events out; no clock, socket, thread or log."""
 
 import math
 from collections.abc import Callable
@@ -32,8 +32,8 @@ class Controller(Robot):
 
     Args:
         setup: Initial setup.
-        plant: Plant to control; None for the setup's own, or else the flexible arm that it describes.
-        order: Has commands of programs planned beside the ticks; None to plan them in the ticks.
+        plant: Plant to control; None for that of the setup, by default its flexible arm.
+        order: Callback that plans commands of programs outside the ticks; None to plan within the ticks.
 
     Raises:
         ValueError: The setup is invalid, or the plant does not fit it.
@@ -44,9 +44,9 @@ class Controller(Robot):
         setup = setup.standing(plant)
         setup.check(placed=plant is None or not (plant.watched or plant.supervised))
         self._failed: PlantError | None = None
-        """Failure of the plant between two ticks, with which the next one deals."""
+        """Failure of the plant between two ticks, handled in the next one."""
         self._next_timeout = -math.inf
-        """Time at which something may time out next [s]."""
+        """Time of the next possible timeout [s]."""
         super().__init__(setup, plant, Planner(setup), order)
 
     # ------------------------------------------------------------------ inputs
@@ -58,10 +58,13 @@ class Controller(Robot):
         session: str | None = None,
         origin: str | None = None,
     ) -> Reply:
-        """Carry out a command between two ticks. A refused command changes nothing.
+        """Carry out a command between two ticks; a refused command changes nothing.
 
-        A plan that was made beforehand is used if it still holds. The session is that of the client that gets control,
-        if `client_gone` will report its end; the origin the IP address of the machine that sent it, if known.
+        Args:
+            command: The command.
+            plan: Plan made in advance, used if still valid.
+            session: Session of a client that takes control, if `client_gone` will report its end.
+            origin: IP address of the sender, if known.
         """
         self.counters.commands += 1
         row = COMMANDS[type(command)]
@@ -86,17 +89,12 @@ class Controller(Robot):
         session: str | None = None,
         origin: str | None = None,
     ) -> Reply | None:
-        """Carry out a command of a client, or of a program; return None if its reply is `Done`.
-
-        Raises:
-            RefusalError: It cannot be carried out, and has changed nothing.
-            NoControlError: Its sender may not send it.
-        """
+        """Carry out a command; return None for the reply `Done`; raise RefusalError or NoControlError."""
         if self.watching is not None and type(command) not in HARMLESS:
             raise RefusalError("wrong_mode", "", REFUSED)
         if self.supervision is not None:
             self.supervision.check(command)
-        if not isinstance(command, SimulationStep):  # which changes nothing before its ticks
+        if not isinstance(command, SimulationStep):  # a step changes nothing before its ticks
             self._look_again()
         row, planned = COMMANDS[type(command)], partial(self.plans.found, command, plan)
         if row.check is not None:
@@ -108,14 +106,10 @@ class Controller(Robot):
     def receive_setpoint(
         self, setpoint: c.Setpoint | Unreadable | None, note: Callable[[], None] | None = None
     ) -> None:
-        """Take a set-point, None for one that was not admitted.
-
-        If it is not accepted, it is counted and dropped, since its sender expects no answer. One of the client in
-        control is first noted in the journal.
-        """
+        """Take a set-point, None if not admitted; `note` journals one of the client in control first."""
         self.counters.setpoints_received += 1
         if setpoint is None or not is_holders(self.session.lease, setpoint.token):
-            self.counters.setpoints_refused += 1  # neither the stream nor the journal is concerned
+            self.counters.setpoints_refused += 1  # not part of the stream or the journal
             return
         if note is not None:
             note()
@@ -125,12 +119,12 @@ class Controller(Robot):
             self.counters.setpoints_refused += 1
 
     def client_gone(self, client: str, session: str) -> None:
-        """Handle the end of a client's session, which ends the rights it held."""
+        """End the rights that a client's ended session held."""
         self._look_again()
         self.session.end_rights(client, session)
 
     def fail(self, why: str) -> None:
-        """Let the next tick deal with a failure of the plant that something outside the controller has seen."""
+        """Handle a plant failure that was detected outside the controller in the next tick."""
         self._failed = PlantError(why)
 
     # ------------------------------------------------------------------ ticks
@@ -142,10 +136,7 @@ class Controller(Robot):
         return report.state, events
 
     def begin_tick(self) -> None:
-        """Begin a control period: what has timed out ends, and programs have their turn.
-
-        Its number is the next one, or that which a robot that is watched gives it.
-        """
+        """Begin a control period: handle timeouts and run programs; a watched robot sets the tick number."""
         if self.watching is not None:
             tick = self.watching.look()
             self.tick_number = max(self.tick_number, 0 if tick is None else tick - 1)
@@ -154,7 +145,7 @@ class Controller(Robot):
         if self.supervision is not None:
             try:
                 self.supervision.look()
-            except PlantError as error:  # leases still end while it does not answer
+            except PlantError as error:  # leases still expire while the plant does not answer
                 self._failed = error
             self.counters.missed_ticks = self.supervision.missed
         if self.now >= self._next_timeout:
@@ -167,10 +158,7 @@ class Controller(Robot):
             self.programs.advance(self.tick_number + 1)
 
     def complete_tick(self) -> tuple[Report, list[Event]]:
-        """Compute the rest of a control period that has begun.
-
-        Nothing here judges what a robot that is watched said, since nothing here could stop it.
-        """
+        """Compute the rest of a control period that has begun."""
         sample = self._step() if self.watching is None else self.watching.sample()
         self.tick_number += 1
         events, self.events = self.events, []
@@ -178,7 +166,6 @@ class Controller(Robot):
         return self.report, events
 
     def _step(self) -> Sample:
-        """Let the arm go on by a tick, and judge that."""
         motion, failed, self._failed = self.motion, self._failed, None
         try:
             if failed is not None:
@@ -200,11 +187,11 @@ class Controller(Robot):
         return sample
 
     def _look_again(self) -> None:
-        """Let the next tick see what has timed out, and what modes have become: a command may have changed both."""
+        """Check timeouts and modes in the next tick, since a command may have changed them."""
         self._next_timeout, self.motion.changed = -math.inf, True
 
     def _watch_time(self) -> None:
-        """End what has timed out or run its course, and note when something will next."""
+        """End everything that has timed out, and store the time of the next timeout."""
         self.faults.end(self.tick_number + 1)
         self.session.watch(self.now)
         self._next_timeout = min(PERIOD * (self.faults.next_end - 1), self.session.ends)
@@ -216,14 +203,14 @@ class Controller(Robot):
     # ------------------------------------------------------------------ outputs
 
     def changed_io(self) -> Io | None:
-        """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
+        """Return inputs, outputs and registers if they changed since the last call, else None."""
         if not self.peripherals.changed:
             return None
         self.peripherals.changed = False
         return self.io(wrench=False)
 
     def truth(self) -> Truth | None:
-        """Return what a real robot cannot measure, after a tick; None if the plant has failed.
+        """Return what a real robot cannot measure; None if the plant has failed.
 
         Raises:
             ValueError: The plant does not provide it.

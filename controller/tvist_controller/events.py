@@ -1,4 +1,4 @@
-"""Events on their way to the clients, and counts of what has reached a controller."""
+"""Events for clients, and counters."""
 
 from dataclasses import dataclass
 from typing import Protocol, TypedDict, Unpack
@@ -16,7 +16,7 @@ class Told(TypedDict, total=False):
 
 
 class Fields(Told, total=False):
-    """Fields of an event besides its kind; see `tvist_protocol.stream.Event`."""
+    """Fields of an event other than its kind; see `tvist_protocol.stream.Event`."""
 
     id: int | None
     code: Code | None
@@ -31,10 +31,10 @@ class Fields(Told, total=False):
 
 
 class Emit(Protocol):
-    """Emits an event."""
+    """Function that emits an event."""
 
     def __call__(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
-        """Emit an event of the tick that is being computed, or of the next one between two ticks."""
+        """Emit an event of the present tick, or of the next one if called between ticks."""
 
 
 @dataclass

@@ -1,8 +1,4 @@
-"""Host of one controller: carries out and journals admitted messages, and passes output to sinks.
-
-It has no clock, thread or socket: time advances when `tick` is called. With the clocks lockstep and free, a client
-does this through `simulation.step`.
-"""
+"""Host of one controller: carries out and journals admitted messages, passes output to sinks; no clock or socket."""
 
 from collections.abc import Callable, Sequence
 
@@ -29,7 +25,7 @@ from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event
 
 Attend = Callable[[], bool]
-"""Does waiting jobs before a tick of a step; returns False if the step has to end."""
+"""Function that handles waiting jobs before a tick of a step; returns False to end the step."""
 _BUSY = Refused(code="busy", where="", why="a step is in progress: send the next one after its answer")
 
 
@@ -38,10 +34,10 @@ class Host:
 
     Args:
         controller: The robot.
-        sinks: Sinks that take its output, in this order.
-        ports: Network for the sockets of programs; None if there is none, so that none can be opened.
-        experience: What the robot makes of its motions; None if it learns nothing.
-        survives: Whether an exception stops the robot, in a protective stop, and goes to the sinks; else it is raised.
+        sinks: Sinks of its output, in this order.
+        ports: Network for sockets of programs; None for no network.
+        experience: What the robot learns from its motions; None for nothing.
+        survives: Whether an exception causes a protective stop and goes to the sinks instead of the caller.
     """
 
     def __init__(
@@ -55,23 +51,22 @@ class Host:
         self.controller, self._experience, self._survives = controller, experience, survives
         self._ports = ports or SocketPorts()
         self.failure: str | None = None
-        """Why the controller has stopped ticking; None if it ticks."""
+        """Reason why the controller has stopped ticking; None while it ticks."""
         self._sinks = sinks
         self._info: tuple[object, bytes] = None, b""
         self._stepping = False
 
     def request(self, data: bytes, origin: str | None = None) -> Reply:
-        """Admit and carry out an encoded command; `origin` is the IP address of the machine that sent it, if known."""
+        """Admit and carry out an encoded command; `origin` is the sender's IP address, if known."""
         admitted = admit(data, *self.standing)
         if isinstance(admitted, Refused):
             return self._turned_away(admitted)
         return self.carry_out(admitted if origin is None else admitted._replace(origin=origin))
 
     def carry_out(self, admitted: Admitted, plan: Plan | None = None, attend: Attend | None = None) -> Reply:
-        """Carry out a command; a plan that was made beforehand is used if it still holds.
+        """Carry out a command, with a plan made in advance if it is still valid.
 
-        `attend` is called before each tick of a step, so that others may send something meanwhile. It may carry out
-        other commands, but no step.
+        `attend` is called before each tick of a step; it may carry out other commands, but no step.
         """
         command = admitted.command
         if self._stepping and isinstance(command, SimulationStep):
@@ -97,7 +92,7 @@ class Host:
 
     @property
     def standing(self) -> Standing:
-        """Who has rights now; any thread may read it."""
+        """Present holders of rights, readable from any thread."""
         return Standing(self.controller.session.lease, self.controller.session.clock)
 
     def setpoint(self, data: bytes) -> None:
@@ -105,19 +100,19 @@ class Host:
         self.receive_setpoint(admit_setpoint(data, self.controller.session.lease))
 
     def client_gone(self, client: str, session: str) -> None:
-        """Handle the end of a client's session; this matters only if it held control or the clock."""
+        """Handle the end of a client's session if it held control or the clock."""
         if session in self.standing.sessions_of(client):
             self._note(Entry(tick=self._next, kind="client_gone", client=client, session=session))
             self.controller.client_gone(client, session)
             self._carry_out_orders()
 
     def missed(self, ticks: int) -> None:
-        """Count ticks that began too late."""
+        """Count ticks that began late."""
         self._note(Entry(tick=self._next, kind="missed", count=ticks))
         self.controller.counters.missed_ticks += ticks
 
     def info(self) -> bytes:
-        """Return the encoded description of the controller, which is made anew after each tick and command."""
+        """Return the encoded description of the controller, cached until the next tick or command."""
         now = self.controller.tick_number, self.controller.counters.commands, self.standing
         if self._info[0] != now:
             self._info = now, encode(info_of(self.controller))
@@ -132,7 +127,7 @@ class Host:
             self._tick()
 
     def _stop_for(self, error: Exception) -> str:
-        """Let the next tick stop the robot, since the controller has failed, if it survives that; say why."""
+        """Stop the robot in the next tick after a controller failure, or raise it; return the reason."""
         if not self._survives:
             raise error
         why = f"the controller has failed, see the server's log: {named(error)}"
@@ -170,7 +165,7 @@ class Host:
     def _learn(self, experience: Experience) -> None:
         for beliefs, lesson, plan in experience.lessons():
             if beliefs.declared != self.controller.assumed.assumed:
-                continue  # it is void: another payload was declared, learnt or forgotten since
+                continue  # outdated: another payload was declared, learnt or forgotten since
             self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
             self.controller.assumed.learn(lesson, plan)
         for error in experience.raised():
@@ -179,13 +174,13 @@ class Host:
                 sink.raised(error)
 
     def _forgets(self, command: Command) -> bool:
-        """Return True if a command invalidates what the robot is learning from its motions."""
+        """Return whether a command invalidates what the robot is learning from its motions."""
         if isinstance(command, SimulationReset):
             return command.payload is not None or self.controller.cell is not None
         return isinstance(command, Forget)
 
     def _tell_truth(self) -> None:
-        """Pass on what a real robot cannot measure, computed once, to those who want it."""
+        """Send what a real robot cannot measure, computed once, to the sinks that want it."""
         published, truth = self.controller.setup.truth, None
         for sink in self._sinks:
             if published or sink.wants_truth:
@@ -195,7 +190,7 @@ class Host:
                 sink.truth(truth)
 
     def tell_raised(self) -> None:
-        """Pass on what methods of the plant and functions of programs have raised."""
+        """Pass exceptions of plant methods and program functions to the sinks."""
         raised = self.controller.programs.raised
         for error in (*told(self.controller.cycle.plant), *raised):
             for sink in self._sinks:
@@ -203,18 +198,18 @@ class Host:
         raised.clear()
 
     def fail(self, why: str) -> None:
-        """Let the next tick deal with a failure of the arm outside the controller, such as of what gives its ticks."""
+        """Handle a failure of the arm outside the controller, such as of its tick source, next tick."""
         self.controller.fail(why)
 
     def leave_arm(self) -> None:
-        """Leave an arm that has power without it, since nobody controls it any more."""
+        """Power off an arm that nobody controls any more."""
         power = self.controller.motion.power
         if power is not None:
             power.end()
             self.tell_raised()
 
     def _carry_out_orders(self) -> Sequence[SocketNews]:
-        """Pass on what programs want of their sockets; return what is known of it at once."""
+        """Carry out socket orders of programs; return results that are known at once."""
         orders = self.controller.programs.sockets.orders
         if not orders:
             return ()
@@ -223,17 +218,13 @@ class Host:
         return news
 
     def socket(self, news: SocketNews) -> None:
-        """Take what happened to a socket of a program."""
+        """Take news about a socket of a program."""
         number, change, data = news
         self._note(Entry(tick=self._next, kind="socket", socket=number, change=change, data=data or None))
         self.controller.programs.sockets.hear(news)
 
     def ask_gripper(self, request: bytes) -> bytes:
-        """Carry out a request of a client to the cell's gripper; return the answer.
-
-        Raises:
-            ValueError: The cell has no gripper.
-        """
+        """Carry out a client's gripper request and return the answer; raise ValueError without a gripper."""
         if self.controller.cell is None:
             raise ValueError("there is no cell")
         if changes(request):
@@ -241,7 +232,7 @@ class Host:
         return self.controller.cell.answer(request)
 
     def warn(self, why: str) -> None:
-        """Send clients a warning about something outside the controller, which is not part of its replay."""
+        """Warn clients about something outside the controller, which a replay does not repeat."""
         event = Event(tick=self._next, kind="warning", why=why)
         for sink in self._sinks:
             sink.event(event)
@@ -251,7 +242,6 @@ class Host:
         return self.controller.tick_number + 1
 
     def _turned_away(self, refusal: Refused) -> Refused:
-        """Count a command that was rejected before it reached the controller."""
         self.controller.counters.commands += 1
         self.controller.counters.refused += 1
         return refusal
@@ -261,7 +251,7 @@ class Host:
             sink.journal(entry)
 
     def receive_setpoint(self, setpoint: Setpoint | Unreadable | None) -> None:
-        """Take an admitted set-point, or None for one that was not admitted; the controller judges whose it is."""
+        """Take an admitted set-point, or None; the controller checks the sender's rights."""
 
         def note() -> None:
             match setpoint:
@@ -273,7 +263,7 @@ class Host:
         self.controller.receive_setpoint(setpoint, note)
 
     def _step(self, step: SimulationStep, attend: Attend | None) -> Done:
-        """Tick as often as a step says, or until its token no longer gives the right to advance time."""
+        """Compute the ticks of a step, until its token loses the right to advance time."""
         controller, setpoints = self.controller, iter(step.setpoints or ())
         motion_token = step.token if step.motion_token is None else step.motion_token
         self._stepping = True

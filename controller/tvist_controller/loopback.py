@@ -1,4 +1,4 @@
-"""The server within a process, without network, thread or clock. Time advances when a client steps it."""
+"""An in-process server without network, thread or clock; time advances when a client steps it."""
 
 from collections.abc import Callable
 
@@ -16,12 +16,12 @@ from tvist_protocol.stream import Event, Truth
 
 
 class LoopbackHost(Sink):
-    """A robot in the caller's own thread, as fast as it computes. Every message still passes through the codec.
+    """A robot in the caller's thread, as fast as it computes; every message still passes through the codec.
 
     Args:
-        setup: Initial setup; its clock should be `free` or `lockstep`.
-        plant: Plant to control; None for the flexible arm of the setup.
-        experience: What the robot makes of its motions; None for what the setup asks for.
+        setup: Initial setup with the clock `free` or `lockstep`.
+        plant: Plant to control; None for the setup's flexible arm.
+        experience: What the robot learns from its motions; None for the setup's choice.
 
     Raises:
         ValueError: The setup is invalid, or the plant does not fit it.
@@ -32,7 +32,7 @@ class LoopbackHost(Sink):
     ) -> None:
         self.controller = Controller(setup, plant)
         self.entries: list[Entry] = []
-        """Inputs of the controller; together with the setup, all that a replay needs."""
+        """Inputs of the controller; a replay needs only these and the setup."""
         self._host = Host(self.controller, self, experience=experience or experience_of(setup))
         self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
 
@@ -49,7 +49,7 @@ class LoopbackHost(Sink):
         return self._host.info()
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], object]) -> Callable[[], None]:
-        """Call a function for each message of a topic, first the present state or io; return how to end this."""
+        """Call a function with each message of a topic, first the present state or io; return its end."""
         callbacks = self._callbacks.setdefault(topic, [])
         callbacks.append(callback)
         if topic == "state":

@@ -1,4 +1,4 @@
-"""Refusals of commands: raised where a problem is found, and sent as the command's reply."""
+"""Refusals of commands, raised where a problem is found and sent as the reply."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
 SLOWEST = {"velocity": 1e-3, "acceleration": 1e-2, "jerk": 0.1}
-"""Lowest accepted limits of a motion; lower ones would make it too slow [rad/s, rad/s^2, rad/s^3]."""
+"""Lowest accepted limits of a motion [rad/s, rad/s^2, rad/s^3]."""
 
 _NOTHING_TO = {
     "pause": "no motion that can be paused is running",
@@ -30,7 +30,7 @@ class RefusalError(Exception):
 
 
 def out_of_turn(command: str, activity: Activity) -> RefusalError:
-    """Return the refusal of a command, by its `type`, that is not allowed in the current activity."""
+    """Return the refusal of a command `type` that is not allowed in the present activity."""
     code: Code = "wrong_mode"
     if activity is Activity.PROTECTIVE_STOPPING:
         why = "safety_mode is PROTECTIVE_STOP: send unlock_protective_stop once the arm is at rest"
@@ -46,13 +46,13 @@ def out_of_turn(command: str, activity: Activity) -> RefusalError:
 
 
 def check_joints(q: Sequence[float], description: RobotDescription, where: str = "q") -> None:
-    """Refuse a posture with a wrong number of joints or outside their range."""
+    """Refuse a posture with a wrong number of joints or beyond a position limit."""
     limits = description.limits.position
     _check_each(q, limits, "limit_position", where, "angles; the arm has {}", "rad; the joint goes to ±{:g}")
 
 
 def check_speeds(qd: Sequence[float], description: RobotDescription) -> None:
-    """Refuse velocities with a wrong number of joints or above their limits."""
+    """Refuse velocities with a wrong number of joints or above a limit."""
     limits = description.limits.velocity
     has, goes = "velocities; the arm has {} joints", "rad/s; the joint's limit is {:g}"
     _check_each(qd, limits, "limit_velocity", "qd", has, goes)
@@ -61,7 +61,6 @@ def check_speeds(qd: Sequence[float], description: RobotDescription) -> None:
 def _check_each(
     values: Sequence[float], limits: Sequence[float], code: Code, where: str, has: str, goes: str
 ) -> None:
-    """Refuse values that are not one for each joint, or beyond a limit."""
     count = len(limits)
     if len(values) != count:
         raise RefusalError("out_of_range", where, f"{where} has {len(values)} {has.format(count)}", count)
@@ -74,7 +73,7 @@ def _check_each(
 def check_motion(
     velocity: float, acceleration: float, jerk: float, description: RobotDescription, prefix: str = ""
 ) -> None:
-    """Refuse limits of a motion above those of the arm, or so low that it would hardly move."""
+    """Refuse motion limits above the arm's, or too low to move."""
     limits = description.limits
     _check_limit("limit_velocity", "velocity", velocity, min(limits.velocity), "rad/s", prefix)
     check_acceleration(acceleration, description, prefix)
@@ -82,7 +81,7 @@ def check_motion(
 
 
 def check_acceleration(acceleration: float, description: RobotDescription, prefix: str = "") -> None:
-    """Refuse an acceleration of the joints above that of the arm, or so low that it would hardly move."""
+    """Refuse a joint acceleration above the arm's, or too low to move."""
     highest = min(description.limits.acceleration)
     _check_limit("limit_acceleration", "acceleration", acceleration, highest, "rad/s²", prefix)
 
@@ -116,7 +115,7 @@ def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> No
 
 
 def check_pace(velocity: float, acceleration: float, jerk: float, where: str = "") -> None:
-    """Refuse limits of a motion of the tool that are so low that it would hardly move."""
+    """Refuse limits of a tool motion that are too low to move."""
     _check_least("velocity", velocity, "m/s", where)
     _check_least("acceleration", acceleration, "m/s²", where)
     _check_least("jerk", jerk, "m/s³", where)

@@ -1,4 +1,4 @@
-"""Initial setup of a controller: everything besides the clients' messages that determines its behaviour."""
+"""Initial setup of a controller: everything besides clients' messages that determines its behaviour."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -32,11 +32,11 @@ from tvist_shaping.named import Registry
 _RECORDED = (
     "description", "q", "payload", "carried", "mode", "calibration", "name", "shaper", "seed", "clock", "truth",
 )  # fmt: skip
-"""Fields that every recording has as they are."""
+"""Fields stored unchanged in every recording."""
 _LATER = ("compensate_sag", "shape_servo", "instance", "hidden")
-"""Fields that recordings from before these options existed do not have."""
+"""Optional fields, missing in older recordings."""
 Adapt = Literal["payload"]
-"""What can follow a robot's own motions."""
+"""Quantities that can be learnt from the robot's own motions."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ class Setup:
     description: RobotDescription
     """Description of the robot."""
     q: tuple[float, ...]
-    """Joint angles at which the arm rests [rad]."""
+    """Initial joint angles, at rest [rad]."""
     payload: Payload
     """Declared payload."""
     calibration: Calibration | None
-    """Calibration of the estimator; None for a robot yet to be identified, with the estimator `fixed` at 10 Hz, 0.2."""
+    """Calibration of the estimator; None before identification, with the estimator `fixed` at 10 Hz and 0.2."""
     name: str = "ur5e"
     """Name of the robot on the network."""
     shaper: str = "zv"
@@ -58,46 +58,42 @@ class Setup:
     seed: int = 0
     """Seed of sensor noise and gear errors."""
     clock: Clock = "realtime"
-    """What advances simulation time. Leases and streams time out only in real time."""
+    """Clock that advances time; leases and streams time out only with `realtime`."""
     carried: Payload | None = None
-    """Carried payload until a client changes it; None: the declared one."""
+    """Carried payload until a client changes it; None for the declared one."""
     mode: ResetMode = "RUNNING"
     """Initial robot mode."""
     truth: bool = False
-    """Whether to publish what a real robot cannot measure."""
+    """Whether to publish values that a real robot cannot measure."""
     own_shapers: tuple[OwnShaper, ...] = ()
-    """Shapers from files, available by name beside those that come with the package."""
+    """Shapers from files, available by name in addition to the package's."""
     compensate_sag: bool = False
-    """Whether the drives lead by the twist of the gears under gravity, so that the arm rests on its target."""
+    """Whether set-points compensate the gears' twist under gravity, so that the arm rests on its target."""
     plant: OwnPlant | None = None
-    """Plant other than the flexible arm of the description; None for that."""
+    """A plant from a file; None for the flexible arm of the description."""
     hidden: int | None = None
-    """Seed of a hidden robot, see `tvist_plant.variants`; None for the robot of the description."""
+    """Seed of a hidden robot, see `tvist_plant.variants`; None for the robot as described."""
     shape_servo: bool = False
-    """Whether `servoj`, `speedj` and `speedl` of programs are shaped where they begin at rest."""
+    """Whether `servoj`, `speedj` and `speedl` of programs are shaped if they start at rest."""
     cell: Cell | None = None
-    """What stands around the robot; None for nothing."""
+    """Wires, tools, gripper and parts around the robot; None for none."""
     adapt: Adapt | None = None
-    """What follows the arm's own motions: its payload; None for nothing."""
+    """Quantity learnt from the arm's own motions; None for none."""
     positions: bool = False
-    """Whether the arm's own controller takes positions only, so that no torque can be fed forward."""
+    """Whether the arm's own controller takes positions only, without feed-forward torque."""
     instance: str = ""
-    """Part of every lease's token that tells this run from earlier ones; empty where equal runs must be equal."""
+    """Part of every lease token that identifies this run; empty where equal runs must be equal."""
 
     @cached_property
     def registry(self) -> Registry:
-        """Shapers that this robot can use.
-
-        Raises:
-            DesignError: Two shapers have the same name.
-        """
+        """Shapers available to this robot; raise DesignError if two have the same name."""
         return Registry(own.shaper for own in self.own_shapers)
 
     def check(self, *, placed: bool = True) -> None:
         """Check what the types of the fields cannot express.
 
         Args:
-            placed: Whether the arm is to be where this setup says; a robot that is watched is where it is.
+            placed: Whether the arm will be placed at `q`; a watched robot stays where it is.
 
         Raises:
             ValueError: A value is out of range; the message names it.
@@ -142,11 +138,7 @@ class Setup:
         return self.source().estimator(1, self.payload)
 
     def made_plant(self) -> Plant | None:
-        """Make the plant; None for the flexible arm of the description.
-
-        Raises:
-            OwnFileError: It cannot be made.
-        """
+        """Make the plant, None for the flexible arm of the description; raise OwnFileError if that fails."""
         carried = body(self.carried or self.payload)
         if self.hidden is not None:
             arm = hidden_variant(self.hidden).make(self.description, carried, self.seed)
@@ -161,7 +153,7 @@ class Setup:
         return made
 
     def standing(self, plant: Plant | None) -> "Setup":
-        """Return the setup for a plant, which begins where it stands if it cannot be placed.
+        """Return the setup for a plant; one that cannot be placed starts at its present position.
 
         Raises:
             ValueError: See `measured_standing`.
@@ -198,7 +190,7 @@ class Setup:
         Args:
             content: Result of `to_builtins`.
             own_shapers: Shapers from files that the recording names, loaded again.
-            plant: The plant that it names, found again.
+            plant: Plant that the recording names, loaded again.
 
         Raises:
             ValueError: A part is missing or invalid.
@@ -233,12 +225,12 @@ def body(payload: Payload) -> Body:
 
 
 def payload_of(told: Body | SetPayload) -> Payload:
-    """Return the payload, for the wire, that a command declares or that a plant carries."""
+    """Return the payload that a command declares or a plant carries as a message."""
     return Payload(mass=told.mass, com=told.com, inertia=told.inertia)
 
 
 def paper_payload(description: RobotDescription, mass: float | None = None) -> Payload:
-    """Return the robot file's payload, with mass and inertia scaled to another mass [kg]."""
+    """Return the robot file's payload, scaled to another mass [kg]."""
     own = description.payload
     xx, xy, xz, yy, yz, zz = own.inertia
     share = 1.0 if mass is None or own.mass == 0.0 else mass / own.mass
@@ -250,13 +242,7 @@ def paper_payload(description: RobotDescription, mass: float | None = None) -> P
 
 
 def check_rating(declared: Payload, description: RobotDescription) -> None:
-    """Check the declared payload against the robot's rating, as `set_payload` does later.
-
-    Only the declared payload is checked: the carried one may be anything, to test what happens then.
-
-    Raises:
-        ValueError: The payload is too heavy.
-    """
+    """Raise ValueError if the declared payload, not the carried one, exceeds the robot's rating."""
     rated = description.limits.payload
     if declared.mass > rated:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Lesson 1: what changes with the pose, and why one fixed shaper is not enough."""
+"""Lesson 1: how the modes change with the pose, and why one fixed shaper is not enough."""
 
 import marimo
 
@@ -56,7 +56,7 @@ def _():
 
 @app.function
 def modes(estimator, poses):
-    """Damped frequency [Hz] and damping ratio of the lowest mode in each pose."""
+    """Return damped frequency [Hz] and damping ratio of the lowest mode in each pose."""
     found = np.array([[value[0] for value in estimator.estimate(q)] for q in poses])
     return found[:, 0], found[:, 1]
 
@@ -107,8 +107,8 @@ def _():
     mo.md(r"""
     ## A shaper that is designed once
 
-    Choose a shaper and the one frequency that it is designed for. Each point is a pose of the workspace: how much of
-    its swing would remain? A shaper that follows the pose would leave nothing in all of them.
+    Choose a shaper and its design frequency. Each point is a pose of the workspace and shows how much of the swing
+    would remain there. A shaper that follows the pose would leave nothing in any of them.
     """)
     return
 
@@ -130,7 +130,7 @@ def _(estimator):
 
 @app.function
 def remaining(f_d, zeta, impulses):
-    """Share of the swing that impulses leave in each pose."""
+    """Return the share of the swing that impulses leave in each pose."""
     return np.array([float(residual(f, z, impulses)) for f, z in zip(f_d, zeta, strict=True)])
 
 

@@ -1,4 +1,4 @@
-"""Lesson 2: a shaper of your own, judged on moves of the simulated arm."""
+"""Lesson 2: write a shaper and test it on moves of the simulated arm."""
 
 import marimo
 
@@ -39,7 +39,7 @@ def _():
 
     The next cell is yours. Your shaper is a function of the damped frequency $f_d$ in Hz and the damping ratio
     $\zeta$ of the arm's lowest mode. It returns amplitudes $A$, whose sum is one, and times $\tau$ in seconds, which
-    begin with zero and are proportional to $1/f_d$. The controller asks it at every tick, so that it follows the arm.
+    start at zero and are proportional to $1/f_d$. The controller calls it at every tick, so that it follows the arm.
 
     As it stands, it is a zero-vibration shaper with a mistake. Find the mistake, then try a third impulse.
     Control+Enter runs the cell, and everything below follows.
@@ -103,8 +103,8 @@ def _():
         [
             mo.md(
                 "## Try it on the arm\n\nThe moves are drawn at random over the workspace of a UR5e with 5 kg. Each is "
-                "simulated unshaped and shaped; what counts is the largest acceleration of the tool after the command "
-                "has ended. Four moves take some seconds."
+                "simulated unshaped and shaped; the largest acceleration of the tool after the end of the command "
+                "counts. Four moves take some seconds."
             ),
             count,
             draw,
@@ -124,7 +124,7 @@ def _(count, draw):
 @app.cell
 def _(calibration, moves, own, robot):
     def try_on_moves(name, frequency_error):
-        """Each move unshaped and shaped, where the shaper is told a frequency that is too high by a share."""
+        """Make each move unshaped and shaped, with a frequency that is too high by a share."""
         known = (OwnShaper("lesson_2_your_shaper.py", "mine", "", own),)
         method = Named(Recipe(name, calibration, frequency_error, own=known), name)
         return [measure(Job(Case(robot, move), (method,)))[0] for move in moves]
@@ -140,14 +140,14 @@ def _(error, rival, try_on_moves):
 
 @app.function
 def remaining(judged):
-    """Median over the moves of the peak, shaped over unshaped; those that hardly ring count only if all do so."""
+    """Median ratio of shaped to unshaped peak; moves that hardly ring count only if all do."""
     loud = [row for row in judged if row["reduction_percent"] is not None] or judged
     return float(np.median([row["shaped_peak_m_s2"] / row["unshaped_peak_m_s2"] for row in loud]))
 
 
 @app.function
 def delay(judged):
-    """Median over the moves of the delay [ms]."""
+    """Median delay of the moves [ms]."""
     return float(np.median([row["delay_ms"] for row in judged]))
 
 
@@ -175,8 +175,8 @@ def _():
     mo.md(r"""
     ## Question
 
-    Suppose that the assumed frequency is 25 % too high, since the arm carries more than anybody told it. Which of `zv`
-    and `ei` leaves less on your moves, and which when the frequency is right? What does the more robust one cost?
+    Suppose that the assumed frequency is 25 % too high, because the arm carries more than was declared. Which of `zv`
+    and `ei` leaves less on your moves, and which if the frequency is right? What does the more robust one cost?
     """)
     return
 
@@ -200,7 +200,7 @@ def _(try_on_moves):
                 f"**{_best[0.25]}** is better. With the right one `zv` leaves {_left['zv', 0.0]} and `ei` "
                 f"{_left['ei', 0.0]}: **{_best[0.0]}** is better. `zv` makes the moves {_delay['zv']:.0f} ms longer, "
                 f"`ei` {_delay['ei']:.0f} ms. What is left with the right frequency is of other modes, of "
-                "friction and of the gears: `docs/results/floors.md` says how much of which."
+                "friction and of the gears: `docs/results/floors.md` gives the share of each."
             )
         }
     )
@@ -211,7 +211,7 @@ def _(try_on_moves):
 def _():
     mo.md(r"""
     To use your shaper on a served robot, save the function in a file and start `tvist serve --shaper FILE.py:mine`.
-    `docs/how-to/change-a-shaper.md` says how, and how to write a filter instead of impulses.
+    `docs/how-to/change-a-shaper.md` explains this, and how to write a filter instead of impulses.
     """)
     return
 

@@ -1,1 +1,1 @@
-"""Experiments, written as clients: identification, the paper's experiment, metrics, figures, replays, speed."""
+"""Experiments that run as clients: identification, the paper's experiment, metrics, figures, replay, benchmarks."""

@@ -1,11 +1,11 @@
-"""What a shaper changed about the vibration after a stop: one computation, in the same words, for every command."""
+"""Reduction of the vibration after a stop by a shaper, in the same words for every command."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Change:
-    """The same motion without and with a shaper; what was not measurable is None."""
+    """Vibration of the same motion without and with a shaper; None if not measurable."""
 
     before: float | None
     """Largest |α| after the unshaped motion [m/s²]."""
@@ -14,18 +14,18 @@ class Change:
     still_before: float | None
     """Time from the start of the unshaped motion until the tool is at rest [ms]."""
     still_after: float | None
-    """The same of the shaped one [ms]."""
+    """Time from the start of the shaped motion until the tool is at rest [ms]."""
 
     @property
     def less_percent(self) -> float | None:
-        """By how much the tool vibrates less [%], negative where it is more; None where it is not defined."""
+        """Reduction of the vibration [%], negative if it grew; None if not defined."""
         if self.before is None or self.after is None or self.before == 0.0:
             return None
         return 100.0 * (1.0 - self.after / self.before)
 
     @property
     def gain_ms(self) -> int | None:
-        """By how much earlier the tool is at rest [ms], negative where it is later; None where it never is."""
+        """How much earlier the tool is at rest [ms], negative if later; None if it never is."""
         if self.still_before is None or self.still_after is None:
             return None
         return round(self.still_before - self.still_after)
@@ -37,14 +37,14 @@ class Change:
         }  # fmt: skip
 
     def less(self) -> str:
-        """How much less or more it vibrates."""
+        """Return the reduction as text."""
         percent = self.less_percent
         if percent is None:
             return "not to be compared"
         return f"{abs(percent):.0f} % {'less' if percent >= 0.0 else 'more'}"
 
     def rest(self) -> str:
-        """What the shaped tool did, with regard to rest."""
+        """Return as text how the settling time changed."""
         if self.gain_ms is not None:
             return f"came to rest {abs(self.gain_ms)} ms {'earlier' if self.gain_ms >= 0 else 'later'}"
         if self.still_after is not None:
@@ -52,5 +52,5 @@ class Change:
         return "was not at rest when the recording ended"
 
     def in_short(self) -> str:
-        """Both in a line."""
+        """Return both changes as one line of text."""
         return f"{self.less()}, {self.rest()}"

@@ -1,4 +1,4 @@
-"""Collection of a robot's messages by a client."""
+"""Collect a robot's messages as a client."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,17 +11,15 @@ from tvist_protocol.stream import Event, State, Truth
 
 @dataclass
 class Collected:
-    """States, events and truths in the order of their arrival."""
+    """States, events and truths in the order of arrival."""
 
     states: list[State] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     truths: list[Truth] = field(default_factory=list)
 
     def recording(self) -> Recording:
-        """Return the messages as columns, from the first to the last tick of which all messages have arrived.
-
-        On a network the truth of a tick may come before or after its state.
-        """
+        """Return the messages as columns, from the first to the last tick for which all have arrived."""
+        # On a network the truth of a tick may come before or after its state.
         from tvist_lab.recordings.messages import recording_of_messages
 
         states = self.states
@@ -33,7 +31,7 @@ class Collected:
 
 @contextmanager
 def collect(robot: Robot) -> Iterator[Collected]:
-    """Collect everything that the robot publishes while the block runs."""
+    """Collect all messages of the robot while the block runs."""
     collected = Collected()
     ends = [
         robot.on_state(collected.states.append),

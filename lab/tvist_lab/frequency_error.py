@@ -1,4 +1,4 @@
-"""What a shaper that assumes a wrong frequency leaves of the vibration, and the one that leaves least over a range."""
+"""Residual vibration of shapers with a wrong frequency, and the best fixed shaper for a range."""
 
 import numpy as np
 
@@ -6,22 +6,20 @@ from tvist_lab.recordings import Floats
 from tvist_shaping import Shaper, residual, shaper
 
 ALLOWED = 0.05
-"""Residual vibration at which a mode counts as settled, and that a robust shaper may leave [-]."""
+"""Residual vibration at which a mode counts as settled, and which a robust shaper may leave [-]."""
 
 
 def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
-    """Residual vibration of a shaper, as a share of the unshaped one, over shares by which its frequency is too high.
-
-    The damping ratio is both the assumed and the true one.
-    """
+    """Return the residual vibration over the unshaped one, for shares by which the assumed frequency is too high."""
+    # `zeta` is both the assumed and the true damping ratio.
     return np.asarray(residual(1.0 / (1.0 + errors), zeta, shaper.impulses(1.0, zeta)))
 
 
 def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> float:
-    """Time from the unshaped stop until the mode is at 5 % of its unshaped vibration for good [s].
+    """Return the time from the unshaped stop until the mode stays below 5 % of its unshaped vibration [s].
 
-    It is the shaper's delay, and after it the time in which what is left decays; infinite where nothing decays. Of an
-    error of the assumed frequency, the worse sign counts.
+    It is the shaper's delay plus the decay of what is left, infinite without damping; the worse sign of
+    `error` counts.
     """
     times = []
     for side in (-error, error):
@@ -34,12 +32,10 @@ def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> floa
 
 
 def robust_over(name: str, f_d: tuple[float, float], zeta: tuple[float, float]) -> tuple[float, float]:
-    """Return frequency [Hz] and damping ratio of a fixed shaper for a whole workspace, given its ranges of both.
-
-    It is the shortest one that leaves at most 5 % anywhere; if none does, the one with the smallest worst case. The
-    damping ratio is assumed to fall linearly from its highest value at the lowest frequency to its lowest value at
-    the highest frequency.
-    """
+    """Return frequency [Hz] and damping ratio of a fixed shaper for the given ranges of a workspace."""
+    # Choose the shortest design that leaves at most 5 % anywhere; if none does, the one with the smallest worst
+    # case. The damping ratio is assumed to fall linearly from its highest value at the lowest frequency to
+    # its lowest at the highest.
     frequencies = np.linspace(*f_d, 60)
     damping = _damping(frequencies, f_d, zeta)
     designs = np.linspace(*f_d, 90)

@@ -1,7 +1,4 @@
-"""A robot in this process, as fast as it computes, with the same client as a robot on the network.
-
-Several that make the same motions with several shapers are comparable tick by tick.
-"""
+"""Run a robot in this process as fast as it computes, with the usual client."""
 
 import math
 from collections.abc import AsyncIterator, Sequence
@@ -22,7 +19,7 @@ from tvist_server.config import ServeConfig
 LEAD = 150
 """Ticks at rest before the first motion."""
 VELOCITY, ACCELERATION = 1.5, 2.0
-"""Limits of the motions: the paper's [rad/s, rad/s²]."""
+"""The paper's limits of the motions [rad/s, rad/s²]."""
 REST_S = 1.0
 """Time for the shaper's delay and the vibration after a motion [s]."""
 
@@ -30,13 +27,8 @@ REST_S = 1.0
 def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
     """Return a setup with a free clock and published truth, by default of the default robot.
 
-    Args:
-        config: Configuration to start from, with its own truth; since nothing in this process follows the wall clock,
-            `realtime` becomes `free`.
-        changes: Fields of `ServeConfig` to change.
-
-    Raises:
-        StartError: A change names no field, or has an invalid value.
+    `config` keeps its own truth, but `realtime` becomes `free`; `changes` are fields of `ServeConfig`. Raises
+    StartError if a change names no field or has an invalid value.
     """
     from tvist_server.config import from_mapping
 
@@ -49,7 +41,7 @@ def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
 
 @asynccontextmanager
 async def robot_in_process(setup: Setup) -> AsyncIterator[Robot]:
-    """Run a robot in this process, and yield a client of it."""
+    """Run a robot in this process; yield its client."""
     async with Robot.over(LoopbackTransport(LoopbackHost(setup))) as robot:
         yield robot
 
@@ -61,16 +53,9 @@ async def run_beside(
     robot: str = "ur5e",
     seed: int = 0,
 ) -> tuple[Info, Collected]:
-    """Move one arm through poses with a shaper; every motion begins at the same tick whatever the shaper.
+    """Move one arm through poses [rad] with a shaper; return the robot's info and all its messages.
 
-    Args:
-        shaper: Name of the shaper.
-        poses: Joint angles, the first of which it starts at [rad].
-        robot: Robot that comes with the package, or path of a robot file.
-        seed: Seed of sensor noise and gear errors.
-
-    Returns:
-        The robot, and everything it published.
+    Every motion starts at the same tick with any shaper. `robot` is a name or the path of a robot file.
     """
     setup = free_setup(robot=robot, shaper=shaper, seed=seed)
     async with robot_in_process(setup) as client, client.control("compare") as arm:
@@ -85,6 +70,6 @@ async def run_beside(
 
 
 def _ticks(start: Sequence[float], end: Sequence[float]) -> int:
-    """Ticks from the beginning of a motion to that of the next, whatever the shaper."""
+    """Return the ticks from the start of a motion to that of the next, equal for all shapers."""
     way = max(abs(a - b) for a, b in zip(start, end, strict=True))
     return math.ceil((way / VELOCITY + VELOCITY / ACCELERATION + REST_S) / PERIOD)

@@ -1,15 +1,14 @@
-"""The arm of the paper's Figure 2, one flexible joint whose inertia changes as it folds.
+"""The arm of the paper's Figure 2: one flexible joint whose inertia changes as the arm folds.
 
-Its inertia, frequency and damping are given in closed form; a pluck of the simulated arm shows that they are right.
-
-A joint's own rotation does not change the inertia about it, so the angle that does is the elbow's. Both axes are
-vertical; then the arm's weight loads no joint. With the parallel-axis theorem for each body and the law of cosines
-for the distance of the forearm's centre of mass from the shoulder,
+Inertia, frequency and damping are given in closed form; plucking the simulated arm confirms them. A joint's
+own rotation does not change the inertia about it, so the elbow's angle does. Both axes are vertical, so
+weight loads no joint. With the parallel-axis theorem for each body and the law of cosines for the distance of
+the forearm's centre of mass from the shoulder,
 
     I(q) = J_1 + J_2 + m_2 (l² + 2 l c_2 cos q)
 
-where J_1 is the inertia of the upper arm about the shoulder, J_2 and m_2 c_2 are inertia and first moment of the
-forearm with its payload about the elbow, l is the length of the upper arm, and q = 0 is the stretched arm.
+where J_1 is the inertia of the upper arm about the shoulder, J_2 and m_2 c_2 are inertia and first moment of
+the forearm with payload about the elbow, l is the length of the upper arm, and q = 0 is the stretched arm.
 """
 
 from dataclasses import dataclass
@@ -30,21 +29,21 @@ MASSES = (0.0, 1.0)
 ANGLES = tuple(np.radians(np.arange(0.0, 151.0, 10.0)).tolist())
 """Elbow angles at which the arm is plucked [rad]."""
 TORQUE = 2.0
-"""Torque that twists the shoulder before it is let go [N m]."""
+"""Torque that twists the shoulder before it is released [N m]."""
 HELD, LISTENED = 1.0, 1.0
-"""Time for which it acts, until the arm rests again, and time that is recorded after that [s]."""
+"""Time for which the torque acts, until the arm rests, and time recorded after its release [s]."""
 GRAVITY = (0.0, 0.0, 9.81)
-"""What the accelerometer of an arm with vertical axes feels at rest [m/s²]."""
+"""Reading of the accelerometer of an arm with vertical axes at rest [m/s²]."""
 
 
 @dataclass(frozen=True)
 class FlexibleShoulder:
-    """What the closed form is made of."""
+    """Parameters of the closed form."""
 
     middle: float
     """I(90°) = J_1 + J_2 + m_2 l² [kg m²]."""
     change: float
-    """2 l m_2 c_2, the inertia by which the stretched arm differs from that [kg m²]."""
+    """2 l m_2 c_2, the additional inertia of the stretched arm [kg m²]."""
     stiffness: float
     """K of the shoulder [N m/rad]."""
     damping: float
@@ -52,17 +51,10 @@ class FlexibleShoulder:
 
     @classmethod
     def of(cls, description: RobotDescription, payload: Payload) -> "FlexibleShoulder":
-        """Take it from a robot file.
+        """Derive the parameters from a robot file with two joints; raise ValueError if the closed form does not apply.
 
-        The drives are taken as rigid. A drive of gain K_d yields, which adds about √(K I)/(2 K_d) to ζ and lowers f_d
-        by a share of about K K_p/(2 K_d ω²).
-
-        Args:
-            description: An arm with two joints.
-            payload: What it carries.
-
-        Raises:
-            ValueError: The arm has not two vertical axes with the masses in line with its links.
+        It needs two vertical axes, and masses in line with the links. The drives are assumed rigid: a drive
+        of gain K_d adds about √(K I)/(2 K_d) to ζ and lowers f_d by a share of about K K_p/(2 K_d ω²).
         """
         kinematics, links = description.kinematics, description.links
         aside = [com[1] for com in links.com] + [payload.com[1]]
@@ -83,45 +75,45 @@ class FlexibleShoulder:
         )
 
     def inertia(self, elbow: float) -> float:
-        """I(q) about the shoulder [kg m²] at an angle of the elbow [rad], 0 where the arm is stretched."""
+        """Return I(q) about the shoulder [kg m²] at an elbow angle [rad], 0 for the stretched arm."""
         return self.middle + self.change * float(np.cos(elbow))
 
     def mode(self, elbow: float) -> tuple[float, float]:
-        """Return f_d [Hz] and ζ [-] at an angle of the elbow [rad]; see `tvist_shaping.flexible_joint`."""
+        """Return f_d [Hz] and ζ [-] at an elbow angle [rad]; see `tvist_shaping.flexible_joint`."""
         return flexible_joint(self.inertia(elbow), self.stiffness, self.damping)
 
     def estimator(self) -> FlexibleJoint:
-        """Return the closed form as an estimator for a filter, which takes the angles of shoulder and elbow."""
+        """Return the closed form as an estimator for a filter, with the angles of shoulder and elbow as input."""
         ends = (self.middle - abs(self.change), self.middle + abs(self.change))
         return FlexibleJoint(lambda q: self.inertia(float(q[1])), ends, self.stiffness, self.damping)
 
 
 class Plucked(NamedTuple):
-    """The mode at one angle of the elbow, by the formula and fitted to the accelerometer after a pluck."""
+    """The mode at one elbow angle: from the formula, and fitted to the accelerometer after a pluck."""
 
     mass: float
     """Mass of the payload [kg]."""
     elbow: float
-    """[rad]."""
+    """Elbow angle [rad]."""
     inertia: float
-    """About the shoulder [kg m²]."""
+    """Inertia about the shoulder [kg m²]."""
     f_d: float
-    """[Hz]."""
+    """Damped frequency [Hz]."""
     zeta: float
-    """[-]."""
+    """Damping ratio [-]."""
     simulated_f_d: float
     simulated_zeta: float
 
 
 @dataclass(frozen=True)
 class Modes:
-    """The modes of the one-joint arm over the angle of its elbow."""
+    """The modes of the one-joint arm over its elbow angle."""
 
     description: RobotDescription
     curve: tuple[Plucked, ...]
-    """Over `ANGLES`, with each of `MASSES`."""
+    """Modes over `ANGLES`, with each of `MASSES`."""
     poses: tuple[Plucked, ...]
-    """At Q1 to Q3 of the robot file, which are the angles of the paper's figure, with its payload."""
+    """Modes at Q1 to Q3 of the robot file, the angles of the paper's figure, with its payload."""
 
     @property
     def worst_f_d(self) -> float:
@@ -135,7 +127,7 @@ class Modes:
 
 
 def pluck_all() -> Modes:
-    """Pluck the arm all over its range."""
+    """Pluck the arm over its whole range."""
     description = load("one-joint")
     curve = [_plucked(description, mass, elbow) for mass in MASSES for elbow in ANGLES]
     elbows = [description.poses[name][1] for name in ("Q1", "Q2", "Q3")]
@@ -151,10 +143,7 @@ def _plucked(description: RobotDescription, mass: float, elbow: float) -> Plucke
 
 
 def pluck(description: RobotDescription, payload: Payload, elbow: float) -> RingDown:
-    """Twist the shoulder, let it go, and fit a damped sine to what the accelerometer feels.
-
-    The fit knows nothing of the arm: neither masses nor spring.
-    """
+    """Twist the shoulder, release it, and fit a damped sine to the accelerometer, without knowledge of the arm."""
     plant = FlexibleArm(description, payload)
     still = DriveCommand(np.array([0.0, elbow]), np.zeros(2), np.zeros(2))
     plant.reset(still, seed=0)

@@ -1,4 +1,4 @@
-"""Replay of a recording's inputs without a clock, with a bit-by-bit comparison of the output."""
+"""Replay a recording's inputs without a clock, and compare the output bit by bit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -30,12 +30,12 @@ from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.recorder import Recorder
 
 ALWAYS, PER_STATE = 30_000, 100
-"""Number of ticks that a recording may have, a minute, and how many more for each of its states: a tick takes time in a
-replay even if its state is missing."""
+"""Ticks that a recording may have, a minute, plus a number for each of its states: even ticks with missing
+states take time in a replay."""
 
 
 class ReplayError(TvistError):
-    """A recording cannot be replayed; the message says why."""
+    """A recording cannot be replayed; the message tells why."""
 
 
 @dataclass
@@ -48,19 +48,13 @@ class Replay:
     first_difference: str | None = None
     """First difference from the original; None if there is none."""
     notes: list[str] = field(default_factory=list)
-    """Remarks for the user."""
 
 
 def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> Replay:
-    """Give a new controller the same inputs at the same ticks.
+    """Give a new controller the same inputs at the same ticks, and compare its states with the recorded ones.
 
-    Args:
-        setup: Initial setup of the recorded controller.
-        journal: Inputs of the recorded controller.
-        states: Its states, from its first tick on; only their number and values are used.
-
-    Raises:
-        ValueError: The setup is invalid, or its plant gives the tick.
+    `states` start at the recorded controller's first tick. Raises ValueError if the setup is invalid, or its
+    plant gives the tick.
     """
     controller, presence, done, names = Controller(setup), Presence(), Replay(), known_fields(states)
     check_unpaced(controller.cycle.plant)
@@ -85,19 +79,11 @@ def replay_file(
     own_shapers: Sequence[OwnShaper] = (),
     plant: OwnPlant | None = None,
 ) -> Replay:
-    """Replay a recording with its own setup.
+    """Replay a recording with its own setup, and optionally record that to `output`.
 
-    Args:
-        content: The recording, from the server's first tick on.
-        output: MCAP file for the replay's own recording.
-        own_shapers: Shapers from files that the robot was served with, loaded again. A note reports each file that
-            has changed since.
-        plant: Plant that the robot was served with, found again; one of this package is found by itself.
-
-    Raises:
-        ReplayError: The recording does not contain its robot's setup, or begins too late; or a shaper from a file or a
-            plant is missing or not needed.
-        ValueError: The recorded setup is invalid, or its plant gives the tick.
+    `own_shapers` and `plant` come from files and are loaded again; a note reports each file that has changed.
+    Raises ReplayError if the recording has no setup or starts too late, or if a shaper or plant is missing or
+    not needed; ValueError if the setup is invalid, or its plant gives the tick.
     """
     if not content.start:  # empty in recordings made by another program
         raise ReplayError(
@@ -132,7 +118,7 @@ def replay_file(
 
 
 def _used(start: dict[str, Any], given: Sequence[OwnShaper]) -> tuple[list[OwnShaper], list[str]]:
-    """Return the shapers from files in the order in which they were loaded, and a note for each changed file."""
+    """Return the shapers from files in the order of loading, and a note for each changed file."""
     try:
         recorded = checked(start.get("own_shapers", []), list[RecordedShaper])
     except ProtocolError as error:
@@ -257,7 +243,7 @@ def _give_message(controller: Controller, entry: Entry, presence: Presence) -> N
 
 
 def known_fields(states: Sequence[State]) -> list[str]:
-    """Return the fields that a recording has: a version that does not know one records none, which is read as None."""
+    """Return the fields that a recording has; a field that is always None may come from an older version."""
     optional = [field.name for field in fields(State) if field.default is None]
     absent = {name for name in optional if all(getattr(state, name) is None for state in states)}
     return [name for name in State.__struct_fields__ if name not in absent]

@@ -1,4 +1,4 @@
-"""A recording on the network at its own time, as a server of its own that takes no commands."""
+"""Publish a recording on the network at its own time, by a server that accepts no commands."""
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
@@ -23,7 +23,7 @@ from tvist_server.gateways.network import Network
 TICK = TICK_NS * 1e-9
 """Duration of a tick [s]."""
 LEAVE = 0.6
-"""Longest time that clients have at the end to read what is on its way [s]."""
+"""Longest time for clients to read the remaining messages at the end [s]."""
 REFUSAL = Refused(
     code="wrong_mode",
     where="",
@@ -70,22 +70,12 @@ class PlaybackDesk(Desk):
 
 
 class Playback:
-    """Publishes a recording.
+    """Publishes a recording on the endpoints `listen`, as robot `name` (default: as recorded) at `speed` times its own.
 
-    Args:
-        content: The recording.
-        listen: Zenoh endpoints to listen on.
-        name: Name of the robot; by default that of the recording.
-        speed: Speed relative to the recording's own time.
-        loop: Begin again at its end. Ticks go on from those of the last round, since a robot's never decrease.
-        security: Folder with certificates and roles.
-        insecure: Accept remote connections without TLS.
-
-    Raises:
-        RecordingError: The recording does not describe its robot.
-        ProtocolError: The name is not allowed.
-        StartError: The robot would be reachable in an unintended way.
-        GatewayError: The server cannot listen on an endpoint.
+    With `loop` it repeats, with ever increasing ticks. `security` is a folder with certificates and roles;
+    `insecure` allows remote connections without TLS. Raises RecordingError if the recording does not describe
+    its robot, ProtocolError for a forbidden name, StartError if the robot would be reachable unintentionally,
+    GatewayError if it cannot listen.
     """
 
     def __init__(
@@ -102,9 +92,7 @@ class Playback:
         if content.info is None:
             raise RecordingError(f"{content.path} does not describe its robot, so no client could read it")
         self.name = keys.check_robot_name(name or content.robot)
-        """Name under which the robot is published."""
         self.states = 0
-        """Number of states published."""
         self._content, self._speed, self._loop = content, speed, loop
         endpoints, guard = guarded(listen, [self.name], security=security, insecure=insecure)
         self._desk = PlaybackDesk(content.info, self.name)
@@ -137,7 +125,7 @@ class Playback:
             self._close()
 
     def _close(self) -> None:
-        """Close the network; a client that has stopped reading can delay that for ten seconds."""
+        """Close the network; a client that has stopped reading may delay that for ten seconds."""
         leaving = Thread(target=self._leave, name="tvist-leave", daemon=True)
         leaving.start()
         leaving.join(LEAVE)
@@ -148,7 +136,7 @@ class Playback:
 
 
 def played(content: RecordingFile, *, loop: bool = False) -> Iterator[Published]:
-    """Yield the messages of a recording in order; with `loop` without end, with ticks and times that go on."""
+    """Yield the messages of a recording in order; with `loop` endlessly, with ticks and times that continue."""
     tick = content.recording["tick"]
     length = int(tick[-1] - tick[0]) + 1
     shift = 0

@@ -1,4 +1,4 @@
-"""Run the same work on many tasks by any executor: processes of this machine, or a cluster."""
+"""Run the same work on many tasks with any executor: processes of this machine, or a cluster."""
 
 import multiprocessing
 import multiprocessing.resource_tracker
@@ -20,13 +20,13 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 AHEAD = 1024
-"""Largest number of tasks handed out at a time: more than a cluster has processes, few enough to keep in memory."""
+"""Largest number of tasks handed out at a time: more than a cluster has processes, but few enough for the memory."""
 OF_GROUP = {signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTERM}
-"""Signals that a terminal or a supervisor sends to all processes of a group; the first process ends the others."""
+"""Signals that a terminal or supervisor sends to a whole process group; only the first process acts on them."""
 
 
 class TaskError(Exception):
-    """A task gave no result for a reason that is not an exception of the work itself; the message gives it."""
+    """A task gave no result for a reason other than an exception of the work itself."""
 
 
 @dataclass(frozen=True)
@@ -34,25 +34,18 @@ class Failed:
     """Why a task gave no result."""
 
     error: Exception
-    """What the work raised, or a `TaskError`."""
+    """Exception of the work, or a `TaskError`."""
 
 
 def outcomes(
     executor: Executor, work: Callable[[Task], Result], tasks: Sequence[Task]
 ) -> Iterator[tuple[int, Result | Failed]]:
-    """Yield the index of each task with its result or failure, in any order, each as soon as it is available.
+    """Yield the index of each task with its result or failure, as soon as available, in any order.
 
-    A task that fails, or cannot be pickled, gives a failure, and the others continue. No result depends on the order,
-    on the number of processes, or on other tasks.
-
-    Args:
-        executor: What does the tasks.
-        work: A module-level function; each task contains all it needs, and no state is kept between tasks.
-        tasks: Tasks; they and their results are pickled. Each is taken from the sequence when its turn comes.
-
-    Raises:
-        ChildProcessError: A process of a pool died, such as for want of memory.
-        ConnectionError: The executor has dropped a task, as a cluster's does without its scheduler.
+    `work` is a module-level function without state; tasks and results are pickled. A task that fails or
+    cannot be pickled gives a failure, and the others continue. Results do not depend on order, number of
+    processes or other tasks. Raises ChildProcessError if a process of a pool died, for example for lack of
+    memory; ConnectionError if the executor dropped a task, as a cluster without its scheduler does.
     """
     out: dict[Future[bytes], int] = {}
     arrived: SimpleQueue[Future[bytes]] = SimpleQueue()
@@ -83,10 +76,10 @@ def outcomes(
 
 
 class Here(Executor):
-    """Does each task at once in this process, since starting others takes seconds."""
+    """Runs each task at once in this process, since starting others takes seconds."""
 
     def submit(self, work: Callable[..., Result], /, *args: Any, **kwargs: Any) -> "Future[Result]":
-        """Do a task."""
+        """Run a task."""
         future: Future[Result] = Future()
         future.set_result(work(*args, **kwargs))
         return future
@@ -94,11 +87,7 @@ class Here(Executor):
 
 @contextmanager
 def processes(number: int | None = None) -> Iterator[Executor]:
-    """Start processes of this machine, which end with the body, whatever ends it.
-
-    Args:
-        number: Number of processes; None for one for each core.
-    """
+    """Start `number` processes on this machine, by default one per core, which end with the block in any case."""
     with _group_signals_blocked():  # the process by which multiprocessing cleans up must outlive this one
         multiprocessing.resource_tracker.ensure_running()
     others = set(multiprocessing.active_children())
@@ -110,12 +99,12 @@ def processes(number: int | None = None) -> Iterator[Executor]:
             process.kill()
         raise
     finally:
-        # Without waiting, the pool's thread may meet the end of this process half way.
+        # Wait, since otherwise this process might end while the pool's thread still runs.
         pool.shutdown(cancel_futures=True)
 
 
 def _begin() -> None:
-    """Let this process end when the one that hands out the work does, and not before."""
+    """Make this process end exactly when the one that hands out the work does."""
     for number in OF_GROUP:
         signal.signal(number, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, OF_GROUP)
@@ -124,7 +113,7 @@ def _begin() -> None:
 
 @contextmanager
 def _group_signals_blocked() -> Iterator[None]:
-    """Let signals wait while the body runs; processes that it starts inherit this."""
+    """Delay signals while the block runs; processes that it starts inherit this."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_GROUP)
     try:
         yield
@@ -133,7 +122,7 @@ def _group_signals_blocked() -> Iterator[None]:
 
 
 def _attempt(work: Callable[[Any], Any], packed: bytes) -> bytes:
-    """Do a task in a process for work: unpickle it, do it, and pickle its outcome."""
+    """Unpickle a task in a worker, run it, and pickle the outcome."""
     try:
         outcome = work(pickle.loads(packed))  # noqa: S301  it comes from the process that started this one
     except Exception as error:  # noqa: BLE001  any failure is this task's alone
@@ -156,11 +145,9 @@ def _portable(error: Exception) -> Exception:
 
 
 def _outcome(future: Future[bytes]) -> Any:
-    """Return the result or failure of a task that an executor has done.
+    """Return the result or failure of a finished task.
 
-    Raises:
-        BrokenExecutor: The executor does no more tasks.
-        CancelledError: It has dropped this one.
+    Raises BrokenExecutor if the executor no longer works, CancelledError if it dropped the task.
     """
     try:
         return pickle.loads(future.result())  # noqa: S301  it comes from a process that does the user's own work

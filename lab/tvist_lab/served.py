@@ -1,4 +1,4 @@
-"""A robot served by a separate process, as a user would start it."""
+"""Serve a robot in a separate process, as a user would start it."""
 
 import asyncio
 import socket
@@ -12,7 +12,7 @@ from tvist_client.robot import Robot
 from tvist_protocol.errors import TvistError
 
 _BIND = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); os.execv(sys.argv[2], sys.argv[2:])"
-"""Binds its process to a processor, and then executes the program given after it."""
+"""Binds its process to a processor, then executes the given program."""
 PATIENCE = 300.0
 """Longest wait for a robot's first answer [s]; a cold start compiles, which takes minutes on a slow machine."""
 
@@ -40,9 +40,9 @@ class Served:
     endpoint: str
     pid: int
     took: float
-    """Time from its start until it answered [s]."""
+    """Time from the start until the first answer [s]."""
     robot: Robot
-    """A client of the robot, or the first of several."""
+    """Client of the robot, or of the first of several."""
 
 
 @asynccontextmanager
@@ -54,17 +54,11 @@ async def served(
     core: int | None = None,
     patience: float = PATIENCE,
 ) -> AsyncIterator[Served]:
-    """Run `tvist serve` with options, and connect a client; at the end, send SIGTERM and check the exit code.
+    """Run `tvist serve` with options and connect a client; at the end, send SIGTERM and check the exit code.
 
-    Args:
-        options: Options of `tvist serve`, besides the endpoint.
-        name: Name of the robot, or of one of several.
-        several: Whether the options name the robots.
-        core: Processor to bind the server to.
-        patience: Longest wait for the first answer [s].
-
-    Raises:
-        ServedError: It does not answer, or its exit code is not 0.
+    `name` is that of the robot, or with `several` of one that the options name; `core` is the processor to
+    bind the server to; `patience` limits the wait for the first answer [s]. Raises ServedError if the server
+    does not answer, or its exit code is not 0.
     """
     endpoint = free_endpoint()
     named = () if several else ("--name", name)
@@ -90,11 +84,7 @@ async def served(
 
 @asynccontextmanager
 async def served_robot(options: Sequence[str], name: str = "ur5e") -> AsyncIterator[tuple[Robot, str]]:
-    """Serve one robot, see `served`; yield a client of it and its endpoint.
-
-    Raises:
-        ServedError: It does not answer, or its exit code is not 0.
-    """
+    """Serve one robot, see `served`; yield its client and endpoint."""
     async with served(options, name) as server:
         yield server.robot, server.endpoint
 

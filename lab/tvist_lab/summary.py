@@ -1,4 +1,4 @@
-"""Summary of a recording or log: what a file holds, without its values."""
+"""Summarize the content of a recording or log, without its values."""
 
 import os
 from collections import Counter
@@ -12,11 +12,10 @@ from tvist_lab.recordings.mcap_records import files_of
 
 
 def summary(path: str | os.PathLike[str], recording: Recording) -> dict[str, Any]:
-    """Describe a file that `tvist_lab.recordings.read` reads.
+    """Describe a file that `tvist_lab.recordings.read` reads; times are in s on its own clock.
 
-    Times are in s on the recording's own clock. `complete`, `dropped`, `replayable`, `from_tick` and `messages` are
-    null for other files than recordings of a served robot. `from_tick` is the first tick of a recording that has
-    forgotten those before.
+    `complete`, `dropped`, `replayable`, `from_tick` (the first tick if earlier ones were dropped) and
+    `messages` are null unless it is a recording of a served robot.
     """
     path = Path(path)
     content: mcap_file.RecordingFile | None = None

@@ -1,4 +1,4 @@
-"""Files that appear under their name only when they are complete."""
+"""Write files that appear under their name only when they are complete."""
 
 import os
 import tempfile
@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import IO
 
 UNFINISHED = ".tmp"
-"""End of the name of a file that is not complete; it remains where the program is killed."""
+"""Suffix of an incomplete file, which remains if the program is killed."""
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[IO[bytes]]:
-    """Give a stream whose content replaces `path` when the block ends; after an error, `path` is as it was.
+    """Yield a stream whose content replaces `path` when the block ends; after an error, `path` is unchanged.
 
-    Raises:
-        OSError: The file cannot be written, for example because the disk is full.
+    Raises OSError if the file cannot be written, for example because the disk is full.
     """
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=UNFINISHED, dir=path.parent)
     try:
@@ -33,11 +32,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file, all of it or nothing; to links and devices, such as /dev/stdout, the bytes go as they are.
-
-    Raises:
-        OSError: It cannot be written.
-    """
+    """Write a file completely or not at all, or raise OSError; links and devices are written directly."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
         path.write_bytes(content)
         return
@@ -46,7 +41,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def _umask() -> int:
-    """Mask of this process's new files, which temporary files do not follow."""
+    """Return the mask for new files, which temporary files ignore."""
     mask = os.umask(0o077)
     os.umask(mask)
     return mask

@@ -1,4 +1,4 @@
-"""Workspace in which an arm is measured and tested."""
+"""The workspace in which an arm is measured and tested."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ WORKSPACE = Region(
     low=(-np.pi, -np.pi, -5.0 * np.pi / 6.0, -np.pi),
     high=(np.pi, 0.0, 5.0 * np.pi / 6.0, 0.0),
 )
-"""That of a six-joint arm: above the stand, the wrist's two outer joints at zero."""
+"""Workspace of a six-joint arm: above the stand, the wrist's two outer joints at zero."""
 
 
 def ranges(description: RobotDescription) -> list[tuple[float, float]]:
@@ -49,14 +49,10 @@ def ranges(description: RobotDescription) -> list[tuple[float, float]]:
 
 
 def workspace(position: Sequence[tuple[float, float]], margin: float = 0.0) -> Region:
-    """Return the workspace of an arm with these limits.
+    """Return the workspace of an arm with these joint ranges [rad], at a margin from them [rad].
 
-    An arm with fewer joints than `WORKSPACE` has is not taken to stand and reach as that one does: its workspace is
-    all that its limits allow, half a turn either way at most.
-
-    Args:
-        position: Smallest and largest angle of each joint [rad].
-        margin: Distance to keep from these limits [rad].
+    An arm with fewer joints than `WORKSPACE` may stand and reach differently: its workspace is all that its
+    limits allow, at most half a turn either way.
     """
     sides = len(WORKSPACE.low)
     whole = WORKSPACE if len(position) >= sides else Region(low=(-np.pi,) * sides, high=(np.pi,) * sides)
@@ -67,11 +63,6 @@ def workspace(position: Sequence[tuple[float, float]], margin: float = 0.0) -> R
 
 
 def identified(position: Sequence[tuple[float, float]], margin: float = 0.0) -> Region:
-    """Return the workspace without the base: turning an arm on a rigid stand changes none of its modes.
-
-    Args:
-        position: Smallest and largest angle of each joint [rad].
-        margin: Distance to keep from these limits [rad].
-    """
+    """Return the workspace without the base: turning an arm on a rigid stand changes none of its modes."""
     region = workspace(position, margin)
     return Region(low=(0.0, *region.low[1:]), high=(0.0, *region.high[1:]))

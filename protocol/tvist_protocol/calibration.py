@@ -23,7 +23,7 @@ class PolynomialModel(_Part, frozen=True, kw_only=True):
     """Two multivariate polynomials in the joint angles, f_d(q) and ζ(q), of the lowest mode."""
 
     joints: Annotated[tuple[Annotated[int, Meta(ge=0, le=6)], ...], Meta(min_length=1, max_length=7)]
-    """Indices of the joints that they depend on, 0 for the first."""
+    """Indices of the joints that the frequency and damping depend on, 0 for the first."""
     basis: Literal["trigonometric"] = "trigonometric"
     """Trigonometric polynomials, which repeat with every turn."""
     degree: Annotated[int, Meta(ge=0, le=12)]
@@ -53,16 +53,17 @@ Quantity = Literal[
     "gear_stiffness", "velocity_gain", "position_gain", "rotor_inertia", "damping_time", "bending_stiffness",
     "coulomb_friction", "breakaway", "stribeck_speed", "friction_width", "viscous_friction",
 ]  # fmt: skip
-"""K_g [N m/rad], K_d [N m s/rad], K_p [1/s], B [kg m²] of a joint and damping over stiffness of its gear [s];
-stiffness of a link that bends [N m/rad]; and a joint's friction [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v:
-F_c [N m], F_s/F_c [-], v_s [rad/s], w [rad/s], F_v [N m s/rad]."""
+"""Units: `gear_stiffness` K_g [N m/rad], `velocity_gain` K_d [N m s/rad], `position_gain` K_p [1/s],
+`rotor_inertia` B [kg m²], `damping_time` of a gear, damping over stiffness [s], `bending_stiffness` of a link
+[N m/rad]; and a joint's friction [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v, with F_c [N m],
+`breakaway` F_s/F_c [-], v_s [rad/s], w [rad/s], F_v [N m s/rad]."""
 Status = Literal["identified", "not identifiable", "assumed"]
 """Whether the measurements determined a parameter, left it at its initial guess, or were not used for it."""
 Parameter = Annotated[float, Meta(gt=0, le=1e9)]
 
 
 class ModalParameter(_Part, frozen=True, kw_only=True):
-    """A parameter of the arm's linear model, with the same value for every joint or link that it names."""
+    """A parameter of the arm's linear model, with the same value for every joint or link listed."""
 
     quantity: Quantity
     """Physical quantity."""
@@ -71,9 +72,9 @@ class ModalParameter(_Part, frozen=True, kw_only=True):
     value: Parameter
     """Value in SI units."""
     deviation: Annotated[float, Meta(ge=0, le=10)]
-    """Standard deviation of its logarithm, which is about that of its relative error; 0 if assumed [-]."""
+    """Standard deviation of its logarithm, approximately its relative standard deviation; 0 if assumed [-]."""
     interval: tuple[Parameter, Parameter]
-    """95 % confidence interval, provided that the model is right."""
+    """95 % confidence interval, assuming that the model is right."""
     status: Status
     """Origin of the value."""
 
@@ -95,8 +96,9 @@ class ModalModel(_Part, frozen=True, kw_only=True):
     """Stiffnesses and drive gains, which give the modes together with the arm's mass matrix for any payload."""
 
     parameters: Annotated[tuple[ModalParameter, ...], Meta(min_length=1, max_length=100)]
-    """Each quantity once for every joint, and `bending_stiffness` for every link that bends, whose damping over
-    stiffness is that of the joint before it. The five of friction may be missing: then it is not known."""
+    """Each quantity once for every joint, and `bending_stiffness` for every flexible link, whose damping over
+    stiffness is that of the joint before it. The five quantities of friction may be missing: then friction is
+    unknown."""
     f_d_min: Frequency
     """Lowest damped frequency over the workspace, up to the rated payload [Hz]."""
     zeta_max: DampingRatio
@@ -110,8 +112,8 @@ class ModalModel(_Part, frozen=True, kw_only=True):
     residual_to_noise: Annotated[float, Meta(ge=0, le=1e4)]
     """rms of the residual of all ring-downs, relative to that of the noise: 1 is a perfect fit [-]."""
     cross_validated_f_d_percent: Annotated[tuple[Spread | None, ...], Meta(min_length=1, max_length=8)]
-    """Deviation of each mode's frequency, the lowest mode first: fits without a configuration are compared with poles
-    fitted to that configuration's ring-downs alone; null if too few of these poles were certain."""
+    """Deviation of each mode's frequency, the lowest mode first: fits without a configuration are compared
+    with poles fitted only to that configuration's ring-downs; null if too few of these poles were certain."""
     cross_validated_zeta_percent: Annotated[tuple[Spread | None, ...], Meta(min_length=1, max_length=8)]
     """Deviation of each mode's damping ratio, computed in the same way."""
 
@@ -148,18 +150,14 @@ class Provenance(_Part, frozen=True, kw_only=True):
 
 
 class Calibration(_Part, frozen=True, kw_only=True):
-    """A calibration: robot, payload, models and origin.
-
-    Raises:
-        ValueError: The calibration contains no model, or half of a servo's lag.
-    """
+    """A calibration: robot, payload, models and origin; ValueError if it has no model, or half of a servo's lag."""
 
     name: Name
     """Name in `info`."""
     robot: Annotated[str, Meta(max_length=64)]
     """Model of the arm."""
     payload: Payload
-    """Payload that the arm carried, the heaviest if there were several. Polynomials hold only for this payload."""
+    """Payload that the arm carried, the heaviest if there were several. The polynomials hold only for this payload."""
     polynomial: PolynomialModel | None = None
     """The lowest mode with that payload, for the estimator `polynomial`."""
     modal: ModalModel | None = None
@@ -167,7 +165,7 @@ class Calibration(_Part, frozen=True, kw_only=True):
     servo_lag_s: Annotated[float, Meta(gt=0, le=1)] | None = None
     """T of a robot that follows set-points p as q̈ = k (p - q - T q̇), from set-points to angles [s]; null: unknown."""
     servo_gain: Annotated[float, Meta(gt=0, le=1e6)] | None = None
-    """k of the same [1/s²]; null: unknown."""
+    """k of the same equation [1/s²]; null: unknown."""
     provenance: Provenance
     """Origin of the calibration."""
 
@@ -183,11 +181,7 @@ class CalibrationError(ValueError):
 
 
 def calibration_of(content: Mapping[str, Any]) -> Calibration:
-    """Return the calibration in a map, such as that of a `set_estimator`.
-
-    Raises:
-        ProtocolError: A key is unknown, missing or out of range; `where` names it within `calibration`.
-    """
+    """Return the calibration in a map; ProtocolError, with `where` within `calibration`, if it is invalid."""
     try:
         return checked(content, Calibration)
     except ProtocolError as fault:
@@ -198,11 +192,7 @@ def calibration_of(content: Mapping[str, Any]) -> Calibration:
 
 
 def calibration_from_json(text: bytes) -> Calibration:
-    """Return the calibration in the content of a file.
-
-    Raises:
-        CalibrationError: The content is not JSON, or a key is unknown, missing or out of range.
-    """
+    """Return the calibration in the content of a file; CalibrationError if it is invalid."""
     try:
         return checked(parse_json(text), Calibration)
     except ProtocolError as error:

@@ -14,23 +14,14 @@ from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One key.
+    """One key."""
 
-    Attributes:
-        key: The key, with `{robot}` and `{client}` where names go.
-        kind: `put`, a queryable, or a liveliness token.
-        by: Side that puts, asks or declares.
-        messages: Types of the messages that are put or asked.
-        answers: Types of the answers.
-        meaning: Description for the documents.
-    """
-
-    key: str
+    key: str  # with `{robot}` and `{client}` as placeholders of names
     kind: Literal["put", "queryable", "liveliness"]
-    by: Literal["server", "client"]
-    messages: tuple[type[Struct], ...]
+    by: Literal["server", "client"]  # side that puts, asks or declares
+    messages: tuple[type[Struct], ...]  # types that are put or asked
     answers: tuple[type[Struct], ...]
-    meaning: str
+    meaning: str  # description for the documents
 
 
 COMMANDS: tuple[type[Struct], ...] = get_args(Command)

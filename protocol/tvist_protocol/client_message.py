@@ -1,4 +1,4 @@
-"""What every message of a client has in common."""
+"""Bases of the messages from clients."""
 
 from msgspec import Struct
 
@@ -8,11 +8,11 @@ from tvist_protocol.values import Token
 class ClientMessage(
     Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="type", gc=False
 ):
-    """Base of what a client sends: an unknown field is a mistake there, and refused."""
+    """Base of the messages from clients; an unknown field is refused as a mistake."""
 
 
 class Leased(ClientMessage, frozen=True, kw_only=True):
-    """Base of what only the client in control may send."""
+    """Base of the messages that only the client in control may send."""
 
     token: Token
     """Token of the lease."""

@@ -1,8 +1,4 @@
-"""Encodes messages as MessagePack maps, and decodes and validates them.
-
-Whatever the bytes, decoding either returns a valid message or raises `ProtocolError`; `refusal` turns the error into
-the server's answer.
-"""
+"""Encodes, decodes and validates messages; whatever the bytes, decoding returns a message or raises ProtocolError."""
 
 from collections.abc import Mapping
 from typing import Any, Generic, TypeVar, Union, get_args
@@ -29,17 +25,14 @@ from tvist_protocol.values import Name
 Message = Command | Setpoint | Reply | State | Event | Truth | Telemetry | Io | Info
 
 MAX_BYTES = 256 * 1024
-"""Largest size of a message [bytes]; a larger one is refused without being decoded.
-
-The longest commands are a step of 1000 set-points of 7 joints, 1000·(18 + 67) bytes, and a calibration sent as a map.
-"""
+"""Largest message that is decoded [bytes]; the longest are steps of 1000 set-points (85 kB) and calibrations."""
 
 _Some = TypeVar("_Some")
 _SomeMessage = TypeVar("_SomeMessage", bound=Message)
 
 
 class Envelope(msgspec.Struct, frozen=True, gc=False):
-    """Type and token of a message, which are decoded at least twenty times as fast as the whole message."""
+    """Type and token of a message; decoding them is at least twenty times as fast as decoding the whole message."""
 
     type: str | None = None
     """The message's `type`; None if it has none."""
@@ -87,7 +80,7 @@ _REPLY: _Reader[Reply] = _Reader(*get_args(Reply))
 _ONLY: dict[type[msgspec.Struct], _Reader[Any]] = {
     kind: _Reader(kind) for kind in (Setpoint, State, Event, Truth, Telemetry, Io, Info)
 }
-"""Readers of the keys that have one kind of messages."""
+"""Readers of the keys that have one kind of message."""
 _READER_OF = _ONLY | {kind: reader for reader in (_COMMAND, _REPLY) for kind in reader.types.values()}
 
 
@@ -104,10 +97,10 @@ def encode(message: Message) -> bytes:
 
 
 def check(message: _SomeMessage) -> _SomeMessage:
-    """Validate a message that was constructed here, as the server will: constructors check nothing.
+    """Validate a message constructed locally, as the server will; constructors validate nothing.
 
     Returns:
-        The message as the server will decode it: integers in fields for numbers become floats, lists become tuples.
+        The message as the server will decode it: integers in number fields become floats, lists become tuples.
 
     Raises:
         ProtocolError: A value is invalid for every robot.
@@ -125,11 +118,7 @@ def refusal(error: ProtocolError) -> Refused:
 
 
 def decode_envelope(data: bytes) -> Envelope:
-    """Return type and token of a message, whose other fields are not validated.
-
-    Raises:
-        ProtocolError: The message is not a map, or type or token is not a string.
-    """
+    """Return type and token of a message without validating other fields; ProtocolError if these are invalid."""
     try:
         return _ENVELOPE.decode(data)
     except msgspec.ValidationError as error:
@@ -142,7 +131,7 @@ def decode_command(data: bytes) -> Command:
     """Decode a command.
 
     Raises:
-        ProtocolError: The bytes are not a valid command. The functions below raise it for their messages.
+        ProtocolError: The bytes are not a valid command. `decode_reply` and `decode` raise it likewise.
     """
     if EXPLAINED_BYTES < len(data) <= MAX_BYTES and b"set_estimator" in data:
         _refuse_long_fault(data)
@@ -150,10 +139,7 @@ def decode_command(data: bytes) -> Command:
 
 
 def _refuse_long_fault(data: bytes) -> None:
-    """Refuse an invalid long calibration from its bytes.
-
-    To explain an error of a whole message, its map would be built, which may take a hundred times as long.
-    """
+    """Refuse an invalid long calibration from its bytes; building a map of it may take a hundred times as long."""
     decode_envelope(data)  # refuses bytes that are no MessagePack map
     try:
         _CALIBRATED.decode(data)
@@ -169,6 +155,6 @@ def decode_reply(data: bytes) -> Reply:
 
 
 def decode(kind: type[_SomeMessage], data: bytes) -> _SomeMessage:
-    """Decode a message of a key that has one kind of messages: `decode(State, data)`."""
+    """Decode a message of a key that has one kind of message: `decode(State, data)`."""
     message: _SomeMessage = _ONLY[kind].read(data)
     return message

@@ -1,7 +1,4 @@
-"""Messages from clients: commands and set-points.
-
-A constructor does not validate; `tvist_protocol.codec.check` does, and the server checks every message.
-"""
+"""Messages from clients: commands and set-points. Constructors do not validate; `tvist_protocol.codec.check` does."""
 
 from math import isfinite
 from typing import Any, Literal
@@ -105,12 +102,11 @@ class MoveJ(Leased, frozen=True, kw_only=True, tag="move_j"):
     jerk: Jerk = 100.0
     """Largest jerk of any joint [rad/s³]."""
     duration: Duration | None = None
-    """Duration of the motion before shaping [s], instead of `velocity`, `acceleration` and `jerk`; one too short for
-    the arm takes longer."""
+    """Duration before shaping [s], in place of `velocity`, `acceleration`, `jerk`; longer if the arm cannot do it."""
 
 
 class ServoStart(Leased, frozen=True, kw_only=True, tag="servo_start"):
-    """Begin to follow a stream of set-points."""
+    """Start to follow a stream of set-points."""
 
     period: Period = 0.002
     """Time between two set-points [s]."""
@@ -165,12 +161,7 @@ class SetEstimator(Leased, frozen=True, kw_only=True, tag="set_estimator", gc=Tr
     """Name of a calibration in `info`, or its content as a map; a path is not accepted."""
 
     def __post_init__(self) -> None:
-        """Refuse values that a calibration cannot contain; the server checks their meaning.
-
-        Raises:
-            ProtocolError: A number is not finite, a key is not a string, a value has a type that JSON does not have, or
-                there are more than `CALIBRATION_DEPTH` levels.
-        """
+        """Refuse with ProtocolError what JSON cannot represent and more than `CALIBRATION_DEPTH` levels."""
         if isinstance(self.calibration, dict):
             _check_plain(self.calibration, "calibration", CALIBRATION_DEPTH)
 
@@ -185,11 +176,11 @@ class SetPayload(Leased, frozen=True, kw_only=True, tag="set_payload", omit_defa
     inertia: Inertia6
     """Inertia xx xy xz yy yz zz about the centre of mass, flange axes [kg m²]."""
     transition_time: Transition = 0.5
-    """Time in which the torques change over to it; a shorter one than 0.5 s takes 0.5 s [s]."""
+    """Time over which the controller changes to the new payload; values below 0.5 s count as 0.5 s [s]."""
 
 
 class Forget(Leased, frozen=True, kw_only=True, tag="forget"):
-    """Undo what the robot has learnt of its payload."""
+    """Undo what the robot has learnt about its payload."""
 
     what: Literal["payload"]
     """What to forget: the payload that it assumes instead of the declared one."""

@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 def checked(content: object, kind: type[T]) -> T:
-    """Return decoded content, of maps, lists and plain values, as the expected type."""
+    """Convert decoded content (maps, lists and plain values) to the expected type."""
     try:
         return msgspec.convert(content, kind)
     except msgspec.ValidationError as error:

@@ -17,7 +17,7 @@ LONGEST = 900
 HARMFUL: Final = re.compile(
     r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )
-"""Control characters, as they begin a terminal's commands; those that turn the direction of text; no characters."""
+"""Control characters, which can start terminal commands; characters that change text direction; non-characters."""
 
 
 class TvistError(Exception):
@@ -27,7 +27,7 @@ class TvistError(Exception):
 class ProtocolError(TvistError):
     """An invalid message.
 
-    It is not a `ValueError`, since msgspec would replace one that is raised while a message is built.
+    Not a `ValueError`, because msgspec would replace one that is raised while a message is built.
 
     Attributes:
         code: Reason, one of the protocol's codes.
@@ -48,11 +48,7 @@ class ProtocolError(TvistError):
 
 
 class RefusedError(TvistError):
-    """A robot refused a command; the command changed nothing.
-
-    Attributes:
-        reply: Refusal from the robot.
-    """
+    """A robot refused a command, which changed nothing; `reply` is the refusal."""
 
     def __init__(self, reply: Refused) -> None:
         super().__init__(reply)

@@ -1,9 +1,4 @@
-"""Explains errors in messages and files, for programs and for people.
-
-msgspec finds the fault and says it in one text; here the text becomes code, field, sentence and limit. Only a
-message at fault pays for it: it is decoded a second time, untyped, to name the value. A long one is not: a quarter of
-a megabyte of empty maps would take a hundred ticks of a robot's time.
-"""
+"""Converts msgspec's errors to code, field, message and limit; a short faulty message is decoded again for this."""
 
 import math
 import re
@@ -19,8 +14,7 @@ from tvist_protocol.places import ABSENT, Place
 from tvist_protocol.values import PATTERN_MEANINGS
 
 FAULTS = (ValueError, TypeError, OverflowError, RecursionError, MemoryError)
-"""What msgspec raises: its own errors and text that is not UTF-8 (ValueErrors), keys that cannot be hashed,
-numbers beyond 64 bits, nesting beyond the stack, lengths beyond memory."""
+"""Errors of msgspec: its own, UTF-8, unhashable keys, numbers beyond 64 bits, deep nesting, huge lengths."""
 
 EXPLAINED_BYTES = 4096
 """Longest message whose values are named [bytes]."""
@@ -29,7 +23,7 @@ _DEPTH = 32
 """Levels that are searched: a value that is nested deeper contains itself."""
 
 Types = Mapping[str, type[msgspec.Struct]]
-"""The messages that were possible, by `type`."""
+"""The possible messages, by `type`."""
 
 
 class _Head(msgspec.Struct):
@@ -54,17 +48,14 @@ class _Fault:
 
 
 def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -> ProtocolError:
-    """Return the error of a message that is valid MessagePack but not one of the expected messages.
-
-    If the message is longer than `EXPLAINED_BYTES`, this names only its type.
-    """
+    """Return the error of a message of another type, naming its values up to `EXPLAINED_BYTES`, then only its type."""
     message = _untyped(data, Any if len(data) <= EXPLAINED_BYTES else _Head)
     name = message.get("type") if isinstance(message, dict) else None
     return _explain(error, message, types.get(name) if isinstance(name, str) else None, "the message", types)
 
 
 def explain_content(error: msgspec.ValidationError, content: Any, kind: object) -> ProtocolError:
-    """Return the error of a file or a map whose content has another type than expected."""
+    """Return the error of a file or map whose content has the wrong type."""
     return _explain(error, content, kind, "the content", {})
 
 
@@ -84,7 +75,7 @@ def _explain(
 
 
 def explain_unknown_type(name: object, types: Types) -> ProtocolError:
-    """Return the error of a message with an unexpected `type`; it names the most similar expected types."""
+    """Return the error of a message with an unexpected `type`, with the most similar expected types."""
     near = list(types) if len(types) <= 3 else get_close_matches(str(name)[:SHOWN], types, n=3)
     return ProtocolError(
         "unknown_type", "type", f"type {quoted(name)} is unknown for this key{_suggest(near)}"

@@ -8,17 +8,11 @@ Field = Literal["seconds", "value", "joint"]
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One fault.
+    """One fault."""
 
-    Attributes:
-        meaning: Description, with the unit of `value`.
-        needs: Required fields.
-        may: Optional fields; any other field is refused.
-    """
-
-    meaning: str
-    needs: tuple[Field, ...] = ()
-    may: tuple[Field, ...] = ()
+    meaning: str  # description, with the unit of `value`
+    needs: tuple[Field, ...] = ()  # required fields
+    may: tuple[Field, ...] = ()  # optional fields; any other field is refused
 
 
 FAULTS: dict[str, Fault] = {

@@ -1,8 +1,6 @@
-"""`python -m tvist_protocol.generate`: everything that is made from the message types.
+"""`python -m tvist_protocol.generate`: writes what is made from the message types: pages, schemas, golden bytes.
 
-The pages `messages.md` and `protocol.md` in `docs/reference/generated/`, and in `protocol/` the `schemas/` and the
-MessagePack beside each golden message.
-Runs in a checkout, and needs the `msgpack` package: golden bytes must not come from the codec they are to test.
+The `msgpack` package encodes golden bytes, because they must not come from the codec that they test.
 """
 
 import json
@@ -21,7 +19,7 @@ PAGES = FOLDER.parent / "docs" / "reference" / "generated"
 
 
 def generated(folder: Path) -> dict[Path, bytes]:
-    """Return the content that every generated file should have, by its path."""
+    """Return the content of every generated file, by its path."""
     files = {folder / "schemas" / f"{tag(kind)}.json": _json(json_schema(kind)) for kind in MESSAGES}
     files |= {source.with_suffix(".msgpack"): _msgpack(source) for source in golden(folder)}
     files |= {PAGES / name: text.encode() for name, text in pages().items()}
@@ -29,7 +27,7 @@ def generated(folder: Path) -> dict[Path, bytes]:
 
 
 def stray(folder: Path, files: Iterable[Path]) -> set[Path]:
-    """Return files that are in the places of generated ones and not among them, such as those of a removed message."""
+    """Return files in the places of generated ones that are not among them, such as those of a removed message."""
     there = {*(folder / "schemas").iterdir(), *(folder / "fixtures" / "v1").glob("*.msgpack")}
     return there - set(files)
 

@@ -1,4 +1,4 @@
-"""What an arm looks like and how it is built, so that a client can draw it."""
+"""Shape and kinematics of an arm, so that a client can draw it."""
 
 from msgspec import Struct
 
@@ -23,14 +23,14 @@ class Capsule(Struct, frozen=True, kw_only=True, gc=False):
 
 
 Origin = tuple[float, float, float, float, float, float]
-"""A frame in another: x y z [m], and roll, pitch and yaw about its fixed axes [rad], as in a URDF."""
+"""A frame in another one: x y z [m], and roll, pitch and yaw about its fixed axes [rad], as in a URDF."""
 
 
 class Mesh(Struct, frozen=True, kw_only=True, gc=False):
-    """A mesh of a URDF that shows a part of the arm."""
+    """A mesh from a URDF that shows a part of the arm."""
 
     link: int
-    """Index of the link in whose frame it stands; -1 for the base frame."""
+    """Index of the link in whose frame it is placed; -1 for the base frame."""
     file: str
     """Its file on the server's machine."""
     placement: Origin
@@ -43,28 +43,28 @@ class WorldShape(Struct, frozen=True, kw_only=True, gc=False):
     """A primitive shape of the world around the arm."""
 
     kind: str
-    """`plane`, `sphere`, `capsule`, `ellipsoid`, `cylinder` or `box`; a client leaves out what it does not know."""
+    """`plane`, `sphere`, `capsule`, `ellipsoid`, `cylinder` or `box`; a client omits kinds that it does not know."""
     size: list[float]
-    """Radius; radius and half of the length along z; half of the lengths; of a plane 0 where it has no end [m]."""
+    """By kind [m]: radius; radius and half length along z; half lengths, 0 where a plane is unbounded."""
     pose: list[float]
-    """In the frame of its body: x y z [m] and rotation vector [rad]."""
+    """Pose in the frame of its body: x y z [m] and rotation vector [rad]."""
     body: int | None
-    """Number of the body that carries it; null: it stands still, in the frame of the base."""
+    """Number of the body that carries it; null: it is fixed, in the base frame."""
     colour: list[float]
     """Red, green, blue and opacity, 0 to 1."""
 
 
 class World(Struct, frozen=True, kw_only=True, gc=False):
-    """What stands around a simulated arm that touches it."""
+    """The surroundings that a simulated arm can touch."""
 
     name: str
     """Name of the scene, or its file."""
     bodies: list[str]
-    """Names of the bodies that move, in the order of `body_poses` in `truth`."""
+    """Names of the moving bodies, in the order of `body_poses` in `truth`."""
     shapes: list[WorldShape]
-    """What can be seen."""
+    """The visible shapes."""
     unseen: int = 0
-    """Number of shapes that are left out, since they are meshes."""
+    """Number of shapes that are omitted because they are meshes."""
 
 
 class Geometry(Struct, frozen=True, kw_only=True, gc=False):
@@ -79,19 +79,19 @@ class Geometry(Struct, frozen=True, kw_only=True, gc=False):
     alpha: list[float]
     """Denavit-Hartenberg link twists, one per joint [rad]."""
     placement: list[Origin] = []
-    """Frame of each link in that of its joint, for an arm from a URDF; `a`, `d` and `alpha` are empty then."""
+    """Frame of each link in that of its joint, for an arm from a URDF; then `a`, `d` and `alpha` are empty."""
     bending: list[int] = []
-    """Indices of the links that bend, in order. Each has two values in `link_deflection` of `truth`: rotations about y
-    and then z, in the middle of the link, after Tx(a/2) Tz(d) from its joint."""
+    """Indices of the links that bend, in order. Each has two values in `link_deflection` of `truth`:
+    rotations about y, then z, in the middle of the link, after Tx(a/2) Tz(d) from its joint."""
     capsules: list[Capsule] = []
     """Parts of the arm, from the base on."""
     meshes: list[Mesh] = []
-    """Meshes that show the arm instead, if the file is there."""
+    """Meshes to draw instead of the capsules, if their files are present."""
     payload_radius: float = 0.05
-    """Radius of the capsule from the flange through the centre of mass of the payload to twice its distance [m]."""
+    """Radius of the capsule from the flange through the payload's centre of mass to twice its distance [m]."""
     floor: float = 0.0
     """Height of the floor [m]."""
     has_floor: bool = True
     """Whether there is a floor, which motions keep clear of."""
     world: World | None = None
-    """What stands around the arm; null if it touches nothing."""
+    """Surroundings of the arm; null if it touches nothing."""

@@ -29,7 +29,7 @@ class Limits(Struct, frozen=True, kw_only=True, gc=False):
 
 
 class Stopping(Struct, frozen=True, kw_only=True, gc=False):
-    """Stop of the joint that takes longest to stop, with the arm stretched out, for the reference of a rigid arm."""
+    """Stop of the slowest joint with the arm stretched out, computed for the reference of a rigid arm."""
 
     payload: float
     """Mass at the flange [kg]."""
@@ -121,8 +121,7 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     stop: StopReason | None = None
     """Stop that keeps the robot from moving now; null if there is none or its reason is unknown."""
     arm: str | None = None
-    """Fingerprint of the parameters that determine the arm's vibration, as in a calibration's `provenance`; null if
-    unknown."""
+    """Fingerprint of the parameters of the arm's vibration, as in a calibration's `provenance`; null if unknown."""
     programs: list[str] = []
     """Programs that can be loaded."""
     stepper: str | None = None
@@ -134,7 +133,6 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     geometry: Geometry | None = None
     """Kinematics and shape of the arm; null from older servers."""
     watched: str | None = None
-    """Address of the robot if it is only watched: its own controller moves it, and commands that concern the arm are
-    refused; null if this server moves it."""
+    """Address of a robot that is only watched: it refuses commands for the arm; null if this server moves it."""
     moved: str | None = None
-    """Address of the robot's own controller, through which this server moves it; null if there is none."""
+    """Address of the robot's own controller, through which this server moves the arm; null if there is none."""

@@ -1,7 +1,4 @@
-"""State of a robot's terminals and registers, and the commands that change it.
-
-Names and the order of bits are those of RTDE.
-"""
+"""State of terminals and registers, and the commands that change it; names and bit order are those of RTDE."""
 
 from typing import Annotated, Literal
 
@@ -14,8 +11,7 @@ from tvist_protocol.values import Fraction, Payload, Token
 BITS, NUMBERS = 128, 48
 """Number of registers in a bank of bits, and in a bank of integers or doubles."""
 Bank = Literal["input_bit", "input_int", "input_double", "output_bit", "output_int", "output_double"]
-"""Banks of registers. Clients write input registers, which the robot's programs read; programs write output registers,
-which clients read."""
+"""Banks of registers: clients write input registers, which programs read; programs write output registers."""
 
 
 class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
@@ -58,20 +54,19 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     program_state: ProgramState = "STOPPED"
     """State of the loaded program."""
     program_line: int = 0
-    """Line that is being carried out, or will be when the program continues, counted from 1; 0 if there is none."""
+    """Line that is being executed, or will be when the program continues, counted from 1; 0 if there is none."""
     program_label: ProgramLabel | None = None
     """Label that the program has passed last; null if there is none."""
     interpreter: Interpreter | None = None
-    """Statements that clients have added to the program; null before the first program that takes some."""
+    """Statements that clients have added to the program; null before the first program that accepts some."""
     watched: list[str] = []
-    """RTDE's names of the input registers that the program watches: it counts how often they are written, even with the
-    same value."""
+    """RTDE names of input registers whose writes the program counts, even writes of the same value."""
     tool_output_voltage: int = 0
     """Supply voltage of the tool [V]."""
     tool_analog_input_types: int = 3
     """Types of the tool's analogue inputs, bit 0 for the first: 0 is current (4–20 mA), 1 voltage (0–10 V)."""
     tool_output_mode: int = 0
-    """Use of the tool's digital outputs: 0 as such, 1 as a second supply."""
+    """Use of the tool's digital outputs: 0 as outputs, 1 as a second supply."""
     tool_digital_output0_mode: int = 1
     """What the first digital output of the tool does: 1 sinks, 2 sources, 3 both."""
     tool_digital_output1_mode: int = 1
@@ -79,7 +74,7 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     tcp_force_zero: list[float] | None = None
     """Force and torque that count as zero: of a sensor in its frame, else at the tool in the base frame [N, N m]."""
     assumed_payload: Payload | None = None
-    """Payload that the robot has found and moves with, instead of the declared one; null while that is assumed."""
+    """Payload that the robot has identified and uses instead of the declared one; null: the declared one is used."""
     actual_TCP_force: list[float] | None = None
     """Force and torque at the tool centre point that explain the torques measured in the previous tick, in the base
     frame [N, N m]; zero while the arm is braked. Sent once a second; null in messages sent because of a change."""
@@ -119,7 +114,7 @@ class SetIo(Leased, frozen=True, kw_only=True, tag="set_io"):
 
 
 class Registers(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Consecutive registers that a `set_registers` writes besides others."""
+    """Consecutive registers that a `set_registers` writes in addition to others."""
 
     bank: Bank
     """Bank of registers to write."""
@@ -130,7 +125,7 @@ class Registers(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, o
 
 
 class SetRegisters(ClientMessage, frozen=True, kw_only=True, tag="set_registers", omit_defaults=True):
-    """Write registers at one tick: consecutive ones, and others beside them."""
+    """Write registers at one tick: consecutive ones, and optionally others."""
 
     bank: Bank
     """Bank of registers to write."""
@@ -141,7 +136,7 @@ class SetRegisters(ClientMessage, frozen=True, kw_only=True, tag="set_registers"
     token: Token | None = None
     """Token of the lease; output registers, which belong to the robot, need it, input registers do not."""
     also: Annotated[tuple[Registers, ...], Meta(max_length=BITS)] = ()
-    """Further registers; programs never see some of them written and others not."""
+    """Further registers; programs never see only some of them written."""
 
 
 class SetTcp(Leased, frozen=True, kw_only=True, tag="set_tcp"):

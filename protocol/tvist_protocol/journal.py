@@ -1,7 +1,4 @@
-"""Journal of everything that reached a controller, tick by tick. With the initial setup, it determines the run.
-
-A journal is never sent over the network; recordings contain it, beside the robot's messages.
-"""
+"""Journal of all inputs of a controller; with the initial setup it determines a run. Recordings contain it."""
 
 from typing import Annotated, Any, Literal
 
@@ -25,34 +22,32 @@ EntryKind = Literal[
     "lesson",
 ]
 SocketChange = Literal["opened", "failed", "received", "closed", "expired"]
-"""What happened to a program's socket: it was opened or could not be, has received bytes, or was closed from outside;
-or the wall time of a wait for it is over.
-"""
+"""What happened to a program's socket: it was opened or could not be, has received bytes, or was closed by
+the peer; or a wait for it has expired in wall time."""
 
 
 class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
-    """One thing that reached the controller before a tick was computed; entries are in order."""
+    """One input that reached the controller before a tick was computed; entries are in order."""
 
     tick: int
     """Number of the first control period computed after it."""
     kind: EntryKind
-    """Kind of entry: a message, an unreadable set-point of the lease's holder, the end of the session that had
-    control or the clock, ticks that began too late, what happened to a program's socket, or what a client has
-    asked of the cell's gripper, except to be told something, or what the robot has learnt. Recordings made before
-    sessions were distinguished contain
-    every liveliness token that came or went."""
+    """Kind of entry: a message, an unreadable set-point of the lease's holder, the end of the session that
+    had control or the clock, ticks that started too late, an event of a program's socket, a request to the
+    cell's gripper that changes it, or something that the robot has learnt. Recordings made before sessions
+    were distinguished contain every liveliness token that appeared or disappeared."""
     client: str | None = None
     """Client that it came from or concerns, if known."""
     session: str | None = None
     """Session that got control or the clock, or has ended; empty if the client's liveliness token does not name it."""
     message: Annotated[dict[str, Any], Meta(extra_json_schema={"properties": {}})] | None = None
-    """Decoded message, for a command or a set-point; for a lesson, that."""
+    """Decoded message, for a command or a set-point; for a lesson, the lesson."""
     count: int | None = None
-    """Number of ticks that began too late."""
+    """Number of ticks that started too late."""
     why: str | None = None
     """Reason why a set-point could not be read; the event of a stream that stops may repeat it."""
     socket: int | None = None
-    """Number of the socket, or of the wait that is over."""
+    """Number of the socket, or of the wait that has expired."""
     change: SocketChange | None = None
     """What happened to the socket."""
     data: bytes | None = None
@@ -60,13 +55,13 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
 
 
 def entry_of(tick: int, message: Command | Setpoint, client: str | None = None) -> Entry:
-    """Make the journal's entry for a message."""
+    """Return the journal's entry for a message."""
     kind: EntryKind = "setpoint" if type(message) is Setpoint else "command"
     return Entry(tick=tick, kind=kind, client=client, message=msgspec.to_builtins(message))
 
 
 def lesson_of(entry: Entry) -> PayloadLesson:
-    """Return the lesson of an entry."""
+    """Return the lesson of an entry; raise ProtocolError if it is invalid."""
     try:
         lesson: PayloadLesson = msgspec.convert(entry.message, PayloadLesson)
     except msgspec.ValidationError as error:
@@ -76,7 +71,7 @@ def lesson_of(entry: Entry) -> PayloadLesson:
 
 
 def message_of(entry: Entry) -> Command | Setpoint:
-    """Return the message of an entry, equal to the original one."""
+    """Return the message of an entry, equal to the original one; raise ProtocolError if it is invalid."""
     where = f"the journal's {entry.kind} before tick {entry.tick}"
     if entry.message is None:
         raise ProtocolError("missing_field", "message", f"{where} has no message")

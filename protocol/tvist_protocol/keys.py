@@ -1,8 +1,4 @@
-"""Keys of a robot on the network, as strings.
-
-Each chunk is checked where a key is built, so no key built here holds a wildcard. Keys that arrive may:
-a server compares them with its own.
-"""
+"""Keys of a robot on the network; built keys contain no wildcard, but received ones may."""
 
 import re
 from typing import Literal
@@ -21,7 +17,7 @@ Leaf = Literal["state", "truth", "event", "telemetry", "io", "command", "setpoin
 """What follows a robot's name in its keys; a client's name follows `client`."""
 
 ANY_ALIVE = f"{PREFIX}/*/alive"
-"""Selects the liveliness tokens of all robots: how a client finds them."""
+"""Selects the liveliness tokens of all robots, which is how a client finds them."""
 
 ANYWHERE_ALIVE = f"**/{ANY_ALIVE}"
 """Selects the liveliness tokens of all robots of all namespaces, for a session without a namespace."""
@@ -35,26 +31,17 @@ _SESSION = re.compile(SESSION_PATTERN)
 
 
 def check_robot_name(name: str) -> str:
-    """Return the name of a robot, if it is valid in a key.
-
-    Raises:
-        ProtocolError: The name is not `[a-z0-9][a-z0-9_-]{0,63}`; code `out_of_range`, where `robot`.
-    """
+    """Return a robot's name; ProtocolError (`out_of_range`, `robot`) if it is not `[a-z0-9][a-z0-9_-]{0,63}`."""
     return _checked("robot", name, _ROBOT)
 
 
 def check_namespace(name: str) -> str:
-    """Return a namespace, if it is valid in front of a key.
-
-    Raises:
-        ProtocolError: It is not 1 to 8 chunks like a robot's name, separated by `/`; code `out_of_range`, where
-            `namespace`.
-    """
+    """Return a namespace; ProtocolError if it is not 1 to 8 chunks like a robot's name, separated by `/`."""
     return _checked("namespace", name, _NAMESPACE)
 
 
 def within(namespace: str, key: str) -> str:
-    """Return a key behind a namespace, as the network carries it; with an empty one, the key itself."""
+    """Return a key preceded by a namespace, as the network carries it; if the namespace is empty, the key itself."""
     return f"{namespace}/{key}" if namespace else key
 
 
@@ -68,31 +55,17 @@ def place(key: str) -> tuple[str, str] | None:
 
 
 def check_client_name(name: str) -> str:
-    """Return the name of a client, if it is valid in a key.
-
-    Raises:
-        ProtocolError: The name is not 1 to 64 printable ASCII characters without `/ * ? # $`, the first not `@`;
-            code `out_of_range`, where `client`.
-    """
+    """Return a client's name; ProtocolError if it does not match `CLIENT_NAME_PATTERN`."""
     return _checked("client", name, _CLIENT)
 
 
 def key(robot: str, leaf: Leaf) -> str:
-    """Return a key of a robot; `channels.CHANNELS` says what each is for."""
+    """Return a key of a robot; `channels.CHANNELS` describes them."""
     return f"{PREFIX}/{check_robot_name(robot)}/{leaf}"
 
 
 def client(robot: str, name: str, session: str = "") -> str:
-    """Return the key of a client's liveliness token.
-
-    Args:
-        robot: The robot's name.
-        name: The client's name.
-        session: Zenoh's id of its session, which tells it from another one of that name; empty leaves it out.
-
-    Raises:
-        ProtocolError: A name or the id is invalid; code `out_of_range`.
-    """
+    """Return the key of a client's liveliness token; `session`, Zenoh's id, distinguishes clients of the same name."""
     own = f"{key(robot, 'client')}/{check_client_name(name)}"
     return f"{own}/{_checked('session', session, _SESSION)}" if session else own
 

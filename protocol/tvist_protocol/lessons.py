@@ -1,4 +1,4 @@
-"""What a robot learns from its motions; a lesson is part of its journal, so that a replay need not learn it again."""
+"""What a robot learns from its motions; the journal contains the lessons for replays."""
 
 from msgspec import Struct
 
@@ -6,11 +6,11 @@ from tvist_protocol.values import Payload
 
 
 class PayloadLesson(Struct, frozen=True, kw_only=True, tag_field="type", tag="payload"):
-    """What the arm carries, as its dynamics and modes have to assume; the declared payload stays as it is."""
+    """Payload that dynamics and modes must assume; the declared payload does not change."""
 
     payload: Payload
     """The payload."""
     why: str
-    """What was learnt, in words."""
+    """Description of what was learnt."""
     beyond: bool = False
     """Whether the arm carries more than that, which is above its rating."""

@@ -27,37 +27,36 @@ MAX_SEGMENTS = 500
 
 
 class MoveL(Leased, frozen=True, kw_only=True, tag="move_l"):
-    """Move the tool centre point on a straight line and turn it by the shortest way; answered as `move_j` is."""
+    """Move the tool centre point on a straight line and rotate it the shortest way; answered as `move_j` is."""
 
     pose: Pose
     """Target of the tool centre point: x y z [m] and rotation vector [rad]."""
     frame: Pose | None = None
     """Frame in which `pose` is given, as a pose in the base frame; null: the base frame."""
     velocity: ToolSpeed = 0.25
-    """Largest speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    """Largest speed of the tool [m/s]; a rotation by 1 rad counts as 0.25 m."""
     acceleration: ToolAcceleration = 1.2
     """Largest acceleration of the tool [m/s²]."""
     jerk: ToolJerk = 60.0
     """Largest jerk of the tool [m/s³]."""
     duration: Duration | None = None
-    """Duration of the motion before shaping [s], instead of `velocity`, `acceleration` and `jerk`; one too short for
-    the arm takes longer."""
+    """Duration before shaping [s], in place of `velocity`, `acceleration`, `jerk`; longer if the arm cannot do it."""
 
 
 class MoveC(Leased, frozen=True, kw_only=True, tag="move_c"):
     """Move the tool centre point on the circular arc through `via` and `pose`; answered as `move_j` is."""
 
     via: Pose
-    """A pose on the arc, of which only the position counts: x y z [m] and rotation vector [rad]."""
+    """A pose on the arc, of which only the position is used: x y z [m] and rotation vector [rad]."""
     pose: Pose
     """Target of the tool centre point: x y z [m] and rotation vector [rad]."""
     frame: Pose | None = None
     """Frame in which `via` and `pose` are given, as a pose in the base frame; null: the base frame."""
     orientation: Orientation = "interpolated"
-    """`interpolated`: turn to the orientation of `pose` by the shortest way; `tangent`: keep the tool's orientation
-    relative to the arc's tangent, and ignore that of `pose`."""
+    """`interpolated`: rotate to the orientation of `pose` the shortest way; `tangent`: keep the tool's
+    orientation relative to the arc's tangent, and ignore that of `pose`."""
     velocity: ToolSpeed = 0.25
-    """Largest speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    """Largest speed of the tool [m/s]; a rotation by 1 rad counts as 0.25 m."""
     acceleration: ToolAcceleration = 1.2
     """Largest acceleration of the tool along the arc [m/s²]."""
     jerk: ToolJerk = 60.0
@@ -86,10 +85,9 @@ class JointSegment(PathSegment, frozen=True, kw_only=True, tag="joint"):
     acceleration: Acceleration = 2.0
     """Largest acceleration of any joint [rad/s²]."""
     duration: Duration | None = None
-    """Duration of this part [s], instead of `velocity` and `acceleration`; one too short for the arm takes longer."""
+    """Duration of this part [s], in place of `velocity` and `acceleration`; longer if the arm cannot do it."""
     blend: Blend = 0.0
-    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
-    it has no effect at the end of the path."""
+    """Distance from this part's end within which the path may leave it for the next [m]; unused in the last part."""
 
 
 class LineSegment(PathSegment, frozen=True, kw_only=True, tag="line"):
@@ -98,14 +96,13 @@ class LineSegment(PathSegment, frozen=True, kw_only=True, tag="line"):
     pose: Pose
     """Pose at its end: x y z [m] and rotation vector [rad]."""
     velocity: ToolSpeed = 0.25
-    """Largest speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    """Largest speed of the tool [m/s]; a rotation by 1 rad counts as 0.25 m."""
     acceleration: ToolAcceleration = 1.2
     """Largest acceleration of the tool, also in the blend at its end [m/s²]."""
     duration: Duration | None = None
-    """Duration of this part [s], instead of `velocity` and `acceleration`; one too short for the arm takes longer."""
+    """Duration of this part [s], in place of `velocity` and `acceleration`; longer if the arm cannot do it."""
     blend: Blend = 0.0
-    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
-    it has no effect at the end of the path."""
+    """Distance from this part's end within which the path may leave it for the next [m]; unused in the last part."""
 
 
 class ProcessSegment(PathSegment, frozen=True, kw_only=True, tag="process"):
@@ -114,30 +111,28 @@ class ProcessSegment(PathSegment, frozen=True, kw_only=True, tag="process"):
     pose: Pose
     """Pose at its end: x y z [m] and rotation vector [rad]."""
     velocity: ToolSpeed = 0.25
-    """Speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    """Speed of the tool [m/s]; a rotation by 1 rad counts as 0.25 m."""
     acceleration: ToolAcceleration = 1.2
     """Largest acceleration of the tool along the path [m/s²]."""
     blend: Blend = 0.0
-    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
-    it has no effect at the end of the path."""
+    """Distance from this part's end within which the path may leave it for the next [m]; unused in the last part."""
 
 
 class ArcSegment(PathSegment, frozen=True, kw_only=True, tag="arc"):
     """A part of a path on which the tool moves as in `move_c`."""
 
     via: Pose
-    """A pose on the arc, of which only the position counts: x y z [m] and rotation vector [rad]."""
+    """A pose on the arc, of which only the position is used: x y z [m] and rotation vector [rad]."""
     pose: Pose
     """Pose at its end: x y z [m] and rotation vector [rad]."""
     orientation: Orientation = "interpolated"
     """`interpolated` or `tangent`, as in `move_c`."""
     velocity: ToolSpeed = 0.25
-    """Largest speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    """Largest speed of the tool [m/s]; a rotation by 1 rad counts as 0.25 m."""
     acceleration: ToolAcceleration = 1.2
     """Largest acceleration of the tool along the path [m/s²]."""
     blend: Blend = 0.0
-    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
-    it has no effect at the end of the path."""
+    """Distance from this part's end within which the path may leave it for the next [m]; unused in the last part."""
 
 
 Segment = JointSegment | LineSegment | ProcessSegment | ArcSegment
@@ -147,29 +142,29 @@ class MovePath(Leased, frozen=True, kw_only=True, tag="move_path", omit_defaults
     """Move along a path of several parts without stopping where they are blended; answered as `move_j` is."""
 
     segments: Annotated[tuple[Segment, ...], Meta(min_length=1, max_length=MAX_SEGMENTS)]
-    """Parts of the path in their order; each begins where the previous one ends."""
+    """Parts of the path in order; each starts where the previous one ends."""
     frame: Pose | None = None
     """Frame in which all poses are given, as a pose in the base frame; null: the base frame."""
     jerk: ToolJerk = 60.0
-    """Largest jerk of the tool [m/s³]; of the joints on joint segments, four times the number [rad/s³]."""
+    """Largest jerk of the tool [m/s³]; of the joints on joint segments, four times this number [rad/s³]."""
 
 
 class ServoJ(Leased, frozen=True, kw_only=True, tag="servo_j"):
-    """Follow a posture with a lag, until another command comes; send one after the other to follow a moving posture.
+    """Follow a posture with a lag, until another command comes; repeat it to follow a moving posture.
 
-    It begins at rest or takes over any motion at once. Answered by `accepted` with the `id` that it shares with its
-    successors until the arm rests.
+    It starts at rest or takes over any motion at once. Answered by `accepted` with the `id` that it shares
+    with its successors until the arm rests.
     """
 
     q: Joints
     """Posture, one angle per joint [rad]."""
     lookahead: Annotated[float, Meta(gt=0, le=10)] = 0.1
-    """Lag behind a moving posture, in addition to two steps [s]; the range is 0.03 to 0.2, and others are clipped."""
+    """Lag behind a moving posture, in addition to two steps [s]; clipped to 0.03 to 0.2."""
     gain: Annotated[float, Meta(gt=0, le=1e6)] = 300.0
-    """How abruptly the arm begins to approach it [1/s²]; the range is 100 to 2000, and others are clipped. It does not
-    change the lag, and is raised where the arm would overshoot."""
+    """Stiffness with which the arm approaches the posture [1/s²]; clipped to 100 to 2000. It does not change
+    the lag, and is raised where the arm would overshoot."""
     shaped: bool = False
-    """Whether the shaper is used; only for a motion that begins at rest."""
+    """Whether the shaper is used; only for a motion that starts at rest."""
 
 
 class SpeedJ(Leased, frozen=True, kw_only=True, tag="speed_j"):
@@ -180,7 +175,7 @@ class SpeedJ(Leased, frozen=True, kw_only=True, tag="speed_j"):
     acceleration: Acceleration = 1.4
     """Acceleration of the joint whose velocity changes most [rad/s²]; the others change in phase."""
     shaped: bool = False
-    """Whether the shaper is used; only for a motion that begins at rest."""
+    """Whether the shaper is used; only for a motion that starts at rest."""
 
 
 class SpeedL(Leased, frozen=True, kw_only=True, tag="speed_l"):
@@ -193,14 +188,14 @@ class SpeedL(Leased, frozen=True, kw_only=True, tag="speed_l"):
     angular_acceleration: Acceleration | None = None
     """Angular acceleration of the tool [rad/s²]; null: the number of `acceleration`."""
     shaped: bool = False
-    """Whether the shaper is used; only for a motion that begins at rest."""
+    """Whether the shaper is used; only for a motion that starts at rest."""
 
 
 class StopJ(Leased, frozen=True, kw_only=True, tag="stop_j"):
     """Come to rest with a deceleration of the joints; a planned motion stays on its path."""
 
     acceleration: Acceleration = 2.0
-    """Deceleration of the joint that is fastest [rad/s²]."""
+    """Deceleration of the fastest joint [rad/s²]."""
 
 
 class StopL(Leased, frozen=True, kw_only=True, tag="stop_l"):

@@ -1,4 +1,4 @@
-"""The generated pages of the protocol's reference: their text, with the tables of `tables.py`."""
+"""Text of the generated pages of the protocol's reference, with the tables of `tables.py`."""
 
 from tvist_protocol.tables import tables
 

@@ -1,4 +1,4 @@
-"""Resolves the path in an error message of msgspec: the value at its end, and the type that was expected there."""
+"""Resolves the path in an error message of msgspec: the value at its end, and the type expected there."""
 
 import re
 import types
@@ -13,13 +13,10 @@ _STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]|\[(\.\.\.)\]")
 
 
 class Place:
-    """The place that a path leads to in the content of a message.
+    """The place that a path leads to in a message's content, which should have the type `kind` (None: unknown).
 
-    Args:
-        content: The decoded message: maps, lists and plain values.
-        kind: Type that was expected of the whole content; None if it is unknown.
-        path: Path as msgspec writes it, such as `.payload.com[2]`. msgspec writes `[...]` for an entry of a map without
-            naming its key; the key is then found by checking each entry.
+    msgspec writes paths as `.payload.com[2]`, and `[...]` for an entry of a map; its key is found by checking each
+    entry.
     """
 
     def __init__(self, content: Any, kind: object, path: str) -> None:
@@ -28,7 +25,7 @@ class Place:
         self.value: Any = content
         """The value there; `ABSENT` if there is none."""
         self.kind = kind
-        """The type that was expected there; None if it is unknown."""
+        """The type expected there; None if it is unknown."""
         self._holder: object = None
         end = 0
         for step in _STEP.finditer(path):
@@ -50,10 +47,7 @@ class Place:
 
     @property
     def struct(self) -> type[msgspec.Struct] | None:
-        """The struct that was expected there; None if it was another type.
-
-        Of a union of structs, it is the one that the value's `type` names, or else the first.
-        """
+        """The struct expected there, in a union that of the value's `type`, else the first; None if another type is."""
         found = list(_structs(self.kind))
         tag = self.value.get("type") if isinstance(self.value, dict) else None
         return next((kind for kind in found if kind.__struct_config__.tag == tag), next(iter(found), None))
@@ -70,7 +64,7 @@ class Place:
 
 
 def _choices(kind: object) -> Iterator[object]:
-    """Yield the members of a union, without their `Annotated`; of any other type, the type itself."""
+    """Yield the members of a union, without their `Annotated`; for any other type, the type itself."""
     origin = get_origin(kind)
     if origin is Annotated:
         yield from _choices(get_args(kind)[0])
@@ -82,7 +76,6 @@ def _choices(kind: object) -> Iterator[object]:
 
 
 def _structs(kind: object) -> Iterator[type[msgspec.Struct]]:
-    """Yield the members of a union that are structs."""
     for member in _choices(kind):
         if isinstance(member, type) and issubclass(member, msgspec.Struct):
             yield member
@@ -101,7 +94,7 @@ def _entry_type(kind: object, name: str | None, index: str | None) -> object:
 
 
 def _culprit(content: Any, kind: object) -> str:
-    """Return the key of the first entry of a map that is not of a type; `...` if each one is."""
+    """Return the key of the first entry of a map that does not have the type; `...` if all have it."""
     for key, value in content.items() if isinstance(content, dict) else ():
         try:
             msgspec.convert(value, kind)

@@ -24,7 +24,7 @@ class ProgramLoad(ClientMessage, frozen=True, kw_only=True, tag="program.load", 
     name: ProgramName
     """Name of the program: one of `programs` in `info`, or any other if `text` is given."""
     text: Script | None = None
-    """Text of the program in URScript, which the robot keeps under this name; null: the one it has."""
+    """Text of the program in URScript, which the robot keeps under this name; null: the one that it has."""
     token: Token | None = None
     """Token of the lease, if the client has one."""
 
@@ -32,46 +32,45 @@ class ProgramLoad(ClientMessage, frozen=True, kw_only=True, tag="program.load", 
 class ProgramRun(Leased, frozen=True, kw_only=True, tag="program.run"):
     """Start a program in URScript at once.
 
-    It replaces a running program, unless it is secondary (`sec`): then it runs beside that. It ends with the lease.
+    It replaces the running program, or runs beside it if it is secondary (`sec`). It ends with the lease.
     """
 
     text: Script
-    """Text of the program, which names it."""
+    """Text of the program, which contains its name."""
 
 
 class ProgramInterpret(Leased, frozen=True, kw_only=True, tag="program.interpret"):
-    """Add a statement to the running program, which has to call `interpreter_mode` somewhere.
+    """Add a line of statements to the running program, which must call `interpreter_mode`.
 
-    The reply has its number. The program carries out statements in their order while it waits in that function. Several
-    statements may follow each other on a line.
+    The reply has its number. The program executes lines in order while it waits in that function.
     """
 
     text: Script
-    """Text of the statement, or of a function for later ones; it can use what the program and its statements define."""
+    """Text of the statements, or of a function for later ones; it can use what the program and earlier lines define."""
 
 
 class ProgramSkip(Leased, frozen=True, kw_only=True, tag="program.skip"):
-    """Skip something in a program that waits for statements."""
+    """Skip statements or a motion of a program in `interpreter_mode`."""
 
     what: Literal["statements", "move"]
-    """All statements that have not begun, or the rest of the planned motion that the program makes now."""
+    """All statements that have not started, or the rest of the present planned motion."""
 
 
 class Interpreter(Struct, frozen=True, kw_only=True):
-    """Statements that clients have added to a program, by their numbers, which begin with 1."""
+    """Statements that clients have added to a program, by their numbers, which start at 1."""
 
     interpreted: int = 0
     """Last statement that was accepted."""
     executed: int = 0
-    """Last statement that has begun."""
+    """Last statement that has started."""
     cleared: int = 0
-    """Last statement that the program has forgotten, with the variables and functions that it defined."""
+    """Last statement whose variables and functions the program has discarded."""
     waiting: int = 0
-    """Number of statements that have not begun."""
+    """Number of statements that have not started."""
 
 
 class ProgramLabel(Struct, frozen=True, kw_only=True):
-    """A label of a program, such as `$ 3 "Waypoint_1"`: a line of the program tree from which it was written."""
+    """A label of a program, such as `$ 3 "Waypoint_1"`: a line of the program tree that it was generated from."""
 
     number: int
     """Its number."""
@@ -80,7 +79,7 @@ class ProgramLabel(Struct, frozen=True, kw_only=True):
 
 
 class ProgramClosePopup(ClientMessage, frozen=True, kw_only=True, tag="program.close_popup"):
-    """Close the message that a program shows, for which it may be waiting. Any client may send this."""
+    """Close the message that a program shows and may be waiting for. Any client may send this."""
 
 
 class ProgramPlay(Leased, frozen=True, kw_only=True, tag="program.play"):

@@ -1,12 +1,11 @@
 """Messages in a recording: JSON, in a form that viewers of recordings can open.
 
-A recording is an MCAP file with channels `state`, `event`, `truth`, `io` and `journal`, their topics named as the
-robot's keys. Its times are ticks of 2 ms as nanoseconds since tick 0, never the wall clock. Metadata `tvist`
-holds the format, `info`, and `start` (how the server was started); metadata `tvist.end`, written when the
-file is closed, what was dropped on each channel.
+A recording is an MCAP file with channels `state`, `event`, `truth`, `io` and `journal`, whose topics are the robot's
+keys. Its times are ticks of 2 ms as nanoseconds since tick 0, never the wall clock. Metadata `tvist` has the format,
+`info`, and `start` (how the server was started); metadata `tvist.end` the messages dropped on each channel.
 
-Viewers require one plain type per field and do not support null. A field that is null is therefore left out, and null
-in a list or a field stands for a number that is not finite, which JSON cannot express.
+Viewers require one plain type per field, without null. A null field is therefore omitted, and null in a list or a
+field stands for a number that is not finite, which JSON cannot express.
 """
 
 import math
@@ -56,13 +55,7 @@ _ENCODER = msgspec.json.Encoder()
 
 
 def segment_name(name: str, run: int, number: int | None) -> str:
-    """Return the name of a segment of a recording: `run-2-part0001.mcap` for `run.mcap`.
-
-    Args:
-        name: Name of the recording.
-        run: Number of the run, from 1.
-        number: Number of the segment, from 1; None for a pattern that all of them match.
-    """
+    """Return a segment's name, `run-2-part0001.mcap` for `run.mcap`; None as `number` gives a pattern of all."""
     path = PurePath(name)
     if number is None:
         return f"{escape(path.stem)}-{run}-part*{escape(path.suffix)}"
@@ -70,7 +63,7 @@ def segment_name(name: str, run: int, number: int | None) -> str:
 
 
 def segment_of(name: str) -> tuple[str, int, int] | None:
-    """Return of which recording, run and number a file is a segment, by its name; None if it is none."""
+    """Return the recording, run and number of a segment from its file name; None if it is not a segment."""
     found = _SEGMENT.fullmatch(name)
     if found is None:
         return None
@@ -80,11 +73,7 @@ def segment_of(name: str) -> tuple[str, int, int] | None:
 
 
 def topics(robot: str) -> dict[type[msgspec.Struct], str]:
-    """Return the topic of each kind of message.
-
-    Raises:
-        ProtocolError: The name is not allowed in a key.
-    """
+    """Return the topic of each kind of message; raise ProtocolError if the robot's name is not allowed in a key."""
     return {
         State: keys.key(robot, "state"),
         Event: keys.key(robot, "event"),
@@ -95,11 +84,7 @@ def topics(robot: str) -> dict[type[msgspec.Struct], str]:
 
 
 def to_json(message: Recorded) -> bytes:
-    """Encode a message for a recording. Every finite float can be restored bit for bit.
-
-    Raises:
-        TypeError: A field has a type that JSON does not have, such as a numpy number.
-    """
+    """Encode a message so that every finite float can be restored bit for bit; TypeError if JSON lacks a type."""
     content: dict[str, Any] = {"type": tag(type(message))}
     for name in message.__struct_fields__:
         value = getattr(message, name)
@@ -109,11 +94,7 @@ def to_json(message: Recorded) -> bytes:
 
 
 class JsonReader(Generic[_Some]):
-    """Reads recorded messages of one kind.
-
-    Args:
-        kind: Type of the message.
-    """
+    """Reads recorded messages of one type."""
 
     def __init__(self, kind: type[_Some]) -> None:
         self._kind = kind
@@ -126,11 +107,7 @@ class JsonReader(Generic[_Some]):
         self._before = _ENCODER.encode(self._absent)[:-1] + b"," if self._absent else b""
 
     def read(self, data: bytes) -> _Some:
-        """Decode a message; a number that was not finite becomes NaN.
-
-        Raises:
-            ProtocolError: The data is not a message of this kind.
-        """
+        """Decode a message, with NaN for a number that was not finite; raise ProtocolError if it has another type."""
         try:
             try:
                 return self._decoder.decode(self._completed(data))
@@ -141,7 +118,7 @@ class JsonReader(Generic[_Some]):
             raise ProtocolError("malformed", "", why) from error
 
     def _completed(self, data: bytes) -> bytes:
-        """Add null for fields that were left out: of two equal keys, msgspec keeps the later one, from the data."""
+        """Add null for omitted fields; if a key occurs twice, msgspec keeps the later one, from the data."""
         return self._before + data[1:] if self._before else data
 
     def _with_nan(self, data: bytes) -> Any:
@@ -152,10 +129,7 @@ class JsonReader(Generic[_Some]):
 
 
 def viewer_schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
-    """Return the JSON Schema of a recorded message, limited to what viewers support.
-
-    They require a single `type` other than null for every field, `properties` for every object, and no references.
-    """
+    """Return the JSON Schema of a recorded message for viewers: one `type` per field, no null, no references."""
     schema = json_schema(kind)
     shared = schema.pop("$defs", {})
     parts: Mapping[str, dict[str, Any]] = schema["properties"]

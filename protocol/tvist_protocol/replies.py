@@ -56,11 +56,11 @@ class Accepted(
     id: int | None = None
     """Id of the motion; its events have the same id."""
     token: str | None = None
-    """Token of the lease or of the clock just taken; every command that needs it must contain it."""
+    """Token of the lease or clock just taken; every command that needs it must contain it."""
     lease_s: float | None = None
     """Duration of the granted lease [s]; absent for the clock, which does not expire."""
     limited: str | None = None
-    """Why the motion is slower than asked, or which limit it will exceed, for people; absent for one as asked."""
+    """Why the motion is slower than requested, or which limit it will exceed, for people; absent otherwise."""
 
 
 class Done(Struct, frozen=True, kw_only=True, tag_field="type", tag="done", omit_defaults=True, gc=False):

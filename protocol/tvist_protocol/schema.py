@@ -1,4 +1,4 @@
-"""Message types as JSON Schema, with the docstring under each field as its description."""
+"""Message types as JSON Schema, with the docstring of each field as its description."""
 
 import ast
 import inspect
@@ -12,7 +12,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema(message: type[msgspec.Struct]) -> dict[str, Any]:
-    """Return the JSON Schema of one message, complete in itself: for a recording, or a client in another language."""
+    """Return the self-contained JSON Schema of one message, for a recording or a client in another language."""
     (root,), parts = components((message,), "#/$defs/{name}")
     name = root["$ref"].removeprefix("#/$defs/")
     schema: dict[str, Any] = {"$schema": DIALECT} | parts.pop(name)
@@ -22,10 +22,7 @@ def json_schema(message: type[msgspec.Struct]) -> dict[str, Any]:
 def components(
     messages: tuple[type[msgspec.Struct], ...], reference: str
 ) -> tuple[tuple[dict[str, Any], ...], dict[str, Any]]:
-    """Return references to messages, and the JSON Schemas of these and what they share, by name.
-
-    The text of a reference has `{name}` in it.
-    """
+    """Return references to messages (`reference` has `{name}` in it), and the JSON Schemas of all structs by name."""
     roots, parts = msgspec.json.schema_components(messages, ref_template=reference)
     described = {kind.__name__: field_docs(kind) for kind in _structs(messages)}
     for name, schema in parts.items():
@@ -36,7 +33,7 @@ def components(
 
 @cache
 def field_docs(described: type) -> dict[str, str]:
-    """Return the docstrings of the fields of a struct, its base's first, or of the members of an enumeration."""
+    """Return the docstrings of a struct's fields, starting with its base's, or of an enumeration's members."""
     base = described.__base__
     docs = {} if base is None or not base.__module__.startswith("tvist_") else dict(field_docs(base))
     body = _classes(described.__module__)[described.__name__]
@@ -52,7 +49,7 @@ def field_docs(described: type) -> dict[str, str]:
 
 @cache
 def _classes(module: str) -> dict[str, ast.ClassDef]:
-    """Return the classes of a module, parsed once: `inspect.getsource` of a class parses the whole module, too."""
+    """Return the classes of a module, parsed once: `inspect.getsource` of a class also parses the whole module."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {part.name: part for part in ast.walk(tree) if isinstance(part, ast.ClassDef)}
 

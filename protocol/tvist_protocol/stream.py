@@ -1,7 +1,6 @@
 """Messages that a robot publishes by itself. A client must ignore fields that it does not know.
 
-Arrays are lists, which are the cheapest to create from numerical arrays five hundred times a second. They have no
-bounds, since they come from the robot. Fields have their RTDE names if RTDE has them.
+Arrays are lists, the cheapest to create 500 times a second. Fields have their RTDE names if RTDE has them.
 """
 
 from typing import Literal
@@ -94,15 +93,15 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     unshaped_qdd: list[float] | None = None
     """Acceleration of the reference before shaping; null: the same as `target_qdd` [rad/s²]."""
     motor_qd: list[float] | None = None
-    """Velocity that the drives are given by feed-forward of the arm's elasticity; null without it [rad/s]."""
+    """Velocity command of the drives, with feed-forward of the arm's elasticity; null without it [rad/s]."""
     motor_qdd: list[float] | None = None
-    """Acceleration of that motion; null without it [rad/s²]."""
+    """Acceleration of that command; null without it [rad/s²]."""
     motor_moment: list[float] | None = None
-    """Torque that they are given with it; null without it [N m]."""
+    """Torque command of the drives, with feed-forward of the arm's elasticity; null without it [N m]."""
     motor_limited: bool = False
-    """Whether the torque limits keep the motors from leading by as much as the arm's elasticity wants."""
+    """Whether the torque limits reduce the lead of the motors that the arm's elasticity requires."""
     flange_wrench: list[float] | None = None
-    """Force [N] and torque about its origin [N m] that the sensor in the flange feels, in its frame; null: none."""
+    """Force [N] and torque about the origin [N m] measured by the flange sensor, in its frame; null: no sensor."""
 
 
 class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc=False):
@@ -119,11 +118,11 @@ class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc
     why: str | None = None
     """Reason, for people."""
     category: int | None = None
-    """Category of a stop by IEC 60204-1: 0 closes the brakes at once, 1 removes power at rest, 2 keeps the power."""
+    """Stop category (IEC 60204-1): 0 closes the brakes at once, 1 removes power at rest, 2 keeps power."""
     duration: float | None = None
-    """Time from now until the shaped reference of a stop is at rest; null if it is too far ahead to tell [s]."""
+    """Time until the shaped reference of a stop is at rest; null if it is too far ahead to predict [s]."""
     way: float | None = None
-    """Largest angle that a joint still turns in a stop; null if its end is too far ahead to tell [rad]."""
+    """Largest angle that a joint still turns in a stop; null if its end is too far ahead to predict [rad]."""
     line: int | None = None
     """Line of the program that ended with an error, counted from 1."""
     column: int | None = None
@@ -137,7 +136,7 @@ class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc
     blocking: bool | None = None
     """Whether the program waits until the popup is closed."""
     secondary: bool | None = None
-    """Whether the program runs beside the one that `io` tells of; null for that one itself."""
+    """Whether the program runs beside the one that `io` describes; null for the latter."""
 
 
 class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc=False):
@@ -170,30 +169,29 @@ class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc
     static_link_deflection: list[float] = []
     """Part of `link_deflection` that remains at rest in this pose; empty if unknown [rad]."""
     body_poses: list[float] = []
-    """Poses of the bodies that move in the arm's world, in the frame of the base, one after the other: x y z [m] and
-    rotation vector [rad]; empty without a world."""
+    """Base-frame poses of moving bodies, consecutively: x y z [m], rotation vector [rad]; empty without a world."""
     contact_force: list[float] = []
-    """Force of all that touches the arm, its tool or its fingers, in the frame of the base; empty without one [N]."""
+    """Total contact force on the arm, its tool or its fingers, in the base frame; empty without a world [N]."""
 
 
 class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="telemetry", gc=False):
     """Timing and counters of the server, once a second. Counters count from the start of the server.
 
-    These definitions hold wherever the words appear. A control period is due at a fixed distance from the one before,
-    on the wall clock. It either begins, or is left out, when the robot is more than 50 periods behind. The lateness of
-    a period is its beginning minus its deadline, and 0 if it begins before: robots of one process take turns, and one
-    that has its turn early does not wait. A period is missed if it begins a period late or more, or is left out; so no
-    more are missed than were due. The rate is the periods that have begun,
-    or the states that were received, per second of the clock of whoever counts them. The load is the time from the
-    beginning to the end of the periods, with the commands carried out between them, per second of the wall clock.
-    The robot is overloaded once a fifth of the periods due were missed in each of two seconds in a row, until less
-    than a twentieth were in each of five. With a client that steps time, nothing is due.
+    These definitions hold wherever the words are used. A control period is due at a fixed interval after the
+    previous one, on the wall clock. It either starts, or is left out if the robot is more than 50 periods
+    behind. The lateness of a period is its start minus its deadline, or 0 if it starts earlier: robots of one
+    process take turns, and a robot whose turn comes early does not wait. A period is missed if it starts a
+    period late or more, or is left out; so no more are missed than were due. The rate is the number of
+    periods started, or of states received, per second of the counting machine's clock. The load is the time
+    spent in periods, including the commands carried out between them, per second of the wall clock. The robot
+    becomes overloaded when a fifth of the due periods were missed in each of two consecutive seconds, and
+    stays so until less than a twentieth were missed in each of five. If a client steps time, nothing is due.
     """
 
     tick: int
     """Number of the control period."""
     ticks_per_second: float
-    """Rate: control periods that have begun in the last second [1/s]."""
+    """Rate: control periods started in the last second [1/s]."""
     late_p50_us: float
     """Median lateness of a tick in the last second [µs]."""
     late_p99_us: float
@@ -223,10 +221,10 @@ class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="teleme
     load: float | None = None
     """Load in the last second [-]; null: a client steps time."""
     due_ticks: int | None = None
-    """Number of control periods that were due: those that have begun, and those left out; null: a client steps time."""
+    """Number of control periods that were due, started or left out; null: a client steps time."""
     due_per_second: float | None = None
     """Control periods due per second of the wall clock [1/s]; null: a client steps time, or an older server."""
     overloaded: bool = False
-    """Whether the robot is overloaded; a `warning` tells when this begins and ends."""
+    """Whether the robot is overloaded; a `warning` reports when this starts and ends."""
     processor_wait_us: float = 0.0
-    """Time in the last second for which the thread of the ticks waited for a processor [µs]; 0 if it is not known."""
+    """Time in the last second for which the tick thread waited for a processor [µs]; 0 if it is unknown."""

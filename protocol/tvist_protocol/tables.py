@@ -27,7 +27,7 @@ _LISTS = {
     frozenset(CODE_MEANINGS): "a [code](#codes)",
     frozenset(EVENT_MEANINGS): "a [kind](#kinds-of-event)",
 }
-"""Choices that have a table of their own."""
+"""Choices that have their own table."""
 
 
 def tables() -> dict[str, str]:
@@ -111,7 +111,6 @@ def _default(field: str, part: Schema, schema: Schema) -> str:
 
 
 def _values(part: Schema) -> str:
-    """Return in words which values a type allows."""
     match part:
         case {"anyOf": choices}:
             words = " or ".join(map(_values, choices))

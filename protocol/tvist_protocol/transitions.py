@@ -1,8 +1,4 @@
-"""Activities of a robot and the transitions between them, as one table.
-
-The server uses the table and the protocol's README shows it as a diagram. A trigger is a command or one of
-`HAPPENINGS`. A trigger without a row for a state is refused, or cannot happen, in that state.
-"""
+"""Activities of a robot and transitions between them, as one table; a trigger is a command or a happening."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -26,9 +22,7 @@ class Activity(StrEnum):
     STREAMING = "STREAMING"
     """The arm follows a stream of set-points."""
     GUIDED = "GUIDED"
-    """The arm follows `servo_j`, `speed_j` or `speed_l`, each of which replaces the one before, or gives way to forces
-    by `force_mode` or `freedrive`.
-    """
+    """The arm follows `servo_j`, `speed_j` or `speed_l`, or is compliant in `force_mode` or `freedrive`."""
     ENDING = "ENDING"
     """A stream has ended, and the arm comes to rest through the filter."""
     STOPPING = "STOPPING"
@@ -116,7 +110,7 @@ _ROBOT_MODES = {
     _A.IDLE: RobotMode.IDLE,
 }
 for _activity in Activity:
-    # Attributes of the members, since looking up another member takes ten times as long, and this is done every tick.
+    # Attributes, because looking up another member at every tick takes ten times as long.
     _activity.robot_mode = _ROBOT_MODES.get(_activity, RobotMode.RUNNING)
     _activity.moving = _activity in _MOVING
     _activity.protective = _activity in {_A.PROTECTIVE_STOPPING, _A.PROTECTIVE_STOP}
@@ -184,10 +178,7 @@ def after(activity: Activity, trigger: str) -> Activity | None:
 
 
 def diagram(states: type[StrEnum]) -> str:
-    """Return the part of the table for these states as a Mermaid state diagram.
-
-    Transitions back to the same state are left out; those common to all motions that can be stopped are drawn once.
-    """
+    """Return the table's part for these states as a Mermaid diagram; transitions of all motions are drawn once."""
     arrows: dict[tuple[str, str], list[str]] = {}
     for row in TRANSITIONS:
         sources = [source for source in row.sources if isinstance(source, states)]

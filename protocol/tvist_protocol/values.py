@@ -1,8 +1,7 @@
 """Types of the values in messages: SI units, radians, every number bounded.
 
-The bounds of the wire only exclude NaN, infinity and errors by orders of magnitude. The limits of the arm are in
-`info`, and the server checks them. An unbounded float would allow NaN. The text in an annotation names the numbers of a
-tuple.
+The bounds only exclude NaN, infinity and errors by orders of magnitude; the server checks the arm's limits. The text
+in an annotation names the entries of a tuple.
 """
 
 from typing import Annotated, Literal
@@ -19,8 +18,8 @@ NAMESPACE_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}(/[a-z0-9][a-z0-9_-]{0,63}){0,7}$
 """Pattern of a namespace: chunks that precede a robot's keys, such as `hall-3/line-1`."""
 
 CLIENT_NAME_PATTERN = r"^(?!@)(?!.*[/*?#$])[ -~]{1,64}$(?!\n)"
-"""Pattern of a client's name, which is one chunk of a key, `client/<client>`: printable ASCII without `/ * ? # $`. No
-wildcard matches a chunk that begins with `@`, so the server would not notice when such a client leaves."""
+"""Pattern of a client's name, one chunk of the key `client/<client>`: printable ASCII without `/ * ? # $`. No
+wildcard matches a chunk that starts with `@`, so the server would not notice when such a client leaves."""
 
 SESSION_PATTERN = r"^[0-9a-f]{1,32}$(?!\n)"
 """Zenoh's id of a session."""
@@ -69,9 +68,9 @@ DampingRatio = Annotated[float, Meta(ge=0, lt=1)]
 """[-]"""
 ModeCount = Annotated[int, Meta(ge=1, le=8)]
 Frequencies = Annotated[tuple[Frequency, ...], Meta(min_length=1, max_length=8)]
-"""One a mode [Hz]"""
+"""One per mode [Hz]"""
 DampingRatios = Annotated[tuple[DampingRatio, ...], Meta(min_length=1, max_length=8)]
-"""One a mode [-]"""
+"""One per mode [-]"""
 
 Mass = Annotated[float, Meta(ge=0, le=100)]
 """[kg]"""
@@ -110,7 +109,7 @@ Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Version = Annotated[int, Meta(ge=0, le=65535)]
 
 Token = Annotated[str, Meta(max_length=128)]
-"""May be empty on the wire: then it is a stale one, which the server says better than a length does."""
+"""May be empty: the server then reports a stale token, which explains more than an error about the length."""
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 """Name of a shaper, an estimator, a calibration or a fault; the server checks that it exists."""
 RobotName = Annotated[str, Meta(pattern=ROBOT_NAME_PATTERN)]

@@ -1,4 +1,4 @@
-"""A flexible shoulder turns an arm that stretches: what it vibrates with afterwards, by three ways to shape."""
+"""Compare three ways of shaping by the vibration of a flexible shoulder that turns a stretching arm."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def inertia(q):  # about the shoulder; the elbow, q[1], changes it [kg m²]
 
 
 def vibration(estimator, name):
-    """Largest deflection from 150 ms after the unshaped motion on [mrad]; the motors follow their reference."""
+    """Largest deflection later than 150 ms after the unshaped motion [mrad]; motors follow exactly."""
     u = np.clip(np.arange(0.0, 2.2, H) / 1.3, 0.0, 1.0)  # constant acceleration, then constant deceleration
     reference = START + np.where(u < 0.5, 2 * u**2, 1 - 2 * (1 - u) ** 2)[:, None] * (END - START)
     tvist = TvistFilter(shaper(name), estimator, joints=2, period=H)

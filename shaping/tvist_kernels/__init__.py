@@ -1,1 +1,1 @@
-"""How functions are compiled, and where their machine code is kept; below all other packages."""
+"""Compile functions and keep their machine code; every other package may import this one."""

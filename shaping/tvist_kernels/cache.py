@@ -1,14 +1,12 @@
-"""Machine code of kernels on disk: one file for each kernel, sources, processor and types of the arguments.
+"""Keep machine code of kernels on disk: one file for each kernel, source hash, processor and argument types.
 
-numba's own cache has one file for each kernel that lists the others. It is renewed if the file with the kernel
-changes, but not if a kernel in another file does that this one calls; and two processes that fill it at once can give
-each other's machine code the wrong name. Here a file's name says all that its content depends on, so that nothing is
-ever renewed, and it appears whole.
-
-A distribution of its own brings files along that run on any processor of its architecture.
+numba's own cache has an index file for each kernel. It renews the index if the kernel's own file changes, but not if a
+called kernel in another file does, and two processes that write at once can mix up their entries. Here the name of a
+file contains everything that its content depends on, so no file is ever updated, and each appears complete. An optional
+distribution brings files that run on any processor of its architecture.
 """
 
-# The types of numba are not whole.
+# numba's type information is incomplete.
 # mypy: disable-error-code="no-untyped-call,attr-defined"
 
 import contextlib
@@ -38,18 +36,18 @@ DIGITS = 16
 """Hexadecimal digits of each hash in a file's name."""
 CHECKSUM_BYTES = 32
 FORMAT = 2
-"""Changes with what `machine_code` writes."""
+"""Version of the format that `machine_code` writes; increase it with each change."""
 
 kernels: "list[KernelCache]" = []
-"""Those of all functions that this process has imported so far."""
+"""Caches of all compiled functions that this process has imported."""
 OTHERS = 16
-"""Files of a kernel's other sources that stay, since several installations share the folder."""
+"""Number of files of other versions of a kernel that stay, since several installations share the folder."""
 SHIPPED = "tvist_compiled"
-"""Package, if it is installed, whose folder holds machine code that somebody else compiled."""
+"""Package whose folder holds precompiled machine code, if it is installed."""
 unkept: dict[str, str] = {}
-"""Why machine code could not be kept, by the folder."""
+"""Why machine code could not be written, by folder."""
 _said: set[str] = set()
-"""Warnings that were given."""
+"""Warnings already given."""
 
 
 class DistrustWarning(UserWarning):
@@ -57,7 +55,7 @@ class DistrustWarning(UserWarning):
 
 
 class KernelCache(_Cache):
-    """The machine code of one kernel, for numba's dispatcher."""
+    """Machine code of one kernel, in the form that numba's dispatcher expects."""
 
     def __init__(self, function: Callable[..., Any], dispatcher: Any = None) -> None:
         self._function, self._dispatcher = function, dispatcher
@@ -69,20 +67,20 @@ class KernelCache(_Cache):
 
     @cached_property
     def sources(self) -> str:
-        """Hash of what the machine code depends on among our sources; computed when a kernel is first called."""
+        """Hash of the sources that the machine code depends on; computed when a kernel is first called."""
         return _short(digest(self._function.__module__) + self._function.__code__.co_code.hex())
 
     @property
     def cache_path(self) -> str:
-        """The folder in which machine code is kept, for numba."""
+        """Folder in which machine code is kept; numba reads this."""
         return str(own_folder())
 
     def holds(self) -> bool:
-        """Return whether there is machine code of this kernel for this processor, for any types."""
+        """Return whether there is machine code of this kernel for this processor, for any argument types."""
         return self in held([self])
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
-        """Return the kernel for types of arguments; None if there is none on disk, or the file is damaged."""
+        """Return the kernel for these argument types; None if there is no file on disk, or it is damaged."""
         for machine in _machines(target_context) if self._enabled else ():
             name = self._file(sig, machine)
             for folder in places():
@@ -91,10 +89,7 @@ class KernelCache(_Cache):
         return None
 
     def load_file(self, file: Path) -> bool:
-        """Take what is in a file into use, for the types of arguments that it is for, unless these are in use.
-
-        Returns False if the file is damaged.
-        """
+        """Add a file's kernel to the dispatcher if its argument types are new; return False if damaged."""
         code, context = _code(file), cpu_target.target_context
         if not self._enabled or code is None:
             return False
@@ -105,7 +100,7 @@ class KernelCache(_Cache):
         return True
 
     def save_overload(self, sig: object, data: Any) -> None:
-        """Write a kernel into its folder; if that is impossible, note it in `unkept`."""
+        """Write a kernel to the folder; if that is impossible, note it in `unkept`."""
         if not self._enabled or not self._content.check_cachable(data):
             return
         code = to_bytes(data)
@@ -135,7 +130,7 @@ class KernelCache(_Cache):
         return f"{self.name}.{self.sources}-{machine}-{_short(str(sig))}.kernel"
 
     def _forget_older(self, written: Path) -> None:
-        """Remove what this kernel was before its sources changed, on this machine; others may use the latest."""
+        """Remove older versions of this kernel on this machine, except the latest, which others may use."""
         same = written.parent.glob(f"{self.name}.*-{written.name.split('-')[-2]}-*.kernel")
         with contextlib.suppress(OSError):  # another process removes some
             others = [file for file in same if self.sources not in file.name]
@@ -143,17 +138,17 @@ class KernelCache(_Cache):
 
 
 class _Content(CompileResultCacheImpl):
-    """How numba turns a compiled function into something to write, and back; where to is ours."""
+    """numba's conversion of a compiled function; the base would also search for a folder to write to."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        # As the base does, without a search for a folder: both are for warnings.
+        # The base's constructor without its search for a folder; numba shows both values in warnings.
         self._lineno = function.__code__.co_firstlineno
         self._py_file = function.__code__.co_filename
         self._locator = self
 
 
 def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
-    """Return those of some kernels of which there is machine code for this processor, with its files."""
+    """Return those of some kernels for which there is machine code for this processor, with the files."""
     machines, listed, real = _machines(cpu_target.target_context), cache(_listed), cache(_real)
 
     def there(kernel: KernelCache, folder: Path) -> list[Path]:
@@ -163,7 +158,7 @@ def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
             for machine in machines
             for file in listing.get(f"{kernel.name}.{kernel.sources}-{machine}", ())
         ]
-        # A folder without such files is nobody's concern, whoever can write there.
+        # A folder without such files is not used, so it does not matter who can write there.
         place = real(folder) if files else None
         return [] if place is None else [place / file for file in files if _may_be_loaded(place / file)]
 
@@ -172,16 +167,13 @@ def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
 
 
 def load_all(some: "Iterable[KernelCache]") -> bool:
-    """Load all machine code of some kernels that is on disk, so that no call does, which takes milliseconds each.
-
-    Returns whether none was damaged.
-    """
+    """Load all machine code of some kernels, so that no call has to (milliseconds); return False if damaged."""
     loaded = [kernel.load_file(file) for kernel, files in held(some).items() for file in files]
     return all(loaded)
 
 
 def _listed(folder: Path) -> dict[str, list[str]]:
-    """Return the names of a folder's files, each below its beginning, which tells all but types."""
+    """Return the names of a folder's files, grouped by the part of the name before the argument types."""
     found: dict[str, list[str]] = {}
     with contextlib.suppress(OSError):
         for file in os.listdir(folder):  # noqa: PTH208  fast
@@ -204,20 +196,20 @@ def _may_be_loaded(file: Path) -> bool:
 
 
 def own_folder() -> Path:
-    """Return the folder in which machine code is kept: NUMBA_CACHE_DIR, or a folder in the user's cache."""
+    """Return the folder for new machine code: NUMBA_CACHE_DIR, or a folder in the user's cache."""
     return Path(
         config.CACHE_DIR or Path(AppDirs(appname="tvist", appauthor=False).user_cache_dir) / "kernels"
     )
 
 
 def places() -> list[Path]:
-    """Return the folders in which machine code is looked for, in this order."""
+    """Return the folders in which machine code is searched, in this order."""
     shipped = top(SHIPPED)
     return [own_folder(), *([] if shipped is None else [shipped.parent])]
 
 
 def _machines(target_context: Any) -> list[str]:
-    """Hashes of processors whose machine code runs here, this one first, each with what compiles and loads for it."""
+    """Hashes of compiler versions and of each processor whose machine code runs here, this one first."""
     python = (sys.implementation.cache_tag, getattr(sys, "abiflags", ""))
     versions = (FORMAT, python, numba.__version__, llvmlite.__version__)
     own = target_context.codegen().magic_tuple()
@@ -235,7 +227,7 @@ def _code(file: Path) -> bytes | None:
 
 
 def _read(file: Path) -> bytes | None:
-    """Return what is in a file; None if there is none, or somebody else may have written it."""
+    """Return a file's content; None if there is none, or somebody else may have written it."""
     with _trusting(file.parent):
         file.lstat()
         return trust.read_file(trust.real_folder(file.parent) / file.name)
@@ -244,12 +236,12 @@ def _read(file: Path) -> bytes | None:
 
 @contextlib.contextmanager
 def _trusting(folder: Path) -> Iterator[None]:
-    """Leave out what is not there, and, with a warning, what somebody else may have written into a folder."""
+    """Suppress errors for missing files; for files that somebody else may have written, warn and suppress."""
     try:
         yield
     except trust.DistrustError as error:
         why = f"{error}, or delete {folder}; until then they are compiled again"
-        # Once; processes that help leave it to the one that they help.
+        # Only once, and only in the main process.
         if why not in _said and multiprocessing.parent_process() is None:
             _said.add(why)
             warnings.warn(
@@ -265,11 +257,11 @@ def _write(file: Path, content: bytes) -> None:
     file = trust.make_folder(file.parent) / file.name
     draft = file.with_name(f"{uuid.uuid4().hex}.draft")
     try:
-        # Whatever the umask, nobody else can write it.
+        # With any umask, nobody else can write it.
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
         with open(os.open(draft, flags, 0o644), "wb") as stream:  # noqa: PTH123  a descriptor
             stream.write(content)
-        os.replace(draft, file)  # noqa: PTH105  whole, or not at all
+        os.replace(draft, file)  # noqa: PTH105  atomic
     except OSError:
         _remove([draft])
         raise
@@ -277,7 +269,7 @@ def _write(file: Path, content: bytes) -> None:
 
 def _remove(files: Iterable[Path]) -> None:
     for file in files:
-        with contextlib.suppress(OSError):  # another process did, or may not be disturbed
+        with contextlib.suppress(OSError):  # another process has removed it or is using it
             file.unlink()
 
 

@@ -7,13 +7,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F, *, nogil: bool = False) -> F:
-    """Compile a function at its first call; its Python source remains available as `.py_func`.
+    """Compile a function at its first call, keep the machine code on disk, and the source as `.py_func`.
 
-    The machine code is kept on disk, see `cache`.
-
-    Args:
-        function: The function; what it calls must be compiled, too.
-        nogil: Let other threads run while it runs.
+    All functions that it calls must be compiled, too. With `nogil`, other threads run while it runs.
     """
     try:
         from numba import njit
@@ -25,15 +21,15 @@ def compiled(function: F, *, nogil: bool = False) -> F:
 
     dispatcher: Any = njit(nogil=nogil)(function)
     template = dispatcher.get_call_template
-    # Each number that a kernel writes into a call is a type of its own to numba, which would compile for each of them.
+    # numba gives each literal in a call its own type, and would compile the called function once for each of them.
     dispatcher.get_call_template = lambda args, kws: template(tuple(map(unliteral, args)), kws)
-    # As njit(cache=True) does, with a cache of our own.
+    # As njit(cache=True) does, with another cache.
     dispatcher._cache = KernelCache(dispatcher.py_func, dispatcher)  # noqa: SLF001
     return cast("F", dispatcher)
 
 
 def inlined(function: F) -> F:
-    """Have a function compiled as a part of the one kernel that calls it, which takes less time than two kernels."""
+    """Have a function compiled as part of the only kernel that calls it, which is faster than two kernels."""
     try:
         from numba import njit
     except ImportError:

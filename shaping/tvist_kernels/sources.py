@@ -1,4 +1,4 @@
-"""What a kernel's machine code depends on among our own sources."""
+"""Find the project's own sources on which a kernel's machine code depends."""
 
 import hashlib
 import re
@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 OURS = "tvist_"
-"""How the names of our packages begin."""
+"""Prefix of the names of the project's packages."""
 _IMPORT = re.compile(
     rf"^(?:from[ ]+({OURS}[\w.]+)[ ]+import[ ]+(\([^)]*\)|[^\n]*)|import[ ]+({OURS}[\w.]+))", re.MULTILINE
 )
@@ -15,10 +15,10 @@ _IMPORT = re.compile(
 
 @cache
 def digest(module: str) -> str:
-    """Return a hash of the contents of a module and of all modules of ours that it imports at its top, transitively.
+    """Return a hash of a module and of all modules of the project that it imports at its top, transitively.
 
-    The machine code of a kernel contains that of the kernels which it calls, and the values of constants, wherever
-    they are from. A module that is imported within a function cannot add to it.
+    A kernel's machine code contains the kernels that it calls and the values of constants, from whatever module. A
+    module that is imported within a function cannot contribute to it.
     """
     found: set[str] = set()
     waiting = [module]
@@ -35,7 +35,7 @@ def digest(module: str) -> str:
 
 @cache
 def _read(module: str) -> tuple[str, tuple[str, ...]]:
-    """Return the hash of a module's source, and the modules of ours that it imports at its top."""
+    """Return the hash of a module's source, and the modules of the project that it imports at its top."""
     file = _file(module)
     if file is None:
         return "", ()
@@ -46,7 +46,7 @@ def _read(module: str) -> tuple[str, tuple[str, ...]]:
         package = _file(origin) if origin else None
         if package is None or package.name != "__init__.py":
             continue
-        # `from package import name`: the name may be that of a module.
+        # In `from package import name`, the name may be a module.
         for name in re.findall(r"^\s*\(?\s*(\w+)|,\s*(\w+)", names):
             inner = f"{origin}.{name[0] or name[1]}"
             if _file(inner) is not None:
@@ -56,7 +56,7 @@ def _read(module: str) -> tuple[str, tuple[str, ...]]:
 
 @cache
 def _file(module: str) -> Path | None:
-    """Return the file of a module, found without importing it; None if there is none."""
+    """Return the file of a module without importing it; None if there is none."""
     package, *inner = module.split(".")
     place = top(package)
     if place is None:
@@ -69,6 +69,6 @@ def _file(module: str) -> Path | None:
 
 @cache
 def top(package: str) -> Path | None:
-    """Return the first file of a package that stands in none; None if it is not installed."""
+    """Return the `__init__` file of a top-level package; None if it is not installed."""
     spec = find_spec(package)
     return None if spec is None or spec.origin is None else Path(spec.origin)

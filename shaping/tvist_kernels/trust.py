@@ -1,4 +1,4 @@
-"""Whether what lies in a folder can be run: nobody but this user and root can have put it there."""
+"""Check that only this user and root can have written a file, before its code is run."""
 
 import errno
 import os
@@ -9,24 +9,20 @@ from pathlib import Path
 
 
 class DistrustError(OSError):
-    """Someone else can write a file, or into its folder; the message names the place, its owner or mode, the remedy."""
+    """Someone else can write a file or its folder; the message has the place, owner, mode and remedy."""
 
 
 def real_folder(folder: Path) -> Path:
-    """Return where a folder into which nobody else can put a file, now or later, really is; it need not exist yet.
+    """Resolve a folder into which nobody else can put a file, now or later; it need not exist yet.
 
-    Each folder on the way, looked at from the root down, keeps what is below it in its place: nobody else can exchange
-    it between this look and what follows, as somebody could exchange a link to it. A folder that everybody can write
-    in, such as /tmp, does so if it is sticky.
-
-    Raises:
-        DistrustError: It is not this user's or root's alone.
-        OSError: It cannot be looked at.
+    Folders are checked from the root down, because each protects the ones below it: nobody else can replace them after
+    the check, as somebody could replace a link. A folder that everybody can write in, such as /tmp, protects them if it
+    is sticky. Raise DistrustError if others can write there, and OSError if it cannot be inspected.
     """
     real = Path(os.path.realpath(folder))
-    if sys.platform == "win32":  # where folders have no such owners and modes
+    if sys.platform == "win32":  # folders have no such owners and modes there
         return real
-    # In a container without root, the root of all folders may belong to somebody else.
+    # In a rootless container, / may belong to somebody else.
     holders = {0, os.geteuid(), Path("/").stat().st_uid}
     with suppress(FileNotFoundError):
         for place in (*reversed(real.parents), real):
@@ -37,13 +33,11 @@ def real_folder(folder: Path) -> Path:
 
 
 def read_file(file: Path) -> bytes:
-    """Read a file that nobody but this user and root can have written; its folder is a `real_folder`.
+    """Read a file in a `real_folder`; raise DistrustError if somebody else owns it or can write it.
 
-    Raises:
-        DistrustError: Somebody else owns it or can write it.
-        OSError: It cannot be read, or is a link.
+    Raise OSError if it cannot be read or is a link.
     """
-    # What has been opened is looked at, not what has this name a moment before. No pipe can hold this process up.
+    # Check the opened file, not the name, which may change in between. O_NONBLOCK: a pipe must not block this process.
     flags = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
     with open(os.open(file, os.O_RDONLY | flags), "rb") as stream:  # noqa: PTH123  a descriptor
         if sys.platform != "win32":
@@ -52,30 +46,24 @@ def read_file(file: Path) -> bytes:
 
 
 def check_file(file: Path) -> None:
-    """Check, as a look that `read_file` repeats, that nobody but this user and root can have written a file.
-
-    Raises:
-        DistrustError: Somebody else owns it or can write it.
-        OSError: It is not there, or is a link.
-    """
+    """Do the check of `read_file`, which repeats it, without reading; raise the same errors."""
     if sys.platform != "win32":
         found = file.lstat()
-        if stat.S_ISLNK(found.st_mode):  # whose mode says nothing
+        if stat.S_ISLNK(found.st_mode):  # the mode of a link says nothing about its target
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(file))
         _check(file, found, {0, os.geteuid()}, sticky=False)
 
 
 def make_folder(folder: Path) -> Path:
-    """Make a folder, and those above it, in which this user alone can write, and return where it really is.
+    """Make a folder and its parents so that only this user can write there; return its resolved path.
 
-    Raises:
-        DistrustError: It is there already, or is to be made where somebody else can write.
-        OSError: It cannot be made.
+    Raise DistrustError if it exists already, or would be, where somebody else can write, and OSError if it cannot be
+    made.
     """
     real = real_folder(folder)
     for missing in reversed([one for one in (real, *real.parents) if not one.exists()]):
         missing.mkdir(mode=0o755, exist_ok=True)
-    return real_folder(real)  # somebody may have been quicker
+    return real_folder(real)  # another process may have made it first
 
 
 def _check(place: Path, found: os.stat_result, owners: set[int], *, sticky: bool) -> None:

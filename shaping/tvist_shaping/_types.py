@@ -10,16 +10,16 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 
 
 class Forked:
-    """Base of what can be run ahead in a copy, to predict what the original will do."""
+    """Base of objects that can be run ahead in a copy to predict what the original will do."""
 
     def fork(self) -> Self:
-        """Return an independent copy of the present state; use it in the same thread as the original.
+        """Return an independent copy of the present state, whose outputs for equal inputs have the same bits.
 
-        For equal inputs it gives the same bits as the original, and its use does not change the original.
+        Use it in the same thread as the original.
         """
         other = copy.copy(self)
         other._unshare()  # noqa: SLF001  one of its own kind
         return other
 
     def _unshare(self) -> None:
-        """Replace everything that is modified in place by copies, since a new copy still shares it."""
+        """Replace everything that is modified in place by copies."""

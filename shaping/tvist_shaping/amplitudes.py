@@ -35,7 +35,7 @@ def ripple(humps: int, V: float) -> Floats:
 
 
 def widening(humps: int, V: float) -> float:
-    """x₀ of `ripple`: the band ends where x₀ cos(π f/2f_d) = 1."""
+    """Return x₀ of `ripple`: the band ends where x₀ cos(π f/2f_d) = 1."""
     return math.cosh(math.acosh(1.0 / V) / (humps + 1))
 
 

@@ -1,4 +1,4 @@
-"""Base of all filters: a delay line, an estimator, and weights that depend on the modes."""
+"""Base class of all filters: a delay line, an estimator, and weights that depend on the modes."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -13,8 +13,10 @@ from tvist_shaping.errors import FilterError, ShaperFailureError, ShapingError
 from tvist_shaping.estimators.base import Estimator
 
 FeedForward: TypeAlias = Literal["rigid", "elastic", "elastic-position"]
-"""What a controller feeds forward to the drives: torques of the rigid arm; or positions, velocities and torques with
-which an elastic arm follows its reference; or of these only positions and velocities.
+"""What a controller feeds forward to the drives.
+
+"rigid": torques of the rigid arm; "elastic": positions, velocities and torques with which an elastic arm follows its
+reference; "elastic-position": only the positions and velocities of these.
 """
 Posture = Callable[[Floats], Floats]
 """Function from a sample, shape (width,), to the joint angles that it represents, shape (joints,) [rad]."""
@@ -24,8 +26,8 @@ class Filter(Forked, ABC):
     """Time-varying shaping of a sampled reference, one filter for all joints.
 
     A sample consists of the joint angles, or of the parameter of a path that the joints follow (see `reset`). In the
-    second case the shaped sample is also a parameter, so the shaped reference stays on the path, however that curves.
-    The modes are always evaluated at the joint angles that the shaped sample represents.
+    second case the shaped sample is also a parameter, so the shaped reference stays on the path, whatever its
+    curvature. The modes are always evaluated at the joint angles that the shaped sample represents.
 
     Attributes:
         name: Name of the filter's shaper or design.
@@ -36,10 +38,9 @@ class Filter(Forked, ABC):
         zeta: Damping ratios in use [-], shape (modes,).
         excess: Share by which the shaped acceleration may exceed the reference's, if such a bound is known and small
             [-]. The generator of the reference can stay below its limit by this share.
-        surplus: Shares by which the shaped velocity and acceleration may exceed those of a reference at the arm's
-            limits, anywhere [-]; who knows the arm sets them, see `mean_delay_of`.
-        clipped: Whether the filter was limited at the last tick: a delay exceeded the buffer, or a mode was outside
-            its estimator's bounds.
+        surplus: Largest shares by which the shaped velocity and acceleration exceed those of a reference at the arm's
+            limits [-]. Only the caller, who knows the arm, can set them; see `mean_delay_of`.
+        clipped: Whether a delay exceeded the buffer, or a mode its estimator's bounds, at the last tick.
         feed_forward: Feed-forward that the drives need for the filter to work as designed.
         fault: Why the shaper's function failed in its last call; None if it did not. A filter cannot stop abruptly
             during a motion, so it continues with its last weights, and the caller should stop the motion.
@@ -58,7 +59,7 @@ class Filter(Forked, ABC):
     fault: str | None
 
     def __init__(self, name: str, estimator: Estimator, joints: int, period: float, capacity: int) -> None:
-        """Initialize the common parts of all filters; a derived class then calls `reset`."""
+        """Initialize what all filters have in common; a derived class then calls `reset`."""
         if joints < 1:
             raise FilterError("joints", joints, "at least 1")
         if not 0.0 < period < np.inf:
@@ -78,12 +79,12 @@ class Filter(Forked, ABC):
     @property
     @abstractmethod
     def delay(self) -> float:
-        """Time of the last tick's last weight [s], by which the shaped reference ends later."""
+        """Time of the last tick's last weight [s]; the shaped reference ends later by this time."""
 
     @property
     @abstractmethod
     def mean_delay(self) -> float:
-        """Mean delay of the last tick's weights [s], which is the lag behind a reference of constant velocity."""
+        """Mean delay of the last tick's weights [s]: the lag behind a reference of constant velocity."""
 
     def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:  # noqa: ARG002  unless overridden
         """Mean delay of the weights for modes [s]; None if it is the same for all.
@@ -137,20 +138,17 @@ class Filter(Forked, ABC):
         self._start()
 
     def aim(self, q: npt.ArrayLike | None) -> None:
-        """Set where the motion that begins now will end; the reference must be at rest.
+        """Set where the motion that starts now will end; the reference must be at rest.
 
         Args:
-            q: Sample at the end, shape (width,); None if it is not known, as in a stream.
+            q: Sample at the end, shape (width,); None if it is unknown, as in a stream.
         """
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
-        """Shape one sample.
+        """Shape one sample; return the shaped reference x*_i, shape (width,), as a new array.
 
         Args:
             q_ref: Reference x_i, shape (width,), finite: joint angles [rad], or the parameter of a path.
-
-        Returns:
-            Shaped reference x*_i, shape (width,), as a new array.
 
         Raises:
             ShapingError: q_ref has another shape.
@@ -160,13 +158,10 @@ class Filter(Forked, ABC):
         return self._q_star.copy()
 
     def filter_all(self, q_ref: npt.ArrayLike) -> Floats:
-        """Shape many samples, one by one as `filter` does, with the same result to the last bit.
+        """Shape many samples one by one, as `filter` does, with the same bits; return x*_i, shape (T, width).
 
         Args:
             q_ref: References x_i, one for each tick, shape (T, width), finite.
-
-        Returns:
-            Shaped references x*_i, shape (T, width).
 
         Raises:
             ShapingError: The samples have another shape.
@@ -190,10 +185,10 @@ class Filter(Forked, ABC):
         return self._line.newest(self._line.capacity)
 
     def _modes(self) -> tuple[Floats, Floats]:
-        """Modes at the last shaped reference: followed in motion, computed anew where all weights give the same.
+        """Return the modes at the last shaped reference: followed during motion, computed anew at rest.
 
-        This is the case if the part of the delay line that weights may use contains a single value, and did so a tick
-        ago, so that the shaped reference rests at that value.
+        The reference counts as at rest if the part of the delay line that weights may use contains a single value, and
+        did so one tick ago.
         """
         q = self._angles(self._q_star)
         return self.estimator.settle(q) if self.settled else self.estimator.estimate(q)
@@ -207,12 +202,12 @@ class Filter(Forked, ABC):
         self._line, self._q_star = DelayLine(width, self._line.capacity), np.zeros(width)
 
     def _check_made(self) -> None:
-        """Refuse a shaper that fails at once, since there are no weights yet to continue with."""
+        """Raise ShaperFailureError if the shaper fails at the start, when no weights exist to continue with."""
         if self.fault is not None:
             raise ShaperFailureError(self.name, self.fault)
 
     def take_over(self, other: "Filter") -> None:
-        """Continue from another filter: with the reference that it was given, and from its last shaped sample.
+        """Continue from another filter's delay line and last shaped sample.
 
         Args:
             other: Filter to continue from; it is not changed.

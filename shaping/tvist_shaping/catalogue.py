@@ -44,17 +44,14 @@ _ENTRIES = (
     _entry("ei3_exact", "ei3 with humps of 5 % for any damping", exact.ei3_exact, exact.EI3),
 )  # fmt: skip
 SHAPERS: Mapping[str, Shaper] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
-"""The catalogue, shortest first."""
+"""All catalogued shapers by name, shortest first."""
 
 
 def shaper(name: str) -> Shaper:
-    """Look up a shaper by its name.
+    """Return the shaper of a name.
 
     Args:
         name: One of `SHAPERS`.
-
-    Returns:
-        The shaper.
 
     Raises:
         UnknownShaperError: There is no shaper of that name; the error lists all names and the most similar one.

@@ -1,9 +1,8 @@
 """A delay line with fractional delays, so that impulses can lie between two ticks.
 
 If delays were rounded to ticks, the shaped reference would jump whenever a delay changes by one tick (Fig. 7 of the
-paper); with interpolation it changes smoothly. Lagrange interpolation through four samples is used: it has no state,
-so a delay may change at every tick without a transient, and it reproduces cubics exactly (the paper's source for
-fractional delays is Laakso et al., 1996).
+paper). Lagrange interpolation through four samples makes it smooth. It has no state, so a delay may change at every
+tick without a transient, and it reproduces cubics exactly (for fractional delays, see Laakso et al., 1996).
 """
 
 import numpy as np
@@ -14,15 +13,15 @@ from tvist_shaping._types import Floats, Forked
 from tvist_shaping.errors import DelayError, ShapingError
 
 _MARGIN = 3
-"""Number of samples that a delay needs beyond itself: two older ones for interpolation, and the newest with delay 0."""
+"""Samples needed beyond a delay: two older ones for interpolation, and the newest with delay 0."""
 
 
 @compiled
 def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats, out: Floats) -> int:
     """Compute a weighted sum of delayed samples; the formula is in `DelayLine.gather`.
 
-    The buffer is a ring of samples, shape (capacity, joints), whose row `newest` is the newest one. `out` is
-    written only if -1 is returned, otherwise the index of the first delay that exceeds the buffer.
+    The buffer is a ring, shape (capacity, joints); `newest` is the row of the newest sample. Return -1, or the index of
+    the first delay that exceeds the buffer; `out` is then unchanged.
     """
     capacity, joints = buffer.shape
     for j in range(A.shape[0]):
@@ -133,7 +132,7 @@ class DelayLine(Forked):
         """
         sample = np.asarray(q, dtype=float)
         if sample.shape != self._shape:
-            sample = self._sample(q)  # which says what is wrong
+            sample = self._sample(q)  # raises the error
         head = self.head = (self.head + 1) % self.capacity
         self.ring[head] = sample
         bits = sample.tobytes()  # the fastest comparison
@@ -141,7 +140,7 @@ class DelayLine(Forked):
         self._bits = bits
 
     def pushed(self, samples: Floats, head: int) -> None:
-        """Note samples that a kernel has appended already."""
+        """Update the state after a kernel has appended samples to the ring."""
         rows = [sample.tobytes() for sample in samples[-self.capacity :]]
         equal = 0
         for bits in reversed(rows):
@@ -153,7 +152,7 @@ class DelayLine(Forked):
         self.head, self._bits = head, rows[-1]
 
     def newest(self, count: int) -> Floats:
-        """The latest samples, oldest first, shape (count, joints); count is at most the capacity."""
+        """Return the latest samples, oldest first, shape (count, joints); count is at most the capacity."""
         ages = np.arange(count - 1, -1, -1)
         return self.ring[(self.head - ages) % self.capacity]
 

@@ -1,4 +1,4 @@
-"""Designs of taps that are made of others: for a known end of a motion, and smoothed; and constant taps."""
+"""Designs built from other designs (smoothed, or with a known end of the motion), and constant taps."""
 
 import math
 
@@ -8,20 +8,20 @@ from tvist_shaping._types import Floats
 from tvist_shaping.steady import Design, ShortDesign
 
 AT_TARGET = 3
-"""Number of modes, from the lowest on, that have a zero-vibration shaper in a motion with a known end."""
+"""Number of modes, from the lowest, that get a zero-vibration shaper in a motion with a known end."""
 LONGEST = 0.26
-"""Longest time of these shapers together, as long as the other design is not slowed down [s]."""
+"""Longest total time of these shapers, unless the design is slowed down [s]."""
 
 
 class TargetDesign(Design):
-    """One design for motions without a known end, and for the others zero-vibration shapers for the modes there.
+    """Zero-vibration shapers for the modes at a known end of a motion, and another design for other motions.
 
-    The weights are constant in a motion with a known end, so they need no constant mean delay, which costs a lightly
-    damped arm most of its reduction.
+    With a known end the weights are constant, so they need no constant mean delay, which would cost a lightly damped
+    arm most of its reduction.
     """
 
     def __init__(self, design: ShortDesign, slower: float = 1.0) -> None:
-        """Create a design from one that no other filter has, for an arm by which all times are longer."""
+        """Create it from a design that no other filter uses; `slower` multiplies all times, for a slow arm."""
         self.name, self.modes, self.period = design.name, design.modes, design.period
         self.taps = math.ceil(LONGEST * slower / self.period) + 3
         self._design = design
@@ -41,7 +41,7 @@ class TargetDesign(Design):
     def at_target(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Compute the taps for the modes at the end of a motion.
 
-        Impulses between two ticks are shared by both, so that no tap is negative and all limits are kept exactly.
+        An impulse between two ticks is shared linearly by both, so no tap is negative and all limits are kept exactly.
         """
         sizes, ticks = np.ones(1), np.zeros(1)
         for f, z in zip(f_d[:AT_TARGET], zeta[:AT_TARGET], strict=True):
@@ -60,7 +60,7 @@ class TargetDesign(Design):
 
 
 class SmoothedDesign(Design):
-    """The taps of another design, which no other filter has, followed by constant weights with sum 1."""
+    """The taps of another design, which no other filter uses, convolved with constant weights of sum 1."""
 
     def __init__(self, design: Design, weights: Floats, name: str) -> None:
         self.name, self.modes, self.period, self.peak = name, design.modes, design.period, design.peak
@@ -87,7 +87,7 @@ class SmoothedDesign(Design):
 
 
 class ConstantDesign(Design):
-    """Constant weights, none negative, with sum 1: feed-forward of the arm's elasticity does the rest."""
+    """Constant non-negative weights with sum 1; elastic feed-forward suppresses the vibration."""
 
     constant = True
 
@@ -99,13 +99,13 @@ class ConstantDesign(Design):
         return f"ConstantDesign({self.name!r}, {self.taps} weights)"
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:  # noqa: ARG002  the same for all modes
-        """Give the weights."""
+        """Return the weights."""
         taps[:] = self.weights
         return True
 
 
 def running_means(*ticks: int) -> Floats:
-    """Weights of consecutive running means over numbers of ticks, shape (sum - count + 1,), with sum 1."""
+    """Return the weights of running means in series, of these numbers of ticks, shape (sum - count + 1,)."""
     weights: Floats = np.ones(1)
     for count in ticks:
         weights = np.convolve(weights, np.full(count, 1.0 / count))

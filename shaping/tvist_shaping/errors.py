@@ -1,4 +1,4 @@
-"""Errors, with one class for each condition; each has its data as attributes and a readable message.
+"""Errors, one class for each condition; each has its data as attributes and a readable message.
 
 ShapingError
 ├── ImpulseError          A and τ are not an impulse train
@@ -41,13 +41,7 @@ class ParameterError(ShapingError):
 
 
 class ShaperRangeError(ParameterError):
-    """A mode is outside the range of a shaper.
-
-    Attributes:
-        field: Name of the parameter, `f_d` or `zeta`.
-        value: Given value, f_d in [Hz], zeta in [-].
-        limit: Permitted range, in words.
-    """
+    """A mode is outside the range of a shaper: `field` is `f_d` [Hz] or `zeta` [-]; see `ParameterError`."""
 
 
 class UnknownShaperError(ShapingError):

@@ -1,19 +1,17 @@
 """Extra-insensitive shapers that are exact with damping: humps of height V, and V at f_d if a hump is there.
 
-`ripple` computes the undamped ones. With damping, neither their times nor their amplitudes are exact: with amplitudes
-multiplied by K^j they leave less than V, and their band is narrower than possible. Here the conditions themselves are
-solved. With N = humps + 2 impulses, T_d = 1, s = 2π(ζ/√(1-ζ²) + i), c = Re s, and r the ratio of true to design
-frequency,
+`ripple` computes the undamped ones. Multiplying their amplitudes by K^j for damping leaves less than V, in a band that
+is narrower than possible. Here the conditions themselves are solved. With N = humps + 2 impulses, T_d = 1, s =
+2π(ζ/√(1-ζ²) + i), c = Re s, and r the ratio of true to design frequency,
 
     E(r) = Σ A_j exp(r (s τ_j - c τ_N))    (|E| is the residual of `sensitivity`)
 
 has N - 1 zeros E = 0 and between them N - 2 humps |E| = V, d|E|/dr = 0; the middle one of all these is at r = 1.
-Together with ΣA = 1 there are as many equations as unknowns A_j, τ_j and r. They are solved from zero damping
-upwards.
+Together with ΣA = 1 there are as many equations as unknowns A_j, τ_j and r. They are solved from zero damping upwards.
 
-The damping is limited, because the highest zero moves up to infinity as damping increases. A shaper ends when this
-zero is at 1.8 times the design frequency. (Cubic fits in ζ to the shapers with two and three humps have been
-published, and are used in printer firmware, valid to 0.3 and 0.2; their times are in *undamped* periods.)
+As damping increases, the highest zero moves to infinity; a shaper's range ends when this zero is at 1.8 times the
+design frequency. (Cubic fits in ζ for two and three humps have been published and are used in printer firmware, valid
+to 0.3 and 0.2; their times are in *undamped* periods.)
 """
 
 import math
@@ -29,14 +27,13 @@ from tvist_shaping.newton import solve
 from tvist_shaping.tabulated import Tabulated
 
 HIGHEST_ZERO = 1.8
-"""Largest permitted frequency of the highest zero, relative to the design frequency [-]."""
+"""Largest permitted ratio of the highest zero to the design frequency [-]."""
 
 
 class HumpShaper:
     """The equations for a given number and height of humps."""
 
     def __init__(self, humps: int, V: float) -> None:
-        """Set up the equations."""
         self.humps, self.V, self.N = humps, V, humps + 2
         degree = humps + 1
         # Zeros and humps of Chebyshev's polynomial, which are those of the undamped shaper.
@@ -47,13 +44,13 @@ class HumpShaper:
         )
 
     def follow(self, zeta: float, near: Floats) -> tuple[Floats, Floats, Floats]:
-        """Unknowns, amplitudes [-] and times in damped periods [-] at ζ, from the unknowns at a nearby ζ."""
+        """Solve at ζ from the solution at a nearby ζ; return it, A [-] and τ in damped periods [-]."""
         x = solve(lambda points: self._equations(zeta, points), near)
         A, tau, _, _ = self._split(x[None])
         return x, A[0], tau[0]
 
     def limit(self) -> float:
-        """Highest damping ratio, to a hundredth [-]."""
+        """Return the highest damping ratio, to a hundredth [-]."""
         zeta, x = 0.0, self.start
         while zeta < 0.9:
             try:

@@ -7,11 +7,11 @@ that both keep. While s changes,
     ÿ = (1 - s) ö + s n̈ + 2 ṡ (ṅ - ȯ) + s̈ (n - o),
 
 so a fade of fixed duration would exceed the limits whenever the motion itself uses them fully. (Shortening the delay
-means playing the motion faster than it comes, which is impossible for a motion at its limits.) Hence s moves as fast
-as the motion leaves room for. It never moves faster than it could be stopped again if the motion took that room away
-at the jerk limit. If n lags behind o, s cannot be stopped until a joint that accelerates at its limit has reached its
-velocity limit, but it slows down by itself; its speed is then limited such that the fade does not end before that. If
-there is no room, s waits; when the reference is at rest, o and n agree and there is nothing left to fade.
+means playing the motion faster than it arrives, which is impossible for a motion at its limits.) Hence s moves as fast
+as the motion leaves room for, but never so fast that it could not be stopped if the motion then took that room away at
+the jerk limit. If n lags behind o, s cannot be stopped until a joint that accelerates at its limit has reached its
+velocity limit, but it slows down by itself; its speed is then limited such that the fade does not end before that.
+Without room, s waits. When the reference is at rest, o and n agree and nothing is left to fade.
 """
 
 import math
@@ -33,7 +33,7 @@ EQUAL = 1e-6
 STRAIGHT = 1e-6
 """Deviation of a joint from the straight line of the others that is tolerated, as a share of its largest step [-]."""
 QUICKEST = 0.3
-"""Shortest duration of a fade [s], however much room there is, since it has to be slow compared with the vibration."""
+"""Shortest duration of a fade [s], even with unlimited room: it must be slow compared with the vibration."""
 PUSH = 0.4
 """Share of the limits of acceleration and jerk that s uses to speed up, and to come to rest at 1 [-]."""
 STOP = 0.5
@@ -60,11 +60,10 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
 ) -> tuple[float, float, float]:
     """Compute one tick of a fade, and return its s, ṡ and s̈; s is 1 when the fade is complete.
 
-    `old` and `new` are the filters' outputs at the last three ticks, the present one last [rad], shape (3,
-    joints), and `out` the fade's, whose last row is written. `progress` is what the previous tick returned: s
-    [-], ṡ [1/s] and the requested rate of change of ṡ [1/s²]. `limits` are those of every joint: velocity
-    [rad/s], acceleration [rad/s²] and jerk of the motion [rad/s³]. `lag` is the excess of the new filter's
-    mean delay [s], and its rate of change [-].
+    `old` and `new` are the filters' outputs at the last three ticks, the present one last [rad], shape (3, joints), and
+    `out` the fade's, whose last row is written. `progress` is what the previous tick returned: s [-], ṡ [1/s] and s̈
+    [1/s²]. `limits` are the velocity [rad/s], acceleration [rad/s²] and jerk [rad/s³] of every joint. `lag` is how much
+    the new filter's mean delay is longer [s], and its rate of change [-].
     """
     share, rate, slope = progress
     velocity, acceleration, jerk = limits
@@ -107,7 +106,7 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
         old_qdd = (old[2, k] - 2.0 * old[1, k] + old[0, k]) / h2
         new_qdd = (new[2, k] - 2.0 * new[1, k] + new[0, k]) / h2
         old_qd, new_qd = (old[2, k] - old[1, k]) / period, (new[2, k] - new[1, k]) / period
-        # A filter with varying parameters may exceed the reference's limits by itself.
+        # A time-varying filter may exceed the reference's limits by itself.
         qdd_max = (1.0 + ROUNDING) * max(acceleration, abs(old_qdd), abs(new_qdd))
         qd_max = (1.0 + ROUNDING) * max(velocity, abs(old_qd), abs(new_qd))
         # The differences of the output are linear in s, so each limit is an interval of s.
@@ -126,13 +125,12 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
             room, size = min(room, counted - sign * qdd), turning
         brake, closed = min(brake, max(room, 0.0) / size), min(closed, max(room, 0.0) / jerk)
         # A longer delay holds the joint back. While the joint accelerates at its limit, d grows and s slows down by
-        # itself, as 1/d², which uses none of the joint's acceleration. This lasts until the joint is at its highest
-        # velocity, which has to be before s is 1.
+        # itself, as 1/d², without using the joint's acceleration, until the joint is at its velocity limit. That has
+        # to happen before s is 1.
         lasts = max(qd_max + sign * qd, 0.0) / acceleration + 2.0 * acceleration / jerk
         grows = (later + min(drift, 0.0) * lasts) * acceleration - qd_max * abs(drift)  # |ḋ| at the least
         shrinks = sign * qdd < 0.0 and sign * (new_qd - old_qd) < -1e-4 * velocity
-        # Joints off a common straight line may block s one after the other, so the end of the fade would be
-        # uncertain.
+        # Joints off a common straight line may block s one after the other, so the fade's end would be uncertain.
         aside = (
             abs(d * along - (new[2, first] - old[2, first]) * (new[2, k] - new[0, k]))
             > STRAIGHT * widest * velocity * period
@@ -168,13 +166,13 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
 
 
 class Fade(Forked):
-    """Shapes like one filter at the beginning, like another at the end, and keeps a motion's limits in between.
+    """Shapes like one filter first and like another in the end, and keeps a motion's limits in between.
 
     As long as the reference keeps limits of velocity, acceleration and jerk, the output keeps those of velocity and
     acceleration. If one of the filters exceeds them by itself, as time-varying ones slightly do, the output exceeds
-    them by no more than that filter. All joints fade together, so a straight line stays straight. The duration
-    depends on the motion; the fade is complete at the latest when the reference has been at rest for the duration of
-    both filters.
+    them by no more than that filter. All joints fade together, so a straight line stays straight. The duration depends
+    on the motion; the fade is complete at the latest when the reference has been at rest for the duration of both
+    filters.
 
     Attributes:
         old: Filter at the beginning.
@@ -229,17 +227,7 @@ class Fade(Forked):
             self.new.estimator = self.old.estimator
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
-        """Shape one sample.
-
-        Args:
-            q_ref: Reference x_i, shape (width,), finite: joint angles [rad], or the parameter of a path.
-
-        Returns:
-            Shaped reference x*_i, shape (width,), as a new array.
-
-        Raises:
-            ShapingError: q_ref has another shape.
-        """
+        """Shape one sample; see `Filter.filter`."""
         if self.finished:
             return self.new.filter(q_ref)
         history = self._history

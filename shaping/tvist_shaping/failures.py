@@ -1,4 +1,4 @@
-"""Failures of a shaper's function, and their descriptions."""
+"""Describe failures of a shaper's function."""
 
 from pathlib import Path
 from traceback import walk_tb
@@ -8,9 +8,9 @@ from tvist_shaping._types import Floats
 from tvist_shaping.errors import ShaperFailureError
 
 FAILURES: Final = (Exception, SystemExit)
-"""Exceptions that a user's function may raise; Control+C is not among them."""
+"""Exceptions that a user's function may raise; KeyboardInterrupt is not among them."""
 ROUNDING: Final = 1e-6
-"""Share by which a value may exceed its shaper's declaration, because of rounding [-]."""
+"""Share by which rounding may let a value exceed its shaper's declaration [-]."""
 _HERE: Final = Path(__file__).parent
 
 
@@ -21,7 +21,7 @@ def failure(error: BaseException, f_d: Floats, zeta: Floats) -> str:
 
 
 def words(error: BaseException) -> str:
-    """Return a phrase to follow a shaper's name: `raises ValueError: …`, or what is wrong with its result."""
+    """Describe an error as a phrase to follow a shaper's name, e.g. `raises ValueError: …`."""
     if isinstance(error, ShaperFailureError):
         return error.why
     said = " ".join(str(error).split())[:200]
@@ -30,7 +30,7 @@ def words(error: BaseException) -> str:
 
 
 def _place(error: BaseException) -> str:
-    """Return where the user's file raised an error, as a phrase: the last line of the first file that is not ours."""
+    """Return where the user's file raised an error, as a phrase: the last line in the first foreign file."""
     lines: dict[str, int] = {}
     for frame, line in walk_tb(error.__traceback__):
         file = frame.f_code.co_filename

@@ -17,9 +17,9 @@ from tvist_shaping.own import longest as longest_of
 from tvist_shaping.shaper import Shaper
 
 EASE = 40.0
-"""Natural frequency of the low-pass through which modes pass that may change abruptly [1/s]."""
+"""Natural frequency of the low-pass for modes that may change abruptly [1/s]."""
 QUICKEST = (1.0, 0.2)
-"""Largest relative rate of change of the frequency behind it, and largest rate of change of ζ [1/s]."""
+"""Largest relative rate of change of f_d after the low-pass, and largest rate of change of ζ [1/s]."""
 
 
 class TvistFilter(Filter):
@@ -37,8 +37,8 @@ class TvistFilter(Filter):
     Attributes:
         shaper: The shaper.
         max_delay: Longest delay for which samples are kept [s].
-        clipped: Whether one of them was clamped to the estimator's `f_d_min` or `zeta_max`. Delays are never clipped,
-            since the constructor refuses combinations that could exceed max_delay.
+        clipped: Whether a mode was clamped to the estimator's `f_d_min` or `zeta_max`. Delays are never clipped, since
+            the constructor refuses combinations that could exceed max_delay.
     """
 
     shaper: Shaper
@@ -120,7 +120,7 @@ class TvistFilter(Filter):
 
     @property
     def delay(self) -> float:
-        """Time of the last tick's last impulse [s], by which the shaped reference ends later."""
+        """Time of the last tick's last impulse [s]; the shaped reference ends later by this time."""
         return self._work.item(1, -1) if self._impulses is None else self._impulses.duration
 
     @property
@@ -129,26 +129,23 @@ class TvistFilter(Filter):
         return self.impulses.mean_delay
 
     def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:
-        """See `Filter.mean_delay_of`: the modes' mean delays add up."""
+        """Sum of the modes' mean delays [s]; see `Filter.mean_delay_of`."""
         give = self.shaper.impulses
         return sum(give(f, z).mean_delay for f, z in zip(f_d.tolist(), zeta.tolist(), strict=True))
 
     @property
     def peak(self) -> float:
-        """See `Filter.peak`: the product of the shaper's own, once for each mode."""
+        """Product of the shaper's peak, once for each mode [-]; see `Filter.peak`."""
         return float(self.shaper.peak**self.estimator.modes)
 
     def replace(self, *, shaper: Shaper | None = None, estimator: Estimator | None = None) -> "TvistFilter":
-        """Return a filter with another shaper or estimator that continues from the state of this one.
+        """Return another filter, with a new shaper or estimator, that continues from the state of this one.
 
-        During a motion its output differs from this one's; `Fade` provides a smooth transition.
+        During a motion the outputs of both differ; `Fade` provides a smooth transition.
 
         Args:
             shaper: Another shaper; None for the same.
             estimator: Another estimator; None for a fork of the same.
-
-        Returns:
-            The new filter; this one is not changed.
 
         Raises:
             FilterError: Shaper and estimator do not fit together, as in the constructor.
@@ -169,7 +166,7 @@ class TvistFilter(Filter):
         self._suppress(modes)
 
     def _modes(self) -> tuple[Floats, Floats]:
-        """See `Filter._modes`; modes that may change abruptly are followed gradually, which keeps the limits."""
+        """Return the modes, through a low-pass if they may change abruptly, which keeps the limits."""
         modes = super()._modes()
         if not self.estimator.abrupt:
             return modes
@@ -180,7 +177,6 @@ class TvistFilter(Filter):
         return self._eased[0].copy(), self._eased[1].copy()
 
     def _suppress(self, modes: tuple[Floats, Floats]) -> None:
-        """Set the impulses for these modes."""
         self.f_d, self.zeta = modes
         self.clipped = self.estimator.clipped
         try:
@@ -191,7 +187,6 @@ class TvistFilter(Filter):
             self.fault = None
 
     def _computed(self) -> Impulses:
-        """Compute the shaper's impulses for the present modes."""
         give, f_d, zeta = self.shaper.impulses, self.f_d, self.zeta
         if len(f_d) == 1:  # the usual case, faster without lists
             impulses = give(f_d.item(), zeta.item())
@@ -204,7 +199,7 @@ class TvistFilter(Filter):
         return impulses
 
     def _weigh(self) -> None:
-        """Compute this tick's impulses for the modes at the last shaped reference (z⁻¹ in Figure 8), and apply them."""
+        """Apply this tick's impulses, for the modes at the last shaped reference (z⁻¹ in Figure 8)."""
         line, estimator, train = self._line, self.estimator, self._train
         if train is not None and type(estimator) is Polynomial:
             mode = np.empty((2, 1))
@@ -228,7 +223,7 @@ class TvistFilter(Filter):
         line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)
 
     def filter_all(self, q_ref: npt.ArrayLike) -> Floats:
-        """Shape many samples; see `Filter.filter_all`. With the paper's estimator this takes one compiled call."""
+        """Shape many samples in one compiled call, with the paper's estimator; see `Filter.filter_all`."""
         estimator, line, train = self.estimator, self._line, self._train
         samples = np.ascontiguousarray(q_ref, dtype=float)
         fits = samples.ndim == 2 and samples.shape[1:] == (line.joints,) and len(samples) > 0

@@ -1,9 +1,8 @@
-"""What the TVIST filter computes in a tick, compiled.
+"""Compiled computations of the TVIST filter in a tick.
 
-`ring`, `head` and `scratch` are those of a `DelayLine`; `train` has the amplitudes without damping [-] and
-the times in damped periods [-], shape (2, N); `impulses` receives amplitudes [-], times [s] and times in
-ticks, shape (3, N); `joints` to `ranges` are the `Coefficients` of a `Polynomial`; `longest` is the longest
-delay [s].
+`ring`, `head` and `scratch` are those of a `DelayLine`; `train` has the amplitudes without damping [-] and the times in
+damped periods [-], shape (2, N); `impulses` receives amplitudes [-], times [s] and times in ticks, shape (3, N);
+`joints` to `ranges` are the `Coefficients` of a `Polynomial`; `longest` is the longest delay [s].
 """
 
 import numpy as np
@@ -24,10 +23,10 @@ LOWEST, HIGHEST = F_D_RANGE
 def eased(
     f_d: Floats, zeta: Floats, ease: float, quickest: tuple[float, float], period: float, state: Floats
 ) -> None:
-    """Advance a critically damped low-pass of second order by one tick; its rates of change are limited.
+    """Advance a critically damped second-order low-pass, whose rates of change are limited, by one tick.
 
-    `state` has frequencies [Hz] and damping ratios [-] that follow the given ones, and their rates of change,
-    shape (4, modes); `ease` is the natural frequency [1/s], and `quickest` limits the rates, see `QUICKEST`.
+    `state`, shape (4, modes), has the filtered f_d [Hz] and ζ [-] and their rates of change; `ease` is the natural
+    frequency [1/s], and `quickest` limits the rates, see `QUICKEST`.
     """
     for k in range(f_d.shape[0]):
         for row in range(2):
@@ -52,9 +51,9 @@ def shape(
     scratch: Floats,
     out: Floats,
 ) -> bool:
-    """Compute the impulses of a mode, and apply them to a delay line.
+    """Compute a mode's impulses and apply them to a delay line; return False if mode or delays are out of range.
 
-    Return whether the mode is in range and the delays are short enough; otherwise `out` is not changed.
+    In that case `out` is not changed.
     """
     f, z = f_d[0], zeta[0]
     if not (LOWEST <= f <= HIGHEST and 0.0 <= z < zeta_max):
@@ -85,10 +84,10 @@ def weigh(
     q_star: Floats,
     modes: Floats,
 ) -> int:
-    """Estimate the paper's mode at the joint angles q of the last shaped sample, and apply its impulses.
+    """Estimate the mode with the paper's polynomials at the last shaped sample, and apply its impulses.
 
-    The next sample replaces q_star if the mode, which `modes` receives, is in range. Return 1 if the estimate
-    was clamped, 0 if not; the same minus 2 if the mode is out of range.
+    `q` are the joint angles of that sample. If the mode, written to `modes`, is in range, the next sample replaces
+    q_star. Return 1 if the estimate was clamped, 0 if not; the same minus 2 if the mode is out of range.
     """
     clamped = evaluate(q, joints, centre, multiples, coefficients, ranges, modes)
     found = 1 if clamped else 0

@@ -9,9 +9,9 @@ The programme minimises this residual and the energy in the weights, for a given
     min  ρ T/(2 h₀) Σ h_n²/g_n + ½ Σ_k w_k |E_k|²     over h ≥ 0, Σ h_n = 1, Σ h_n t_n = D,
 
 with g_n = clip((T - t_n)/EDGE, 0, 1), which makes the weights fade out towards the length T. Each of the lower modes
-has two terms, at a slightly lower and a slightly higher frequency than estimated, which makes the filter tolerate
-errors. The dual has one unknown per row and no constraints; Newton's method solves it in a few steps from the
-previous solution. T follows slowly: it increases if the residual exceeds the permitted one, and decreases otherwise.
+has two terms, at a slightly lower and a slightly higher frequency than estimated, so that the filter tolerates errors.
+The dual has one unknown per row and no constraints; Newton's method solves it in a few steps from the previous
+solution. T follows slowly: it increases while the residual exceeds the permitted one, otherwise decreases.
 """
 
 import math
@@ -33,7 +33,7 @@ STEPS = 60
 SOLVED = 1e-9
 """Norm of the dual's gradient that counts as zero [-]."""
 SCALE = 0.03
-"""Scale of the mean delay's row, which gives all rows the same magnitude [s]."""
+"""Scale of the mean delay's row, so that all rows have the same magnitude [s]."""
 QUICKEST = 0.15
 """Largest relative change of the length per second [1/s]."""
 GAIN = 0.3
@@ -94,7 +94,7 @@ class Programme(NamedTuple):
     weight: Floats
     """`weight` of `FirDesign`, shape (modes,)."""
     dual: Floats
-    """Unknowns of the dual, shape (R,): initial values, and afterwards the solution."""
+    """Unknowns of the dual, shape (R,): the initial guess, then the solution."""
     taps: Floats
     """Result, shape (N,), with sum 1."""
     remains: Floats
@@ -139,8 +139,8 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
 ) -> bool:
     """Compute the weights for given modes, length [s] and mean delay [s].
 
-    `dual`, `taps` and `remains` of the programme receive them. Return whether it was solved; otherwise the
-    taps are the best that were found.
+    `dual`, `taps` and `remains` of the programme receive them. Return whether it was solved; otherwise the taps are the
+    best ones found.
     """
     spread, weight, dual, taps, remains, rows, columns, hessian = programme
     R, N, modes = dual.shape[0], taps.shape[0], f_d.shape[0]
@@ -157,7 +157,7 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
         sigma = omega * zeta[k] / math.sqrt(1.0 - zeta[k] * zeta[k])
         for side in range(2 if spread[k] > 0.0 else 1):
             factor = 1.0 + (2 * side - 1) * spread[k] if spread[k] > 0.0 else 1.0
-            # Each tick multiplies a weight's term by a constant rotation and growth, so no sine has to be computed.
+            # Each tick multiplies the term by a constant rotation and growth, so no sine has to be computed.
             turn = np.exp(complex(sigma * factor * period, omega * factor * period))
             value = complex(math.exp(-sigma * factor * length), 0.0)
             for n in range(N):
@@ -233,7 +233,7 @@ def _ascend(dual: Floats, rows: Floats, room: Floats, price: Floats, taps: Float
 
 @compiled
 def _gradient(dual: Floats, columns: Floats, price: Floats, taps: Floats, hessian: Floats) -> float:
-    """Return the norm of the dual's gradient, which is stored in the second to last column."""
+    """Return the norm of the dual's gradient, which is stored in the last but one column of `hessian`."""
     N, R = columns.shape
     gradient = np.empty(R)
     for i in range(R):
@@ -252,12 +252,12 @@ def _gradient(dual: Floats, columns: Floats, price: Floats, taps: Floats, hessia
 
 @compiled
 def _newton(columns: Floats, room: Floats, price: Floats, taps: Floats, hessian: Floats) -> bool:  # noqa: C901, PLR0912  a kernel
-    """Compute Newton's step in the last column, by Cholesky factorisation."""
+    """Compute Newton's step into the last column of `hessian`, by Cholesky factorisation."""
     N, R = columns.shape
     for i in range(R):
         for j in range(i + 1):
             hessian[i, j] = 0.0
-    # Weight by weight, so that a processor can treat several entries at once without adding in another order.
+    # Weight by weight, so that SIMD can treat several entries at once without changing the order of additions.
     for n in range(N):
         if taps[n] > 0.0:
             for i in range(R):

@@ -1,4 +1,4 @@
-"""A user-defined shaper that is a FIR filter: weights of the newest samples, as a function of the modes."""
+"""User-defined FIR filters: weights of the newest samples as a function of the modes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,18 +20,18 @@ MAX_TAPS = 500
 class FirShaper:
     """A user-defined shaper that is a FIR filter.
 
-    Its filter computes new taps every fourth tick and averages them over 0.4 s, so that they change smoothly while
-    the arm moves. For constant taps, use a function that ignores the modes.
+    Its filter computes new taps every fourth tick and averages them over 0.4 s, so that they change smoothly while the
+    arm moves. For constant taps, use a function that ignores the modes.
 
     Attributes:
         name: Name on the wire and in tables.
         description: Description in one line.
-        function: (f_d [Hz], ζ [-]), each of shape (modes,), the lowest mode first -> weights h_n of the samples n
-            ticks ago [-], shape (N,) with N at most `taps`, sum 1.
+        function: (f_d [Hz], ζ [-]), each of shape (modes,), the lowest mode first -> weights h_n of the samples n ticks
+            ago [-], shape (N,) with N at most `taps`, sum 1.
         taps: Largest number of taps, 1 to 500.
         modes: Number of modes passed to the function, 1 to 8.
-        peak: Upper bound of Σ|h_n|, by which it may exceed its reference's velocity and acceleration; 1 if no tap is
-            negative [-].
+        peak: Upper bound of Σ|h_n|, the factor by which the shaped velocity and acceleration may exceed the
+            reference's; 1 if no tap is negative [-].
         period: Tick [s].
 
     Raises:
@@ -89,7 +89,7 @@ class FirShaper:
         return np.pad(given, (0, self.taps - given.size))
 
     def impulses(self, f_d: float, zeta: float) -> Impulses:
-        """Return the taps as impulses, with all modes equal, to compute the shaper's other properties.
+        """Return the taps for equal modes as impulses, to compute the shaper's other properties.
 
         Args:
             f_d: Damped frequency of the mode [Hz].
@@ -108,7 +108,7 @@ class FirShaper:
 
 
 class _Weights(Design):
-    """A `FirShaper`'s taps, which depend only on the modes."""
+    """Design with the taps of a `FirShaper`, which depend only on the modes."""
 
     def __init__(self, shaper: FirShaper) -> None:
         self._shaper = shaper

@@ -1,4 +1,4 @@
-"""A train of impulses, which is what a shaper makes of a mode, and the modes for which there may be one."""
+"""The train of impulses that a shaper computes for a mode, and the range of modes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from tvist_shaping._types import Floats
 from tvist_shaping.errors import ImpulseError, ShaperRangeError
 
 F_D_RANGE = (1e-6, 1e6)
-"""Range of damped frequencies of a shaper [Hz]: wide enough for any vibration, without overflow of times."""
+"""Range of damped frequencies of a shaper [Hz]: wide enough for any vibration, and times cannot overflow."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -52,19 +52,19 @@ class Impulses:
 
     @classmethod
     def _by_construction(cls, A: Floats, tau: Floats) -> "Impulses":
-        """Create impulses whose validity the caller guarantees, since this happens at every tick."""
+        """Create impulses that the caller guarantees to be valid; this saves checks at every tick."""
         impulses = object.__new__(cls)
         impulses._hold(A, tau)
         return impulses
 
     @property
     def duration(self) -> float:
-        """Time of the last impulse [s], by which the shaped reference ends later than the unshaped one."""
+        """Time of the last impulse [s]; the shaped reference ends later by this time."""
         return float(self.tau[-1])
 
     @property
     def mean_delay(self) -> float:
-        """Σ A_j τ_j [s], by which the shaped reference lags behind a reference of constant velocity."""
+        """Σ A_j τ_j [s], the lag of the shaped reference behind one of constant velocity."""
         return float(self.A @ self.tau)
 
 
@@ -73,7 +73,7 @@ UNSHAPED = Impulses(np.ones(1), np.zeros(1))
 
 
 def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = "") -> None:
-    """Refuse a mode outside a shaper's range, with what to use for a higher ζ, in words."""
+    """Raise ShaperRangeError if a mode is outside a shaper's range; `instead` says what to use for a higher ζ."""
     if not F_D_RANGE[0] <= f_d <= F_D_RANGE[1]:
         raise ShaperRangeError("f_d", f_d, f"{F_D_RANGE[0]:g} to {F_D_RANGE[1]:g} Hz")
     if not 0.0 <= zeta < zeta_max:
@@ -84,11 +84,10 @@ def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = ""
 def product(trains: Sequence[Impulses]) -> Impulses:
     """Convolve the impulse trains of several modes, which suppresses all of them.
 
+    The result has amplitudes A_i B_j … [-] at the times τ_i + σ_j + … [s], sorted by time, shape (Π N,).
+
     Args:
         trains: One train for each mode, at least one.
-
-    Returns:
-        Amplitudes A_i B_j … [-] at the times τ_i + σ_j + … [s], sorted by time, shape (Π N,).
 
     Raises:
         ImpulseError: There are no trains.

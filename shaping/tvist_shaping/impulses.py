@@ -4,10 +4,10 @@ Every shaper here has equally spaced impulses with amplitudes a_j without dampin
 
     A_j = a_j K^j / Σ_i a_i K^i,    τ_j = j s T_d,    K = exp(-2π s ζ/√(1-ζ²)),    T_d = 1/f_d,
 
-where K is the factor by which the mode decays in the distance s T_d between two impulses. A zero of the residual
-vibration at f_d remains one with any damping. The shapers that leave V instead of zero at f_d (ei, ei3) leave less
-than V if ζ > 0: this is safe, but not the widest possible band for their length. The shapers of `tvist_shaping.exact`
-leave V.
+where K is the factor by which the mode decays in the time s T_d between two impulses. A zero of the residual vibration
+at f_d remains one with any damping. The shapers that leave V instead of zero at f_d (ei, ei3) leave less than V if ζ >
+0, which is safe, but their band is not the widest for their length. The shapers of `tvist_shaping.exact` leave exactly
+V.
 """
 
 import math
@@ -27,9 +27,9 @@ V = 0.05
 
 @compiled
 def decay(a: Floats, periods: Floats, f_d: float, zeta: float, A: Floats, tau: Floats) -> None:
-    """Apply damping to the amplitudes of an undamped shaper: each decays as the mode does until then.
+    """Apply damping to the amplitudes of an undamped shaper: A_j decays by as much as the mode does until τ_j.
 
-    A_j = a_j exp(-2π ζ/√(1-ζ²) τ_j f_d), normalised [-], and τ_j [s], for a mode that is checked.
+    A_j = a_j exp(-2π ζ/√(1-ζ²) τ_j f_d), normalised [-], and τ_j [s]. The caller has checked the mode.
     """
     rate = -2.0 * math.pi * zeta / math.sqrt(1.0 - zeta * zeta)
     total = 0.0
@@ -45,7 +45,7 @@ _decay: Callable[..., None] = decay.py_func  # type: ignore[attr-defined]
 
 
 class Train(NamedTuple):
-    """A shaper without damping, of which `decay` makes the impulses of a mode."""
+    """An undamped shaper, from which `decay` computes the impulses of a mode."""
 
     a: Floats
     """Amplitudes [-], shape (N,), sum positive."""
@@ -54,19 +54,18 @@ class Train(NamedTuple):
 
     @classmethod
     def spaced(cls, a: Sequence[float], distance: float) -> "Train":
-        """Return the train of impulses a_j that are `distance` damped periods apart."""
+        """Return impulses a_j that are `distance` damped periods apart."""
         return cls(np.array(a, dtype=float), distance * np.arange(float(len(a))))
 
     def of(self, f_d: float, zeta: float) -> Impulses:
-        """Return the impulses of a mode that is checked: its damped frequency [Hz] and damping ratio [-]."""
+        """Return the impulses of a mode, f_d [Hz] and ζ [-], that the caller has checked."""
         A, tau = np.empty((2, len(self.a)))
-        _decay(
-            self.a, self.periods, f_d, zeta, A, tau
-        )  # to load the compiled one would take longer than this
+        # Not the compiled one, which would take longer to load.
+        _decay(self.a, self.periods, f_d, zeta, A, tau)
         return Impulses._by_construction(A, tau)  # noqa: SLF001  both come from this package
 
     def at(self, f_d: float, zeta: float) -> Impulses:
-        """Return the impulses of a mode."""
+        """Check a mode and return its impulses."""
         check_mode(f_d, zeta)
         return self.of(f_d, zeta)
 
@@ -78,7 +77,7 @@ ZVDD = Train.spaced((1.0, 3.0, 3.0, 1.0), 0.5)
 ZVDDD = Train.spaced((1.0, 4.0, 6.0, 4.0, 1.0), 0.5)
 MZV = Train.spaced(modified(3, 0.75).tolist(), 0.375)
 EI, EI2, EI3 = (Train.spaced(ripple(humps, V).tolist(), 0.5) for humps in (1, 2, 3))
-# What `specified` finds for 0.75 to 1.25 and V; it takes longer than everything else that is imported with this.
+# The result of `specified(0.75, 1.25, V)`, which would take longer than all other imports together.
 SI = Train(
     np.array([0.16990040201608808, 0.3300995979839119, 0.3300995979839119, 0.16990040201608808]),
     np.array([0.0, 0.420881413088327, 0.8251686762703891, 1.246050089358716]),

@@ -16,7 +16,7 @@ from tvist_shaping.shaper import Shaper
 from tvist_shaping.specified import specified
 
 SMALL = 1e-6
-"""Share of V by which a residual may exceed it, because of rounding [-]."""
+"""Share of V by which rounding may let a residual exceed it [-]."""
 
 
 def mzv_of(n: int = 3, t: float = 0.75, *, name: str = "", description: str = "") -> Shaper:
@@ -144,7 +144,6 @@ def custom(
 
 
 def _checked(train: Train, zeta_max: float, f_d: float, zeta: float) -> Impulses:
-    """Return the impulses of a mode after checking it."""
     check_mode(
         f_d, zeta, zeta_max, "" if zeta_max == 1.0 else "more than V is left: take a higher V or ei_of"
     )

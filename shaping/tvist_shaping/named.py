@@ -1,4 +1,4 @@
-"""Filters by name: all shapers of the catalogue, the designs with constant mean delay, and the user's own shapers."""
+"""Filters by name: the catalogue, designs with constant mean delay, smoothing, and the user's own shapers."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -26,12 +26,11 @@ AnyShaper: TypeAlias = Shaper | FirShaper
 
 
 SLOW = 5.5
-"""Lower bound of an arm's frequencies [Hz] below which the designs with constant mean delay become longer: their times
-grow as the longest period.
-"""
+"""Lower bound of an arm's frequencies [Hz] below which the designs' times grow with the longest period."""
 LIGHT = 0.040
-"""Mean delay of zero-vibration shapers for the two lowest modes at q = 0 [s] above which they grow as well: the less an
-arm is damped, the later its weights have to be.
+"""Mean delay at q = 0 of zero-vibration shapers for the two lowest modes above which they grow, too [s].
+
+The less an arm is damped, the later its weights have to be.
 """
 
 
@@ -58,22 +57,24 @@ DESIGNS: Mapping[str, Callable[[float], Design]] = MappingProxyType(
         ELASTIC_AUTO: lambda slower: SmoothedDesign(_auto(slower), running_means(8, 8), ELASTIC_AUTO),
     }
 )
-"""Designs with constant mean delay against an arm's four lowest modes: one with a smaller residual, one that is
-shorter, one that knows where a motion will end, and one for what feed-forward of the arm's elasticity leaves. The
-argument is the factor of their times.
+"""Designs with constant mean delay for an arm's four lowest modes; the argument is the factor of their times.
+
+They are one with a smaller residual, one that is shorter, one for motions with a known end, and one for what elastic
+feed-forward leaves.
 """
 SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
     {"elastic": "elastic", "elastic-position": "elastic-position"}
 )
-"""Filters that only smooth the reference, with the feed-forward that stills the arm."""
+"""Filters that only smooth the reference, and the feed-forward that suppresses the vibration."""
 SMOOTHING = 40
-"""Length of their smoothing if the name says none [ms]."""
+"""Length of the smoothing if the name contains none [ms]."""
 SMOOTHINGS = range(8, 62, 2)
-"""Lengths that a name may say, as in `elastic-16` [ms]: shorter ones leave the lead little torque, and longer ones gain
-little.
+"""Lengths that a name may contain, as in `elastic-16` [ms].
+
+Shorter ones leave the lead too little torque, and longer ones gain little.
 """
 FIRST = 0.63
-"""Share of the first of two running means in both, tuned at 40 ms [-]."""
+"""Share of the first of two running means in the total length, tuned at 40 ms [-]."""
 _LENGTH = re.compile(r"(.+)-(0|[1-9][0-9]{0,8})")
 OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
     {
@@ -86,7 +87,7 @@ OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
         ELASTIC_AUTO: "auto, smoothed, with feed-forward of the arm's elasticity: leaves least",
     }
 )
-"""What distinguishes the filters that are no shapers of the catalogue, by name."""
+"""Descriptions of the filters that are not in the catalogue, by name."""
 USES: Mapping[str, str] = MappingProxyType(
     {
         "elastic-auto": "the least vibration, also with an inexact model",
@@ -95,7 +96,7 @@ USES: Mapping[str, str] = MappingProxyType(
         "auto": "streams and whatever has no known end, by drives that take no torques",
     }
 )
-"""For what each of these is the one to take, by measurement: docs/how-to/evaluate-a-shaper.md has the figures."""
+"""What each of these is best for, as measured: docs/how-to/evaluate-a-shaper.md has the figures."""
 
 PERIOD = 0.002
 """Tick of every filter that is created by name [s]."""
@@ -103,7 +104,7 @@ _NAME = re.compile(r"[a-z0-9][a-z0-9_.,()-]{0,63}")
 
 
 class Registry:
-    """Filters by name for references at 500 Hz: those of this package, and the user's own shapers. It is immutable.
+    """Immutable registry of filters by name for references at 500 Hz: this package's, and the user's own shapers.
 
     Args:
         own: The user's own shapers, `Shaper` or `FirShaper`.
@@ -136,7 +137,7 @@ class Registry:
 
         Raises:
             UnknownShaperError: There is no shaper of that name; the error lists all names and the most similar one.
-            DesignError: Its name says a length that it cannot have.
+            DesignError: The name contains a smoothing length that is out of range.
         """
         if name not in self.names() and not _smoothing(name):
             near = get_close_matches(name, self.names(), n=1)
@@ -201,7 +202,7 @@ class Registry:
 
 
 def means_of(length: int) -> tuple[int, int]:
-    """Return the ticks of the two running means that smooth over a length [ms]."""
+    """Return the ticks of the two running means for a smoothing length [ms]."""
     both = length // 2 + 2
     first = round(FIRST * both)
     return first, both - first
@@ -222,26 +223,23 @@ def _smoothing(name: str) -> tuple[FeedForward, int] | None:
 
 
 BUILT_IN = Registry()
-"""The filters of this package only."""
+"""The registry without own shapers."""
 
 
 def make_filter(shaper: str | AnyShaper, estimator: Estimator, *, joints: int) -> Filter:
-    """Create a filter for a sampled reference at 500 Hz.
+    """Create a filter for a sampled reference at 500 Hz, at rest at q = 0; `reset` moves it to the arm's configuration.
 
     Args:
-        shaper: Name of a shaper of this package, as `BUILT_IN.names()` lists them, or a shaper of your own.
-        estimator: The modes as functions of q. Four modes are required for the names in `DESIGNS`, and the
-            declared number for a `FirShaper`; for others, it determines how many modes are suppressed.
+        shaper: Name of a shaper of this package, as `BUILT_IN.names()` lists them, or your own shaper.
+        estimator: The modes as functions of q. The names in `DESIGNS` require four modes, and a `FirShaper` its
+            declared number; for others, this determines how many modes are suppressed.
         joints: Number of joints of the arm, >= 1.
-
-    Returns:
-        The filter, at rest at q = 0; `reset` moves it to the arm's configuration.
 
     Raises:
         UnknownShaperError: There is no shaper of that name.
-        DesignError: The name of the own shaper is invalid or belongs to another one; or it has another period.
+        DesignError: Your shaper's name is invalid or belongs to another one, or it has another period.
         FilterError: Shaper and estimator do not fit together.
-        ShaperFailureError: The function of the own shaper fails for the modes at q = 0.
+        ShaperFailureError: The function of your shaper fails for the modes at q = 0.
     """
     if isinstance(shaper, str):
         return BUILT_IN.make_filter(shaper, estimator, joints=joints)

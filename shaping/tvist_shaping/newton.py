@@ -1,4 +1,4 @@
-"""Newton's method for the few equations that define a shaper without a closed form."""
+"""Newton's method for shapers that are defined by a few equations without a closed-form solution."""
 
 from collections.abc import Callable
 
@@ -16,7 +16,7 @@ SOLVED = 1e-12
 
 
 def solve(equations: Callable[[Floats], Floats], start: Floats) -> Floats:
-    """Solve m equations, whose residuals at M points are of shape (M, m), from a close guess."""
+    """Solve m equations from a close guess; `equations` maps M points to residuals, shape (M, m)."""
     x, m = np.array(start, dtype=float), len(start)
     with np.errstate(all="ignore"):  # divergence is detected below
         for _ in range(60):

@@ -1,4 +1,4 @@
-"""The user's own shapers: created from a function, and checked before anything moves."""
+"""Create shapers from the user's functions, and check them before anything moves."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,12 +13,12 @@ from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.shaper import Shaper
 
 TRIED_F_D = (0.1, 200.0)
-"""Range of damped frequencies with which a shaper is tried [Hz]: all that a client may send to a robot."""
+"""Damped frequencies with which a shaper is tried [Hz]: all that a client may send to a robot."""
 _USUAL = (10.0, 0.1)
 """Mode that is tried first: damped frequency [Hz], damping ratio [-]."""
 _F_D = np.geomspace(*TRIED_F_D, 23)
 _SHARES = np.array([*np.linspace(0.0, 1.0, 24, endpoint=False), 0.99])
-"""Damping ratios to check, as shares of the highest one that a shaper supports [-]."""
+"""Damping ratios to try, as shares of the shaper's zeta_max [-]."""
 _DECLARED = (
     ("duration_periods", 0.0, 1e6, "a number from 0 to 1e6"),
     ("zeta_max", 1e-6, 1.0, "a number from 1e-6 to 1"),
@@ -77,7 +77,7 @@ def check_shaper(shaper: Shaper | FirShaper) -> None:
 def check_range(
     shaper: Shaper | FirShaper, f_d: tuple[float, float], zeta: tuple[float, float], whose: str
 ) -> None:
-    """Try a shaper with all modes that an arm may have, from the lowest to the highest f_d [Hz] and ζ [-]."""
+    """Raise ShaperFailureError unless a shaper works for all f_d [Hz] and ζ [-] of an arm, named by `whose`."""
     for one in np.geomspace(*f_d, 25).tolist():
         for other in np.linspace(*zeta, 10).tolist():
             try:
@@ -92,9 +92,9 @@ def check_range(
 
 
 def longest(shaper: Shaper, f_d_min: float) -> float:
-    """Return the largest time of the last impulse of one mode [s], for the modes from a frequency on that it supports.
+    """Return the longest duration of one mode [s] over all modes from f_d_min [Hz] up that the shaper supports.
 
-    It is shorter than `duration_periods` says if the times are not proportional to 1/f_d, as those from a table.
+    It is shorter than `duration_periods` suggests if the times are not proportional to 1/f_d, as those from a table.
     """
     undeclared = replace(shaper, duration_periods=np.inf, peak=np.inf)
     return _tried(undeclared, np.geomspace(f_d_min, max(f_d_min, TRIED_F_D[1]), _F_D.size))[2]
@@ -103,7 +103,7 @@ def longest(shaper: Shaper, f_d_min: float) -> float:
 def _tried(shaper: Shaper | FirShaper, tried: Floats = _F_D) -> tuple[float, float, float]:
     """Return the longest duration in damped periods, the largest sum of magnitudes, and the longest duration [s].
 
-    They are those of the modes for which the function works.
+    They are the largest over those of the tried modes for which the function works.
     """
     zeta_max = shaper.zeta_max if isinstance(shaper, Shaper) else 1.0
     undeclared = shaper if isinstance(shaper, Shaper) else replace(shaper, peak=1e300)
@@ -135,7 +135,7 @@ def _tried(shaper: Shaper | FirShaper, tried: Floats = _F_D) -> tuple[float, flo
 
 
 def _evaluated(shaper: Shaper | FirShaper, f_d: float, zeta: float) -> Impulses:
-    """Return the impulses for a mode; for a FIR filter of several, the others are above it."""
+    """Return the impulses for a mode; a FIR filter of several modes gets the others at higher frequencies."""
     count = 1 if isinstance(shaper, Shaper) else shaper.modes
     modes = np.array([f_d * _APART**mode for mode in range(count)]), np.full(count, zeta)
     try:

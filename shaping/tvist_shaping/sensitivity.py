@@ -11,21 +11,18 @@ from tvist_shaping.impulse_train import Impulses
 
 
 def residual(f: npt.ArrayLike, zeta: float, impulses: Impulses) -> Floats:
-    """Residual vibration of a mode after the impulses, relative to that after a single impulse.
+    """Return the residual vibration V [-] of a mode after the impulses, relative to that after a single impulse.
 
         V = exp(-ζ ω_n τ_N) √(C² + S²)
         C = Σ A_j exp(ζ ω_n τ_j) cos(ω_d τ_j),    S = Σ A_j exp(ζ ω_n τ_j) sin(ω_d τ_j)
 
-    with ω_d = 2π f and ω_n = ω_d/√(1-ζ²) (Singer and Seering, 1990). Fig. 4 of the paper is V(f) at ζ = 0.
+    with ω_d = 2π f and ω_n = ω_d/√(1-ζ²) (Singer and Seering, 1990). It has the shape of f: 0 is no vibration, 1 as
+    much as without shaping. Fig. 4 of the paper is V(f) at ζ = 0.
 
     Args:
-        f: *Damped* frequency of the true mode [Hz], any shape, >= 0. (The design frequency is implied by the
-            impulses.)
+        f: *Damped* frequency of the true mode [Hz], any shape, >= 0. (The impulses imply the design frequency.)
         zeta: Damping ratio of the true mode [-], 0 <= ζ < 1.
         impulses: Impulses of the shaper.
-
-    Returns:
-        V [-], in the shape of f; 0 is no vibration, 1 as much as without shaping.
 
     Raises:
         ShaperRangeError: f or ζ is outside the range above.
@@ -45,20 +42,16 @@ def residual(f: npt.ArrayLike, zeta: float, impulses: Impulses) -> Floats:
 
 
 def band(impulses: Impulses, f_d: float, zeta: float, V: float) -> tuple[float, float]:
-    """Return the range of frequencies around f_d in which the residual vibration is at most V.
+    """Return the lowest and highest damped frequency around f_d at which the residual is at most V [Hz].
 
     It is searched on a grid of f_d/1000 up to 10 f_d, and its ends are refined by bisection; a hump that touches V is
-    inside.
+    inside. The highest frequency is infinite if 10 f_d is still inside; both are NaN if f_d itself is not.
 
     Args:
         impulses: Impulses of the shaper.
         f_d: Damped frequency to start from, usually the design frequency [Hz], > 0.
         zeta: Damping ratio of the true mode [-], 0 <= ζ < 1.
         V: Permitted residual vibration [-], 0 < V < 1.
-
-    Returns:
-        Lowest and highest damped frequency of the true mode [Hz]. The highest is infinite if 10 f_d is still inside;
-        both are NaN if f_d itself is not.
 
     Raises:
         ShapingError: V or f_d is outside the range above.
@@ -78,7 +71,7 @@ def band(impulses: Impulses, f_d: float, zeta: float, V: float) -> tuple[float, 
 
 
 def _end(grid: Floats, zeta: float, impulses: Impulses, limit: float) -> float:
-    """Return the point of the grid where the residual first exceeds the limit; the grid starts below it."""
+    """Return where the residual first exceeds the limit along the grid, whose first point is below it."""
     outside = np.flatnonzero(residual(grid, zeta, impulses) > limit)
     if outside.size == 0:
         return math.inf

@@ -1,4 +1,4 @@
-"""A shaper as a filter uses it: impulses as a function of the mode, and properties that must be known in advance."""
+"""Shapers as a filter uses them: impulses as a function of the mode, and properties known in advance."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ class Shaper:
         function: (f_d [Hz], ζ [-]) -> impulses of one mode.
         duration_periods: Largest time of the last impulse over all ζ, in damped periods [-].
         zeta_max: Damping ratios must stay below this [-].
-        peak: Σ|A_j|, the largest factor by which it may exceed its reference's velocity and acceleration while f_d
-            and ζ are constant; 1 for positive impulses [-].
-        train: The impulses without damping, if `function` only applies damping to them; then a filter computes them in
-            compiled code instead.
+        peak: Σ|A_j|, the largest factor by which the shaped velocity and acceleration may exceed the reference's while
+            f_d and ζ are constant; 1 for positive impulses [-].
+        train: The impulses without damping, if `function` only applies damping to them; a filter then computes them in
+            compiled code.
     """
 
     name: str
@@ -53,14 +53,13 @@ class Shaper:
         return impulses
 
     def band(self, V: float = 0.05, zeta: float = 0.0) -> tuple[float, float]:
-        """Return the range of the ratio of true to assumed frequency in which at most V is left.
+        """Return the lowest and highest ratio of true to assumed frequency at which at most V is left [-].
+
+        Both are NaN if even the ratio 1 leaves more; see `sensitivity.band`.
 
         Args:
             V: Permitted residual vibration [-], 0 < V < 1.
             zeta: Damping ratio, both assumed and true [-].
-
-        Returns:
-            Lowest and highest ratio [-], as in `sensitivity.band`: NaN if even 1 is not inside.
 
         Raises:
             ShapingError: V or ζ is out of range.

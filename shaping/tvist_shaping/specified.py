@@ -6,14 +6,14 @@ find the train by optimisation. Without damping the shortest train is symmetric,
     R(f) = Σ a_j cos(2π f x_j),    x_j the times relative to its middle,
 
 which touches the bound with alternating sign: +V at the lower end, then the humps. So there are as many relevant
-samples as unknowns, and Newton's method moves both the samples and the train to their final positions (Remez
-exchange). N impulses have N - 1 unknowns (amplitudes of sum 1, times) and N - 1 extremes. There are two cases:
+samples as unknowns, and Newton's method moves both the samples and the train to their final positions (Remez exchange).
+N impulses have N - 1 unknowns (amplitudes of sum 1, times) and N - 1 extremes. There are two cases:
 
 * If the band is wide for N, the last extreme is a hump within the band. The train is then the extra-insensitive
-  shaper of `ripple`, scaled in time such that its own band begins at the requested lower end; it tolerates more than
+  shaper of `ripple`, scaled in time such that its band starts at the requested lower end; it tolerates more than
   requested above the upper end.
-* Otherwise the last extreme is the band's upper end, where the residual is not stationary: this is solved by
-  continuation from the first case downwards.
+* Otherwise the last extreme is the band's upper end, where the residual is not stationary. This case is solved by
+  continuation from the first one downwards.
 """
 
 import math
@@ -45,7 +45,7 @@ def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
     else:
         widest = low * (2.0 - ends) / ends
         raise DesignError("band", high, f"at most {widest:g} at its upper end for {MOST} impulses and this V")
-    # The equal-ripple shaper, in units of the lower end, so that its band begins at 1.
+    # The equal-ripple shaper, in units of the lower end, so that its band starts at 1.
     x = np.asarray((np.arange(N) - (N - 1) / 2.0) / 2.0 * ends, dtype=float)
     humps = _humps(N, V) / ends
     if N > 2 and ratio < humps[-1]:
@@ -54,7 +54,7 @@ def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
 
 
 def _humps(N: int, V: float) -> Floats:
-    """Return the extremes of the residual of `ripple` within its band, in design frequencies, shape (N - 2,)."""
+    """Return the extremes of `ripple`'s residual within its band, in design frequencies, shape (N - 2,)."""
     extremes = np.cos(np.arange(1, N - 1) * math.pi / (N - 1))
     return np.asarray(2.0 / math.pi * np.arccos(extremes / widening(N - 2, V)))
 
@@ -66,7 +66,7 @@ def _followed(a: Floats, x: Floats, humps: Floats, ratio: float, V: float) -> tu
     signs = (-1.0) ** np.arange(1, N - 1)
 
     def parts(points: Floats) -> tuple[Floats, Floats]:
-        """Amplitudes and times of the earlier half; the middle one is last and counts twice if it is a pair."""
+        """Return amplitudes and times of the first half; the middle is last and counts twice if it is a pair."""
         A, late = points[:, :free], points[:, free : free + pairs]
         rest = 1.0 - 2.0 * A.sum(axis=1, keepdims=True)
         if N % 2:

@@ -2,12 +2,11 @@
 
 If the reference is a parabola over the length of the filter, a filter with mean delay D and variance S of its delays
 gives y = x(t - D) + ẍ S/2. While D changes, the velocity is ẋ (1 - Ḋ), which exceeds the reference's while the delay
-shrinks, and the acceleration contains -ẋ D̈. If D is the same at every configuration, both effects vanish; what
-remains is S̈/2, a thousandth. The price is the difference between the longest mean delay anywhere and the present
-one.
+shrinks, and the acceleration contains -ẋ D̈. If D is the same at every configuration, both effects vanish; what remains
+is S̈/2, a thousandth. The price is that motions always have the longest mean delay of any configuration.
 
-Taps are designed every few ticks and averaged by three consecutive running means, so that they change smoothly; a
-mean of tap vectors with equal sum and mean delay has the same sum and mean delay.
+Taps are designed every few ticks and averaged by three running means in series, so that they change smoothly; a mean of
+tap vectors with equal sum and mean delay has the same sum and mean delay.
 """
 
 import math
@@ -27,13 +26,13 @@ from tvist_shaping.taps import average, length, product_taps
 EVERY = 4
 """Ticks between two designs."""
 SMOOTH = 64
-"""Ticks of each running mean: with fewer, the spread of the delays changes too fast; with more, it lags too far."""
+"""Ticks of each running mean: with fewer, the variance of the delays changes too fast; with more, taps lag."""
 EXCESS = 0.005
-"""Share by which the acceleration may exceed the reference's [-]: the largest in random motions at their limits."""
+"""Largest share by which the acceleration exceeded the reference's in random motions at their limits [-]."""
 
 
 class Design(Forked, ABC):
-    """Design that computes taps from modes."""
+    """Base class of designs, which compute taps from modes."""
 
     name: str
     """Name of the filter."""
@@ -44,29 +43,26 @@ class Design(Forked, ABC):
     period: float
     """Tick [s]."""
     peak: float = 1.0
-    """Upper bound of the sum of the taps' magnitudes, 1 if none is negative [-]."""
+    """Upper bound of the sum of the taps' magnitudes; 1 if none is negative [-]."""
     constant: bool = False
-    """True if the taps do not depend on the modes, which are then estimated only for reports."""
+    """True if the taps do not depend on the modes, which are then estimated only to be reported."""
 
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Compute the taps for a reference that has always been at rest.
+        """Compute the taps for a reference that has always been at rest; return False if they miss a requirement.
 
         Args:
             f_d: Damped frequencies [Hz], shape (modes,).
             zeta: Damping ratios [-], shape (modes,).
             taps: Result, shape (taps,), with sum 1.
-
-        Returns:
-            Whether the taps are as required; False if a delay was clipped.
         """
 
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:  # noqa: ARG002
-        """Compute the taps some time after the last ones [s]: by default, as `start` for these modes."""
+        """Compute the taps `seconds` after the last ones; by default, as `start` for these modes."""
         return self.start(f_d, zeta, taps)
 
     def at_target(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Compute the taps for the modes at the known end of a motion, for its whole length: by default, as `start`."""
+        """Compute the taps of a whole motion for the modes at its known end; by default, as `start`."""
         return self.start(f_d, zeta, taps)
 
     def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:  # noqa: ARG002  unless overridden
@@ -174,7 +170,7 @@ class ShortDesign(Design):
             taps[:] = self._programme.taps
 
     def _excess(self) -> float:
-        """Logarithm of the ratio of the residual to the permitted one, 0 if they are equal."""
+        """Return the logarithm of the ratio of the residual to the permitted one; 0 if they are equal."""
         square = 0.0
         for remains, permitted in zip(self._programme.remains.tolist(), self.wanted.residual, strict=True):
             square += (remains / permitted) * (remains / permitted)
@@ -182,11 +178,11 @@ class ShortDesign(Design):
 
 
 class SteadyFilter(Filter):
-    """Time-varying shaping by taps: with a constant mean delay, or by constant taps.
+    """Time-varying shaping by taps with a constant mean delay, or by constant taps.
 
-    An estimator's `f_d_min` may be far below the modes anywhere in the workspace. A design is therefore not refused
-    for being too short at that frequency. If it is too short for the actual modes, `clipped` reports this at that
-    tick, and no delay exceeds the delay line.
+    An estimator's `f_d_min` may be far below the modes anywhere in the workspace, so a design that is too short for it
+    is not refused. If it is too short for the actual modes, `clipped` is True at that tick, and no delay exceeds the
+    delay line.
 
     Attributes:
         design: Computes the taps.
@@ -243,7 +239,7 @@ class SteadyFilter(Filter):
 
     @property
     def delay(self) -> float:
-        """Time of the last tap [s], by which the shaped reference ends later."""
+        """Time of the last tap [s]; the shaped reference ends later by this time."""
         return self._length * self.period
 
     @property
@@ -252,17 +248,17 @@ class SteadyFilter(Filter):
         return float(self._taps @ self._delays) * self.period
 
     def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:
-        """See `Filter.mean_delay_of`: the design's own."""
+        """The design's value [s]; see `Filter.mean_delay_of`."""
         return self.design.mean_delay_of(f_d, zeta)
 
     @property
     def peak(self) -> float:
-        """See `Filter.peak`: the design's own."""
+        """The design's value [-]; see `Filter.peak`."""
         return self.design.peak
 
     def _unshare(self) -> None:
         super()._unshare()
-        if self.design.constant:  # nothing of it ever changes
+        if self.design.constant:  # nothing in it changes
             return
         self.design = self.design.fork()
         self._designed, self._taps = self._designed.copy(), self._taps.copy()
@@ -285,7 +281,7 @@ class SteadyFilter(Filter):
         self._line.gather(self._taps, self._delays, self._q_star)
 
     def _ask(self, modes: tuple[Floats, Floats], seconds: float | None) -> None:
-        """Compute taps for these modes, some time after the last ones; None for a start at rest."""
+        """Compute taps for these modes, `seconds` after the last ones; None for a start at rest."""
         self.f_d, self.zeta = modes
         try:
             if seconds is None:
@@ -302,9 +298,8 @@ class SteadyFilter(Filter):
 class AimedFilter(SteadyFilter):
     """Filter for motions with a known end, since the vibration after a motion has the modes of the arm at its end.
 
-    Constant weights cannot exceed the limits of the reference, need no averaging, and do not lag behind the arm.
-    During the motion, while the arm is elsewhere, they fit less well. If no end is known, as in a stream, the filter
-    behaves like a `SteadyFilter`.
+    Constant weights cannot exceed the limits of the reference, need no averaging, and do not lag behind the arm, but
+    they fit less well during the motion. If no end is known, as in a stream, the filter behaves like a `SteadyFilter`.
     """
 
     spared = 0.0

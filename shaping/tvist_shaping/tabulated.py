@@ -1,8 +1,7 @@
 """Shapers whose amplitudes and times have no closed form in ζ: solved once, then interpolated.
 
-The equations are solved at Chebyshev nodes between zero damping and the highest one, each starting from the previous
-solution. In between, the polynomial through the nodes is evaluated: it is as exact as the solutions, smooth in ζ, and
-takes a microsecond per tick.
+The equations are solved at Chebyshev nodes from zero damping to the highest one, each starting from the previous
+solution. The polynomial through the nodes is as exact as the solutions, smooth in ζ, and takes a microsecond per tick.
 """
 
 import math
@@ -15,23 +14,21 @@ from tvist_shaping._types import Floats
 from tvist_shaping.impulse_train import Impulses, check_mode
 
 NODES = 32
-"""Number of nodes, which is the degree of the polynomials in ζ plus 1; twice as many where the equations end at a
-branch point just beyond the highest damping, since the polynomials converge slowly there."""
+"""Number of Chebyshev nodes to start with.
+
+It is doubled where the equations end at a branch point just beyond the highest damping, since the polynomials converge
+slowly there.
+"""
 SMALL = 1e-7
-"""Largest of the last coefficients that says that the polynomials have converged [-]."""
+"""Largest magnitude of the last coefficients of converged polynomials [-]."""
 MOST_NODES = 256
 
 
 class Tabulated:
-    """Impulses of one mode as polynomials in ζ.
+    """Impulses of one mode as polynomials in ζ."""
 
-    Attributes:
-        zeta_max: Damping ratios must stay below this [-].
-        duration_periods: Longest duration over all ζ, to within 1e-9 damped periods [-].
-    """
-
-    zeta_max: float
-    duration_periods: float
+    zeta_max: float  # damping ratios must stay below this [-]
+    duration_periods: float  # longest duration over all ζ, to within 1e-9 damped periods [-]
 
     def __init__(
         self,
@@ -41,11 +38,10 @@ class Tabulated:
         instead: str,
         duration_periods: float | None = None,
     ) -> None:
-        """Compute the polynomials, when first evaluated if the longest duration is given [periods].
+        """Compute the polynomials, or only at the first evaluation if the longest duration [periods] is given.
 
-        `follow` takes ζ and the unknowns at a slightly lower ζ, and returns the unknowns, A [-] and times in
-        damped periods [-]; `start` has the unknowns without damping. `instead` says what to use beyond
-        `zeta_max`.
+        `follow` takes ζ and the unknowns at a slightly lower ζ, and returns the unknowns, A [-] and times in damped
+        periods [-]; `start` has the unknowns without damping. `instead` says what to use beyond `zeta_max`.
         """
         self._follow, self._start, self.zeta_max, self._instead = follow, start, zeta_max, instead
         self.duration_periods = self.longest() if duration_periods is None else duration_periods
@@ -68,7 +64,6 @@ class Tabulated:
         return coefficients, last
 
     def _tabulate(self, number: int) -> tuple[Floats, Floats]:
-        """Compute the polynomials from the solutions at a number of nodes."""
         k, zeta_max = np.arange(number), self.zeta_max
         nodes = np.cos((k + 0.5) * math.pi / number)[::-1]
         values, last, x, zeta = [], self._start, self._start, 0.0

@@ -1,8 +1,8 @@
-"""Weights of the newest samples, used instead of impulses by filters with constant mean delay.
+"""Taps, the weights of the newest samples, which filters with constant mean delay use instead of impulses.
 
-Taps h_n, n = 0 … N-1, at delays of n ticks are equivalent to impulses between ticks, each distributed over four taps
-by Lagrange's cubic. Unlike impulses they can be averaged: the sum and the mean delay of an averaged tap vector are
-the averages of those of the vectors.
+Taps h_n, n = 0 … N-1, at delays of n ticks are equivalent to impulses between ticks, each distributed over four taps by
+Lagrange's cubic. Unlike impulses they can be averaged: the mean of tap vectors has the mean of their sums and mean
+delays.
 """
 
 import math
@@ -13,12 +13,12 @@ from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 
 MATTERS = 1e-12
-"""A tap below this does not count [-]."""
+"""Magnitude below which a tap does not count [-]."""
 
 
 @compiled
 def mean_delay(f_d: Floats, zeta: Floats) -> float:
-    """Mean delay Σ A_j τ_j of the product of the modes' zero-vibration shapers [s]."""
+    """Return Σ A_j τ_j of the product of the modes' zero-vibration shapers [s]."""
     total = 0.0
     for k in range(f_d.shape[0]):
         K = math.exp(-math.pi * zeta[k] / math.sqrt(1.0 - zeta[k] * zeta[k]))
@@ -28,10 +28,10 @@ def mean_delay(f_d: Floats, zeta: Floats) -> float:
 
 @compiled
 def product_taps(f_d: Floats, zeta: Floats, mean: float, period: float, taps: Floats) -> bool:
-    """Compute the product of the modes' zero-vibration shapers, delayed to a given mean delay [s].
+    """Compute the product of the modes' zero-vibration shapers, delayed to a mean delay [s].
 
-    Return False if the product's own mean delay is longer, and is then kept, or if the last impulse is beyond
-    the last tap, and is moved to it.
+    Return False if the product's own mean delay is longer, and is then kept, or if the last impulse is beyond the last
+    tap, and is moved to it.
     """
     modes, N = f_d.shape[0], taps.shape[0]
     own = mean_delay(f_d, zeta)
@@ -61,10 +61,10 @@ def product_taps(f_d: Floats, zeta: Floats, mean: float, period: float, taps: Fl
 
 @compiled
 def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> int:
-    """Update three consecutive running means, over the last tap vectors of each; the third has sum 1.
+    """Update three running means of tap vectors in series; normalise the third to sum 1.
 
-    `past` has the inputs of each mean, shape (3, ticks, N), whose row `row` is replaced, and `sums` their
-    sums. Return the number of taps up to the last one that matters, as `length` does.
+    `past` has the inputs of each mean, shape (3, ticks, N), whose row `row` is replaced, and `sums` their sums. Return
+    the index of the last tap that matters, as `length` does.
     """
     ticks, N = past.shape[1], taps.shape[0]
     for n in range(N):
@@ -92,6 +92,6 @@ def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> 
 
 
 def length(taps: Floats) -> int:
-    """Number of taps up to the last one that matters; 0 if none does."""
+    """Return the index of the last tap that matters, which is the filter's length in ticks; 0 if none does."""
     matter = np.flatnonzero(np.abs(taps) > MATTERS)
     return int(matter[-1]) if len(matter) else 0

@@ -1,11 +1,11 @@
 """Unity-magnitude shapers: impulses +1, -1, +1, …, shorter than any positive train.
 
-The cost is in the reference's limits. A positive train is a mean of the reference's past and keeps its limits of
-velocity and acceleration; +1 -1 +1 may reach three times as much, and five impulses five times as much. These shapers
-also excite modes that are faster than the one they are designed for. Only the times of the impulses can be chosen
-(Singhose, Singer and Seering, "Time-optimal negative input shapers", J. Dyn. Sys. Meas. Control 119, 1997); here they
-are found by Newton's method. As ζ increases, the first times grow and pairs of impulses approach each other; the
-shapers end at ζ = 0.5, where the last pair is a twentieth of a period apart.
+A positive train is a mean of the reference's past and keeps its limits of velocity and acceleration; +1 -1 +1 may
+exceed them up to three times, and five impulses up to five times. These shapers also excite modes that are faster than
+the one they are designed for. Only the times of the impulses can be chosen (Singhose, Singer and Seering, "Time-optimal
+negative input shapers", J. Dyn. Sys. Meas. Control 119, 1997); here Newton's method finds them. As ζ increases, the
+first times grow and pairs of impulses approach each other; the shapers end at ζ = 0.5, where the last pair is a
+twentieth of a period apart.
 """
 
 import math
@@ -19,17 +19,17 @@ from tvist_shaping.tabulated import Tabulated
 
 
 class UnityShaper:
-    """The equations: E(1) = 0, and with `derivative` also E'(1) = 0; E(r) = Σ ±exp(r s τ_j), T_d = 1 (see `exact`)."""
+    """The equations E(1) = 0, and with `derivative` E'(1) = 0, where E(r) = Σ ±exp(r s τ_j), T_d = 1 (see `exact`)."""
 
     def __init__(self, *, derivative: bool) -> None:
-        """Set up the equations for three impulses, or for five with `derivative`."""
+        """Set up three impulses, or five with `derivative`."""
         self.derivative = derivative
         self.A = np.array([1.0, -1.0, 1.0, -1.0, 1.0] if derivative else [1.0, -1.0, 1.0])
         # Without damping; for five impulses, four digits are enough as a starting point.
         self.start: Floats = np.array([0.0895, 0.3662, 0.643, 0.7325] if derivative else [1 / 6, 1 / 3])
 
     def follow(self, zeta: float, near: Floats) -> tuple[Floats, Floats, Floats]:
-        """Unknowns, amplitudes [-] and times in damped periods [-] at ζ, from the unknowns at a nearby ζ."""
+        """Solve at ζ from the solution at a nearby ζ; return it, A [-] and τ in damped periods [-]."""
         s = 2.0 * math.pi * (zeta / math.sqrt(1.0 - zeta * zeta) + 1j)
 
         def equations(points: Floats) -> Floats:

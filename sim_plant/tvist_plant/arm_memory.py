@@ -1,7 +1,6 @@
-"""Memory of a simulated arm for the kernels: one array, whose parts get names in a kernel and in Python alike.
+"""The kernels' memory of a simulated arm: one array with named views.
 
-A kernel should have few arguments, since numba checks the type of each at every call: a dozen arrays take longer than
-much of what the kernel computes.
+Numba checks the type of each argument at every call; passing a dozen arrays would cost more than some kernels.
 """
 
 from typing import NamedTuple
@@ -16,37 +15,37 @@ from tvist_plant.model import Floats
 LAST, NOW = 0, 1
 """Indices of the commands and dynamics of the last and the current tick."""
 LINKS, JOINTS, PERIOD, SUBSTEPS, GRAVITY, ENCODER_STEP, HEAD = range(7)
-"""Places of the single numbers at the front of the memory; their number."""
+"""Indices of the scalars at the front of the memory, and their number."""
 
 
 class ArmMemory(NamedTuple):
-    """Parts of the memory of an arm with N links and n motors, all of them views."""
+    """Views of the memory of an arm with N links and n motors."""
 
     state: Floats
     """Rows of `ArmState`, shape (6, N+n)."""
     commands: Floats
     """Rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n)."""
     dynamics: Floats
-    """Mass matrix, upper triangle [kg m^2], and below it a row with the bias [N m]: Coriolis, centrifugal and gravity
-    torques minus external ones; of the last tick and of this one, shape (2, N+1, N)."""
+    """Upper triangle of M [kg m^2] over a row with the bias [N m]: Coriolis, centrifugal and gravity torques
+    minus external ones; last tick and this one, shape (2, N+1, N)."""
     springs: Floats
-    """Stiffness [N m/rad] and damping [N m s/rad] of each link and motor by itself, shape (2, N+n)."""
+    """Diagonal of stiffness [N m/rad] and damping [N m s/rad] of each link and motor, shape (2, N+n)."""
     joints: Floats
     """Rows of `JointParameters`, shape (23, n)."""
     chain: Floats
     """Parameters of the links, see `chain_of`, shape (N+1, 22)."""
     bodies: Floats
-    """Scratch of `sweep`; in its last row the flange, shape (N+1, 28)."""
+    """Scratch of `sweep`, with the flange in the last row, shape (N+1, 28)."""
     pushed: Floats
     """External torques, shape (N,) [N m]."""
     qdd: Floats
     """Accelerations of the links, shape (N,) [rad/s^2]."""
     readings: Floats
-    """Readings of the encoders, NaN before the first, shape (n,) [rad]."""
+    """Last encoder readings, NaN before the first, shape (n,) [rad]."""
     factor: Floats
-    """Scratch: a factorised matrix, shape (N, N)."""
+    """Scratch for a factorised matrix, shape (N, N)."""
     force: Floats
-    """Scratch: torques that do not depend on the state, shape (N+n,) [N m]."""
+    """Scratch for the torques that do not depend on the state, shape (N+n,) [N m]."""
 
 
 def shapes(N: int, n: int) -> ArmMemory:
@@ -59,7 +58,7 @@ def shapes(N: int, n: int) -> ArmMemory:
 
 
 def memory_for(N: int, n: int) -> Floats:
-    """Return memory for an arm with N links and n motors, full of zeros."""
+    """Return zeroed memory for an arm with N links and n motors."""
     memory = np.zeros(HEAD + sum(int(np.prod(shape)) for shape in shapes(N, n)))
     memory[LINKS], memory[JOINTS] = N, n
     return memory

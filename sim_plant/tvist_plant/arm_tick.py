@@ -1,4 +1,4 @@
-"""One control period of the simulated arm, compiled: it moves, its dynamics are evaluated, and its sensors are read."""
+"""One control period of the simulated arm, compiled: integration, dynamics, sensors."""
 
 import math
 
@@ -17,7 +17,7 @@ def move(
     qd: Floats,  # q̇_r
     torque: Floats,  # feed-forward, shape (n,) [N m]
 ) -> None:
-    """Move the arm by one period, while its drives go linearly from the previous command to this one."""
+    """Move the arm by one period while the drives' commands go linearly from the previous one to this one."""
     arm = parts(memory)
     now = arm.commands[NOW]
     for j in range(q.shape[0]):
@@ -32,8 +32,8 @@ def evaluate(
 ) -> bool:
     """Compute dynamics, accelerations and measurements at the present state; return whether it is finite.
 
-    The result has shape (3n+3,): joint angles read by the encoders [rad], joint velocities [rad/s], motor
-    torques [N m], and the specific force in the flange frame without noise [m/s^2].
+    `out` becomes encoder angles [rad], joint velocities [rad/s], motor torques [N m] and the flange's
+    specific force without noise [m/s^2], shape (3n+3,).
     """
     arm = parts(memory)
     links, n = arm.qdd.shape[0], arm.joints.shape[1]
@@ -57,11 +57,7 @@ def evaluate(
 
 @compiled
 def read(arm: ArmMemory, step: float, out: Floats) -> None:
-    """Read encoders and accelerometer; arguments as in `evaluate`.
-
-    A reading is updated when the angle has moved by a step. This is hysteresis, since rounding would flicker if an
-    angle rests between two steps.
-    """
+    """Read encoders and accelerometer into `out`; readings change by whole steps, so as not to flicker."""
     links, n, qdd = arm.qdd.shape[0], arm.joints.shape[1], arm.qdd
     y, v = arm.state[0], arm.state[1]
     for j in range(n):
@@ -87,7 +83,7 @@ def read(arm: ArmMemory, step: float, out: Floats) -> None:
 
 @compiled
 def tick(memory: Floats, q: Floats, qd: Floats, torque: Floats, out: Floats) -> bool:
-    """Compute one period of an arm on which nothing pushes: `move`, then `evaluate`."""
+    """Compute one period without external forces: `move`, then `evaluate`."""
     move(memory, q, qd, torque)
     return evaluate(memory, out)
 
@@ -99,10 +95,7 @@ def play(
     measured: Floats,  # result, as in `evaluate`, shape (T, 3n+3)
     flange: Floats,  # result: its rotation and position after each period, shape (T, 12)
 ) -> int:
-    """Compute many periods of an arm on which nothing pushes, one by one as `tick` does.
-
-    Returns the number of periods until the state was no longer finite; T if it always was.
-    """
+    """Compute T periods as `tick` does; return how many passed before the state was no longer finite."""
     T: int = commands.shape[0]
     for k in range(T):
         if not tick(memory, commands[k, 0], commands[k, 1], commands[k, 2], measured[k]):

@@ -25,17 +25,17 @@ AXES = {
 }
 """Rotation that turns z into the axis of each kind of joint."""
 TURN, SHIFT, BODY, WIDTH = 0, 9, 12, 22
-"""Columns of a chain's rows: rotation, translation and inertia of a link; their number."""
+"""Columns of a chain's row: rotation, translation and inertia of a link; the number of columns."""
 SCRATCH = 28
-"""Columns of the scratch of a chain: twist 6, inertia 10, velocity 6, acceleration or force 6."""
+"""Columns of the scratch: twist (6), inertia (10), velocity (6), acceleration or force (6)."""
 
 
 def chain_of(model: pin.Model, frame: int) -> Floats:
-    """Return the parameters of a serial chain up to a frame, by its index, as one array, shape (N+1, 22).
+    """Return the parameters of a serial chain up to a frame, given by its index, shape (N+1, 22).
 
-    A row has the rotation (9) and translation (3) of a joint's frame, whose z is its axis, in that of the joint before,
-    and its body's ten inertial parameters in pinocchio's order [kg, kg m, kg m^2]. The last row places the frame at the
-    end.
+    A row holds the rotation (9) and translation (3) of a joint's frame, with z as its axis, relative to the
+    previous joint, and its body's ten inertial parameters in pinocchio's order [kg, kg m, kg m^2]. The last
+    row is the end frame.
     """
     links = model.nv
     chain = np.zeros((links + 1, WIDTH))
@@ -60,7 +60,7 @@ def chain_of(model: pin.Model, frame: int) -> Floats:
 
 
 def body_of(model: pin.Model, number: int) -> Floats:
-    """Return the ten inertial parameters of a joint's body, as `chain_of` does in a row."""
+    """Return the ten inertial parameters of a joint's body, as in a row of `chain_of`."""
     turned = pin.SE3(AXES[model.joints[number].shortname()], np.zeros(3))
     parameters: Floats = turned.inverse().act(model.inertias[number]).toDynamicParameters()
     return parameters
@@ -72,7 +72,7 @@ def _place(row: Floats, placement: pin.SE3) -> None:
 
 @compiled
 def turn(R: Floats, row: Floats) -> None:
-    """Multiply a rotation by that of a link, from the right, in place."""
+    """Multiply the rotation R by that of a link from the right, in place."""
     for i in range(3):
         x, y, z = R[i, 0], R[i, 1], R[i, 2]
         R[i, 0] = x * row[0] + y * row[3] + z * row[6]
@@ -82,7 +82,7 @@ def turn(R: Floats, row: Floats) -> None:
 
 @compiled
 def step_along(row: Floats, R: Floats, o: Floats) -> None:
-    """Move a frame, of rotation R and origin o, by the placement of a link."""
+    """Move a frame with rotation R and origin o by the placement of a link."""
     for i in range(3):
         o[i] += R[i, 0] * row[9] + R[i, 1] * row[10] + R[i, 2] * row[11]
     turn(R, row)
@@ -90,7 +90,7 @@ def step_along(row: Floats, R: Floats, o: Floats) -> None:
 
 @compiled
 def bend(R: Floats, angle: float) -> None:
-    """Turn a frame of rotation R about its z axis."""
+    """Turn the frame R about its z axis."""
     c, s = math.cos(angle), math.sin(angle)
     for i in range(3):
         x, y = R[i, 0], R[i, 1]
@@ -109,7 +109,7 @@ def start(R: Floats, o: Floats) -> None:
 
 @compiled
 def twist(R: Floats, o: Floats, S: Floats) -> None:
-    """Twist of a unit velocity about the z axis of a frame: angular velocity, then velocity at the base's origin."""
+    """Compute the twist of a unit velocity about a frame's z axis: angular, then linear at the base."""
     x, y, z = R[0, 2], R[1, 2], R[2, 2]
     S[0], S[1], S[2] = x, y, z
     S[3], S[4], S[5] = o[1] * z - o[2] * y, o[2] * x - o[0] * z, o[0] * y - o[1] * x
@@ -117,7 +117,7 @@ def twist(R: Floats, o: Floats, S: Floats) -> None:
 
 @compiled
 def placed(row: Floats, R: Floats, o: Floats, inertia: Floats) -> None:
-    """Inertial parameters of a link's body in the axes of the base and about its origin, shape (10,)."""
+    """Compute the inertial parameters of a link's body in base axes about the base origin, shape (10,)."""
     m, hx, hy, hz = row[12], row[13], row[14], row[15]
     xx, xy, yy, xz, yz, zz = row[16], row[17], row[18], row[19], row[20], row[21]
     # About the body's own frame, in the axes of the base: R I Rᵀ.
@@ -148,7 +148,7 @@ def placed(row: Floats, R: Floats, o: Floats, inertia: Floats) -> None:
 
 @compiled
 def momentum(I: Floats, V: Floats) -> tuple[float, float, float, float, float, float]:
-    """Moment about the base's origin, and force: an inertia times a twist or its derivative."""
+    """Return inertia times twist (or its derivative): moment about the base origin, then force."""
     m, hx, hy, hz = I[0], I[1], I[2], I[3]
     a, b, c, u, v, w = V[0], V[1], V[2], V[3], V[4], V[5]
     return (
@@ -163,11 +163,9 @@ def momentum(I: Floats, V: Floats) -> tuple[float, float, float, float, float, f
 
 @compiled
 def sweep(chain: Floats, q: Floats, qd: Floats, qdd: Floats, gravity: float, scratch: Floats) -> None:
-    """Compute twist, inertia, velocity and force of each body, from the base to the end.
+    """Compute twist S, inertia, velocity V and force F of each body, from the base to the end.
 
-    The result is in the scratch, shape (N+1, 28): in each row the twist S (6), inertia (10), velocity V (6)
-    and force F (6); in the last row, the acceleration of the last body instead of a force. The angles and
-    their rates have shape (N,).
+    Rows of the scratch: `SCRATCH`; the last one holds the last body's acceleration instead of a force.
     """
     R, o, A = np.empty((3, 3)), np.empty(3), np.empty(6)
     start(R, o)
@@ -214,13 +212,13 @@ def sweep(chain: Floats, q: Floats, qd: Floats, qdd: Floats, gravity: float, scr
 
 @compiled
 def along(S: Floats, F: Floats) -> float:
-    """Power of a wrench along a twist."""
+    """Return the power of a wrench along a twist."""
     return float(S[0] * F[0] + S[1] * F[1] + S[2] * F[2] + S[3] * F[3] + S[4] * F[4] + S[5] * F[5])
 
 
 @compiled
 def collect_torques(scratch: Floats, torque: Floats) -> None:
-    """Torques on the joints after a sweep, shape (N,) [N m]; afterwards each force is that of all bodies from there."""
+    """Compute the joint torques after a sweep [N m]; each F then holds the sum over all outer bodies."""
     for i in range(torque.shape[0] - 1, -1, -1):
         F = scratch[i, 22:28]
         torque[i] = along(scratch[i, :6], F)
@@ -231,7 +229,7 @@ def collect_torques(scratch: Floats, torque: Floats) -> None:
 
 @compiled
 def collect_gravity(scratch: Floats, gravity: float, torque: Floats) -> None:
-    """Torques on the joints that balance gravity, after a sweep with any velocities, shape (N,) [N m]."""
+    """Compute the joint torques that balance gravity after a sweep at any velocities, shape (N,) [N m]."""
     m = x = y = 0.0
     for j in range(torque.shape[0] - 1, -1, -1):
         row = scratch[j]
@@ -241,7 +239,7 @@ def collect_gravity(scratch: Floats, gravity: float, torque: Floats) -> None:
 
 @compiled
 def collect_inertia(scratch: Floats, M: Floats) -> None:
-    """Upper triangle of the mass matrix after a sweep, shape (N, N) [kg m^2]; inertias are then those from there on."""
+    """Compute the upper triangle of M after a sweep [kg m^2]; inertias then include all outer bodies."""
     W = np.empty(6)
     for k in range(M.shape[0] - 1, -1, -1):
         inertia = scratch[k, 6:16]
@@ -257,6 +255,6 @@ def collect_inertia(scratch: Floats, M: Floats) -> None:
 def torques(
     chain: Floats, q: Floats, qd: Floats, qdd: Floats, gravity: float, scratch: Floats, torque: Floats
 ) -> None:
-    """Inverse dynamics: τ = M(q) q̈ + C(q, q̇) q̇ + g(q), shape (N,) [N m]; other arguments as in `sweep`."""
+    """Compute inverse dynamics, τ = M(q) q̈ + C(q, q̇) q̇ + g(q), shape (N,) [N m], as `sweep`."""
     sweep(chain, q, qd, qdd, gravity, scratch)
     collect_torques(scratch, torque)

@@ -1,4 +1,4 @@
-"""A robot as described by its file: numbers with units, checked but not processed."""
+"""A robot file's content: numbers with units, validated but not processed."""
 
 import tomllib
 from hashlib import sha256
@@ -43,24 +43,20 @@ _VIBRATING: Final = (
     "gear_stiffness", "gear_damping", "rotor_inertia", "velocity_gain", "position_gain", "integral_gain",
     "coulomb_friction", "friction_width",
 )  # fmt: skip
-"""Parameters of the drives that determine frequency and damping; feed-forward and gear error only excite vibration."""
+"""Drive parameters that determine frequency and damping; feed-forward and gear error only excite vibration."""
 
 
 def robots() -> tuple[str, ...]:
-    """Names of the robots that come with the package."""
+    """Return the names of the robots that come with the package."""
     files = (entry.name for entry in _ROBOTS.iterdir())
     return tuple(sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml")))
 
 
 def load(robot: str | Path) -> RobotDescription:
-    """Read and check a robot file.
+    """Read and check the robot file of that name or path (TOML or URDF).
 
-    Args:
-        robot: Name of a robot that comes with the package, or path of a TOML or URDF file.
-
-    Raises:
-        DescriptionError: There is no such robot, or the file is invalid; the message names the key.
-        UserFileError: The file is not text, too large, nested too deeply, or has its limits in degrees.
+    Raise DescriptionError if there is no such robot or the file is invalid; the message names the key. Raise
+    UserFileError if the file is not text, too large, nested too deeply, or has its limits in degrees.
     """
     try:
         content = completed(_content(robot))
@@ -91,11 +87,10 @@ def _content(robot: str | Path) -> dict[str, Any]:
 
 
 def fingerprint(description: RobotDescription) -> str:
-    """Return a fingerprint of everything that affects vibration: geometry, masses, springs, dampers and drive gains.
+    """Return 16 hexadecimal digits, equal on all machines for robot files with equal vibration.
 
-    It tells whether two robot files describe the same arm. Names, limits, poses, collision bodies, sensors and the
-    payload are left out; a calibration itself contains the payload that it was measured with. The 16 hexadecimal digits
-    are equal for equal numbers on every machine.
+    They cover geometry, masses, springs, dampers and drive gains. Names, limits, poses, collision bodies and
+    sensors do not count, nor does the payload, which a calibration stores itself.
     """
     drives = [getattr(description.drives, name) for name in _VIBRATING]
     parts = (description.kinematics, description.links, description.link_flexibility, drives)

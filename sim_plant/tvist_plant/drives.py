@@ -1,4 +1,4 @@
-"""The drives: their commands at each tick, and the linear part of arm and drives together.
+"""The drives' commands at each tick, and the linear part of arm and drives together.
 
 Equations (joint side, one joint j; y = (q, θ) are link-side and motor-side angles):
 
@@ -7,8 +7,8 @@ Equations (joint side, one joint j; y = (q, θ) are link-side and motor-side ang
     drive   τ_m = τ_ff + K_d [q̇_r - θ̇ + K_p (q_r - θ) + K_i (q_r - θ) + K_p K_i s],     ṡ = q_r - θ
     gear    e(θ) = ε sin(n_w θ + φ)
 
-The drive's loop is a cascade of P on position and PI on velocity, on the motor side. Because the motor impedance is
-in series with the gear's spring, damping decreases as frequency increases, as in the paper's Table 1.
+Each drive is a cascade of P on position and PI on velocity, closed on the motor side. The motor's impedance
+is in series with the gear's spring, so damping decreases as frequency increases (Table 1 of the paper).
 """
 
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ from tvist_plant.model import FlexibleModel, Floats
 
 @dataclass(slots=True, eq=False)
 class DriveCommand:
-    """Set-points of all drives for the end of a tick; the drives interpolate linearly from the previous ones.
+    """Set-points of all drives for the end of a tick, interpolated linearly from the previous ones.
 
-    The class is not frozen, since one is created at every tick, and that would take five times as long.
+    Not frozen, because creating a frozen one at every tick takes five times as long.
     """
 
     q: Floats
@@ -36,7 +36,7 @@ class DriveCommand:
 
 @dataclass(frozen=True)
 class LinearPart:
-    """Stiffness, damping and gains of arm and drives, equal in every posture; N links, then n motors."""
+    """Stiffness, damping and gains of arm and drives, the same in every posture; N links, then n motors."""
 
     stiffness: Floats
     """Springs and position gains, shape (N+n, N+n) [N m/rad]."""
@@ -84,10 +84,10 @@ class LinearPart:
 
 @dataclass(frozen=True)
 class Nonlinear:
-    """Friction and gear error, with one entry per joint."""
+    """Friction and gear error, one entry per joint."""
 
     friction: Floats
-    """F_c, shape (n,); zero if friction is modelled as linear [N m]."""
+    """F_c, shape (n,); zero if the file models friction as linear [N m]."""
     friction_width: float
     """w [rad/s]."""
     gear_stiffness: Floats
@@ -99,7 +99,7 @@ class Nonlinear:
 
     @classmethod
     def of(cls, drives: Drives) -> "Nonlinear":
-        """Copy them from the robot's description."""
+        """Take the values from the robot's description."""
         return cls(
             friction=np.array(drives.coulomb_friction) * (not drives.linear_friction),
             friction_width=drives.friction_width,

@@ -1,4 +1,4 @@
-"""The simulated arm, with elastic joints and links. It has no clock and no I/O."""
+"""The simulated arm with elastic joints and links, without clock or I/O."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -24,27 +24,17 @@ from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth, Respo
 from tvist_plant.sensors import Accelerometer, gear_phases
 
 SUBSTEPS_OF_A_PERIOD = 4
-"""Substeps per period. From Q1 to Q3, four agree with eight to within 0.02 m/s² of tool acceleration, two to within
-0.09; most of that is the ripple of the gears.
-"""
+"""Substeps per period. Over moves Q1 to Q3, four agree with eight within 0.02 m/s² of tool acceleration,
+mostly gear ripple; two agree within 0.09."""
 SUBSTEPS_IF_IMPERFECT = 8
-"""Substeps per period of an arm with imperfections, which are integrated explicitly; stiction alone needs no more than
-an arm without any: with four the flange's acceleration is within 0.02 m/s² of that with 64.
-"""
+"""Substeps with imperfections, which are integrated explicitly. Stiction alone needs only four: the flange's
+acceleration is then within 0.02 m/s² of that with 64."""
 
 
 class FlexibleArm(SimulatedArm):
-    """A flexible arm and its drives: a `Plant` that also supports pushes, other payloads, a failure, and its modes.
+    """A flexible arm and its drives: a `Plant` with pushes, payload changes, a fault and vibration modes.
 
-    Args:
-        description: The robot.
-        payload: Carried payload.
-        imperfections: Properties of the arm that no controller knows, beside those in its file. They are integrated
-            explicitly, so all but stiction need 8 substeps for the accuracy that the rest has with 4.
-        period: Control period [s].
-        substeps: Number of the integrator's steps per period; None for 4, or 8 if the file has imperfections
-            other than stiction.
-        carries: What it truly carries when it is said to carry a payload; None for that payload.
+    `imperfections` add to those of the robot file. `carries` maps each declared payload to the one truly carried.
     """
 
     def __init__(
@@ -68,7 +58,7 @@ class FlexibleArm(SimulatedArm):
         self._phase = np.zeros(n)
         self._width = 3 * n + 3
         self._places = slice(n), slice(n, 2 * n), slice(2 * n, 3 * n), slice(3 * n, None)
-        """Places of what `evaluate` measures: angles, velocities, torques and specific force."""
+        """Slices of what `evaluate` measures: angles, velocities, torques and specific force."""
         self._carries = carries
         self._load(payload)
         self._accelerometer = Accelerometer(description.sensors.accelerometer_noise, 0)
@@ -79,7 +69,7 @@ class FlexibleArm(SimulatedArm):
         return self._payload
 
     def _load(self, payload: Payload) -> None:
-        """Create the models of the arm with this payload, and memory for its state."""
+        """Build the models with this payload, and memory for the state."""
         self._payload = payload
         truly = payload if self._carries is None else self._carries(payload)
         self._flexible: FlexibleModel = imperfect_model(self.description, truly, self._imperfections)
@@ -103,13 +93,7 @@ class FlexibleArm(SimulatedArm):
         self._arm = arm
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest in static equilibrium under a command, with preloaded integrators and restarted noise.
-
-        Args:
-            command: Position to hold and feed-forward torque; its velocity must be zero.
-            payload: New carried payload; None to keep the present one.
-            seed: Seed of sensor noise and gear errors.
-        """
+        """Put the arm at rest in static equilibrium under a command at zero velocity."""
         if payload is not None:
             self._load(payload)
         self._outside.clear()
@@ -126,7 +110,7 @@ class FlexibleArm(SimulatedArm):
         return measured
 
     def _settle(self, command: DriveCommand) -> None:
-        """Find static equilibrium by fixed-point iteration; gravity hardly depends on the small deflections."""
+        """Find static equilibrium by fixed-point iteration; gravity varies little with the deflections."""
         joints, flexes = self._flexible.joints, self._flexible.flexes
         q = np.zeros_like(self._q)
         q[joints] = command.q
@@ -147,12 +131,12 @@ class FlexibleArm(SimulatedArm):
         self._s[:] = np.divide(wanted, gain, out=np.zeros_like(wanted), where=gain > 0.0)
 
     def _gear_error(self, motor: Floats) -> Floats:
-        """Kinematic errors of the gears at motor angles [rad]."""
+        """Return the kinematic errors of the gears at motor angles [rad]."""
         nonlinear = self._nonlinear
         return np.asarray(nonlinear.gear_error * np.sin(nonlinear.gear_waves * motor + self._phase))
 
     def _static_deflections(self) -> tuple[Floats, Floats]:
-        """Deflections of gears and of links that remain where the arm rests as it stands now [rad]."""
+        """Return the deflections of gears and links that remain at rest in this posture [rad]."""
         joints, flexes = self._flexible.joints, self._flexible.flexes
         gravity = pin.computeGeneralizedGravity(self._flexible.model, self._data, self._q)
         gears = self._gear_error(self._motor) - self._law.twist(gravity[joints])
@@ -161,11 +145,7 @@ class FlexibleArm(SimulatedArm):
         return gears, given_way[self._flexible.bending]
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Move the arm by one period, while its drives go linearly from the previous command to this one.
-
-        Raises:
-            PlantError: The state is no longer finite.
-        """
+        """Move the arm by one period; the drives' commands go linearly from the previous one to this one."""
         if self._outside.rests:
             out = np.empty(self._width)
             finite = tick(self.memory, command.q, command.qd, command.torque, out)
@@ -177,11 +157,7 @@ class FlexibleArm(SimulatedArm):
         return measured
 
     def play(self, commands: Floats) -> Response:
-        """Move the arm by many periods in one call.
-
-        Raises:
-            PlantError: The state is no longer finite.
-        """
+        """Move the arm by many periods in one call."""
         if not self._outside.rests:
             return super().play(commands)
         response = self._played(self.memory, commands)
@@ -192,7 +168,7 @@ class FlexibleArm(SimulatedArm):
         return replace(response, measured=replace(response.measured, accelerometer=noisy))
 
     def held(self) -> Callable[[int], Response]:
-        """Keep the present state, and return what the arm would do from it if nothing moved it."""
+        """Save the present state; return a function that computes the response with the command held."""
         memory = self.memory.copy()
         command = parts(memory).commands[NOW].copy()
         command[1] = 0.0
@@ -200,7 +176,7 @@ class FlexibleArm(SimulatedArm):
 
     @staticmethod
     def _played(memory: Floats, commands: Floats) -> Response:
-        """Compute periods on which nothing pushes; the accelerometer has no noise."""
+        """Compute periods without external forces or accelerometer noise."""
         T, n = len(commands), commands.shape[2]
         out, flange = np.empty((T, 3 * n + 3)), np.empty((T, 12))
         if play(memory, np.ascontiguousarray(commands, dtype=float), out, flange) < T:
@@ -217,18 +193,11 @@ class FlexibleArm(SimulatedArm):
         self._arm.pushed[:] = 0.0 if self._outside.rests else self._outside.generalized_force(self._q)
         evaluate(self.memory, np.empty(self._width))
         self._arm.pushed[:] = 0.0
-        # The integrator extrapolates from the last two ticks: the jump between them is no trend.
+        # The integrator extrapolates from the last two ticks, but their difference is a jump, not a trend.
         self._arm.dynamics[LAST] = self._arm.dynamics[NOW]
 
     def push(self, torque: Floats) -> None:
-        """Apply external torques to the joints, until they are changed or the arm is reset.
-
-        Args:
-            torque: Torques on the link side, shape (n,); zeros end the push [N m].
-
-        Raises:
-            ValueError: The torque is not n finite numbers.
-        """
+        """Apply external link-side torques (n,) [N m] until changed or reset; raise ValueError if invalid."""
         self._outside.push(torque)
 
     def push_body(
@@ -238,37 +207,28 @@ class FlexibleArm(SimulatedArm):
         moment: Sequence[float] = (0.0, 0.0, 0.0),
         point: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """Apply an external wrench to a body, until it is changed or the arm is reset.
+        """Apply a force [N] and a moment about the point [N m] to one of `bodies` until changed or reset.
 
-        It acts in addition to those on other bodies and to `push`. A new wrench on the same body replaces it, and one
-        of zeros ends it. It is given in world axes, so it does not rotate with the body.
-
-        Args:
-            body: One of `bodies`.
-            force: Force [N].
-            moment: Moment about the point [N m].
-            point: Point of application in the frame of the body, which is that of its joint or of the flange [m].
-
-        Raises:
-            ValueError: There is no such body, or an argument is not three finite numbers.
+        The wrench adds to those on other bodies and to `push`, replaces the last one on this body, and ends
+        with zeros. It is in world axes and does not rotate; the point [m] is in the body's frame, that of its
+        joint or of the flange. Raise ValueError for an unknown body or anything but three finite numbers.
         """
         self._outside.push_body(body, force, moment, point)
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies for `push_body`, from the base on.
+        """Names of the bodies for `push_body`, from the base outwards.
 
-        A link has the name of the joint that moves it; the outer half of a bending link has that of its virtual joint
-        about z; the last body is "flange".
+        A link is named after its joint, the outer half of a bending link after its virtual joint about z, the
+        last body "flange".
         """
         return self._outside.bodies
 
     def make_nan(self) -> None:
-        """Make the state NaN as a fault, which the next step detects."""
+        """Make the state NaN, a fault that the next step detects."""
         self._speed[:] = math.nan
 
     def _evaluate(self) -> Measurement:
-        """Compute the dynamics at the present state, and measure."""
         out = np.empty(self._width)
         return self._measured(out, evaluate(self.memory, out))
 
@@ -280,7 +240,7 @@ class FlexibleArm(SimulatedArm):
         return Measurement(out[q], out[qd], out[moment], self._accelerometer.read(self._specific_force))
 
     def truth(self) -> PlantTruth:
-        """Return what a real robot cannot measure, at the present state."""
+        """Return the present values that a real robot cannot measure."""
         joints, flange = self._flexible.joints, self._arm.bodies[-1]
         static_gears, static_links = self._static_deflections()
         return PlantTruth(
@@ -296,7 +256,7 @@ class FlexibleArm(SimulatedArm):
         )
 
     def modes(self, q: Floats | None = None) -> Modes:
-        """Return the vibration modes of the closed loop, linearised at rest at joint positions q (default: its own)."""
+        """Return the closed loop's modes, linearised at rest at joint positions q (default: present ones)."""
         links = self._q.copy()
         if q is not None:
             links[:] = 0.0
@@ -304,10 +264,7 @@ class FlexibleArm(SimulatedArm):
         return modes(self._flexible, self._linear, self.description, links)
 
     def energy(self) -> float:
-        """Kinetic, gravitational and elastic energy [J], without that in the drives' gains and imperfections.
-
-        It is used to check the integrator.
-        """
+        """Return kinetic, gravitational and elastic energy, to check the integrator [J]."""
         model, data = self._flexible.model, self._data
         kinetic = pin.computeKineticEnergy(model, data, self._q, self._qd)
         rotors = 0.5 * self._linear.rotor_inertia @ self._speed**2

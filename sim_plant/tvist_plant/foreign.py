@@ -1,8 +1,4 @@
-"""Plants that somebody else has written: defaults for what they lack, checks of what they return, and their failures.
-
-What a method of a served one raises, or measures wrongly, is a failure of the plant. So the robot stops and says why,
-instead of the thread that ticks coming to its end with all its robots.
-"""
+"""Wrap users' plants: add missing methods, check results, and raise only `PlantError`, which stops just one robot."""
 
 import math
 from collections.abc import Callable
@@ -24,27 +20,21 @@ _METHODS = [
     if callable(value) and not name.startswith("_") and name != "can"
 ]
 MOST_KEPT = 10
-"""Largest number of exceptions that are kept until `told` returns them."""
+"""Largest number of exceptions kept for `told`."""
 
 
 def is_plant(value: object) -> bool:
-    """Return whether an object has what every plant has."""
+    """Return whether an object has the minimum interface of a plant."""
     return hasattr(value, "payload") and callable(getattr(value, "step", None))
 
 
 def arm_of(plant: Plant) -> Plant:
-    """Return a plant with all methods: itself, or what stands for an object that derives from no class here."""
+    """Return the plant, or a wrapper with all methods if it derives from no class of `tvist_plant.plant`."""
     return plant if isinstance(plant, SimulatedArm | RealArm) else called(plant, None)
 
 
 def called(plant: Plant, joints: int | None, *, untold: bool = False) -> Plant:
-    """Return what stands for a plant, with the same abilities, and raises only `PlantError`.
-
-    Args:
-        plant: Somebody's own plant, or a hidden one.
-        joints: Number of joints in the robot's description; None to let all that it raises and measures pass.
-        untold: Whether to leave out what a real arm could not tell.
-    """
+    """Return a wrapper that raises only `PlantError` (passes all if joints is None); `untold` hides the truth."""
     members: dict[str, Any] = {
         name: _method(name)
         for name in _METHODS
@@ -64,7 +54,7 @@ def _method(name: str) -> Callable[..., Any]:
 
 
 def told(plant: Plant) -> list[Exception]:
-    """Return what methods of a plant have raised since the last call."""
+    """Return and clear the exceptions that methods of a plant have raised."""
     if not isinstance(plant, _StandIn) or not plant.raised:
         return []
     raised, plant.raised = plant.raised, []
@@ -72,13 +62,13 @@ def told(plant: Plant) -> list[Exception]:
 
 
 class _StandIn(Plant):
-    """Stands for a plant, and has its methods; none of its exceptions but `PlantError` is raised."""
+    """Wrapper of a plant that raises only `PlantError`."""
 
     def __init__(self, plant: Plant, joints: int | None) -> None:
         self.plant, self._joints = plant, joints
         self._payload = plant.payload
         self.raised: list[Exception] = []
-        """Exceptions of its methods other than `PlantError`, until `told` returns them."""
+        """Exceptions other than `PlantError`, until `told` returns them."""
 
     @property
     def payload(self) -> Payload:  # type: ignore[override]
@@ -117,7 +107,7 @@ class _StandIn(Plant):
 
 
 def check_unpaced(plant: Plant) -> None:
-    """Check that a plant may be moved as fast as a machine computes, without a clock."""
+    """Raise ValueError if a plant sets the tick itself and so cannot run faster than real time."""
     if plant.can(Plant.wait):
         name = type(plant).__name__
         raise ValueError(
@@ -126,7 +116,7 @@ def check_unpaced(plant: Plant) -> None:
 
 
 def measured_standing(plant: Plant, joints: int) -> Measurement:
-    """Return what a plant that cannot be placed measures where it stands."""
+    """Return the measured position of a plant that cannot be placed; raise ValueError if it is not known."""
     name = type(plant).__name__
     assert isinstance(plant, RealArm), f"plant {name}: a simulated arm is placed"
     try:
@@ -141,7 +131,7 @@ def measured_standing(plant: Plant, joints: int) -> Measurement:
 
 
 def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
-    """Check the first measurement of a plant, which is named in the error."""
+    """Check the shapes of a plant's measurement; the ValueError names plant and field."""
     shapes = {"q": (joints,), "qd": (joints,), "moment": (joints,), "accelerometer": (3,)}
     if getattr(measured, "wrench", None) is not None:
         shapes["wrench"] = (6,)
@@ -155,11 +145,11 @@ def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
 
 
 def check_sight(sight: Sight, joints: int) -> None:
-    """Check what a robot that its own controller moves has said; a `ValueError` names the field that is wrong."""
+    """Check what a robot driven by its own controller reports; the ValueError names the field."""
     felt, load = sight.measured, sight.payload
     measured = np.concatenate((felt.q, felt.qd, felt.moment)).tolist()
     body = None if load is None else (load.mass, *load.com, *load.inertia)
-    for name, said, count in (  # whose sums are finite only if they are, and quicker to see than by numpy
+    for name, said, count in (  # a finite sum means finite values; faster than numpy
         ("target", np.ravel(sight.target).tolist(), 4 * joints), ("measured", measured, 3 * joints),
         ("modes", sight.modes, 3), ("speed", (sight.speed,), 1), ("tick", (sight.tick,), 1),
         ("tool", sight.tool, 6), ("force", sight.force, 6), ("payload", body, 10),

@@ -1,7 +1,6 @@
-"""Optional properties of an arm that are not in its description.
+"""Optional deviations of an arm from its description.
 
-Friction on a motor turning at v decreases with speed (Stribeck; Canudas de Wit and others 1995, without the
-bristles):
+Friction of a motor turning at v decreases with speed (Stribeck; Canudas de Wit et al. 1995, without bristles):
 
     F(v) = [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w)
 
@@ -10,18 +9,18 @@ A gear twisted by δ transmits the torque
     K δ                                   as described,
     K₁ δ up to |δ| = δ₁, K beyond it      piecewise (makers of strain wave gears give K₁ < K),
     K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968);
-    0 up to |δ| = b                       with backlash: the laws above hold for the twist beyond b.
+    0 up to |δ| = b                       with backlash: the laws above then hold for the twist beyond b.
 
-A motor that hardly turns sticks: it is held by a torque d, which grows like a spring while it turns by θ, up to the
-break-away torque, and exists only near standstill. Sliding friction F(v) acts beside it.
+Near standstill, stiction holds a motor by a torque d in addition to F(v). It grows with the angle θ like a spring until
+it breaks away (Dahl 1968; Stribeck 1902):
 
-    dd/dθ = σ K (1 - d sgn(θ̇)/most),    most = (F_s + μ_s |τ_g|) exp(-(θ̇/v_s)²)     (Dahl 1968; Stribeck 1902)
+    dd/dθ = σ K (1 - d sgn(θ̇)/most),    most = (F_s + μ_s |τ_g|) exp(-(θ̇/v_s)²)
 
-τ_g is the torque in its gear, and K the gear's stiffness. This F_s and v_s are those of `stiction`.
+τ_g is the gear's torque, K its stiffness; this F_s and v_s are those of `stiction`.
 
-The damper of a gear acts within its backlash, too, as oil and teeth do. A yielding base stands on two springs about the
-world's x and y axes, and carries a ring with mass under the arm. A tilted arm stands on a slope that nobody told its
-controller about: the world, in which the truth is given, is upright, and the arm is turned.
+A gear's damper also acts within its backlash, as oil and teeth do. A yielding base stands on springs about the world's
+x and y axes and carries a ring with mass under the arm. A tilted arm leans in the world without its controller's
+knowledge; the truth is given in the upright world.
 """
 
 import math
@@ -35,20 +34,16 @@ from tvist_plant.model import FLANGE, FlexibleModel, Floats, flexible_model
 from tvist_plant.robot_tables import Payload, RobotDescription
 
 STICTION = frozenset({"stiction", "stiction_load", "stiction_speed", "stiction_stiffness"})
-"""The keys of the stiction of motors."""
+"""Keys of the motors' stiction."""
 TOUCH = 1e-6
-"""Torque below which a gear at rest lies between the flanks of its backlash [N m]."""
+"""Torque below which a gear at rest lies within its backlash [N m]."""
 STEEPEST = math.pi / 6
 """Largest tilt of an arm [rad]."""
 
 
 @dataclass(frozen=True)
 class YieldingBase:
-    """A base on springs.
-
-    Raises:
-        ValueError: A value is not positive; `damping_time` may be 0.
-    """
+    """A base on springs; raise ValueError unless each value is positive (`damping_time` may be 0)."""
 
     stiffness: float = 1.5e5
     """Stiffness about each of the two axes [N m/rad]."""
@@ -60,7 +55,6 @@ class YieldingBase:
     """Radius of the ring, for its inertia [m]."""
 
     def __post_init__(self) -> None:
-        """Check the values."""
         for name in ("stiffness", "mass", "radius"):
             _check(f"base.{name}", getattr(self, name), 0.0, math.inf, above=True)
         _check("base.damping_time", self.damping_time, 0.0, math.inf)
@@ -68,20 +62,16 @@ class YieldingBase:
 
 @dataclass(frozen=True)
 class Imperfections:
-    """Additions to the arm of the description; the defaults add nothing.
-
-    Raises:
-        ValueError: A value is outside its documented range.
-    """
+    """Deviations from the description; the defaults add none. Raise ValueError if a value is out of range."""
 
     breakaway: float = 1.0
     """F_s divided by F_c, at least 1 [-]."""
     stribeck_speed: float = 0.05
     """v_s, above 0 [rad/s]."""
     rotor: float = 1.0
-    """Rotor inertia divided by the description's, above 0: no feed-forward knows of what it has more [-]."""
+    """Rotor inertia divided by the description's, above 0; the feed-forward does not know it [-]."""
     hysteresis: float = 0.0
-    """r: additional relative stiffness of a gear when its twist reverses, at least 0 [-]."""
+    """r: relative stiffness added to a gear when its twist reverses, at least 0 [-]."""
     hysteresis_torque: float = 0.02
     """z_max divided by the joint's torque limit, above 0 [-]."""
     soft: float = 1.0
@@ -91,22 +81,21 @@ class Imperfections:
     stiction: tuple[float, ...] = ()
     """F_s of the torque d that holds each motor near standstill, at least 0; empty for none [N m]."""
     stiction_load: float = 0.0
-    """μ_s: by how much d may be larger per torque in the gear, at least 0 [-]."""
+    """μ_s: increase of d per torque in the gear, at least 0 [-]."""
     stiction_speed: float = 0.03
-    """v_s: speed over which d falls, above 0 [rad/s]."""
+    """v_s: speed over which d decays, above 0 [rad/s]."""
     stiction_stiffness: float = 27.0
     """σ: stiffness of d before it breaks away, divided by the gear's, above 0 [-]."""
     base: YieldingBase | None = None
     """The yielding base; None for a rigid one."""
     torsion: float | None = None
-    """Stiffness against twisting of each link that bends, above 0; None if they do not twist [N m/rad]."""
+    """Torsional stiffness of each link that bends, above 0; None for rigid in torsion [N m/rad]."""
     backlash: tuple[float, ...] = ()
-    """b of each joint, half of the width of its backlash, at least 0; empty for none [rad]."""
+    """b of each joint, half its backlash, at least 0; empty for none [rad]."""
     tilt: float = 0.0
     """Angle by which the arm leans about the world's x axis, at most 30 degrees either way [rad]."""
 
     def __post_init__(self) -> None:
-        """Check the values."""
         _check("breakaway", self.breakaway, 1.0, math.inf)
         _check("stribeck_speed", self.stribeck_speed, 0.0, math.inf, above=True)
         _check("rotor", self.rotor, 0.0, math.inf, above=True)
@@ -127,11 +116,7 @@ class Imperfections:
 
     @classmethod
     def of(cls, description: RobotDescription, more: "Imperfections | None" = None) -> "Imperfections":
-        """Return those of a robot file, with further ones that win where they differ from the defaults.
-
-        Raises:
-            msgspec.ValidationError: The file's are invalid, which its check finds first.
-        """
+        """Return the robot file's imperfections, overridden by values of `more` other than the defaults."""
         own = msgspec.convert(description.imperfections, cls)
         if more is None:
             return own
@@ -142,7 +127,7 @@ class Imperfections:
 
 @dataclass(frozen=True)
 class GearLaw:
-    """The imperfections of friction and gears in the units of the equations; arrays have one entry per joint."""
+    """Imperfections of friction and gears in the units of the equations; arrays have one entry per joint."""
 
     breakaway: float
     """F_s/F_c [-]."""
@@ -171,11 +156,7 @@ class GearLaw:
 
     @classmethod
     def of(cls, imperfections: Imperfections, description: RobotDescription) -> "GearLaw":
-        """Scale the imperfections by the arm's gears and torque limits.
-
-        Raises:
-            ValueError: The arm has another number of joints than there are widths of backlash, or values of stiction.
-        """
+        """Scale by gears and torque limits; raise ValueError unless lists have one value per joint."""
         limit = np.array(description.limits.torque)
         of_joints = {}
         for name in ("backlash", "stiction"):
@@ -200,7 +181,7 @@ class GearLaw:
         )
 
     def twist(self, torque: Floats) -> Floats:
-        """Angle by which each gear is twisted under a steady torque [N m], without hysteresis [rad]."""
+        """Return each gear's twist under a steady torque [N m] without hysteresis [rad]."""
         if not self.softness.any() and not self.backlash.any():
             return torque / self.stiffness
         soft = self.stiffness - self.softness
@@ -213,11 +194,7 @@ class GearLaw:
 def imperfect_model(
     description: RobotDescription, payload: Payload, imperfections: Imperfections
 ) -> FlexibleModel:
-    """Create the model of an arm with links that twist, on a base that yields or leans.
-
-    Raises:
-        ValueError: Links are to twist, but the arm has none that bends.
-    """
+    """Model an arm whose links may twist and base may yield or lean; raise ValueError if none can twist."""
     if imperfections.torsion is not None and not description.link_flexibility.links:
         raise ValueError(
             f"torsion is {imperfections.torsion:g} N m/rad, but no link of the {description.robot.model} bends: "
@@ -231,7 +208,7 @@ def imperfect_model(
 
 
 def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
-    """Return the same arm on a base that yields about the world's x and y axes, as two more virtual joints."""
+    """Put an arm on a base that yields about the world's x and y axes: two more virtual joints."""
     ground = pin.Model()
     inertia = pin.Inertia(base.mass, np.zeros(3), base.mass * base.radius**2 * np.eye(3) / 2.0)
     light = pin.Inertia(0.05 * base.mass, np.zeros(3), 0.05 * base.mass * base.radius**2 * np.eye(3) / 2.0)
@@ -257,7 +234,7 @@ def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
 
 
 def _check(name: str, value: float, least: float, most: float, *, above: bool = False) -> None:
-    """Check that a number is finite, at least (with `above`: above) the lower limit, and at most the upper limit."""
+    """Raise ValueError unless a value is finite and within its limits; `above` excludes the lower one."""
     if math.isfinite(value) and (least < value if above else least <= value) and value <= most:
         return
     limit = f"{'above' if above else 'at least'} {least:g}" + (

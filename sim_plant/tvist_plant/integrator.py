@@ -1,19 +1,19 @@
 """One control period of arm and drives: the linearly implicit midpoint rule.
 
-M(q) is constant during the period at its value in the middle, and the bias b(q, q̇) changes linearly; both are
-extrapolated from the last two ticks. Springs, dampers and the drives' gains are implicit, so a single Cholesky factor
-of
+During a period M(q) keeps its midpoint value and the bias b(q, q̇) changes linearly; both are extrapolated from the
+last two ticks. Springs, dampers and drive gains are implicit, so one Cholesky factor serves all substeps of the period:
 
     S = M_b + h/2 D + h²/4 (K + h/2 G_i)
 
-is used for all substeps of the period (h one substep, M_b = diag(M(q), B), G_i the integral gains). Each substep
-solves for the mean acceleration, and moves y by the mean velocity. The method is of second order, and stable for the
-fast poles of light lumps between stiff springs (about -5e4 1/s), for which explicit methods need steps below 0.04 ms.
+with the substep h, M_b = diag(M(q), B) and the integral gains G_i. Each substep solves for the mean acceleration and
+moves y by the mean velocity. The method is of second order, and stable for the fast poles of light lumps between stiff
+springs (about -5e4 1/s), for which explicit methods need steps below 0.04 ms.
 
-Each motor is coupled to the link of its joint only, so S has an arrow's form: the motors are eliminated first, and only
-the matrix of the links is factorised,
+Each motor is coupled to its joint's link only. The motors are therefore eliminated first, and only the links' matrix
 
-    S_ll - Σ_j c_j² / S_mm,j at the joint's link,    c_j = -(h/2 D_g + h²/4 K_g).
+    S_ll - Σ_j c_j² / S_mm,j at the joint's link,    c_j = -(h/2 D_g + h²/4 K_g)
+
+is factorised.
 """
 
 import math
@@ -28,10 +28,7 @@ from tvist_plant.stiction import relaxed, stiction_after
 
 @compiled
 def cholesky(S: Floats) -> None:
-    """Replace the lower triangle of a positive definite matrix by its Cholesky factor with inverse diagonal.
-
-    The rest is not changed.
-    """
+    """Replace the lower triangle of a positive definite matrix by its Cholesky factor, diagonal inverted."""
     for j in range(S.shape[0]):
         pivot = S[j, j]
         for k in range(j):
@@ -47,7 +44,7 @@ def cholesky(S: Floats) -> None:
 
 @compiled
 def solve(L: Floats, x: Floats) -> None:
-    """Replace x, or the first part of a longer one, by (L Lᵀ)⁻¹ x, with L as `cholesky` returns it."""
+    """Replace the first part of x by (L Lᵀ)⁻¹ x, with L from `cholesky`."""
     n = L.shape[0]
     for i in range(n):
         value = x[i]
@@ -65,31 +62,31 @@ class ArmState(NamedTuple):
     """State of the arm with N links and n motors."""
 
     y: Floats
-    """Angles, N of the links then n of the motors, shape (N+n,) [rad]."""
+    """Angles of N links, then n motors, shape (N+n,) [rad]."""
     v: Floats
-    """Their velocities, shape (N+n,) [rad/s]."""
+    """Velocities, shape (N+n,) [rad/s]."""
     a: Floats
     """Mean accelerations of the last substep, shape (N+n,) [rad/s^2]."""
     s: Floats
     """Integrators of the drives, shape (n,) [rad s]."""
     z: Floats
-    """Torque of each gear's hysteresis, shape (n,) [N m]."""
+    """Hysteresis torque of each gear, shape (n,) [N m]."""
     d: Floats
     """Stiction of each motor, shape (n,) [N m]."""
     load: Floats
-    """Torque in the gear of each motor that has stiction in the middle of the last substep, shape (n,) [N m]."""
+    """Torque in each motor's gear in the middle of the last substep, if motors stick, shape (n,) [N m]."""
 
 
 @compiled
 def rows(state: Floats, n: int) -> ArmState:
-    """Return the rows of a state, shape (6, N+n), by name, as views."""
+    """Return named views of the rows of a state of shape (6, N+n)."""
     last = state[5]
     return ArmState(state[0], state[1], state[2], state[3, :n], state[4, :n], last[:n], last[n : 2 * n])
 
 
 @compiled
 def shift(ticks: Floats) -> None:
-    """Copy NOW to LAST in loops, since numba takes seconds to compile an assignment of arrays."""
+    """Copy NOW to LAST in loops; numba takes seconds to compile an assignment of arrays."""
     for i in range(ticks.shape[1]):
         for j in range(ticks.shape[2]):
             ticks[LAST, i, j] = ticks[NOW, i, j]
@@ -97,7 +94,7 @@ def shift(ticks: Floats) -> None:
 
 @compiled
 def set_points(commands: Floats, j: int, share: float) -> tuple[float, float, float]:
-    """Set-points q_r, q̇_r and τ_ff of joint j at a share of the period."""
+    """Return q_r, q̇_r and τ_ff of joint j at a fraction of the period."""
     start, end = commands[LAST], commands[NOW]
     return (
         start[0, j] + share * (end[0, j] - start[0, j]),
@@ -108,7 +105,7 @@ def set_points(commands: Floats, j: int, share: float) -> tuple[float, float, fl
 
 @compiled
 def softened(joint: JointParameters, twist: float) -> float:
-    """Difference of a gear's torque from K δ, because it has backlash, or is softer near zero [N m]."""
+    """Return a gear's torque minus K δ, due to backlash or softness near zero [N m]."""
     loose = min(max(twist, -joint.backlash), joint.backlash)
     beyond = twist - loose
     soft = joint.softness * min(max(beyond, -joint.soft_angle), joint.soft_angle)
@@ -117,7 +114,7 @@ def softened(joint: JointParameters, twist: float) -> float:
 
 @compiled
 def dragged(joint: JointParameters, z: float, twist: float) -> float:
-    """Torque of the hysteresis in the gear of a joint after a further twist [N m]."""
+    """Return the hysteresis torque of a joint's gear after a further twist [N m]."""
     if joint.hysteresis > 0.0:
         return relaxed(z, twist, joint.hysteresis, joint.hysteresis_torque)
     return z
@@ -125,20 +122,20 @@ def dragged(joint: JointParameters, z: float, twist: float) -> float:
 
 @compiled
 def stuck(joint: JointParameters, d: float, way: float, speed: float, load: float) -> float:
-    """Stiction of the motor of a joint after it has turned [N m]."""
+    """Return the stiction torque of a joint's motor after it has turned [N m]."""
     law = joint.stiction, joint.stiction_load, joint.stiction_speed, joint.stiction_stiffness
     return stiction_after(d, way, speed, load, *law)
 
 
 @compiled
 def coupling(joint: JointParameters, h: float) -> float:
-    """Entry c_j of S between a motor and the link of its joint."""
+    """Return entry c_j of S, between a motor and its joint's link."""
     return float(-0.5 * h * joint.gear_damping - 0.25 * h * h * joint.gear_stiffness)
 
 
 @compiled
 def of_motor(joint: JointParameters, springs: Floats, m: int, h: float) -> float:
-    """Entry of S on the diagonal at a motor, with index m."""
+    """Return the diagonal entry of S at the motor with index m."""
     implicit = 0.5 * h * springs[1, m] + 0.25 * h * h * springs[0, m]
     return float(joint.rotor_inertia + implicit + 0.125 * h * h * h * joint.integral_gain)
 
@@ -161,17 +158,14 @@ def factorise(arm: ArmMemory, h: float) -> None:
 
 @compiled
 def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are the loops over rows and joints
-    """Advance the state in place by one period; afterwards the LAST entries contain those of the present tick.
-
-    Commands and dynamics have LAST entries; the head has the single numbers at the front of the arm's memory.
-    """
+    """Advance the state by one period in place, then shift commands and dynamics from NOW to LAST."""
     n, links = arm.joints.shape[1], arm.qdd.shape[0]
     size, period, substeps = links + n, head[PERIOD], int(head[SUBSTEPS])
     y, v, a, s, z, d, load = rows(arm.state, n)
     bias, last_bias = arm.dynamics[NOW, links], arm.dynamics[LAST, links]
     springs, f = arm.springs, arm.force
     h = period / substeps
-    sticks = False  # found once, since the arms whose motors do not stick have to stay as fast as without
+    sticks = False  # keeps arms without stiction fast
     for j in range(n):
         joint = of_joint(arm.joints, j)
         sticks = sticks or joint.stiction > 0.0 or joint.stiction_load > 0.0
@@ -190,7 +184,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
             if joint.breakaway != 1.0:
                 fall = math.exp(-((speed / joint.stribeck_speed) ** 2))
                 rise = 1.0 + (joint.breakaway - 1.0) * fall
-            # Friction's slope at rest is implicit in `springs`; the part that saturates is corrected here.
+            # `springs` treats friction's slope at rest implicitly; correct the saturated part here.
             slack = 0.0
             if joint.friction > 0.0:
                 steep = speed / joint.friction_width
@@ -243,10 +237,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
 
 @compiled
 def balance(arm: ArmMemory, moment: Floats) -> None:
-    """Link accelerations and motor torques at a state, from the present commands and dynamics.
-
-    The former become the arm's `qdd`; the latter, `moment`, have shape (n,) [N m].
-    """
+    """Compute link accelerations (`arm.qdd`) and motor torques (`moment`, shape (n,) [N m]) at this state."""
     n, links, qdd = arm.joints.shape[1], arm.qdd.shape[0], arm.qdd
     y, v, s, z = arm.state[0], arm.state[1], arm.state[3], arm.state[4]
     command, M, springs, S = arm.commands[NOW], arm.dynamics[NOW], arm.springs, arm.factor

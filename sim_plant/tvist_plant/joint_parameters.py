@@ -1,7 +1,4 @@
-"""Parameters of each joint's drive and gear for the kernel: one array, whose columns get names in the kernel.
-
-In the kernel, a NamedTuple of numbers costs nothing.
-"""
+"""Parameters of each joint's drive and gear: one array for the kernel, which names its columns at no cost."""
 
 from typing import NamedTuple
 
@@ -33,7 +30,7 @@ class JointParameters(NamedTuple):
     stribeck_speed: float
     """v_s [rad/s]."""
     link: float
-    """Index of its link among the links, as a float [-]."""
+    """Index of its link, as a float [-]."""
     gear_stiffness: float
     """K [N m/rad]."""
     gear_damping: float
@@ -65,12 +62,11 @@ class JointParameters(NamedTuple):
 
 
 ROWS = len(JointParameters._fields)
-"""Number of parameters of a joint."""
 
 
 @compiled
 def of_joint(parameters: Floats, j: int) -> JointParameters:
-    """Return the parameters of joint j from the array that `packed` created."""
+    """Return the parameters of joint j from the array of `packed`."""
     return JointParameters(
         parameters[0, j], parameters[1, j], parameters[2, j], parameters[3, j],
         parameters[4, j], parameters[5, j], parameters[6, j], parameters[7, j],
@@ -84,11 +80,7 @@ def of_joint(parameters: Floats, j: int) -> JointParameters:
 def packed(
     joints: Integers, linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: Floats
 ) -> Floats:
-    """Return one array of all parameters, one row each in the order of `JointParameters`, shape (23, n).
-
-    The joints are given by their indices among the links, each gear's error by its phase [rad], both of shape
-    (n,).
-    """
+    """Return one array with a row per field of `JointParameters`, shape (23, n); phase in [rad]."""
     rows = {
         "rotor_inertia": linear.rotor_inertia,
         "velocity_gain": linear.velocity_gain,

@@ -1,14 +1,11 @@
 """Conversion of a robot description and payload to multibody models (pinocchio).
 
-There are two models of the same arm:
-
-- The *rigid* model is known to a controller: n joints, and the declared payload.
-- The *flexible* model is the simulated arm: the same joints and, in the middle of each link that bends, two virtual
-  revolute joints (about y and z), and a third about x where it also twists. The mass of such a link is in two equal
-  lumps at com ± √(Iyy/m) along the link,
-  each with inertia Ixx/2 about every axis. Mass, centre of mass and Ixx are preserved; Iyy grows by Ixx (UR5e's upper
-  arm: by 0.015, to 0.349 kg m²), Izz becomes equal to it, and products vanish. Lumps without inertia of their own
-  would put the fastest pole at -1.6e6 1/s, beyond any integrator at 500 Hz.
+The *rigid* model is the one a controller knows: n joints and the declared payload. The *flexible* model is
+the simulated arm: in the middle of each bending link it adds virtual revolute joints about y and z, and about
+x if the link also twists. The link's mass is split into two equal lumps at com ± √(Iyy/m) along the link,
+each with inertia Ixx/2 about every axis. Mass, centre of mass and Ixx are preserved; Iyy grows by Ixx (UR5e's
+upper arm: by 0.015, to 0.349 kg m²), Izz becomes equal to it, and products vanish. Lumps without inertia
+would put the fastest pole at -1.6e6 1/s, beyond any integrator at 500 Hz.
 """
 
 import math
@@ -32,13 +29,13 @@ class FlexibleModel:
     """The flexible model of an arm."""
 
     model: pin.Model
-    """Model with N = n + 2 x (links that bend) degrees of freedom, or more, in the order of the chain."""
+    """Model with at least N = n + 2 x (bending links) degrees of freedom, in the order of the chain."""
     joints: Integers
     """Indices of the n joints."""
     flexes: Integers
     """Indices of all virtual joints."""
     bending: Integers
-    """Indices of those about y and z of bending links."""
+    """Indices of the virtual joints about y and z of bending links."""
     flex_stiffness: Floats
     """Stiffness of each virtual joint [N m/rad]."""
     flex_damping: Floats
@@ -46,10 +43,10 @@ class FlexibleModel:
     flange: int
     """Frame index of the flange."""
     bare: pin.Inertia
-    """Body of the last joint without a payload."""
+    """Body of the last joint, without payload."""
 
     def carry(self, payload: Payload) -> None:
-        """Change the payload in place, since a new model takes half a tick; it equals one up to rounding."""
+        """Change the payload in place, since a new model takes half a tick; both are equal up to rounding."""
         place = self.model.frames[self.flange].placement
         self.model.inertias[self.model.njoints - 1] = (
             self.bare + place.act(payload_inertia(payload)) if payload.mass > 0.0 else self.bare
@@ -57,7 +54,7 @@ class FlexibleModel:
 
 
 def rigid_model(description: RobotDescription, payload: Payload) -> pin.Model:
-    """Create the model of the arm with rigid joints and links, n degrees of freedom and a frame named "flange"."""
+    """Create the model with rigid joints and links: n degrees of freedom and a frame "flange"."""
     rigid = msgspec.structs.replace(description, link_flexibility=LinkFlexibility())
     return flexible_model(rigid, payload).model
 
@@ -65,11 +62,7 @@ def rigid_model(description: RobotDescription, payload: Payload) -> pin.Model:
 def flexible_model(
     description: RobotDescription, payload: Payload, torsion: float | None = None
 ) -> FlexibleModel:
-    """Create the model of the arm with links that bend.
-
-    They also twist about the line along x through their centre of mass, with the stiffness `torsion`
-    [N m/rad]; None: they do not.
-    """
+    """Create the model with bending links; `torsion` is their torsional stiffness about x [N m/rad]."""
     flexibility = description.link_flexibility
     stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
     model = pin.Model()
@@ -96,7 +89,7 @@ def flexible_model(
         flexes += bending[-2:]
         stiffness += [stiffness_of[number]] * 2
         if torsion is not None:
-            # A tube twists about its middle, which the line between the joints' frames may be far from.
+            # A tube twists about its axis, which may be far from the line between the joint frames.
             _, y, z = frame.rotation @ np.array(description.links.com[number])
             axis = pin.SE3(np.eye(3), np.array([0.0, y, z]))
             parent = model.addJoint(parent, pin.JointModelRX(), axis, f"{name}_torsion")
@@ -122,13 +115,13 @@ def flexible_model(
 
 
 def carries_weight(description: RobotDescription) -> bool:
-    """Whether gravity can load a joint: not where every axis is vertical, as the first one always is."""
+    """Return whether gravity can load any joint, which it cannot if all axes are vertical."""
     turns = [link_frame(description, number).rotation for number in range(description.joints - 1)]
     return any(np.hypot(turn[0, 2], turn[1, 2]) > 1e-9 for turn in turns)
 
 
 def link_frame(description: RobotDescription, number: int) -> pin.SE3:
-    """Return the frame at the end of a link in that of its joint: Tz(d) Tx(a) Rx(alpha), or its placement."""
+    """Return the frame at a link's end relative to its joint: Tz(d) Tx(a) Rx(alpha), or its placement."""
     kinematics = description.kinematics
     if kinematics.placement:
         x, y, z, *turn = kinematics.placement[number]
@@ -139,7 +132,7 @@ def link_frame(description: RobotDescription, number: int) -> pin.SE3:
 
 
 def rotation_of(roll: float, pitch: float, yaw: float) -> Floats:
-    """Return the rotation matrix by angles as URDF has them: about fixed x, then y, then z [rad], shape (3, 3)."""
+    """Return the rotation matrix of URDF angles: about fixed x, then y, then z [rad], shape (3, 3)."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))
     return np.array(
         [
@@ -171,5 +164,5 @@ def _lumps(description: RobotDescription, number: int) -> tuple[pin.Inertia, pin
 
 
 def payload_inertia(payload: Payload) -> pin.Inertia:
-    """Return mass, centre of mass and inertia of a payload in the frame of the flange."""
+    """Return a payload's inertia in the flange frame."""
     return pin.Inertia(payload.mass, np.array(payload.com), _matrix(payload.inertia))

@@ -1,7 +1,4 @@
-"""Vibration modes of arm and drives together, linearised: damped frequency, damping ratio and participation.
-
-This is the truth for judging estimators; a real robot cannot measure it.
-"""
+"""Vibration modes of arm and drives, linearised: the reference for estimators, unknown on real arms."""
 
 from dataclasses import dataclass
 
@@ -15,23 +12,22 @@ from tvist_plant.model import FlexibleModel, Floats
 
 @dataclass(frozen=True)
 class Modes:
-    """Oscillatory modes in the order of their frequency; arrays have one entry per mode."""
+    """Oscillatory modes in ascending frequency; arrays have one entry per mode."""
 
     f_d: Floats
     """Damped frequencies [Hz]."""
     zeta: Floats
     """Damping ratios [-]."""
     participation: Floats
-    """Amplitude of the flange acceleration after a step of 1 rad/s² in a joint's reference acceleration, as the root
-    of the sum of squares over joints and axes [m/s^2 per rad/s^2].
-    """
+    """Amplitude of the flange acceleration after a step of 1 rad/s² in a joint's reference acceleration, root
+    sum of squares over joints and axes [m/s^2 per rad/s^2]."""
 
 
 def modes(flexible: FlexibleModel, linear: LinearPart, description: RobotDescription, q: Floats) -> Modes:
-    """Linearise the closed loop at rest, at link angles of shape (N,) [rad], and solve its eigenvalue problem.
+    """Linearise the closed loop at rest at link angles of shape (N,) [rad], and solve its eigenvalue problem.
 
-    With z = (y, ẏ, s), y = (q, θ): M_b ÿ = -(K + ∂g/∂q) y - D ẏ + K_d K_p K_i s and ṡ = -θ. A complex pair
-    λ = -σ ± iω gives f_d = ω/2π and ζ = σ/|λ|. The description is that of the feed-forward.
+    With z = (y, ẏ, s), y = (q, θ): M_b ÿ = -(K + ∂g/∂q) y - D ẏ + K_d K_p K_i s and ṡ = -θ. A complex pair λ
+    = -σ ± iω gives f_d = ω/2π and ζ = σ/|λ|. The description supplies the feed-forward.
     """
     links, n = flexible.model.nv, len(flexible.joints)
     size = links + n

@@ -1,9 +1,4 @@
-"""External forces on an arm: torques on its joints, and wrenches on any of its bodies.
-
-A wrench w = (f, m) on a body enters the equations of motion as the generalized force Jᵀ w, where J is the Jacobian of
-its point of application. Its power is w · J q̇ for any motion of the arm. So the sum over all wrenches is added to
-the torques on the joints, and subtracted from the bias b(q, q̇).
-"""
+"""External forces on an arm: torques on joints, and wrenches w on bodies, which enter the equations as Jᵀ w."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -16,9 +11,9 @@ from tvist_plant.model import FLANGE, FlexibleModel, Floats
 
 class _Wrench(NamedTuple):
     joint: int
-    """Index of the model's joint that the body is attached to."""
+    """Index of the model's joint that moves the body."""
     point: Floats
-    """Point of application in that joint's frame, shape (3,) [m]."""
+    """Point of application in the joint's frame, shape (3,) [m]."""
     force: Floats
     """Force in world axes, shape (3,) [N]."""
     moment: Floats
@@ -26,7 +21,7 @@ class _Wrench(NamedTuple):
 
 
 class Outside:
-    """Torques and wrenches that act on an arm until they are changed."""
+    """Torques and wrenches that act until they are changed."""
 
     def __init__(self, flexible: FlexibleModel) -> None:
         self._flexible = flexible
@@ -40,7 +35,7 @@ class Outside:
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies: each has that of the joint or virtual joint that moves it, or "flange"."""
+        """Names of the bodies: that of the joint or virtual joint that moves each, or "flange"."""
         return tuple(self._bodies)
 
     def clear(self) -> None:
@@ -48,7 +43,7 @@ class Outside:
         self._torque, self._wrenches = None, {}
 
     def push(self, torque: Floats) -> None:
-        """Set the torques on the link side of the joints; see `FlexibleArm.push`."""
+        """Set the torques on the link side of the joints, as `FlexibleArm.push`."""
         given, shape = np.array(torque, dtype=float), self._flexible.joints.shape
         if given.shape != shape or not np.isfinite(given).all():
             raise ValueError(f"torque is {given.tolist()}: must be {shape[0]} finite numbers, one per joint")
@@ -57,7 +52,7 @@ class Outside:
     def push_body(
         self, body: str, force: Sequence[float], moment: Sequence[float], point: Sequence[float]
     ) -> None:
-        """Set the wrench on a body; see `FlexibleArm.push_body`."""
+        """Set the wrench on a body, as `FlexibleArm.push_body`."""
         if body not in self._bodies:
             raise ValueError(f"body is {body!r}: must be one of {', '.join(self._bodies)}")
         vectors = f, m, r = [np.array(value, dtype=float) for value in (force, moment, point)]
@@ -75,7 +70,7 @@ class Outside:
         return self._torque is None and not self._wrenches
 
     def generalized_force(self, q: Floats) -> Floats:
-        """Return the sum of all torques and wrenches as torques on all N links, shape (N,) [N m]."""
+        """Return the sum of all torques and wrenches as link torques, shape (N,) [N m]."""
         sum_ = np.zeros(self._flexible.model.nv)
         if self._torque is not None:
             sum_[self._flexible.joints] = self._torque

@@ -1,8 +1,8 @@
-"""Interface between a controller and a plant: drive commands in, measurements out, one control period at a time.
+"""Interface between a controller and a plant: drive commands in, measurements out, once per control period.
 
-A plant is a `SimulatedArm`, which can be put anywhere, or a `RealArm`, which stands somewhere. All else that only some
-arms can do has a default in `Plant`. A class that derives from neither but has the methods is a plant, too; see
-`foreign.arm_of`.
+A plant is a `SimulatedArm`, which can be placed anywhere, or a `RealArm`, which cannot be placed. Abilities
+of only some arms have a default in `Plant`. A class with the same methods that derives from neither also
+works (`foreign.arm_of`).
 """
 
 from abc import ABC, abstractmethod
@@ -31,7 +31,7 @@ class PlantError(ArithmeticError):
 class Measurement:
     """Measurements of a robot's own sensors.
 
-    The class is not frozen, since one is created at every tick, and that would take five times as long.
+    Not frozen, because creating a frozen one at every tick takes five times as long.
     """
 
     q: Floats
@@ -43,17 +43,16 @@ class Measurement:
     accelerometer: Floats
     """Specific force in the flange frame, with noise, shape (3,) [m/s^2]."""
     timestamp: float | None = None
-    """Time at which the plant measured, by its own clock [s]; None if it has none."""
+    """Time of the measurement on the plant's clock; None if it has none [s]."""
     wrench: Floats | None = None
-    """Force and torque about the flange's origin that all beyond the force sensor exerts on the flange, in its frame,
-    shape (6,) [N, N m]: weight, inertia and contact of what is mounted, with noise and offset; a push towards the
-    flange reads along the push, as UR's do. None: the plant has no such sensor.
-    """
+    """Force and torque about the flange's origin that everything beyond the force sensor exerts on the
+    flange, in its frame, shape (6,) [N, N m]: weight, inertia and contact, with noise and offset. A push
+    towards the flange reads along the push, as on UR robots. None: no such sensor."""
 
 
 @dataclass(frozen=True)
 class PlantTruth:
-    """Quantities that a real robot cannot measure, but a simulation knows."""
+    """Quantities that a simulation knows and a real robot cannot measure."""
 
     motor_q: Floats
     """Motor angles on the joint side θ, shape (n,) [rad]."""
@@ -62,9 +61,9 @@ class PlantTruth:
     gear_deflection: Floats
     """q - θ, shape (n,) [rad]."""
     link_deflection: Floats
-    """Angles of the virtual joints by which links bend, about y and z of each; empty if links are rigid [rad]."""
+    """Angles of the links' virtual joints, about y and z of each; empty if links are rigid [rad]."""
     flange_position: Floats
-    """Position of the flange in the world, in which a tilted arm leans; deflections included, shape (3,) [m]."""
+    """Position of the flange in the world including deflections and tilt, shape (3,) [m]."""
     flange_rotation: Floats
     """Orientation of the flange, deflections included, shape (3, 3)."""
     specific_force: Floats
@@ -77,10 +76,10 @@ class PlantTruth:
 
 @dataclass(frozen=True)
 class Response:
-    """What a plant did in T consecutive periods."""
+    """Results of T consecutive periods."""
 
     measured: Measurement
-    """Measurements after each, with arrays of shape (T, n) and (T, 3)."""
+    """Measurements after each period, with arrays of shape (T, n) and (T, 3)."""
     specific_force: Floats
     """Specific force in the flange frame without noise, shape (T, 3) [m/s^2]."""
     flange_position: Floats
@@ -91,88 +90,88 @@ class Response:
 
 @dataclass(frozen=True)
 class Halt:
-    """Why an arm's own controller does not follow us any more."""
+    """A stop by the arm's own controller."""
 
     why: str
-    """The reason, and what to do before the arm can be powered on or unlocked here, in words."""
+    """The reason, and what to do before tvist can power on or unlock the arm."""
     safety_mode: int
-    """Its safety mode, with RTDE's number."""
+    """The arm's safety mode (RTDE number)."""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """What a plant says of its own power."""
+    """State of a plant's drives as the plant reports it."""
 
     ready: bool
-    """Whether the drives hold the arm: they have power, and the brakes are released."""
+    """Whether the drives have power and the brakes are released."""
     fault: str | None = None
-    """What is wrong with it, in words; None if nothing is."""
+    """Description of a fault; None without one."""
     halt: Halt | None = None
-    """Why its own controller has stopped it; None if it has not."""
+    """The stop by the arm's own controller; None if it has not stopped."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sight:
-    """What a robot that its own controller moves has said in one of its cycles."""
+    """One cycle's report of a robot that its own controller moves."""
 
     tick: int
-    """Number of the control period by the robot's own clock; it increases from one to the next."""
+    """Number of the control period on the robot's clock, increasing."""
     measured: Measurement
-    """Its measurements."""
+    """The robot's measurements."""
     target: Floats
-    """Position [rad], velocity [rad/s], acceleration [rad/s²] and torque [N m] that it follows, shape (4, n)."""
+    """The robot's target position [rad], velocity [rad/s], acceleration [rad/s²] and torque [N m], shape (4, n)."""
     modes: tuple[int, int, int]
-    """Robot mode, safety mode and runtime state, with RTDE's numbers."""
+    """Robot mode, safety mode and runtime state (RTDE numbers)."""
     speed: float
-    """Share of the programmed speed [-]."""
+    """Fraction of the programmed speed [-]."""
     missed: int
-    """Number of cycles since the first that did not arrive."""
+    """Number of cycles lost since the first one."""
     payload: Payload | None = None
-    """Payload that it was told; None if it does not say."""
+    """Payload set on the robot; None if not reported."""
     tool: tuple[float, ...] | None = None
-    """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]; None if it does not say."""
+    """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]; None if not reported."""
     force: tuple[float, ...] | None = None
-    """Force and torque at the tool centre point, base frame [N, N m]; None if it does not say."""
+    """Force and torque at the tool centre point, base frame [N, N m]; None if not reported."""
     slider: float | None = None
-    """Position of the speed slider [-]; None if it does not say."""
+    """Position of the speed slider [-]; None if not reported."""
     inputs: int = 0
-    """Digital inputs, as RTDE orders the bits."""
+    """Digital inputs, bits in RTDE's order."""
     outputs: int = 0
-    """Digital outputs, as RTDE orders the bits."""
+    """Digital outputs, bits in RTDE's order."""
     told: tuple[str, ...] = ()
-    """What people should know, in sentences."""
+    """Messages for users."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A primitive shape of a thing."""
+    """A primitive shape."""
 
     kind: str
     """`plane`, `sphere`, `capsule`, `ellipsoid`, `cylinder` or `box`."""
     size: tuple[float, ...]
-    """As MuJoCo's: radius and half of the length along z; half of the lengths; of a plane 0 where it has no end [m]."""
+    """Size as in MuJoCo: radius and half length along z, or half lengths; 0 for an infinite side of a plane [m]."""
     pose: tuple[float, ...]
-    """Pose in the frame of its body: x y z [m] and rotation vector [rad]."""
+    """Pose in the body's frame: x y z [m] and rotation vector [rad]."""
     body: int | None
-    """Number of the body that carries it; None if it stands still, in the frame of the arm's base."""
+    """Number of the body that carries it; None if fixed in the arm's base frame."""
     colour: tuple[float, ...]
     """Red, green, blue and opacity, 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Things:
-    """What stands around an arm."""
+    """The objects around an arm."""
 
     name: str
     """Name of the scene."""
     bodies: tuple[str, ...]
-    """Names of the bodies that move."""
+    """Names of the moving bodies."""
     shapes: tuple[Shape, ...]
-    """What they, and all that stands still, look like."""
+    """Shapes of the moving bodies and of everything fixed."""
     areas: Mapping[str, Shape]
-    """Places of which a test may ask whether a body is there, by their names."""
+    """Named areas in which a test can check for a body."""
     unseen: int = 0
-    """Number of shapes that are left out, such as meshes."""
+    """Number of shapes left out, such as meshes."""
 
 
 @dataclass(frozen=True)
@@ -184,75 +183,73 @@ class Hand:
     position: Floats
     """Position of the tool centre point in the flange frame, shape (3,) [m]."""
     rotation: Floats
-    """Its orientation, shape (3, 3)."""
+    """Orientation of the tool centre point in the flange frame, shape (3, 3)."""
 
     @property
     def direction(self) -> Floats:
-        """The way from the flange along which the fingers point, shape (3,)."""
+        """Direction of the fingers, away from the flange, shape (3,)."""
         return np.asarray(self.rotation[:, 2])
 
     @property
     def root(self) -> Floats:
-        """Where the fingers begin, in the flange frame, shape (3,) [m]."""
+        """Root of the fingers in the flange frame, shape (3,) [m]."""
         return np.asarray(self.position - 0.05 * self.direction)
 
 
 class Plant(ABC):
-    """An arm with its drives, simulated or real: all that a controller may ask of it.
+    """An arm with its drives, simulated or real, as a controller uses it.
 
-    A controller owns its plant: no other code steps or resets it, and controllers do not share plants. When it starts,
-    it places a `SimulatedArm`, and begins where a `RealArm` stands; from then on it calls `step` once in every control
-    period of `PERIOD` seconds, with power or without. Every other method has a default, and `can` tells whether a plant
-    has one of its own.
+    A controller owns its plant: no other code steps or resets it. On start the controller resets a `SimulatedArm`, or
+    starts at the position of a `RealArm`. It then calls `step` once per control period (`PERIOD`), with or without
+    power. All other methods have a default; `can` tells whether a plant overrides it.
 
     An implementation guarantees:
 
-    - n joints, as many as in the robot's description, in its order and with its signs and zeros;
-    - that equal resets and equal commands give equal measurements to the last bit, if runs are to be replayed;
-    - that returned arrays are not changed later, since they belong to the receiver;
-    - that the command's arrays are neither kept nor changed;
+    - n joints, in the order and with the signs and zeros of the robot's description;
+    - measurements equal to the last bit after equal resets and commands, if runs are to be replayed;
+    - that it neither changes the arrays it returned nor keeps or changes the command's arrays;
     - that each call returns within the control period, if the clock is real time.
     """
 
     payload: Payload
-    """Carried payload, as far as it is known; it determines how far the arm moves when the brakes close."""
+    """Carried payload as far as known; it determines how far the arm moves while the brakes close."""
 
     @abstractmethod
     def step(self, command: DriveCommand) -> Measurement:
         """Move the arm by one control period.
 
         Args:
-            command: Set-points for the end of the period; the drives go linearly from the previous ones to these.
+            command: Set-points for the end of the period; the drives interpolate linearly from the previous ones.
 
         Returns:
             Measurements at the end of the period.
 
         Raises:
-            PlantError: A simulated state is no longer finite, or a real arm does not answer. A simulated arm then is in
-                a protective stop; a real one gets no power until the safety system is restarted.
+            PlantError: A simulated state is no longer finite, or a real arm does not answer. A simulated arm then
+                enters a protective stop; a real one stays without power until the safety system is restarted.
         """
 
     def can(self, method: Callable[..., Any]) -> bool:
-        """Return whether the plant has a method of its own for one that has a default here, such as `Plant.load`."""
+        """Return whether the plant overrides a method that has a default here, such as `Plant.load`."""
         found = getattr(self, method.__name__)
         return callable(found) and getattr(found, "__func__", found) is not method
 
-    # ------------------------------------------------------------------ what it carries and grips
+    # ------------------------------------------------------------------ payload and gripper
 
     def load(self, payload: Payload) -> None:
-        """Carry another payload from now on, for the parts and tools of a cell; positions and velocities stay."""
+        """Carry another payload from now on; positions and velocities stay."""
         self._lacks("load")
 
     def mount(self, hand: Hand) -> None:
-        """Mount a gripper that really holds, before the first reset."""
+        """Mount a gripper with simulated grasping, before the first reset."""
         self._lacks("mount")
 
     def grip(self, opening: float, force: float) -> None:
         """Move the fingers from the next step on.
 
         Args:
-            opening: Wanted distance between them [m].
-            force: Largest force of each [N].
+            opening: Wanted distance between the fingers [m].
+            force: Largest force of each finger [N].
         """
         self._lacks("grip")
 
@@ -260,46 +257,46 @@ class Plant(ABC):
         """Return the measured distance between the fingers [m]."""
         self._lacks("opening")
 
-    # ------------------------------------------------------------------ power, and the tick
+    # ------------------------------------------------------------------ power and ticks
 
     @property
     def condition(self) -> Condition:
-        """Its present condition. If it stops being ready while the robot runs, the robot stops."""
+        """Present condition. If it stops being ready while the robot runs, the robot stops."""
         return Condition(ready=True)
 
     def switch(self, *, power: bool, brakes: bool) -> None:
-        """Ask for another state, which may take a while: `condition` tells when the drives hold the arm.
+        """Request another power state, which may take a while; `condition` reports when the drives are ready.
 
         Args:
-            power: Whether the drives are to have power.
-            brakes: Whether the brakes are to hold the arm.
+            power: Whether the drives get power.
+            brakes: Whether the brakes hold the arm.
         """
 
     def stop(self) -> None:
-        """Stop with category 0, no power and brakes closed, for stops that do not go through the control line."""
+        """Stop with category 0 (power off, brakes closed), for stops that bypass the control line."""
 
     def wait(self, timeout: float) -> bool:
-        """Give the tick: wait for the next control period; return False if it does not begin within the timeout [s]."""
+        """Wait for the plant's next control period; return False if none begins within the timeout [s]."""
         self._lacks("wait")
 
     @property
     def watched(self) -> bool:
-        """Whether its own controller moves it, while we watch; see `RealArm.sight`."""
+        """Whether its own controller moves it while tvist watches; see `RealArm.sight`."""
         return False
 
     @property
     def supervised(self) -> bool:
-        """Whether we move it through its own controller; see `RealArm.seen`."""
+        """Whether tvist moves it through its own controller; see `RealArm.seen`."""
         return False
 
-    # ------------------------------------------------------------------ what only a simulation knows
+    # ------------------------------------------------------------------ simulation only
 
     def truth(self) -> PlantTruth | None:
-        """Return what a real robot cannot measure, after the last step or reset; None if that is unknown."""
+        """Return what a real robot cannot measure, after the last step or reset; None if unknown."""
         return None
 
     def modes(self, q: Floats | None = None) -> Modes | None:
-        """Return the vibration modes of the closed loop at rest; None if they are unknown.
+        """Return the vibration modes of the closed loop at rest; None if unknown.
 
         Args:
             q: Joint positions, shape (n,) [rad]; None for the present ones.
@@ -307,16 +304,17 @@ class Plant(ABC):
         return None
 
     def held(self) -> Callable[[int], Response]:
-        """Keep the present state, which takes little time.
+        """Save the present state, which is quick, for a later prediction.
 
         Returns:
-            What the arm would do in a number of periods if its drives held the position of the last command, without
-            noise and without pushes from outside. It does not change the arm, and may be called at any later time.
+            A function of a number of periods. It computes the arm's response if the drives hold the position
+                of the last command, without noise or external pushes. It does not change the arm and may be
+                called at any time.
         """
         self._lacks("held")
 
     def push(self, torque: Floats) -> None:
-        """Apply external torques to the joints until they are changed or the arm is reset, for the fault `torque`.
+        """Apply external torques to the joints until changed or reset, for the fault `torque`.
 
         Args:
             torque: Torques on the link side, shape (n,); zeros end the push [N m].
@@ -324,25 +322,25 @@ class Plant(ABC):
         self._lacks("push")
 
     def make_nan(self) -> None:
-        """Make the state NaN for the fault `nan`, so that the next step raises `PlantError`."""
+        """Make the state NaN for the fault `nan`; the next step then raises `PlantError`."""
         self._lacks("make_nan")
 
-    # ------------------------------------------------------------------ the world around it
+    # ------------------------------------------------------------------ world
 
     def things(self) -> Things | None:
-        """Return what stands around it and touches it, which stays the same; None if nothing does."""
+        """Return the objects around the arm, which do not change; None if there are none."""
         return None
 
     def places(self) -> Floats:
-        """Return the present poses of the bodies that move, in the frame of the base, shape (bodies, 6) [m, rad]."""
+        """Return the present poses of the moving bodies in the base frame, shape (bodies, 6) [m, rad]."""
         return np.empty((0, 6))
 
     def contact(self) -> Floats:
-        """Return the force of all that touches the arm, its tool or its fingers, base frame, shape (3,) [N]."""
+        """Return the contact force on arm, tool and fingers together, base frame, shape (3,) [N]."""
         return np.zeros(3)
 
     def obstacle(self, q: Floats, payload: Payload | None) -> str | None:
-        """Say what the arm would stand in after a reset; None if it would be clear. Asking changes nothing.
+        """Return what the arm would overlap after a reset, None if nothing; the state does not change.
 
         Args:
             q: Joint angles of the reset, shape (n,) [rad].
@@ -355,27 +353,27 @@ class Plant(ABC):
 
 
 class SimulatedArm(Plant):
-    """A plant that can be put anywhere at rest: `simulation.reset` needs it."""
+    """A plant that can be placed anywhere at rest, as `simulation.reset` requires."""
 
     @abstractmethod
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest under a command without motion, as if it had stood there for a long time.
+        """Place the arm at rest under a command, as if it had stood there for a long time.
 
         Args:
-            command: Position to hold, shape (n,) [rad], feed-forward torque [N m], and a velocity of zero.
+            command: Position to hold, shape (n,) [rad], feed-forward torque [N m], and zero velocity.
             payload: New carried payload; None to keep the present one.
             seed: Seed of all random effects, such as sensor noise.
 
         Raises:
-            ValueError: The arm cannot be there, or cannot carry the payload, so that no controller can start with it.
-                Once its controller has started, a plant must not raise this.
+            ValueError: The arm cannot be placed there or cannot carry the payload, so its controller cannot
+                start. After the start a plant must not raise this.
         """
 
     def play(self, commands: Floats) -> Response:
-        """Move the arm by T control periods, with the same results to the last bit as one by one.
+        """Move the arm by T control periods, with the results of `step` to the last bit.
 
         Args:
-            commands: Position, velocity and torque of the command for the end of each, shape (T, 3, n).
+            commands: Position, velocity and torque for the end of each period, shape (T, 3, n).
 
         Raises:
             PlantError: See `step`.
@@ -394,45 +392,42 @@ class SimulatedArm(Plant):
 
 
 class RealArm(Plant):
-    """A plant that stands somewhere by itself.
-
-    Its own controller may move it (`sight`), or follow our positions and stop it (`seen`); neither has a default.
-    """
+    """A plant that cannot be placed; its own controller may move it (`sight`) or supervise it (`seen`)."""
 
     def measure(self) -> Measurement:
         """Return the present measurements without moving the arm.
 
         Raises:
-            PlantError: It does not answer. The robot then cannot begin with it, or does not switch its power on.
+            PlantError: The arm does not answer; the robot then cannot start, or does not power on.
         """
         name = type(self).__name__
         raise ValueError(f"the plant {name} has neither reset nor measure: it needs one of them")
 
     @property
     def watched(self) -> bool:
-        """Whether its own controller moves it: no command reaches it, and `step` only measures."""
+        """Whether its own controller moves it: commands have no effect, and `step` only measures."""
         return self.can(RealArm.sight) and self.can(Plant.wait)
 
     @property
     def supervised(self) -> bool:
-        """Whether we move it through its own controller, which follows our positions and may stop it."""
+        """Whether tvist moves it through its own controller, which follows the set-points and may stop it."""
         needed = (RealArm.seen, RealArm.described, Plant.wait, Plant.switch, Plant.stop)
         return all(self.can(one) for one in needed)
 
     def sight(self) -> Sight:
-        """Return what it said in its next cycle, for which `wait` has waited.
+        """Return the report of the cycle that `wait` waited for.
 
         Raises:
-            PlantError: It has said nothing since the last call.
+            PlantError: There was no new report since the last call.
         """
         self._lacks("sight")
 
     def interval(self) -> float:
-        """Return the time between two of its cycles as they arrive [s]."""
+        """Return the interval at which its cycles arrive [s]."""
         return PERIOD
 
     def seen(self) -> Sight:
-        """Return what it said last; its `told` are those since the last call."""
+        """Return the latest report, with the messages (`told`) since the last call."""
         self._lacks("seen")
 
     def described(self) -> RobotDescription:

@@ -1,4 +1,4 @@
-"""Checks of a robot file that types cannot express, and msgspec's messages about those that they can."""
+"""Checks of a robot file beyond its types, and readable messages for msgspec's type errors."""
 
 import math
 import re
@@ -13,25 +13,25 @@ from tvist_plant.robot_tables import MAX_JOINTS, ORIGINS, RobotDescription, Robo
 from tvist_plant.user_file import LONGEST_NAME, is_name
 
 MAX_POSITION: Final = 20.0 * math.pi
-"""Largest position limit that is accepted as radians: ten turns in either direction [rad]."""
+"""Largest position limit accepted as radians: ten turns in either direction [rad]."""
 MAX_VELOCITY: Final = 16.0 * math.pi
-"""Largest velocity limit that is accepted as radians: eight turns per second [rad/s]."""
+"""Largest velocity limit accepted as radians: eight turns per second [rad/s]."""
 
 
 def check(description: RobotDescription) -> None:
-    """Check lengths, limits, bodies and names of a robot file."""
+    """Check lengths, limits, bodies and names of a robot file; raise RobotFileError."""
     for what in (_names, _joints, _collision, _limits, _bodies, _provenance, _imperfections):
         for said in what(description):
             raise RobotFileError(said)
 
 
 def is_real_body(inertia: Tensor) -> bool:
-    """Return whether the principal moments are physically possible: none negative, none above the sum of the others."""
+    """Return whether the principal moments are possible: none negative, none above the sum of the others."""
     return lacking_inertia(inertia) == 0.0
 
 
 def lacking_inertia(inertia: Tensor) -> float:
-    """Return what all principal moments lack at least to be physically possible; 0 for a real body [kg m^2]."""
+    """Return the least amount missing from the principal moments to be possible; 0 if possible [kg m^2]."""
     xx, xy, xz, yy, yz, zz = inertia
     least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
     if least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6):
@@ -40,7 +40,7 @@ def lacking_inertia(inertia: Tensor) -> float:
 
 
 def _names(description: RobotDescription) -> Iterator[str]:
-    """Check that names, which go to terminals, pages and other programs, can be shown there."""
+    """Check that names are printable and short, since terminals, pages and other programs show them."""
     robot, bodies = description.robot, description.collision.bodies
     names = {
         "robot.name": [robot.name], "robot.model": [robot.model], "robot.joints": robot.joints,
@@ -57,7 +57,7 @@ def _names(description: RobotDescription) -> Iterator[str]:
 
 
 def _joints(description: RobotDescription) -> Iterator[str]:
-    """Check that tables have an entry for each joint, and that frames and bends of links are given in one way."""
+    """Check for one entry per joint, and that link frames and bending links are given in one way only."""
     joints, kinematics, flexible = description.joints, description.kinematics, description.link_flexibility
     if not 1 <= joints <= MAX_JOINTS:
         yield f"robot.joints has {joints} names; 1 to {MAX_JOINTS} are supported"
@@ -90,7 +90,7 @@ def _joints(description: RobotDescription) -> Iterator[str]:
 
 
 def _collision(description: RobotDescription) -> Iterator[str]:
-    """Check that bodies belong to links that exist, and that pairs name bodies."""
+    """Check that collision bodies belong to existing links and pairs to existing bodies."""
     names = [body.name for body in description.collision.bodies]
     known = {*names, "payload"}
     if len(known) <= len(names):
@@ -109,7 +109,7 @@ def _collision(description: RobotDescription) -> Iterator[str]:
 
 
 def _limits(description: RobotDescription) -> Iterator[str]:
-    """Refuse limits that only make sense in degrees, which would be no limits at all."""
+    """Refuse limits that can only be degrees; in radians they would limit nothing."""
     limits = description.limits
     for key, values, most, unit in (
         ("position", limits.position, MAX_POSITION, "rad"),
@@ -124,7 +124,6 @@ def _limits(description: RobotDescription) -> Iterator[str]:
 
 
 def _bodies(description: RobotDescription) -> Iterator[str]:
-    """Check that every inertia is physically possible."""
     links = {f"links.inertia[{number}]": inertia for number, inertia in enumerate(description.links.inertia)}
     for key, inertia in {**links, "payload.inertia": description.payload.inertia}.items():
         if not is_real_body(inertia):
@@ -135,7 +134,7 @@ def _bodies(description: RobotDescription) -> Iterator[str]:
 
 
 def _provenance(description: RobotDescription) -> Iterator[str]:
-    """Check that what is said to come from somewhere exists, and that the kind of its source is known."""
+    """Check that provenance refers to existing keys and known kinds of sources."""
     for key, origin in description.provenance.items():
         value: object = description
         for part in key.split("."):
@@ -151,7 +150,7 @@ def _provenance(description: RobotDescription) -> Iterator[str]:
 
 
 def _imperfections(description: RobotDescription) -> Iterator[str]:
-    """Check the table of imperfections by converting it, and that this arm can have them."""
+    """Check that the imperfections are valid and possible for this arm."""
     given = description.imperfections
     if not given:
         return
@@ -176,7 +175,7 @@ def _imperfections(description: RobotDescription) -> Iterator[str]:
 
 
 def _keys(table: dict[str, Any]) -> set[str]:
-    """Return all keys of a table, and those of its tables with a dot."""
+    """Return the keys of a table, and those of its tables joined by a dot."""
     inner = {f"{key}.{one}" for key, value in table.items() if isinstance(value, dict) for one in value}
     return inner | table.keys()
 
@@ -189,7 +188,7 @@ _RELATIONS: Final = {">=": "at least", "<=": "at most", ">": "more than", "<": "
 
 
 def in_words(error: msgspec.ValidationError, content: Any, table: str = "") -> str:
-    """Return msgspec's message about a content or a table of it, with the key, the value and the permitted values."""
+    """Turn msgspec's message into one with the key, the value and the permitted values."""
     said, _, path = str(error).partition(" - at `$")
     key = f"{table}{path.rstrip('`')}".removeprefix(".")
     value = content

@@ -19,15 +19,15 @@ Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
 
 MAX_JOINTS = 7
 DISTURBANCES = ("friction", "gear", "noise")
-"""Disturbances unknown to a shaper: Coulomb friction, kinematic error of the gears, noise of the accelerometer."""
+"""Disturbances unknown to a shaper: Coulomb friction, kinematic gear error, accelerometer noise."""
 ORIGINS = ("published", "measured", "given", "assumed", "invented")
-"""Kinds of origin that `provenance` knows."""
+"""Kinds of sources in `provenance`."""
 QUIET_STEP = 2.0 * math.pi / 2**23
-"""Step of an encoder with 23 bits per turn [rad]; an arm at rest moves by less than this while its drives settle."""
+"""Step of a 23-bit encoder [rad]; an arm at rest moves less while its drives settle."""
 
 
 class DescriptionError(ValueError):
-    """There is no such robot, or its file is invalid; the message says what is allowed."""
+    """There is no such robot, or its file is invalid; the message states what is allowed."""
 
 
 class RobotFileError(DescriptionError, UserFileError):
@@ -35,7 +35,7 @@ class RobotFileError(DescriptionError, UserFileError):
 
 
 class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One table of the file; unknown keys are rejected."""
+    """One table of the file, without unknown keys."""
 
 
 class RobotNames(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -44,14 +44,14 @@ class RobotNames(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     name: str
     model: str
     joints: tuple[str, ...]
-    """Names of the joints, from the base to the flange, which also define the number of joints."""
+    """Names of the joints from the base to the flange; they define the number of joints."""
 
 
 class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """The frame at the end of each link in that of its joint, which turns about z; one entry per joint.
+    """The frame at the end of each link relative to its joint, which turns about z; one entry per joint.
 
-    The next joint turns about the z axis of this frame; that of the last link is the flange. Either the standard
-    Denavit-Hartenberg parameters give it, Tz(d) Tx(a) Rx(alpha), or `placement` does.
+    The next joint turns about z of this frame; the last one is the flange. Give either standard
+    Denavit-Hartenberg parameters, Tz(d) Tx(a) Rx(alpha), or `placement`.
     """
 
     a: tuple[Number, ...] = ()
@@ -65,7 +65,7 @@ class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True, 
 
 
 class Links(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Masses of the rigid links, in the frame at the end of each link."""
+    """Mass properties of the rigid links, in the frame at the end of each link."""
 
     mass: tuple[Positive, ...]
     """Masses [kg]."""
@@ -125,21 +125,21 @@ class Drives(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     friction_width: Positive
     """Width w in F_c tanh(velocity/w) [rad/s]."""
     friction_feedforward: NotNegative
-    """Share of F_c that is fed forward [-]."""
+    """Fraction of F_c that is fed forward [-]."""
     friction_feedforward_width: Positive
     """Width of the fed-forward friction [rad/s]."""
     windup_feedforward: tuple[NotNegative, ...]
-    """c_w, share of the gears' wind-up that is fed forward [-]."""
+    """c_w, fraction of the gears' wind-up that is fed forward [-]."""
     gear_error_amplitude: NotNegative
     """Amplitude of the gears' kinematic error [rad]."""
     gear_error_waves: Positive
-    """Number of waves of that error per turn of the joint [-]."""
+    """Waves of the kinematic error per turn of the joint [-]."""
     linear_friction: bool = False
-    """Use F_c/w times velocity as friction, and feed all of it forward: the plant that the linear modes describe."""
+    """Use linear friction, F_c/w times velocity, and feed all of it forward; the linear modes describe this plant."""
 
 
 class LinkFlexibility(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Links that bend, with two virtual elastic joints about y and z in the middle of each."""
+    """Links that bend, each with two virtual elastic joints about y and z in its middle."""
 
     links: tuple[Annotated[int, Meta(ge=0, lt=MAX_JOINTS)], ...] = ()
     """Indices of the links, 0 for the first."""
@@ -155,17 +155,16 @@ class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     accelerometer_noise: NotNegative = 0.0
     """rms per axis [m/s^2]."""
     encoder_step: NotNegative = 0.0
-    """Change of a joint angle after which its reading is updated [rad]."""
+    """Change of a joint angle that updates its reading [rad]."""
     force_noise: NotNegative = 1.2
-    """rms per axis of the force sensor in the flange, which only an arm in a world has; a third of the precision that
-    UR publishes for its e-Series, 3.5 N [N].
-    """
+    """rms per axis of the force of the flange sensor, which only an arm in a world has; a third of UR's
+    published e-Series precision, 3.5 N [N]."""
     torque_noise: NotNegative = 0.07
-    """The same of its torque; a third of 0.2 N m [N m]."""
+    """rms per axis of the torque of the flange sensor; a third of 0.2 N m [N m]."""
     force_offset: NotNegative = 4.0
-    """Largest constant error per axis of its force, which the seed draws; the accuracy that UR publishes [N]."""
+    """Largest constant force error per axis, drawn from the seed; UR's published accuracy [N]."""
     torque_offset: NotNegative = 0.3
-    """The same of its torque [N m]."""
+    """Largest constant torque error per axis [N m]."""
 
 
 class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -173,7 +172,7 @@ class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     name: str
     link: Annotated[int, Meta(ge=-1, lt=MAX_JOINTS)]
-    """Index of the link that it belongs to, and in whose frame it is given; -1 for the world."""
+    """Index of the link in whose frame it is given; -1 for the world."""
     start: Vector3
     """One end of its axis [m]."""
     end: Vector3
@@ -183,31 +182,31 @@ class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Collision(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Bodies that must not collide: those of the arm, and the floor. Neighbours in the list may touch."""
+    """Bodies of the arm and the floor, which must not collide; neighbours in the list may touch."""
 
     floor: Number = 0.0
-    """Height of the floor [m]; the first two bodies stand on it and cannot collide with it."""
+    """Height of the floor, which the first two bodies may touch [m]."""
     has_floor: bool = True
     """Whether there is a floor."""
     payload_radius: Positive = 0.05
-    """Radius of the capsule from the flange through the payload's centre to twice its distance [m]."""
+    """Radius of a capsule from the flange through the payload's centre to twice its distance [m]."""
     apart: tuple[tuple[str, str], ...] = ()
-    """Further pairs that cannot collide; "payload" is one of the names."""
+    """Further pairs that are not checked; "payload" is a valid name."""
     bodies: tuple[Body, ...] = ()
     """Bodies of the arm, from the base to the flange."""
 
 
 class Mesh(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A mesh that shows a part of the arm; it is drawn, and nothing else."""
+    """A mesh of a part of the arm, for drawing only."""
 
     link: Annotated[int, Meta(ge=-1)]
-    """Index of the link in whose frame it stands; -1 for the base frame."""
+    """Index of the link in whose frame it is given; -1 for the base frame."""
     file: str
-    """Its file."""
+    """Path of the mesh file."""
     placement: Placement = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     """Position [m] and roll, pitch, yaw about fixed axes [rad]."""
     scale: Vector3 = (1.0, 1.0, 1.0)
-    """Factors of its coordinates [-]."""
+    """Scale factors [-]."""
 
 
 class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -222,17 +221,13 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
     link_flexibility: LinkFlexibility = LinkFlexibility()
     sensors: Sensors = Sensors()
     imperfections: dict[str, Any] = {}
-    """Fields of `imperfections.Imperfections`, which the simulated arm has. Of these, a controller knows the stiction
-    alone.
-    """
+    """Fields of `imperfections.Imperfections` for the simulated arm; a controller knows only the stiction."""
     collision: Collision = Collision()
     meshes: tuple[Mesh, ...] = ()
     poses: dict[str, tuple[Number, ...]] = {}
     """Named joint positions [rad]."""
     provenance: dict[str, str] = {}
-    """Where the numbers of a table, or of a key as in "links.inertia", come from: one of `ORIGINS`, a colon, and the
-    source.
-    """
+    """Source of a table or a key such as "links.inertia": one of `ORIGINS`, a colon, and the source."""
 
     @property
     def joints(self) -> int:
@@ -240,21 +235,21 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
         return len(self.robot.joints)
 
     def quiet(self) -> "RobotDescription":
-        """Return the same arm with sensors whose values are constant once the arm is at rest."""
+        """Return the arm with sensors whose readings are constant at rest."""
         still = Sensors(encoder_step=QUIET_STEP, force_noise=0.0, torque_noise=0.0)
         return msgspec.structs.replace(self, sensors=still)
 
     def without_floor(self) -> "RobotDescription":
-        """Return the same arm without a floor that it could collide with."""
+        """Return the arm without a floor."""
         replace = msgspec.structs.replace
         return replace(self, collision=replace(self.collision, has_floor=False))
 
     def clean(self) -> "RobotDescription":
-        """Return the same arm without noise, gear error and Coulomb friction (its linear equivalent stays)."""
+        """Return the arm without noise, gear error and Coulomb friction, whose linear equivalent stays."""
         return self.disturbed_by(())
 
     def disturbed_by(self, kept: Collection[str]) -> "RobotDescription":
-        """Return the same arm with only some of its `DISTURBANCES`; the linear equivalent of Coulomb friction stays."""
+        """Return the arm with only these `DISTURBANCES`; the linear equivalent of Coulomb friction stays."""
         for name in kept:
             if name not in DISTURBANCES:
                 raise DescriptionError(f"disturbance is {name!r}: must be one of {', '.join(DISTURBANCES)}")

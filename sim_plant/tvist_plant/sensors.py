@@ -1,4 +1,4 @@
-"""The arm's sensors, an accelerometer and a force sensor in the flange, and the phases of the gears' errors."""
+"""Accelerometer and force sensor in the flange, and random phases of gear errors."""
 
 from collections.abc import Callable, Iterator
 from itertools import islice
@@ -9,16 +9,13 @@ from tvist_plant.model import Floats
 
 
 def _rows(draw: Callable[[], Floats]) -> Iterator[Floats]:
-    """Draw rows of noise in blocks, since one call of the generator takes as long as a hundred samples."""
+    """Draw noise in blocks, since one call of the generator takes as long as a hundred samples."""
     while True:
         yield from draw()
 
 
 class Accelerometer:
-    """Three-axis specific force in the flange frame with white noise, rms per axis [m/s^2].
-
-    Equal seeds give equal noise. At rest it reads the reaction to gravity: 9.81 m/s² pointing up.
-    """
+    """Specific force in the flange frame with white noise, rms per axis [m/s^2]; +9.81 m/s² up at rest."""
 
     def __init__(self, noise: float, seed: int) -> None:
         random = np.random.default_rng([seed, 1])
@@ -30,7 +27,7 @@ class Accelerometer:
         return specific_force.copy() if self._noise == 0.0 else specific_force + next(self._drawn)
 
     def read_all(self, specific_forces: Floats) -> Floats:
-        """Return noisy readings one after the other, as `read` does, shape (T, 3) [m/s^2]."""
+        """Return consecutive noisy readings, shape (T, 3) [m/s^2]."""
         if self._noise == 0.0:
             return specific_forces.copy()
         rows = list(islice(self._drawn, len(specific_forces)))
@@ -38,10 +35,7 @@ class Accelerometer:
 
 
 class ForceSensor:
-    """Force and torque in the flange with white noise and a constant error; equal seeds give equal readings.
-
-    The noise is the rms of force [N] and torque [N m], the offset the largest constant error of each.
-    """
+    """Flange force [N] and torque [N m] with white noise (rms) and a constant error of at most `offset`."""
 
     def __init__(self, noise: tuple[float, float], offset: tuple[float, float], seed: int) -> None:
         random = np.random.default_rng([seed, 2])
@@ -54,5 +48,5 @@ class ForceSensor:
 
 
 def gear_phases(joints: int, seed: int) -> Floats:
-    """Phase of each gear's kinematic error, random for each seed, shape (joints,) [rad]."""
+    """Return the phase of each gear's kinematic error, drawn from the seed, shape (joints,) [rad]."""
     return np.random.default_rng([seed, 0]).uniform(0.0, 2.0 * np.pi, joints)

@@ -1,8 +1,8 @@
-"""Springs and drives of an arm that nobody has measured: the UR5e's, scaled by dynamic similarity.
+"""Springs and drives of an unmeasured arm: those of the UR5e, scaled by dynamic similarity.
 
-An arm is taken for a scaled copy of the UR5e in the same gravity. Two ratios describe a joint: τ, of its largest torque
-to that of the UR5e's joint, and λ, of the arm's stretched length to the UR5e's. A joint's torque holds a weight m g L,
-so the inertia that it carries, m L², grows as τ λ, and times grow as the square root of λ (equal Froude number):
+The arm is treated as a scaled copy of the UR5e in the same gravity, with two ratios: τ, of a joint's largest
+torque to that of the UR5e's joint, and λ, of the arm's stretched length to the UR5e's. A joint's torque holds
+a weight m g L, so its inertia m L² grows as τ λ, and times grow as √λ (equal Froude number):
 
     stiffness, friction            K, k_l, F_c  ∝ τ          every gear twists by the same angle at its largest torque
     inertia of a rotor             B            ∝ τ λ
@@ -12,8 +12,8 @@ so the inertia that it carries, m L², grows as τ λ, and times grow as the squ
     time of a link's damping       d_l/k_l      ∝ √λ
     shares, and errors of gears                 are the same
 
-The first joint is like the UR5e's base, the last three like its wrist, the one before these like its elbow, and all
-others like its shoulder; an arm of less than five joints has the UR5e's first ones.
+The first joint corresponds to the UR5e's base, the last three to its wrist, the one before to its elbow, all
+others to its shoulder. An arm with fewer than five joints corresponds to the UR5e's first ones.
 """
 
 import math
@@ -28,11 +28,11 @@ from tvist_plant.robot_tables import ArmLimits, Kinematics, RobotDescription
 from tvist_plant.user_file import toml
 
 RULE: Final = "assumed: the UR5e's, scaled by dynamic similarity to this arm's torques and length"
-"""Provenance of what this module computes."""
+"""Provenance of the values computed here."""
 WRIST: Final = 3
-"""Number of joints at the end of an arm that are like those of the UR5e's wrist."""
+"""Number of joints at the end that correspond to the UR5e's wrist."""
 DIGITS: Final = 4
-"""Number of significant digits that a scaled value keeps."""
+"""Number of significant digits of scaled values."""
 
 _POWERS: Final = {
     "gear_stiffness": (1.0, 0.0),
@@ -46,7 +46,7 @@ _POWERS: Final = {
     "friction_feedforward_width": (0.0, -0.5),
     "windup_feedforward": (0.0, 0.0),
 }
-"""Powers of τ and λ by which parameters of drives grow; all others are those of the UR5e."""
+"""Exponents of τ and λ for parameters of the drives; the others are the UR5e's."""
 
 
 @cache
@@ -57,14 +57,14 @@ def _measured() -> RobotDescription:
 
 
 def stretched(kinematics: Kinematics) -> float:
-    """Return the length of all links after the first [m], stretched out into one line."""
+    """Return the length of all links after the first, stretched into one line [m]."""
     if kinematics.placement:
         return math.fsum(math.hypot(*link[:3]) for link in kinematics.placement[1:])
     return math.fsum(math.hypot(a, d) for a, d in zip(kinematics.a[1:], kinematics.d[1:], strict=False))
 
 
 def counterpart(joint: int, joints: int) -> int:
-    """Return the index of the UR5e's joint that a joint of an arm with so many joints is like."""
+    """Return the index of the UR5e's joint that corresponds to a joint of an arm with `joints` joints."""
     if joints < WRIST + 2:
         return joint
     if joint >= joints - WRIST:
@@ -73,12 +73,12 @@ def counterpart(joint: int, joints: int) -> int:
 
 
 class Scale:
-    """Ratios of an arm to the UR5e, by its links and the largest torque of each joint, shape (n,) [N m]."""
+    """Ratios of an arm to the UR5e, from its links and largest joint torques, shape (n,) [N m]."""
 
     def __init__(self, kinematics: Kinematics, torque: Sequence[float]) -> None:
         measured = _measured()
         self.like = [counterpart(joint, len(torque)) for joint in range(len(torque))]
-        """Index of the UR5e's joint that each joint is like, shape (n,)."""
+        """Index of the UR5e's corresponding joint, shape (n,)."""
         self.torque = [
             value / measured.limits.torque[like] for value, like in zip(torque, self.like, strict=True)
         ]
@@ -108,10 +108,10 @@ class Scale:
         return own
 
     def link_flexibility(self, kinematics: Kinematics) -> dict[str, Any]:
-        """Return the table `link_flexibility`: the long links between the first joint and the wrist bend as the UR5e's.
+        """Return the table `link_flexibility`: long links between first joint and wrist bend as the UR5e's.
 
-        Only links with Denavit-Hartenberg parameters bend. A link is long if most of its length is along its x axis;
-        the first one is like the upper arm, all others are like the forearm.
+        Only links with DH parameters bend. Long means mostly along x; the first is like the upper arm, the
+        rest like the forearm.
         """
         own = _measured().link_flexibility
         joints = len(self.torque) if kinematics.a else 0
@@ -132,14 +132,11 @@ class Scale:
 
 
 LONG: Final = 0.2
-"""Length of a link above which it bends, in an arm as long as the UR5e [m]."""
+"""Length above which a link bends, in an arm as long as the UR5e [m]."""
 
 
 def completed(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content of a robot file with springs and drives by the rule, if it has no table `drives`.
-
-    Wrong content stays unchanged; the checks that follow report it.
-    """
+    """Add springs and drives to a robot file's content without them; leave invalid content to the checks."""
     whole = dict(content)
     if "drives" in whole:
         return whole
@@ -160,11 +157,9 @@ def completed(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def with_limits(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content of a robot file with what a URDF lacks: further limits, payload, sensors and poses.
+    """Add what a URDF lacks to a robot file's content: further limits, payload, sensors and poses.
 
-    The payload is the UR5e's, scaled as a weight at the arm's end that loads the second joint as much;
-    accelerations and repeatability scale with the length. The arm has at least one joint, and `limits`
-    position, velocity and torque.
+    The payload is the UR5e's, scaled to load the second joint equally; accelerations scale with the length.
     """
     known, given = _measured(), content["limits"]
     scale = Scale(msgspec.convert(content["kinematics"], Kinematics), given["torque"])
@@ -197,7 +192,7 @@ def with_limits(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 _POSES: Final = {"Q1": 0.0, "Q2": 0.5}
-"""Poses of an arm from a URDF: the angle of every joint [rad]."""
+"""Poses of an arm from a URDF: one angle for all joints [rad]."""
 
 
 def _rounded(value: float) -> float:

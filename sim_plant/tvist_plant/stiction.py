@@ -1,19 +1,16 @@
-"""Dahl's friction, and the stiction of a motor that hardly turns."""
+"""Dahl's friction, and stiction of a motor near standstill."""
 
 import math
 
 from tvist_plant._compiled import compiled
 
 LEAST = 1e-9
-"""Torque that is left of the stiction of a fast motor, so that nothing is divided by zero [N m]."""
+"""Remaining stiction of a fast motor, to avoid a division by zero [N m]."""
 
 
 @compiled
 def relaxed(z: float, way: float, stiffness: float, most: float) -> float:
-    """Dahl's friction z after a further way in one direction: the exact solution of its equation.
-
-    A way is an angle if z is a torque. Source: P. Dahl, A solid friction model, 1968: dz/dx = k (1 - z sgn(ẋ)/most).
-    """
+    """Return Dahl's friction z (1968) after a travel: dz/dx = k (1 - z sgn(ẋ)/most), solved exactly."""
     end = most if way > 0.0 else -most
     return float(end + (z - end) * math.exp(-stiffness * abs(way) / most))
 
@@ -31,8 +28,7 @@ def stiction_after(
 ) -> float:
     """Return the stiction d of a motor after it has turned, see `Imperfections` [N m].
 
-    d has a spring's energy d²/(2 σ K_g). Turning takes d²/most from it per angle, so it never gives more than it got,
-    however load and speed change `most`.
+    It dissipates d²/most per angle and so never returns more energy than it stored, however `most` changes.
     """
     slow = speed / stiction_speed
     most = (stiction + stiction_load * abs(load)) * math.exp(-slow * slow) + LEAST

@@ -1,4 +1,4 @@
-"""α, the acceleration of the tool without gravity, from the specific force that an accelerometer feels."""
+"""The tool's acceleration without gravity, from an accelerometer's specific force."""
 
 from typing import Any
 
@@ -9,12 +9,12 @@ from tvist_plant.plant import GRAVITY
 
 
 def tool_acceleration(force: ArrayLike, up: ArrayLike) -> NDArray[np.float64]:
-    """α = f - g u, with f the specific force [m/s²] and u the upward direction in its axes, shape (..., 3) [m/s²]."""
+    """Return α = f - g u [m/s²] from specific force f and the upward direction u in its axes, (..., 3)."""
     return np.asarray(force, dtype=np.float64) - GRAVITY * np.asarray(up)
 
 
 def upward(rotation: ArrayLike) -> NDArray[np.float64]:
-    """The upward direction Rᵀ z in frames with rotation vectors, both of shape (..., 3), by Rodrigues' formula."""
+    """Return the upward direction Rᵀ z in frames given by rotation vectors, shape (..., 3) (Rodrigues)."""
     rotation = np.asarray(rotation, dtype=np.float64)
     angle: Any = np.linalg.norm(rotation, axis=-1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,9 +1,8 @@
-"""Robots from URDF files: an open chain of turning joints, its masses and its limits.
+"""Robots from URDF files: an open chain of revolute joints with masses and limits.
 
-The file is checked here, where messages name its elements, and read by pinocchio, which makes one body of links that
-are fixed to each other. A URDF says nothing of springs, drives, accelerations or payload: these follow from the UR5e's
-by the rule of `tvist_plant.similar`. The base frame is where the first joint's axis meets the height of the URDF's root
-link; that axis must be vertical.
+The file is checked here, so that messages name its elements; pinocchio then merges links that are fixed to
+each other. Springs, drives, accelerations and payload, which a URDF lacks, follow from `tvist_plant.similar`.
+The first joint's axis must be vertical; the base frame lies on it at the height of the URDF's root link.
 """
 
 import math
@@ -22,13 +21,13 @@ from tvist_plant.user_file import LONGEST_NAME, UserFileError, is_name, read_tex
 
 TURNING: Final = ("revolute", "continuous")
 FLANGES: Final = ("tool0", "flange")
-"""Names of a link that stands for the flange, if it is fixed to the last joint; otherwise that joint's link does."""
+"""Names of a link that marks the flange if it is fixed to the last joint; otherwise that joint's link is the flange."""
 CONTINUOUS: Final = 4.0 * math.pi
-"""Largest distance from zero of a joint without end stops [rad]."""
+"""Position limit of a joint without end stops [rad]."""
 UPRIGHT: Final = 1e-6
-"""Deviation of the first axis from the vertical that still counts as rounding [-]."""
+"""Deviation of the first axis from the vertical that counts as rounding [-]."""
 DEEPEST: Final = 200
-"""Largest number of joints from the base to a link, fixed ones included: parsers of URDF recurse along a chain."""
+"""Largest number of joints from the base to a link, fixed ones included, because URDF parsers recurse."""
 LARGEST: Final = 1e7
 """Largest number, as in other robot files."""
 _ORIGIN: Final = {"xyz": (0.0, 0.0, 0.0), "rpy": (0.0, 0.0, 0.0)}
@@ -42,11 +41,11 @@ NUMBERS: Final[dict[tuple[str, str], dict[str, tuple[float, ...]]]] = {
     ("link", "visual/origin"): {**_ORIGIN},
     ("link", "visual/geometry/mesh"): {"scale": (1.0, 1.0, 1.0)},
 }
-"""Attributes that are read, by the elements of joints and links, with their defaults."""
+"""Attributes read from elements of joints and links, with their defaults."""
 
 
 def read_urdf(path: str | Path) -> dict[str, Any]:
-    """Read a URDF file as the content of a robot file without springs and drives."""
+    """Read a URDF file as a robot file's content without springs and drives."""
     text = read_text(path, "robot file")
     try:
         root = xml(text.encode())
@@ -80,7 +79,7 @@ def _named(element: Element) -> str:
 
 
 def _check_numbers(root: Element) -> None:
-    """Check the numbers of all elements that are read, and write them as every parser reads them."""
+    """Check the numbers of all elements that are read, and rewrite them for every parser."""
     for (kind, at), keys in NUMBERS.items():
         for element in root.findall(kind):
             for part, (key, default) in product(element.findall(at), keys.items()):
@@ -105,12 +104,11 @@ def _check_number(element: Element, key: str, default: tuple[float, ...], here: 
 
 
 def _numbers(element: Element, key: str) -> Floats:
-    """Return the numbers of an attribute that was checked."""
     return np.array([float(word) for word in str(element.get(key)).split()])
 
 
 def _check_tree(root: Element, links: dict[str, Element]) -> None:
-    """Check that joints make one tree of the links."""
+    """Check that the joints connect the links to one tree."""
     children: Counter[str] = Counter()
     after: dict[str, list[str]] = {}
     for joint in root.findall("joint"):
@@ -143,7 +141,6 @@ def _check_tree(root: Element, links: dict[str, Element]) -> None:
 
 
 def _check_joints(joints: dict[str, Element]) -> None:
-    """Check that joints that are not fixed turn, about an axis and within limits of their own."""
     for name, joint in joints.items():
         here, kind, axis = f"joint {name}", str(joint.get("type")), joint.find("axis")
         if kind == "fixed":
@@ -159,7 +156,7 @@ def _check_joints(joints: dict[str, Element]) -> None:
 
 
 def _model(root: Element) -> pin.Model:
-    """Return pinocchio's model of what was checked; other elements of a file, and limits, are not passed on."""
+    """Build pinocchio's model of the checked elements, without limits and unknown elements."""
     checked = Element("robot", {"name": "arm"})
     for kind, parts in (("link", {"inertial"}), ("joint", {"origin", "parent", "child", "axis"})):
         for element in root.findall(kind):
@@ -173,7 +170,6 @@ def _model(root: Element) -> pin.Model:
 
 
 def _check_chain(model: pin.Model, chain: list[Element]) -> None:
-    """Check that no two joints follow the same one, and that all that moves has a mass."""
     carriers = [f"link {joint.find('child').get('link')}" for joint in chain]  # type: ignore[union-attr]
     for number in range(model.njoints):
         after = [model.names[one] for one in range(1, model.njoints) if model.parents[one] == number]
@@ -208,13 +204,13 @@ def _content(
     ends.append(last[0].placement if last else pin.SE3.Identity())
     away = first.translation * [1.0, 1.0, 0.0]  # the base frame is on the first joint's axis
     into = [pin.SE3(np.eye(3), -away)]
-    """From the base link and from each joint's frame into that of the robot file's link."""
+    """From the base link and from each joint's frame to the frame of the robot file's link."""
     placements, bodies = [], []
     for number, turn in enumerate(turns):
         placement = turn.inverse() * ends[number + 1]
         into.append((turn * placement).inverse())
         bodies.append(into[-1].act(model.inertias[number + 1]))
-        if number == 0:  # turning about the first axis and moving along it change places with the joint
+        if number == 0:  # rotation about and shift along the first axis commute with the joint
             placement = pin.SE3(first.rotation, first.translation - away) * placement
         placements.append(_row(placement))
     meshes = [
@@ -244,12 +240,12 @@ def _content(
 
 
 def _row(placement: pin.SE3) -> list[float]:
-    """Return a placement as a robot file gives it: x y z [m], roll pitch yaw [rad]."""
+    """Return a placement as in a robot file: x y z [m], roll pitch yaw [rad]."""
     return [*placement.translation.tolist(), *pin.rpy.matrixToRpy(placement.rotation).tolist()]
 
 
 def _about_z(axis: Element | None) -> Floats:
-    """Return the rotation of a frame whose z axis is a joint's axis, shape (3, 3)."""
+    """Return a rotation whose z axis is the joint's axis, shape (3, 3)."""
     direction = np.array([1.0, 0.0, 0.0]) if axis is None else _numbers(axis, "xyz")
     z = direction / np.linalg.norm(direction)
     if np.array_equal(z, [0.0, 0.0, 1.0]):
@@ -261,7 +257,7 @@ def _about_z(axis: Element | None) -> Floats:
 
 
 def _meshes(number: int, link: Element, frame: pin.SE3, path: Path) -> list[dict[str, Any]]:
-    """Return the meshes that show a link, whose frame is given in that of the link of a number."""
+    """Return the meshes of a link, whose frame is given relative to the robot file's link `number`."""
     found = []
     for visual in link.findall("visual"):
         mesh, origin = visual.find("geometry/mesh"), visual.find("origin")
@@ -277,15 +273,12 @@ def _meshes(number: int, link: Element, frame: pin.SE3, path: Path) -> list[dict
 
 
 def mesh_file(name: str, urdf: Path) -> Path:
-    """Return where a mesh's file is, as far as that can be known without ROS: beside its package's folder.
-
-    Its name in the URDF is `package://PACKAGE/...`, `file://...` or a path from the URDF's folder.
-    """
+    """Return a mesh's path from `package://PACKAGE/...`, `file://...` or a path relative to the URDF."""
     folder = urdf.resolve().parent
     if not name.startswith("package://"):
         return folder / name.removeprefix("file://")
     inside = Path(name.removeprefix("package://"))
-    # A URDF stands somewhere in its package, or in one beside it.
+    # A URDF is in its own package, or in a neighbouring one.
     places = [
         above / part for above in (folder, *folder.parents) for part in (inside, Path(*inside.parts[1:]))
     ]

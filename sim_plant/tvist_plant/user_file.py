@@ -1,8 +1,4 @@
-"""Safe reading of files that a user names, none of which may block or crash the program.
-
-A path on the command line may be anything: an endless device, a pipe without a writer, gigabytes of another kind of
-file, or a file deliberately nested too deeply for a parser.
-"""
+"""Safe reading of users' files: endless devices, pipes, huge or deeply nested files cannot block or crash."""
 
 import os
 import re
@@ -13,37 +9,36 @@ from typing import Any, Final
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 LARGEST: Final = 4 << 20
-"""Largest size of a file [bytes]: a hundred times the largest useful one."""
+"""Largest file size, a hundred times the largest useful one [bytes]."""
 DEEPEST: Final = 100
-"""Largest number of levels of brackets, or of parts of a dotted key, in a TOML file, which needs five, and of elements
-in an XML file. The parser's time grows with the square of the parts of a key.
-"""
+"""Deepest nesting of XML elements and TOML brackets, and most parts of a dotted TOML key, since the parser
+takes quadratic time. TOML files need five levels."""
 LONGEST_NAME: Final = 100
-"""Largest number of characters of a name in a file."""
+"""Largest number of characters of a name."""
 LONGEST_LINE: Final = 500
-"""Largest number of characters of what a file, or a library that reads it, says."""
+"""Largest number of characters quoted from a file or a library's message."""
 
 
 def named(error: BaseException, said: str | None = None) -> str:
-    """Return an exception in one line: its type, and its message or what is said instead."""
+    """Return an exception in one line: its type and its message, or `said` instead."""
     words = one_line(str(error) if said is None else said)
     return f"{type(error).__name__}: {words}" if words else type(error).__name__
 
 
 def one_line(text: str) -> str:
-    """Return a text in one line that can be shown anywhere: printable, and not too long."""
+    """Return a text in one printable line of limited length."""
     shown = " ".join(text.split())[:LONGEST_LINE]
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in shown)
 
 
 class UserFileError(ValueError):
-    """A file exists but has the wrong content; the message names it and says what was expected."""
+    """A file exists but has the wrong content; the message names the file and what was expected."""
 
 
 def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
-    """Read a file that a user has named; messages say what kind of file it is, "robot file"."""
-    # Check before opening, since opening a device may already have an effect, and again afterwards, since the path
-    # may refer to another file by then. Open without blocking, since that may be a pipe.
+    """Read a file named by a user; `what` names its kind in messages, such as "robot file"."""
+    # Opening a device may have effects, so check before; the file may be replaced meanwhile, so check again
+    # afterwards. It may then be a pipe, so open without blocking.
     check_is_file(path, what)
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with open(descriptor, "rb") as stream:  # noqa: PTH123  a descriptor, not a path
@@ -57,7 +52,7 @@ def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
 
 
 def read_text(path: str | os.PathLike[str], what: str) -> str:
-    """Read a text that a user has named."""
+    """Read a text file named by a user."""
     try:
         return read_bytes(path, what).decode()
     except UnicodeDecodeError as error:
@@ -67,7 +62,7 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
 
 
 def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
-    """Read a TOML file that a user has named."""
+    """Read a TOML file named by a user."""
     text = read_text(path, what)
     if _is_deeper(text, DEEPEST):
         raise UserFileError(f"{what} {path} is nested too deeply: at most {DEEPEST} levels are supported")
@@ -75,7 +70,7 @@ def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
 
 
 def toml(text: str) -> dict[str, Any]:
-    """Parse TOML."""
+    """Parse TOML; raise only TOMLDecodeError."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError:
@@ -85,20 +80,20 @@ def toml(text: str) -> dict[str, Any]:
 
 
 def xml(data: bytes) -> Element:
-    """Parse XML without a document type, since its entities could grow without end."""
+    """Parse XML without a document type, whose entities could expand without end; raise UserFileError."""
     parser = XMLParser(target=_Tree())  # noqa: S314  see `_Tree`
     try:
         parser.feed(data)
         root: Element = parser.close()
     except UserFileError:
         raise
-    except (ParseError, LookupError, ValueError) as error:  # the last two: of an unknown encoding
+    except (ParseError, LookupError, ValueError) as error:  # the last two: unknown encoding
         raise UserFileError(f"it is not valid XML: {error}") from error
     return root
 
 
 class _Tree(TreeBuilder):
-    """Elements of an XML file, as far as they are accepted."""
+    """Builder of XML elements that limits the depth."""
 
     depth = 0
 
@@ -117,7 +112,7 @@ class _Tree(TreeBuilder):
 
 
 def is_name(text: str) -> bool:
-    """Return whether a text can be shown as a name anywhere: printable, and not too long."""
+    """Return whether a text can be shown as a name: printable, and not too long."""
     return len(text) <= LONGEST_NAME and text.isprintable()
 
 
@@ -127,7 +122,7 @@ def check_is_file(path: str | os.PathLike[str], what: str) -> None:
 
 
 def _is_deeper(text: str, most: int) -> bool:
-    """Return whether a TOML text has more levels of brackets, or more dots in one key."""
+    """Return whether a TOML text has more than `most` levels of brackets or dots in a key."""
     depth = dots = 0
     for token in _TOKENS.finditer(text):
         match token[0]:
@@ -153,7 +148,7 @@ _TOKENS: Final = re.compile(
     r"|[\[\]{}.,=\n]",
     re.DOTALL,
 )
-"""Tokens that affect the depth, and those that hide them. Each character is examined once, whatever the text."""
+"""Tokens that affect the depth or hide such tokens; linear in the length of any text."""
 
 
 def _check_kind(path: str | os.PathLike[str], what: str, status: os.stat_result) -> None:

@@ -1,10 +1,7 @@
-"""Plants by name: arms that differ from what their controller knows, each in one way or in many.
+"""Plants by name: arms that deviate from the robot file, which their controller uses, in one way or in many.
 
-A controller uses the robot file for all of them. What is drawn is drawn from the seed of a case or of a robot.
-
-A hidden robot is not quite its file, so that a controller stands before it as before a real one: each gear and link is
-softer or stiffer, its dampers, loops, rotors and friction are others, and what it carries is not quite what it was said
-to carry. All factors are uniform within 1 ± a share, and independent of each other.
+A hidden robot deviates in all parameters, as a real one would: each by an independent uniform factor within 1
+± a share.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,17 +22,16 @@ from tvist_plant.similar import counterpart
 SCATTER: Final = 0.15
 """Relative deviation of each stiffness and gain from the description, with random sign [-]."""
 MASS_SCATTER, COM_SCATTER = 0.07, 0.010
-"""Relative deviation of each link's mass [-], and deviation of its centre of mass along each axis [m], where the
-description is wrong about all of them; random signs.
-"""
+"""Relative deviation of each link's mass [-] and deviation of its centre of mass per axis [m] in `blind`,
+with random signs."""
 TORSION: Final = 2e4
-"""Stiffness of links that twist [N m/rad]."""
+"""Torsional stiffness of links that twist [N m/rad]."""
 BACKLASH: Final = (5e-5, 1e-4, 1e-4, 2e-4, 2e-4, 2e-4)
-"""Half of the width of the gears' backlash, by the joint of the UR5e that a joint is like [rad]."""
+"""Half the backlash of each gear, by the corresponding joint of the UR5e [rad]."""
 SPRINGS: Final = ("gear_stiffness",)
-"""What is a spring among the parameters of the drives."""
+"""Stiffnesses among the drives' parameters."""
 LOOPS: Final = (*SPRINGS, "velocity_gain", "position_gain")
-"""Springs and the gains of the loops."""
+"""Springs and loop gains."""
 DRIVES: Final = {
     "gear_stiffness": 0.2,
     "gear_damping": 0.2,
@@ -44,13 +40,13 @@ DRIVES: Final = {
     "coulomb_friction": 0.2,
     "friction_width": 0.2,
 }
-"""Largest relative deviation of each joint's drive of a hidden robot; the width is one for all joints [-]."""
+"""Largest relative deviation per joint of a hidden robot's drives; the width is common to all joints [-]."""
 LINKS: Final = {"stiffness": 0.2, "damping_time": 0.2}
-"""Largest relative deviation of each of its links that bends; the time is one for all links [-]."""
+"""Largest relative deviation per bending link; the damping time is common to all links [-]."""
 MASS: Final = 0.15
-"""Largest relative deviation of its carried mass from the declared one [-]."""
+"""Largest relative deviation of the carried mass from the declared one [-]."""
 CENTRE: Final = 0.015
-"""Largest deviation of its carried centre of mass along each axis of the flange [m]."""
+"""Largest deviation of the carried centre of mass per flange axis [m]."""
 
 HEAVIER: Final[Mapping[str, float | tuple[float, ...]]] = {
     "coulomb_friction": (1.21, 1.3, 1.02, 1.22, 1.29, 1.06),
@@ -59,12 +55,11 @@ HEAVIER: Final[Mapping[str, float | tuple[float, ...]]] = {
     "stiction_speed": 1.48,
     "stiction_stiffness": 0.79,
 }
-"""Friction of an arm that sticks more than its controller knows, over what that knows, drawn once: F_s and μ_s within
-1.3 to 2.5, F_c within 1 to 1.4, v_s and σ within 0.7 to 1.5 [-].
-"""
+"""Factors for an arm with more friction than its controller knows, drawn once: F_s and μ_s within 1.3 to 2.5,
+F_c within 1 to 1.4, v_s and σ within 0.7 to 1.5 [-]."""
 
 Factors = Callable[[float, tuple[int, ...]], Any]
-"""Makes factors of a shape from a share."""
+"""Function that returns factors for a share and a shape."""
 
 
 def _same(description: RobotDescription, _seed: int) -> RobotDescription:
@@ -73,25 +68,25 @@ def _same(description: RobotDescription, _seed: int) -> RobotDescription:
 
 @dataclass(frozen=True)
 class Variant:
-    """One of the arms. The controller uses the unchanged description for all of them."""
+    """A plant by name."""
 
     name: str
-    """Name in JSON, and on the command line."""
+    """Name in JSON and on the command line."""
     label: str
-    """What distinguishes it, for people."""
+    """Description for users."""
     truly: Callable[[RobotDescription, int], RobotDescription] = _same
-    """Returns what it is like from the controller's description and a seed."""
+    """Function that returns the true arm from the controller's description and a seed."""
     imperfections: Imperfections | None = None
-    """What no description says; None for none."""
+    """Deviations that no description contains; None for none."""
     backlash: float = 0.0
-    """Backlash of its gears, relative to `BACKLASH` [-]."""
+    """Backlash of the gears, relative to `BACKLASH` [-]."""
     carries: Callable[[Payload], Payload] | None = None
-    """Returns what it carries from what it is said to carry; None if that is true."""
+    """Function that returns the carried payload from the declared one; None if they are equal."""
     seed: int | None = None
-    """Seed of its own, which then counts alone."""
+    """Fixed seed that overrides the given one."""
 
     def make(self, description: RobotDescription, carried: Payload, seed: int) -> SimulatedArm:
-        """Create the arm from the controller's description, the payload that it is said to carry, and a seed."""
+        """Create the arm from the controller's description, the declared payload and a seed."""
         arm = self.truly(description, seed if self.seed is None else self.seed)
         found = self.imperfections
         if self.backlash:
@@ -105,7 +100,7 @@ class Variant:
 def _changed(
     description: RobotDescription, drives: Mapping[str, float], links: Mapping[str, float], factors: Factors
 ) -> RobotDescription:
-    """Return an arm with parameters of its drives and its bending links multiplied by factors of their shares."""
+    """Multiply parameters of drives and bending links by random factors of their shares."""
 
     def changed(table: Drives | LinkFlexibility, shares: Mapping[str, float]) -> Any:
         own = {name: np.array(getattr(table, name)) for name in shares}
@@ -122,7 +117,6 @@ def _changed(
 
 
 def _signs(*seed: int) -> Factors:
-    """Return what draws 1 plus or minus a share."""
     random = np.random.default_rng(seed)
     return lambda share, shape: random.choice([1.0 - share, 1.0 + share], shape)
 
@@ -130,12 +124,12 @@ def _signs(*seed: int) -> Factors:
 def _off(
     share: float, number: int, description: RobotDescription, seed: int, names: tuple[str, ...] = LOOPS
 ) -> RobotDescription:
-    """Return an arm with each gear, link and gain of the drives' loops changed by a share, up or down at random."""
+    """Change each gear, link and loop gain by a share, up or down at random."""
     return _changed(description, dict.fromkeys(names, share), {"stiffness": share}, _signs(seed, number))
 
 
 def stiffer(description: RobotDescription, factor: float) -> RobotDescription:
-    """Return an arm all of whose springs are stiffer by a factor; their damping stays the same."""
+    """Multiply all springs by a factor, without changing their damping."""
     springs, links = dict.fromkeys(SPRINGS, factor), {"stiffness": factor}
     return _changed(description, springs, links, lambda factor, _: factor)
 
@@ -145,7 +139,7 @@ def _sprung(factor: float, description: RobotDescription, _seed: int) -> RobotDe
 
 
 def _sharper(share: float, description: RobotDescription, _seed: int) -> RobotDescription:
-    """Return an arm whose friction, never linear, changes sign within a share of the speed."""
+    """Scale the speed within which friction changes sign; friction is then never linear."""
     drives = description.drives
     return structs.replace(
         description,
@@ -156,7 +150,7 @@ def _sharper(share: float, description: RobotDescription, _seed: int) -> RobotDe
 def rubbed(
     factors: Mapping[str, float | tuple[float, ...]], description: RobotDescription, _seed: int = 0
 ) -> RobotDescription:
-    """Return an arm whose motors stick, with its friction multiplied by factors, such as `HEAVIER`."""
+    """Return an arm with stiction, its friction multiplied by factors such as `HEAVIER`."""
     own = {"coulomb_friction": description.drives.coulomb_friction, **description.imperfections}
     new = {name: (np.array(value) * factors.get(name, 1.0)).tolist() for name, value in own.items()}
     drives = structs.replace(description.drives, coulomb_friction=tuple(new.pop("coulomb_friction")))
@@ -164,12 +158,12 @@ def rubbed(
 
 
 def in_file(file: RobotDescription, _description: RobotDescription, _seed: int) -> RobotDescription:
-    """Return an arm that is as a robot file says, whatever its controller knows."""
+    """Return the arm of a robot file, independent of the controller's description."""
     return file
 
 
 def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
-    """Return an arm of which the description knows neither masses nor springs, gains and friction exactly."""
+    """Return an arm that deviates in masses, springs, gains and friction."""
     random, links = np.random.default_rng([seed, 47]), description.links
 
     def signs(*shape: int) -> np.ndarray[Any, Any]:
@@ -187,16 +181,12 @@ def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
 
 
 def _all_at_once(description: RobotDescription, seed: int) -> RobotDescription:
-    """Return an arm with each spring softer or stiffer, and friction that changes sign in half the speed."""
+    """Return an arm with scattered springs, and friction that changes sign within half the speed."""
     return _off(SCATTER, 61, _sharper(0.5, description, seed), seed, SPRINGS)
 
 
 def hidden(description: RobotDescription, seed: int) -> RobotDescription:
-    """Draw the robot behind a robot file, which is all that a controller knows, by a seed of at least 0.
-
-    Its springs, dampers, loops, rotors and friction differ; kinematics, masses, limits and sensors are the
-    file's.
-    """
+    """Draw the true robot behind a robot file: springs, dampers, loop gains, rotors and friction differ."""
     random = np.random.default_rng([seed, 53])
     return _changed(
         description, DRIVES, LINKS, lambda share, shape: random.uniform(1.0 - share, 1.0 + share, shape)
@@ -204,7 +194,7 @@ def hidden(description: RobotDescription, seed: int) -> RobotDescription:
 
 
 def _other_payload(payload: Payload, factor: float, aside: Any) -> Payload:
-    """Return a payload with another mass, whose centre is elsewhere; nothing stays nothing."""
+    """Scale the mass and shift the centre of a payload; an empty payload stays empty."""
     if payload.mass == 0.0:
         return payload
     centre = tuple((np.array(payload.com) + aside).tolist())
@@ -213,17 +203,14 @@ def _other_payload(payload: Payload, factor: float, aside: Any) -> Payload:
 
 
 def hidden_payload(declared: Payload, seed: int) -> Payload:
-    """Return what a hidden robot carries when somebody says that it carries a payload.
-
-    The same seed, at least 0, gives the same error each time.
-    """
+    """Return what a hidden robot with this seed (at least 0) carries for a declared payload."""
     random = np.random.default_rng([seed, 59])
     factor = float(random.uniform(1.0 - MASS, 1.0 + MASS))
     return _other_payload(declared, factor, random.uniform(-CENTRE, CENTRE, 3))
 
 
 AS_DESCRIBED: Final = Variant("calibrated", "as described")
-"""The arm that is as the controller knows it."""
+"""The arm exactly as described."""
 _ALL = (
     AS_DESCRIBED,
     Variant(
@@ -279,11 +266,10 @@ _ALL = (
     Variant("springs+30", "springs 30 % stiffer", partial(_sprung, 1.3)),
 )
 VARIANTS: Final = {one.name: one for one in _ALL}
-"""All plants by name."""
 
 
 def variant(name: str) -> Variant:
-    """Return a plant by its name: one of `VARIANTS`, or a hidden robot, `hidden-SEED`."""
+    """Return one of `VARIANTS`, or the hidden robot of the name `hidden-SEED`."""
     kind, dash, number = name.partition("-")
     if kind == "hidden" and dash and number.isascii() and number.isdigit() and len(number) < 19:
         return hidden_variant(int(number))
@@ -293,7 +279,7 @@ def variant(name: str) -> Variant:
 
 
 def hidden_variant(seed: int) -> Variant:
-    """Return a hidden robot, see `hidden`; its draw depends on its own seed alone."""
+    """Return a hidden robot, see `hidden`, which depends only on its own seed."""
     return Variant(
         f"hidden-{seed}",
         f"hidden: springs, dampers, loops, rotors, friction and payload drawn from {seed}",
@@ -304,7 +290,7 @@ def hidden_variant(seed: int) -> Variant:
 
 
 def scattered(share: float) -> Variant:
-    """Return an arm with each gear, link and velocity loop stiffer or softer by a share, at random."""
+    """Return an arm with the stiffness and gains of gears, links and loops changed by ± a share at random."""
     if share == 0.0:
         return AS_DESCRIBED
     percent = f"{100.0 * share:g}"
@@ -314,7 +300,7 @@ def scattered(share: float) -> Variant:
 
 
 def with_springs(factor: float) -> Variant:
-    """Return an arm all of whose springs are stiffer by a factor."""
+    """Return an arm with all springs multiplied by a factor."""
     if factor == 1.0:
         return AS_DESCRIBED
     percent = f"{100.0 * (factor - 1.0):+g}"

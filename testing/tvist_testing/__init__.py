@@ -1,6 +1,6 @@
-"""A kit for tests of programs that move a robot: fixtures, markers and assertions for pytest.
+"""A test kit for programs that move a robot: fixtures, markers and assertions for pytest.
 
-`pip install 'tvist[testing]'` is all that a project needs: pytest finds the fixtures by itself.
+Install it with `pip install 'tvist[testing]'`; pytest finds the fixtures by itself.
 """
 
 from tvist_testing.assertions import (

@@ -1,6 +1,6 @@
-"""Assertions on how a robot moved. They let time pass where they need to see more, and show a small table if they fail.
+"""Assertions on how a robot moved; they advance time if they need to see more, and fail with a small table.
 
-Times count from the tick in which the reference after shaping came to rest, which is when a motion is reported as done.
+Times count from the tick in which the shaped reference came to rest, when a motion is reported as done.
 """
 
 import math
@@ -13,26 +13,26 @@ if TYPE_CHECKING:
     from tvist_testing.history import Row
 
 BAND = 1e-4
-"""Distance from its attained position within which the tool counts as settled [m]."""
+"""Distance from its final position within which the tool counts as settled [m]."""
 WINDOW = 0.3
 """Time after the stop in which residual vibration is measured [s]."""
 BEYOND = 0.5
-"""Time for which a robot is observed after the time allowed [s]."""
+"""Time for which a robot is observed after the permitted time [s]."""
 TAIL = 0.2
-"""Time at the end of the observed rest whose mean position is the attained position [s]."""
+"""Time at the end of the observed rest whose mean position is the final position [s]."""
 AFTER_STOP = 0.01
 """Time after the stop in which the end of the deceleration still counts as motion [s]."""
 
 
 def assert_settles_within(robot: "FixtureRobot", seconds: float, *, band: float = BAND) -> float:
-    """Assert that the tool soon stays where it comes to rest; return the time that it took [s].
+    """Assert that the tool settles in time; return the time that it took [s].
 
     A running motion is awaited first. The tool is the flange of the flexible arm, as the simulation knows it.
 
     Args:
         robot: Robot of `tvist_robot`, `tvist_robots` or `tvist_ur`.
         seconds: Largest time from the stop of the shaped reference until the tool stays within the band [s].
-        band: Distance from the attained position, the mean of the last 0.2 s observed [m].
+        band: Distance from the final position, which is the mean of the last 0.2 s observed [m].
 
     Raises:
         AssertionError: It takes longer, or the robot has not moved; the message has a table.
@@ -68,8 +68,8 @@ def assert_settles_within(robot: "FixtureRobot", seconds: float, *, band: float 
 def assert_residual_vibration_below(robot: "FixtureRobot", limit: float, *, window: float = WINDOW) -> float:
     """Assert that the tool hardly vibrates after a motion; return the residual vibration [m/s²].
 
-    It is the largest acceleration of the flange, without gravity and noise, from 10 ms after the stop of the shaped
-    reference to the end of the window. A running motion is awaited first.
+    It is the largest acceleration of the flange, without gravity and noise, from 10 ms after the stop of the
+    shaped reference to the end of the window. A running motion is awaited first.
 
     Args:
         robot: Robot of `tvist_robot`, `tvist_robots` or `tvist_ur`.
@@ -111,10 +111,10 @@ def assert_within_limits(
     torque: float | Sequence[float] | None = None,
     tool_speed: float | None = None,
 ) -> None:
-    """Assert that since the test began no joint, and if wanted the tool, was beyond its limits.
+    """Assert that no joint, nor the tool if `tool_speed` is given, has exceeded its limits since the test began.
 
-    Measured angles, velocities and torques count, and the accelerations of the shaped reference. At most the last ten
-    minutes of simulation are looked at.
+    Measured angles, velocities and torques and the accelerations of the shaped reference are checked, for the
+    last ten minutes of simulation at most.
 
     Args:
         robot: Robot of `tvist_robot`, `tvist_robots` or `tvist_ur`.
@@ -124,7 +124,7 @@ def assert_within_limits(
         tool_speed: Largest speed of the tool centre point [m/s]; by default it has no limit.
 
     Raises:
-        AssertionError: A limit was exceeded; the message has a table. Or no time has passed.
+        AssertionError: A limit was exceeded (the message has a table), or no time has passed.
         ValueError: A limit is not positive, or there is not one for each joint.
     """
     __tracebackhide__ = True
@@ -140,7 +140,7 @@ def assert_within_limits(
         _check("tool_speed", tool_speed, least=math.ulp(0.0))
     rows = tuple(robot.history.rows)
     if not rows:
-        raise AssertionError(f"no time has passed for {robot.name}, so there is nothing to look at")
+        raise AssertionError(f"no time has passed for {robot.name}, so there is nothing to check")
     beyond: list[tuple[str, str, str, str]] = []
     for joint in range(joints):
         low, high = own.position[joint]
@@ -164,12 +164,12 @@ def assert_within_limits(
 
 
 def _at_rest(robot: "FixtureRobot", seconds: float) -> "list[Row]":
-    """Let the shaped reference come to rest, and at least some time pass after that; return the rows since then."""
+    """Wait for the shaped reference's rest, then until `seconds` have passed since; return the rows since then."""
     __tracebackhide__ = True
     robot.rest()
     history = robot.history
     if not any(row.moving for row in history.rows):
-        raise AssertionError(f"{robot.name} has not moved, so there is nothing to look at")
+        raise AssertionError(f"{robot.name} has not moved, so there is nothing to check")
     rows = history.since_rest()
     seen = rows[-1].time - rows[0].time if rows else 0.0
     ticks = math.ceil((seconds - seen) / history.period - 1e-6)
@@ -186,7 +186,6 @@ def _check(name: str, value: float, least: float) -> None:
 
 
 def _each(name: str, given: float | Sequence[float] | None, own: Sequence[float]) -> Sequence[float]:
-    """Return a limit for each joint."""
     if given is None:
         return own
     limits = [float(given)] * len(own) if isinstance(given, int | float) else [float(one) for one in given]
@@ -204,17 +203,15 @@ class Settling:
     """How the tool settled after its reference had come to rest."""
 
     seconds: float
-    """Time from the stop until the tool stays within the band [s]; infinite if it did not while it was observed."""
+    """Time from the stop until the tool stays within the band [s]; infinite if it did not while observed."""
     farthest: float
-    """Largest distance from the attained position after the stop [m]."""
+    """Largest distance from the final position after the stop [m]."""
 
 
 def settling(rows: "Sequence[Row]", band: float) -> Settling:
-    """Measure the settling of the flange of the flexible arm around the position that it attains.
+    """Measure how the flexible arm's flange settles around its final position.
 
-    Args:
-        rows: Ticks at rest, from the stop of the reference on, for longer than `TAIL`.
-        band: Largest distance from the attained position [m].
+    `rows` start at the stop of the reference and last longer than `TAIL`; `band` is a distance [m].
     """
     stop, end = rows[0].time, rows[-1].time
     tail = [row.pose for row in rows if row.time > end - TAIL]
@@ -227,13 +224,11 @@ def settling(rows: "Sequence[Row]", band: float) -> Settling:
 
 
 def vibration(rows: "Sequence[Row]", until: float) -> list[tuple[float, float]]:
-    """Return the residual vibration: time after the stop [s] and |α| [m/s²] of each tick, from 10 ms after the stop on.
+    """Return time [s] and |α| [m/s²] of each tick from 10 ms after the stop to the time `until` after it [s].
 
-    Args:
-        rows: Ticks at rest, from the stop of the reference on.
-        until: Last time after the stop [s].
+    `rows` start at the stop of the reference.
     """
-    from tvist_plant.tool_acceleration import tool_acceleration, upward  # not in every run of pytest
+    from tvist_plant.tool_acceleration import tool_acceleration, upward  # imported only if needed
 
     stop, slack = rows[0].time, 1e-9
     late = [row for row in rows if AFTER_STOP + slack < row.time - stop <= until + slack]
@@ -244,7 +239,7 @@ def vibration(rows: "Sequence[Row]", until: float) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Extreme:
-    """The largest absolute value of a quantity, in a joint or of the tool."""
+    """Largest absolute value of a quantity of a joint or the tool."""
 
     value: float
     time: float
@@ -264,7 +259,7 @@ def fastest_tool(rows: "Sequence[Row]") -> Extreme:
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table whose columns are aligned; the first column to the left, the others to the right."""
+    """Return a table with aligned columns: the first one to the left, the others to the right."""
     widths = [max(len(row[column]) for row in (heads, *rows)) for column in range(len(heads))]
 
     def line(cells: Sequence[str]) -> str:
@@ -278,5 +273,5 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def figure(value: float) -> str:
-    """Return a number with four digits."""
+    """Return a number with four significant digits."""
     return f"{value:.4g}"

@@ -1,4 +1,4 @@
-"""The robot of a test: the blocking client in lockstep, whose waiting calls let time pass."""
+"""The robot of a test: a blocking client in lockstep whose calls advance time while they wait."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,9 +14,9 @@ from tvist_testing.history import History
 from tvist_testing.robots import ServedRobot
 
 CLIENT = "test"
-"""Name under which the test holds the clock while one of its calls waits."""
+"""Name under which the test controls the clock while one of its calls waits."""
 LONGEST = 15_000
-"""Number of ticks that may pass until the next message of an iterator; 30 s of simulation."""
+"""Most ticks until the next message of an iterator: 30 s of simulation."""
 M = TypeVar("M")
 
 
@@ -24,11 +24,7 @@ class SteppingRobot(asynchronous_robot.Robot):
     """An asynchronous robot that takes the clock for each call that needs time to pass."""
 
     async def advance(self, ticks: int) -> int:
-        """Advance time; neither control nor the clock is needed.
-
-        Args:
-            ticks: Number of control periods of 0.002 s, at least 1.
-        """
+        """Advance time by ticks of 0.002 s, at least 1; the caller needs neither control nor the clock."""
         if self.stepper is not None or self.arm is not None or await self.clock() == "realtime":
             return await super().advance(ticks)
         async with self.clock_control(CLIENT):
@@ -36,7 +32,7 @@ class SteppingRobot(asynchronous_robot.Robot):
 
 
 class SteppingStream(blocking.Stream[M], Generic[M]):
-    """Messages as an iterator that lets time pass while none is there."""
+    """Messages as an iterator that advances time until the next one."""
 
     def __init__(self, portal: Portal, robot: SteppingRobot, messages: feed.Stream[M]) -> None:
         super().__init__(portal, messages)
@@ -51,16 +47,16 @@ class SteppingStream(blocking.Stream[M], Generic[M]):
 
 
 class FixtureRobot(blocking.Robot):
-    """A robot of a test's own. In lockstep, each call that waits for it steps its time.
+    """A test's own robot; in lockstep, each call that waits for it advances its time.
 
     Attributes:
         name: Name of the robot on the network.
-        endpoint: Zenoh endpoint, by which programs in other processes reach it.
+        endpoint: Zenoh endpoint for programs in other processes.
         pid: Number of its process, for tests that kill or stop it.
         log: File with the robot's log.
         recording: File that the robot records into; after the test it remains only if the test failed.
         seed: Seed of sensor noise and gear errors.
-        history: What the robot has measured since the test began.
+        history: Measurements of the robot since the test began.
     """
 
     def __init__(self, portal: Portal, robot: SteppingRobot) -> None:
@@ -94,38 +90,38 @@ class FixtureRobot(blocking.Robot):
         return self
 
     def _begin(self, publish_state: Callable[[], None]) -> None:
-        """Subscribe, and have the state published that no tick precedes."""
+        """Subscribe, and have the robot publish its state before the first tick."""
         self.history.joint_limits = self.info().limits
         self.on_truth(self.history.on_truth)
         self.on_state(self.history.on_state)
         self.on_event(self.history.on_event)
-        self._portal.run(self._inner._ios.subscribe)  # noqa: SLF001  so that `io` has something at once
-        self.info()  # answered after the robot has learnt of the subscriptions
+        self._portal.run(self._inner._ios.subscribe)  # noqa: SLF001  so that `io` has a value at once
+        self.info()  # answered after the robot has received the subscriptions
         publish_state()
         self._portal.call(lambda: self._inner.until(0))
 
     def settle_messages(self) -> None:
-        """Wait until everything has arrived that the robot published before now, such as the truth of the last tick."""
-        self.info()  # answered behind what was published before
+        """Wait for everything that the robot has published before now, such as the truth of the last tick."""
+        self.info()  # the answer arrives after everything published before
 
     def states(self, buffer: int = BUFFER) -> SteppingStream[State]:
-        """Iterate over every state from now on; time passes by a tick for each."""
+        """Iterate over every state from now on; each one advances time by a tick."""
         return SteppingStream(
             self._portal, self._stepping, self._portal.run(lambda: self._inner.states(buffer))
         )
 
     def events(self, buffer: int = BUFFER) -> SteppingStream[Event]:
-        """Iterate over every event from now on; time passes until the next one."""
+        """Iterate over every event from now on; time advances until the next one."""
         return SteppingStream(
             self._portal, self._stepping, self._portal.run(lambda: self._inner.events(buffer))
         )
 
 
 class UrRobot(FixtureRobot):
-    """A robot of a test's own with UR's interfaces, in real time, since clients of UR robots wait by the wall clock.
+    """A test's own robot with UR's interfaces, in real time, since clients of UR robots wait by the wall clock.
 
     Attributes:
-        host: IP address of UR's interfaces; on Linux it has UR's usual ports.
+        host: IP address of UR's interfaces; on Linux they have UR's usual ports.
         ports: Port of each interface: `dashboard`, `primary`, `secondary`, `realtime`, `rtde`, and so on.
     """
 

@@ -1,9 +1,9 @@
-"""One robot in a process of its own, which the test's process commands over a socket.
+"""One robot in its own process, which the test's process commands over a socket.
 
-From the test: `state` to publish the present state, `close` to complete the recording and end, `leave` to end. To the
-test: one line of JSON with the robot's endpoint, or with the reason why there is none; and after `close` or `leave` one
-with the number of clients of UR's interfaces, without which it goes on: ur_rtde aborts its process when a robot goes
-that it is connected to. At the end of the socket, which is that of the test's process, the robot ends in any case.
+Commands are `state` (publish the present state), `close` (complete the recording and end) and `leave` (end).
+Answers are lines of JSON: at first the robot's endpoint or an error; after `close` or `leave` the number of
+clients of UR's interfaces, until whose end the robot continues, since ur_rtde aborts its process when its
+robot disappears. When the socket closes because the test's process has ended, the robot ends in any case.
 """
 
 import asyncio
@@ -40,18 +40,18 @@ from tvist_server.ur_ports import UrPorts
 from tvist_testing.wanted import WantedFault, WantedRobot
 
 LOOK = 0.05
-"""Time between two looks at whether the last client has gone [s]."""
+"""Time between two checks whether the last client is gone [s]."""
 COMPLETING = 20.0
 """Longest wait for the end of the recording [s]."""
 ATTEMPTS = 50
-"""Number of ports or addresses to try, since another process may take one just before the robot listens there."""
+"""Ports or addresses to try, since another process may take one just before the robot listens there."""
 CLIENT = "tvist_testing"
 """Name under which faults are injected while nobody else has control."""
 log = logging.getLogger("robot")
 
 
 class Preparation:
-    """Prepares one robot."""
+    """Loads the program and injects the faults that a test's markers describe."""
 
     def __init__(self, wanted: WantedRobot) -> None:
         self._wanted = wanted
@@ -68,7 +68,7 @@ class Preparation:
         return _Observer(self)
 
     def on(self, robot: ServedRobot) -> None:
-        """Do what comes before the first tick."""
+        """Do everything that precedes the first tick."""
         self._post, self._request = robot.driven.post, robot.request
         if self._wanted.program is not None:
             name, text = self._wanted.program
@@ -116,7 +116,7 @@ class Preparation:
 
 
 class _Observer(Sink):
-    """Writes events into the log, and lets the preparation see each tick."""
+    """Logs events, and reports each tick to the preparation."""
 
     def __init__(self, preparation: Preparation) -> None:
         self._preparation = preparation
@@ -136,15 +136,15 @@ def _accepted(reply: Reply) -> Reply:
 
 
 def serve(wanted: WantedRobot, connection: socket.socket) -> int:
-    """Serve a robot until the test's process wants it to end; return the exit code of this process."""
+    """Serve a robot until the test's process ends it; return the exit code of this process."""
     _log_into(wanted.log)
     ending = Ending()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the test's process is to hear it, and then ends this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the test's process handles it, and then ends this one
     preparation = Preparation(wanted)
     try:
         server, place = _listening(wanted, preparation)
         preparation.on(server.robots[0])
-    except Exception as error:  # noqa: BLE001  whatever it is, the test should say it
+    except Exception as error:  # noqa: BLE001  the test should report any error
         _tell(connection, {"error": str(error) or type(error).__name__})
         return 1
     listening = threading.Thread(target=_obey, args=(connection, server, ending), daemon=True)
@@ -160,7 +160,7 @@ def serve(wanted: WantedRobot, connection: socket.socket) -> int:
 
 
 def _listening(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, dict[str, Any]]:
-    """Return a server on ports that nobody else uses, and where it listens."""
+    """Return a server that listens on unused ports, and the addresses."""
     for attempt in range(ATTEMPTS):
         address = _own_address() if wanted.ur else "127.0.0.1"
         endpoint = f"tcp/{address}:{_free_port(address)}"
@@ -190,8 +190,8 @@ def _listening(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, d
 
 
 def _own_address() -> str:
-    """Return an address of this machine on which UR's own ports are free, as far as the system has such addresses."""
-    if sys.platform != "linux":  # elsewhere only 127.0.0.1 is there
+    """Return a loopback address on which UR's usual ports are free, if the system has several."""
+    if sys.platform != "linux":  # other systems have only 127.0.0.1
         return "127.0.0.1"
     return f"127.{1 + secrets.randbelow(254)}.{secrets.randbelow(256)}.{1 + secrets.randbelow(254)}"
 
@@ -218,7 +218,7 @@ def _obey(connection: socket.socket, server: Server, ending: Ending) -> None:
 
 
 def _complete_recording(robot: ServedRobot) -> None:
-    """End the recording between two ticks, while the robot goes on."""
+    """End the recording between two ticks, while the robot continues."""
     done = threading.Event()
 
     def complete() -> None:
@@ -230,7 +230,7 @@ def _complete_recording(robot: ServedRobot) -> None:
 
 
 def _see_off(connection: socket.socket, server: Server) -> None:
-    """Wait until the last client of UR's interfaces has gone, or the test's process has ended."""
+    """Wait until the last client of UR's interfaces is gone, or the test's process has ended."""
     while server.ur_clients and not select.select([connection], [], [], LOOK)[0]:
         pass
 
@@ -240,7 +240,7 @@ def _tell(connection: socket.socket, message: dict[str, Any]) -> None:
 
 
 def _log_into(path: str) -> None:
-    """Let everything that this process says go into a file."""
+    """Redirect all output of this process into a file."""
     file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     for standard in (1, 2):
         os.dup2(file, standard)

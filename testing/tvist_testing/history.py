@@ -1,4 +1,4 @@
-"""What a robot measured during a test, in little memory: a row of numbers for each tick."""
+"""A robot's measurements during a test, compact in memory: a row of numbers for each tick."""
 
 from array import array
 from collections import deque
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from tvist_protocol.stream import Event, State, Truth
 
 LONGEST = 300_000
-"""Largest number of rows that are kept; ten minutes of simulation."""
+"""Most rows that are kept: ten minutes of simulation."""
 EVENTS = 10_000
-"""Largest number of events that are kept."""
+"""Most events that are kept."""
 EARLY = 256
-"""Largest number of truths that wait for the state of their tick."""
+"""Most truths that wait for the state of their tick."""
 
 
 class Row:
@@ -44,35 +44,29 @@ class Row:
         self.true = False
         """Whether the truth of this tick is known."""
         self.pose = array("d", state.actual_TCP_pose)
-        """Pose of the flexible arm's flange if that is known, else of the measured tool: x y z [m], rotation vector
-        [rad]."""
+        """Pose of the flexible arm's flange if known, else of the measured tool: x y z [m], rotation vector [rad]."""
         self.acceleration = array("d", state.actual_tool_accelerometer)
-        """Specific force at the flange, without noise if the truth is known, in its own frame [m/s²]."""
+        """Specific force at the flange in its own frame, without noise if the truth is known [m/s²]."""
 
     def know(self, truth: "Truth") -> None:
-        """Replace what was measured by what is true at this tick."""
+        """Replace measurements of this tick by the truth."""
         self.true = True
         self.pose = array("d", truth.flange_pose)
         self.acceleration = array("d", truth.tool_acceleration)
 
 
 class History:
-    """The last ten minutes of a robot.
-
-    Attributes:
-        joint_limits: The robot's limits; None before it has been asked.
-        period: Control period [s].
-    """
+    """The last ten minutes of a robot."""
 
     def __init__(self) -> None:
-        self.joint_limits: Limits | None = None
-        self.period = 0.002
+        self.joint_limits: Limits | None = None  # None before the robot was queried
+        self.period = 0.002  # control period [s]
         self.rows: deque[Row] = deque(maxlen=LONGEST)
         self.events: deque[Event] = deque(maxlen=EVENTS)
         self._early: deque[Truth] = deque(maxlen=EARLY)
 
     def on_truth(self, truth: "Truth") -> None:
-        """Take what a real robot cannot measure; it may come before the state of its tick, or after later ones."""
+        """Add the truth of a tick, which may come before the state of its tick, or after later ones."""
         for row in reversed(self.rows):
             if row.tick <= truth.tick:
                 if row.tick == truth.tick:
@@ -82,7 +76,7 @@ class History:
         self._early.append(truth)
 
     def on_state(self, state: "State") -> None:
-        """Take a state; that before the first tick, which measures nothing, is left out."""
+        """Add a state; the one before the first tick measures nothing and is ignored."""
         if state.tick == 0:
             return
         row = Row(state)
@@ -94,14 +88,14 @@ class History:
         self.rows.append(row)
 
     def on_event(self, event: "Event") -> None:
-        """Take an event."""
+        """Add an event."""
         self.events.append(event)
 
     def since_rest(self) -> list[Row]:
-        """Return the rows after the one in which the shaped reference came to rest last; all if it never moved.
+        """Return the rows since the shaped reference last came to rest; all if it never moved.
 
-        The flange of the flexible arm and the measured tool are different points. So where the truth of any of these
-        ticks is known, those without it are left out.
+        The flange of the flexible arm and the measured tool are different points. So if the truth of any of
+        these ticks is known, rows without it are left out.
         """
         rows: list[Row] = []
         for row in reversed(self.rows):

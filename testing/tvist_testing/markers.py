@@ -1,4 +1,4 @@
-"""The markers of a test, each with its arguments, and the robot that they describe."""
+"""The markers of a test, and the robot that they describe."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -13,25 +13,25 @@ if TYPE_CHECKING:
 Part = dict[str, Any]
 """What a marker adds to the description of a robot."""
 FILES = (".toml", ".json")
-"""Ends of the names of files with a state."""
+"""Suffixes of files with a state."""
 
 
 class MarkerError(ValueError):
-    """A marker has arguments that it cannot have; the message says which, and what is expected."""
+    """A marker has invalid arguments; the message says which, and what is expected."""
 
 
 def robot(robot: str) -> Part:
-    """Robot by its name, such as "ur5e", or the path of a robot file."""
+    """Name of the robot, such as "ur5e", or path of a robot file."""
     return {"robot": _text("tvist_robot", robot)}
 
 
 def payload(kilograms: float) -> Part:
-    """Payload that the arm carries and declares [kg]."""
+    """Mass that the arm carries and declares as payload [kg]."""
     return {"payload": _number("tvist_payload", kilograms, "a mass in kg")}
 
 
 def shaper(shaper: str) -> Part:
-    """Shaper by its name, such as "none" or "zv", or FILE.py:NAME."""
+    """Name of the shaper, such as "none" or "zv", or FILE.py:NAME."""
     return {"shaper": _text("tvist_shaper", shaper)}
 
 
@@ -41,7 +41,7 @@ def plant(plant: str) -> Part:
 
 
 def cell(cell: str) -> Part:
-    """What stands around the robot, a TOML file with wires, tools, a gripper and parts; see `tvist serve --cell`."""
+    """Cell around the robot: a TOML file with wires, tools, a gripper and parts; see `tvist serve --cell`."""
     return {"cell": _text("tvist_cell", cell)}
 
 
@@ -52,7 +52,7 @@ def state(
     mode: str | None = None,
     payload: Mapping[str, Any] | None = None,
 ) -> Part:
-    """State to start in: a pose such as "Q2", or a file; or q [rad], mode such as "POWER_OFF", carried payload."""
+    """State at the start: a pose such as "Q2", or a file; or q [rad], mode such as "POWER_OFF", carried payload."""
     given = {"q": q, "mode": mode, "payload": payload}
     fields = {name: value for name, value in given.items() if value is not None}
     if start is None and not fields:
@@ -76,7 +76,7 @@ def faults(
     value: float | None = None,
     after: float = 0.0,
 ) -> Part:
-    """Fault of simulation.inject, with its fields, after a simulation time [s]; repeat the marker for more faults."""
+    """Fault for simulation.inject with its fields, after a simulation time [s]; repeat the marker for more faults."""
     from tvist_protocol.faults import FAULTS
 
     if fault not in FAULTS:
@@ -87,7 +87,7 @@ def faults(
 
 
 def program(program: str) -> Part:
-    """Program in URScript to load: its text, or a file NAME.script; `arm.play_program()` or the dashboard plays it."""
+    """URScript program to load: its text, or a file NAME.script; `arm.play_program()` or the dashboard plays it."""
     text = _text("tvist_program", program)
     if "\n" in text or not text.endswith(".script"):
         return {"program": ("test", text)}
@@ -97,11 +97,11 @@ def program(program: str) -> Part:
     except OSError as error:
         raise MarkerError(f"tvist_program has the file {text}: {error.strerror}") from error
     except UnicodeDecodeError:
-        raise MarkerError(f"tvist_program has the file {text}: it is no text") from None
+        raise MarkerError(f"tvist_program has the file {text}: must be text in UTF-8") from None
 
 
 def seed(seed: int) -> Part:
-    """Seed of sensor noise and gear errors; without the marker, that of --tvist-seed."""
+    """Seed of sensor noise and gear errors; without the marker, the value of --tvist-seed."""
     if not isinstance(seed, int) or isinstance(seed, bool):
         raise MarkerError(f"tvist_seed has {seed!r}: must be a whole number")
     return {"seed": seed}
@@ -121,7 +121,7 @@ MARKERS: dict[str, Callable[..., Part]] = {
 
 
 def described() -> list[str]:
-    """Return the markers with their arguments and meaning, as pytest lists them."""
+    """Return the markers with their arguments and descriptions, as pytest lists them."""
     lines = []
     for name, function in MARKERS.items():
         signature = inspect.signature(function).replace(return_annotation=inspect.Signature.empty)
@@ -131,7 +131,7 @@ def described() -> list[str]:
 
 
 def combined(item: "pytest.Item") -> Part:
-    """Return what all markers of a test say together; of equal markers the nearest counts, but faults add up."""
+    """Return the combined description of all markers of a test; the nearest of equal ones counts, but faults add up."""
     found: Part = {}
     injected: list[WantedFault] = []
     for name, function in MARKERS.items():
@@ -157,7 +157,7 @@ def _called(name: str, function: Callable[..., Part], marker: "pytest.Mark") -> 
 
 def _text(name: str, value: object) -> str:
     if not isinstance(value, str | Path) or not str(value).strip():
-        raise MarkerError(f"{name} has {value!r}: must be a text that is not empty")
+        raise MarkerError(f"{name} has {value!r}: must be a non-empty string")
     return str(value)
 
 

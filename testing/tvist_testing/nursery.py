@@ -1,11 +1,11 @@
 """The process that makes robots: it imports and compiles everything once, and forks for each robot.
 
-A forked robot starts in a fraction of the time of `tvist serve`. It has a process of its own, and each begins with a
-copy of the same memory, so what a robot computes does not depend on the robots before it.
+A forked robot starts much faster than `tvist serve`. All robots start as copies of the same memory, so what a
+robot computes does not depend on the robots before it.
 
-The test's process runs `python -m tvist_testing.nursery FD`. On the socket of that number it sends one line of JSON
-for each robot, with one end of the robot's own socket. When the test's process ends, for whatever reason, its sockets
-close, and so the nursery and all its robots end.
+The test's process runs `python -m tvist_testing.nursery FD`. It sends one line of JSON for each robot over
+the socket FD, with one end of the robot's own socket. However the test's process ends, its sockets close, and
+so this process and all its robots end.
 """
 
 import gc
@@ -22,8 +22,8 @@ LONGEST = 4 << 20
 
 def main(number: int) -> None:
     """Make robots until the socket closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Control+C ends the test's process, and with it this one
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that no robot stays behind as a zombie
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Control+C ends the test's process, which ends this one
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that robots do not become zombies
     warm_up()
     gc.collect()
     gc.freeze()
@@ -40,7 +40,7 @@ def main(number: int) -> None:
 
 
 def warm_up() -> None:
-    """Let a robot make a short motion, which loads or compiles every kernel that a robot usually needs."""
+    """Run a short motion, which loads or compiles every kernel that a robot usually needs."""
     from tvist_controller.loopback import LoopbackHost
     from tvist_protocol.codec import decode_reply, encode
     from tvist_protocol.commands import MoveJ, TakeControl
@@ -71,7 +71,7 @@ def _receive(requests: socket.socket) -> tuple[bytes, list[int]]:
 
 
 def _become_robot(line: bytes, descriptor: int) -> None:
-    """Serve a robot in this forked process, and end it."""
+    """Serve a robot in this forked process, and end the process."""
     from tvist_testing.forked_robot import serve
     from tvist_testing.wanted import WantedRobot
 
@@ -82,7 +82,7 @@ def _become_robot(line: bytes, descriptor: int) -> None:
             code = serve(msgspec.json.decode(line, type=WantedRobot), connection)
     finally:
         sys.stderr.flush()
-        # Without the clean-up of the interpreter, which belongs to the process that was forked.
+        # Skip the interpreter's clean-up, which belongs to the parent process.
         os._exit(code)
 
 

@@ -1,7 +1,7 @@
-"""The plugin that pytest loads: fixtures with robots, markers, and what remains of a failed test.
+"""The pytest plugin: fixtures with robots, markers, and the files of failed tests.
 
-It is loaded wherever this package is installed, so it imports nothing but pytest and the standard library; the rest
-follows with the first robot.
+It is loaded wherever this package is installed, so it imports only pytest and the standard library; the first
+robot imports the rest.
 """
 
 import sys
@@ -28,16 +28,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="Seed of sensor noise and gear errors of robots without the marker tvist_seed [0].",
+        help="Set the seed of sensor noise and gear errors for robots without the marker tvist_seed [0].",
     )
     group.addoption(
         "--tvist-recordings",
         default="tvist-recordings",
         metavar="DIR",
-        help="Folder for the recordings and logs of failed tests [tvist-recordings in the root folder].",
+        help="Keep the recordings and logs of failed tests in this folder [tvist-recordings in the root folder].",
     )
     group.addoption(
-        "--tvist-keep-all", action="store_true", help="Keep the recordings and logs of passed tests as well."
+        "--tvist-keep-all", action="store_true", help="Keep the recordings and logs of passed tests, too."
     )
 
 
@@ -50,7 +50,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """End the process that makes robots; a session fixture would end before the last test's report is made."""
+    """End the process that makes robots; a session fixture would end before the last test's report."""
     serving = config.stash.get(_SERVING, None)
     if serving is not None:
         serving.close()
@@ -58,7 +58,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="session")
 def _tvist_serving(request: pytest.FixtureRequest) -> "Serving":
-    """What makes robots in this session."""
+    """The maker of robots for this session."""
     from tvist_testing.robots import unavailable
 
     why = unavailable()
@@ -76,7 +76,7 @@ def _tvist_serving(request: pytest.FixtureRequest) -> "Serving":
 def tvist_robots(
     request: pytest.FixtureRequest, _tvist_serving: "Serving"
 ) -> Iterator[Callable[[int], "list[FixtureRobot]"]]:
-    """Make robots: `tvist_robots(3)` returns three like `tvist_robot`, which differ in name, endpoint and seed."""
+    """Make robots: `tvist_robots(3)` returns three like `tvist_robot` with different names, endpoints and seeds."""
     from tvist_testing.fixture_robot import FixtureRobot
 
     made: list[FixtureRobot] = []
@@ -96,7 +96,7 @@ def tvist_robots(
 
 @pytest.fixture
 def tvist_robot(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Iterator["FixtureRobot"]:
-    """A robot in lockstep of the test's own, ready to be read and moved."""
+    """The test's own robot in lockstep, ready to be read and moved."""
     from tvist_testing.fixture_robot import FixtureRobot
 
     robot, one = _tvist_serving.robot(FixtureRobot, request.node)
@@ -107,7 +107,7 @@ def tvist_robot(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> It
 
 @pytest.fixture
 def tvist_ur(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Iterator["UrRobot"]:
-    """A robot in real time of the test's own, with UR's interfaces on an address of its own."""
+    """The test's own robot in real time, with UR's interfaces on its own address."""
     from tvist_testing.fixture_robot import UrRobot
 
     robot, one = _tvist_serving.robot(UrRobot, request.node, ur=True)
@@ -120,7 +120,7 @@ def tvist_ur(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Itera
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Say in the report of a failed test where its recordings are; at the test's end keep them, or remove them."""
+    """Report where a failed test's recordings are; at the end of the test, keep or remove them."""
     report = yield
     robots = item.stash.get(_ROBOTS, [])
     if not robots:
@@ -146,9 +146,9 @@ def pytest_runtest_makereport(
 
 
 def _release_locals() -> None:
-    """Let the last failure's local variables go, which has been reported, so that clients among them end now.
+    """Release the last failure's local variables after its report, so that clients among them end now.
 
-    While a client of UR's interfaces is connected, its robot goes on; see `forked_robot`.
+    A robot continues while a client of UR's interfaces is connected; see `forked_robot`.
     """
     error, seen = getattr(sys, "last_value", None), set[int]()
     while error is not None and id(error) not in seen:
@@ -169,7 +169,7 @@ def _tell(item: pytest.Item, report: pytest.TestReport, robots: "list[RobotOfTes
 
 
 def _note(item: pytest.Item, report: pytest.TestReport, robots: "list[RobotOfTest]") -> None:
-    """Let JUnit and other reports have the paths and the seeds."""
+    """Add paths and seeds to JUnit and other reports."""
     properties = [one for robot in robots for one in robot.properties()]
-    item.user_properties += properties  # of the reports that follow
+    item.user_properties += properties  # for later reports
     report.user_properties += properties

@@ -16,29 +16,29 @@ import msgspec
 from tvist_testing.wanted import WantedRobot
 
 PATIENCE = 300.0
-"""Longest wait for an answer of the process [s]: the first start compiles, which takes minutes on a slow machine."""
+"""Longest wait for an answer of the process [s]; the first start compiles, for minutes on a slow machine."""
 ENDING = 30.0
 """Longest wait for a robot to end in order [s]."""
 NEEDED = (
     "tvist_server", "tvist_shaping", "tvist_urscript",
     "numpy", "numba", "pinocchio", "ruckig", "mcap", "zstandard", "cryptography",
 )  # fmt: skip
-"""Packages that a robot needs, most of them of the extra `server`."""
+"""Packages that a robot needs, most of them from the extra `server`."""
 
 
 class CannotServeError(RuntimeError):
-    """No robot can be served; the message says why, and what to do."""
+    """No robot can be served; the message says why and what to do."""
 
 
 class ServedRobot:
-    """A robot in a process of its own.
+    """A robot in its own process.
 
     Attributes:
         endpoint: Zenoh endpoint on which it listens.
-        host: IP address of UR's interfaces; empty if they are not open.
+        host: IP address of UR's interfaces; empty if they are closed.
         ports: Port of each of UR's interfaces.
         pid: Number of its process.
-        closed: Whether it has ended, or ends as soon as its last client has gone.
+        closed: Whether it has ended, or will end when its last client is gone.
     """
 
     def __init__(self, connection: socket.socket, told: dict[str, Any]) -> None:
@@ -55,18 +55,18 @@ class ServedRobot:
         self._connection.sendall(b"state\n")
 
     def close(self) -> None:
-        """End the robot in order, so that its recording is complete, or else at once; a second call does nothing."""
+        """End the robot in order, so that its recording is complete; kill it if it does not answer."""
         self._leave(b"close\n")
 
     def discard(self) -> None:
-        """End the robot; nothing is left to be read. A second call does nothing."""
+        """End the robot without completing its recording."""
         if self.host:
             self._leave(b"leave\n")
         else:
             self.kill()
 
     def _leave(self, order: bytes) -> None:
-        """End the robot; but while a client of UR's interfaces is connected, it goes on until that has gone."""
+        """End the robot; while a client of UR's interfaces is connected, it continues until that is gone."""
         if self.closed:
             return
         with contextlib.suppress(OSError):
@@ -80,12 +80,12 @@ class ServedRobot:
         self.kill()
 
     def forget(self) -> None:
-        """Leave a robot with clients to itself: it ends when this process has ended, and its clients with it."""
+        """Leave a robot with clients alone: it ends when this process has ended, together with its clients."""
         if self._left:
             self._connection.detach()
 
     def kill(self) -> None:
-        """End the robot at once, even if a test has stopped its process; nothing is left to be read."""
+        """Kill the robot's process, even if a test has stopped it; its recording stays incomplete."""
         if self.closed:
             return
         with contextlib.suppress(OSError):
@@ -102,7 +102,7 @@ class ServedRobot:
 
 
 class Robots:
-    """The process that makes robots, which starts with the first one. One for each process of tests."""
+    """The process that makes robots, started with the first one; there is one for each process of tests."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
@@ -110,7 +110,7 @@ class Robots:
         self._served: list[ServedRobot] = []
 
     def serve(self, wanted: WantedRobot) -> ServedRobot:
-        """Serve a robot; return it when it answers."""
+        """Serve a robot; return it when it answers. Raise CannotServeError if it cannot start."""
         if self._requests is None or (self._process is not None and self._process.poll() is not None):
             self._start()
         assert self._requests is not None
@@ -129,7 +129,7 @@ class Robots:
         return served
 
     def close(self) -> None:
-        """End the process, and robots that still run; a second call does nothing."""
+        """End the process and robots that still run."""
         for served in self._served:
             if served.closed:
                 served.forget()
@@ -157,11 +157,11 @@ class Robots:
         ours, theirs = socket.socketpair()
         ours.settimeout(PATIENCE)
         environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-        # The matrices are small, and a process with threads cannot fork safely.
+        # Small matrices need no threads, and a process with threads cannot fork safely.
         for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
             environment[threads] = "1"
         with theirs:
-            self._process = subprocess.Popen(  # noqa: S603  our own interpreter and module
+            self._process = subprocess.Popen(  # noqa: S603  this interpreter and a module of this package
                 [sys.executable, "-m", "tvist_testing.nursery", str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,

@@ -1,4 +1,4 @@
-"""Robots for one session of tests: from a test's markers to a robot, and what remains of a failed test."""
+"""Make robots for a session of tests from their markers, and keep the files of failed tests."""
 
 import itertools
 import json
@@ -18,36 +18,28 @@ from tvist_testing.robots import CannotServeError, Robots, ServedRobot
 from tvist_testing.wanted import WantedRobot
 
 NAME = "ur5e"
-"""Name of a single robot, which clients look for unless they are told another one."""
+"""Name of a single robot, for which clients look by default."""
 MOST = 100
-"""Largest number of robots of a test."""
+"""Most robots of a test."""
 R = TypeVar("R", bound=FixtureRobot)
 LONGEST_NAME = 120
 """Longest name of a test's folder [characters]."""
 LOG_LINES = 10
-"""Number of lines of the log that a report shows."""
+"""Lines of the log that a report shows."""
 
 
 @dataclass
 class RobotOfTest:
-    """A robot of a test, which may have ended.
-
-    Attributes:
-        served: The robot.
-        recording: File that it records into, in a folder that goes with the test.
-        log: File that it logs into, beside the recording.
-        kept: Folder that both are moved to if the test fails.
-        seed: Its seed.
-    """
+    """A robot of a test, which may have ended."""
 
     served: ServedRobot
-    recording: Path
-    log: Path
-    kept: Path
+    recording: Path  # in a folder that is removed after the test
+    log: Path  # beside the recording
+    kept: Path  # folder to which both are moved if the test fails
     seed: int
 
     def keep(self) -> None:
-        """End the robot in order, and move its files to where they remain."""
+        """End the robot in order, and move its files to `kept`."""
         self.served.close()
         self.kept.mkdir(parents=True, exist_ok=True)
         for file in (self.recording, self.log):
@@ -70,7 +62,7 @@ class RobotOfTest:
         ]
 
     def described(self) -> str:
-        """Return what a report says about the robot of a failed test."""
+        """Return the section of a failed test's report about the robot."""
         recording = self.kept / self.recording.name
         lines = [
             f"recording: {recording}",
@@ -86,7 +78,7 @@ class RobotOfTest:
 
 
 def folder_of(nodeid: str) -> str:
-    """Return the name of the folder for a test, which says which test it is."""
+    """Return the name of a test's folder, made from the test's name."""
     return re.sub(r"[^A-Za-z0-9_.-]+", "-", nodeid).strip("-")[-LONGEST_NAME:]
 
 
@@ -119,7 +111,7 @@ class Serving:
     def robot(
         self, kind: type[R], item: pytest.Item, name: str = NAME, number: int = 0, *, ur: bool = False
     ) -> tuple[R, RobotOfTest]:
-        """Make a robot of a test; one that cannot be made fails the test with one sentence."""
+        """Make a robot of a test; fail the test with one line if that is impossible."""
         folder = self._own.path / str(next(self._numbers))
         folder.mkdir()
         recording, log = folder / f"{name}.mcap", folder / f"{name}.log"

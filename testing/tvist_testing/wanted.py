@@ -1,4 +1,4 @@
-"""The robot that a test wants, as its markers and the command line describe it."""
+"""The robot that a test wants, according to its markers and the command line."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,12 +13,12 @@ class WantedFault:
     seconds: float | None = None
     value: float | None = None
     after: float = 0.0
-    """Simulation time at which it is injected [s]; 0: before the first tick."""
+    """Simulation time of the injection [s]; 0 is before the first tick."""
 
 
 @dataclass(frozen=True)
 class WantedRobot:
-    """One robot, as it travels in JSON from the test's process to the process that makes robots."""
+    """One robot, in the form sent as JSON to the process that makes robots."""
 
     options: dict[str, Any]
     """Options of `tvist serve`, as in a configuration file."""
@@ -26,6 +26,6 @@ class WantedRobot:
     """Name and text of the program to load."""
     faults: tuple[WantedFault, ...] = ()
     ur: bool = False
-    """Whether UR's interfaces are open, on an address of their own if the system has several."""
+    """Whether UR's interfaces are open, on their own address if the system has several."""
     log: str = ""
-    """File that the robot writes its log to."""
+    """Path of the robot's log."""

@@ -3,8 +3,6 @@
 import ast
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 SERVED = [
     path
@@ -22,11 +20,12 @@ def kernels(path):
             yield node
 
 
-@pytest.mark.parametrize("path", [path for path in SERVED if any(kernels(path))], ids=lambda path: path.stem)
-def test_no_kernel_calls_linear_algebra(path):
-    for kernel in kernels(path):
+def test_no_kernel_calls_linear_algebra():
+    found = [kernel for path in SERVED for kernel in kernels(path)]
+    assert len(found) > 50
+    for kernel in found:
         for node in ast.walk(kernel):
             matrices = isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult)
             asked = isinstance(node, ast.Attribute) and node.attr in {"linalg", "dot", "vdot"}
-            assert not matrices, f"{kernel.name}: {ast.unparse(node)}"
-            assert not asked, f"{kernel.name}: {ast.unparse(node)}"
+            wrong = matrices or asked
+            assert not wrong, f"{kernel.name}: {ast.unparse(node)}"

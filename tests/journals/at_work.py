@@ -8,7 +8,7 @@ from tests.conformance.served import PATIENCE, finished
 from tests.journals.hand import robot
 
 ROOT = Path(__file__).parents[2]
-CELL, PALLET = (ROOT / "clients" / "examples" / name for name in ("cell.toml", "palletise.toml"))
+CELL = ROOT / "clients" / "examples" / "cell.toml"
 THREE, SEVEN = (ROOT / "tests" / "plant" / "urdf" / name for name in ("three.urdf", "seven.urdf"))
 BENT = "0,-1.57,1.57,-1.57,-1.57,0"
 """Where the tool can go in all directions."""
@@ -216,26 +216,6 @@ def cell_with_a_gripper(path):
         hand.wait(150)
 
 
-def boxes_of_a_world(path):
-    options = ("--cell", str(PALLET), "--profile", "ursim", "--shaper", "zv")
-    with started(path, OVER_THE_TABLE, *options) as hand:
-        program(
-            hand,
-            "rq_activate()",
-            "rq_set_force(100)",
-            "movel(p[-0.52, -0.25, 0.2, 2.2214, 2.2214, 0], a=2, v=0.5)",
-            "movel(p[-0.52, -0.25, 0.15, 2.2214, 2.2214, 0], a=0.8, v=0.25)",
-            "rq_activate_and_wait()",
-            "rq_close_and_wait()",
-            "set_payload(1.32, [0, 0, 0.09])",
-            "movel(p[-0.52, -0.25, 0.2, 2.2214, 2.2214, 0], a=1.2, v=0.5)",
-            "movel(p[-0.36, -0.32, 0.2, 2.2214, 2.2214, 0.0], a=2, v=0.5)",
-            "rq_open_and_wait()",
-            "sleep(0.2)",
-            ticks=1700,
-        )
-
-
 def arm_of_three_joints(path):
     options = (*identified(path, THREE), "--shaper", "zvd", "--payload", "2", "--truth")
     with started(path, "0.2,0.4,1.0", *options) as hand:
@@ -301,5 +281,5 @@ def learnt_payload(path):
 
 RUNS = (
     elastic_with_a_payload, tool_paths, speeds, servoj_of_a_program, force_mode_in_contact, freedrive,
-    cell_with_a_gripper, boxes_of_a_world, arm_of_three_joints, arm_of_seven_joints, learnt_payload,
+    cell_with_a_gripper, arm_of_three_joints, arm_of_seven_joints, learnt_payload,
 )  # fmt: skip

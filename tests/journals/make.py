@@ -4,7 +4,6 @@ Each is a served robot with the clients that its name tells of. What runs in rea
 every time; only its replay is always the same.
 """
 
-import random
 import socket
 import sys
 import time
@@ -36,36 +35,6 @@ def moves_with_another_payload(path):
         hand.move(Q1)
 
 
-def stops_pauses_and_the_slider(path):
-    draw = random.Random(3)
-    with robot(path, "--shaper", "auto") as hand:
-        for number in range(10):
-            hand.do("set_shaper", name=SHAPERS[number % len(SHAPERS)])
-            hand.do("move_j", q=(Q2, Q3, Q1)[number % 3])
-            hand.wait(draw.randrange(1, 700))
-            match number % 5:
-                case 0:
-                    hand.do("stop")
-                case 1:
-                    hand.do("pause")
-                    hand.wait(draw.randrange(1, 300))
-                    hand.do("resume")
-                case 2:
-                    hand.do("set_speed", fraction=0.3)
-                    hand.wait(draw.randrange(1, 300))
-                    hand.do("set_speed", fraction=1.0)
-                case 3:
-                    hand.do("stop", deceleration=3.0)
-                case 4:
-                    hand.do("set_shaper", name="zvd")
-                    hand.do("pause")
-                    hand.wait(200)
-                    hand.do("stop")
-            hand.wait(1500)
-            hand.do("move_j", q=Q1)
-            hand.wait(1500)
-
-
 def streams(path):
     with robot(path, "--shaper", "zv") as hand:
         hand.stream_in_steps(2.0)
@@ -84,14 +53,8 @@ def streams(path):
 
 def faults(path):
     with robot(path, "--shaper", "short") as hand:
-        for fault in (
-            "protective_stop",
-            "safeguard_stop",
-            "emergency_stop",
-            "power_loss",
-            "violation",
-            "nan",
-        ):
+        stops = ("protective_stop", "safeguard_stop", "emergency_stop")
+        for fault in (*stops, "power_loss", "violation", "nan"):
             hand.do("move_j", q=Q2)
             hand.wait(333)
             hand.do("simulation.inject", fault=fault)
@@ -161,63 +124,36 @@ def live_lost_lease(path):
         hand.wait(700)
 
 
-def asked(host, port, *lines, waits=0.2):
-    """What UR's dashboard answers, after its greeting."""
-    said = []
-    with (
-        socket.create_connection((host, port), PATIENCE) as stream,
-        stream.makefile("rw", newline="\n") as talk,
-    ):
-        talk.readline()
-        for line in lines:
-            talk.write(f"{line}\n")
-            talk.flush()
-            said.append(talk.readline().strip())
-            time.sleep(waits)
-    return said
-
-
-UR = ("--profile", "real", "--start", "Q1", "--ur-address")
-"""Options that open UR's interfaces, without the profile of UR's simulator."""
-
-
 def live_programs_of_the_dashboard(path):
     address = "127.20.251.7"
-    with robot(path, *UR, address, clock="realtime") as hand:
+
+    def ask(*lines):
+        with socket.create_connection((address, 29999), PATIENCE) as stream, stream.makefile("rw") as talk:
+            talk.readline()
+            for line in lines:
+                talk.write(f"{line}\n")
+                talk.flush()
+                talk.readline()
+                time.sleep(0.2)
+
+    # The options open UR's interfaces, without the profile of UR's simulator.
+    options = ("--profile", "real", "--start", "Q1", "--ur-address", address)
+    with robot(path, *options, clock="realtime") as hand:
         hand.do("release_control")
-        asked(address, 29999, "load paper.urp", "play", "programState")
+        ask("load paper.urp", "play", "programState")
         hand.wait(1500)
-        asked(address, 29999, "pause", "programState", "play", "stop")
+        ask("pause", "programState", "play", "stop")
         hand.wait(500)
-        asked(address, 29999, "load Q1.urp", "play", "running")
+        ask("load Q1.urp", "play", "running")
         hand.wait(1500)
-        asked(address, 29999, "power off", "power on", "brake release", "load wait_program.urp", "play")
+        ask("power off", "power on", "brake release", "load wait_program.urp", "play")
         hand.wait(200)
-        asked(address, 29999, "stop")
-
-
-def live_rtde_inputs(path):
-    import rtde_io
-
-    address = "127.20.251.8"
-    with robot(path, *UR, address, "--shaper", "auto", clock="realtime") as hand:
-        hand.do("release_control")
-        io = rtde_io.RTDEIOInterface(address)
-        asked(address, 29999, "load paper.urp", "play")
-        hand.wait(200)
-        assert io.setSpeedSlider(0.4)
-        hand.wait(300)
-        assert io.setStandardDigitalOut(3, True)
-        assert io.setInputIntRegister(20, 77)
-        assert io.setSpeedSlider(1.0)
-        hand.wait(2500)
-        io.disconnect()
+        ask("stop")
 
 
 RUNS = (
-    moves_with_every_shaper, moves_with_another_payload, stops_pauses_and_the_slider, streams, faults,
-    collisions_and_refusals, live_moves, live_stream, live_faults, live_lost_lease, live_programs_of_the_dashboard,
-    live_rtde_inputs, *at_work.RUNS,
+    moves_with_every_shaper, moves_with_another_payload, streams, faults, collisions_and_refusals, live_moves,
+    live_stream, live_faults, live_lost_lease, live_programs_of_the_dashboard, *at_work.RUNS,
 )  # fmt: skip
 
 

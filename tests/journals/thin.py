@@ -21,10 +21,8 @@ def processor():
     """What the last bits depend on: the processor, and the libraries that choose their code by it."""
     features = sorted(name for name, there in binding.get_host_cpu_features().items() if there)
     libraries = [version(name) for name in ("numpy", "numba", "llvmlite", "pin", "ruckig")]
-    chosen = [
-        os.environ.get(name, "") for name in ("OPENBLAS_CORETYPE", "NUMBA_CPU_NAME", "NUMBA_DISABLE_JIT")
-    ]
-    told = " ".join([*features, *libraries, *chosen])
+    names = ("OPENBLAS_CORETYPE", "NUMBA_CPU_NAME", "NUMBA_DISABLE_JIT")
+    told = " ".join([*features, *libraries, *(os.environ.get(name, "") for name in names)])
     return f"{binding.get_host_cpu_name()} {hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
 

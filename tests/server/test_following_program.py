@@ -6,16 +6,27 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.controller.robots import NoArm, Robot
+from tests.controller.scripts import URSIM
 from tests.examples import examples
-from tests.server.followed import HERE, PATIENCE, RUN, Alone, H, OnRobot, late, packages, swings
 
 from tvist_controller.programs.checking import check_program
+from tvist_controller.programs.library import known_signatures
+from tvist_controller.programs.player import GUIDED
 from tvist_protocol.commands import UnlockProtectiveStop
-from tvist_protocol.programs import ProgramPause, ProgramPlay
+from tvist_protocol.io import Registers, SetRegisters
+from tvist_protocol.programs import ProgramPause, ProgramPlay, ProgramRun
 from tvist_protocol.simulation import SimulationInject
 from tvist_server.moving import program as r
-from tvist_server.moving.program import CLOSE, Window, program
+from tvist_server.moving.program import CLOSE, MARGIN, Window, program
+from tvist_urscript import EVALUATIONS, Array, Machine, compile_script
 
+H, RUN = 0.002, 71
+HERE = np.array(URSIM)
+PATIENCE = 20
+"""Periods of 2 ms within which braking has to begin."""
+LAG = 17
+"""Periods by which the arm of a program alone follows `servoj`."""
 BACK = 1.1 * CLOSE / H**2
 """Acceleration with which the rest of a distance from the set-points is made up for [rad/s²]."""
 GIVEN = {"speed": 0.5, "deceleration": 4.0, "lookahead": 0.03, "gain": 2000.0}
@@ -24,6 +35,181 @@ DOCUMENTED = {
     *("read_input_integer_register", "read_input_float_register", "write_output_integer_register"),
 }
 """Functions in UR's manuals of software 3.14 and 5.9, which also compute with lists."""
+
+
+class Followed:
+    """What the program has done.
+
+    Attributes:
+        told: What `servoj` was told, one posture a call, and the tick of each.
+        numbers: The number that the program said in each of these ticks.
+        alone: The number of periods without a set-point that it said then.
+    """
+
+    def __init__(self, speed, deceleration, step):
+        self.speed, self.most, self.tick = speed, MARGIN * speed * step, 0
+        self.told, self.at, self.numbers, self.alone = [], [], [], []
+        self.text = program(RUN, speed=speed, deceleration=deceleration, lookahead=0.03, gain=2000.0)
+        if step != H:
+            self.text = self.text.replace("get_steptime()", str(step))
+
+    def steps(self, count=1):
+        for _ in range(count):
+            before = len(self.told)
+            self._step()
+            self.tick += 1
+            if len(self.told) > before:
+                self.numbers.append(self.output(r.PLAYED))
+                self.alone.append(self.output(r.ALONE))
+
+    def _tell(self, q):
+        self.told.append(np.array(q.items))
+        self.at.append(self.tick)
+
+    def play(self, packages, arrivals):
+        """Let packages arrive, by their places in a list: those of each tick in turn."""
+        for come in arrivals:
+            for place in come:
+                self.write(*packages[place])
+            self.steps()
+
+    def until_ended(self, most=2000):
+        for _ in range(most):
+            self.steps()
+            if self.state is r.State.ENDED:
+                return self
+        raise AssertionError("it goes on")
+
+    @property
+    def state(self):
+        return r.State(self.output(r.STATE))
+
+    @property
+    def ended(self):
+        return r.Ended(self.output(r.ENDED))
+
+    def assert_kept(self, last_came):
+        """Check all that holds whatever came; `last_came` is the tick of the last new number."""
+        assert (np.diff(self.at) == 1).all(), "a period in which it tells `servoj` nothing holds the arm back"
+        told = np.array([HERE, *self.told])
+        assert np.abs(np.diff(told, axis=0)).max(initial=0.0) <= self.most * (1 + 1e-9)
+        played = np.array(self.numbers)[np.diff([0, *self.alone]) == 0]
+        assert set(np.diff([0, *self.alone])) <= {0, 1}
+        if len(played):
+            assert self.output(r.LEFT_OUT) == played[-1] - played[0] + 1 - len(set(played))
+        assert (np.diff(played) >= 0).all()
+        if self.state is r.State.ENDED:
+            assert self.ended is not r.Ended.NOT
+            assert not self.at or self.at[-1] < last_came + PATIENCE
+
+
+class OnRobot(Followed):
+    """The program on a robot without an arm."""
+
+    def __init__(self, *, speed=0.5, deceleration=4.0, step=H):
+        super().__init__(speed, deceleration, step)
+        self.robot = Robot(plant=NoArm(), q=URSIM, shaper="none")
+        functions = self.robot.controller.programs._functions
+        servoj = functions["servoj"]
+
+        def listening(q, *others):
+            self._tell(q)
+            yield from servoj(q, *others)
+
+        functions["servoj"] = listening
+        self.reply = self.robot.send(ProgramRun, text=self.text)
+        self.steps(2)
+
+    def _step(self):
+        self.robot.tick()
+
+    def write(self, n, order, *doubles):
+        also = (Registers(bank="input_double", first=r.SETPOINTS, values=tuple(map(float, doubles))),)
+        self.robot.send(
+            SetRegisters, bank="input_int", first=r.NUMBER, values=(int(n), int(order)), also=also, token=None
+        )
+
+    def output(self, place):
+        return self.robot.controller.io().output_int_register[place]
+
+    @property
+    def targets(self):
+        return np.array([state.target_q for state in self.robot.states])
+
+    def assert_kept(self, last_came):
+        super().assert_kept(last_came)
+        limits = self.robot.controller.cycle.description.limits
+        speeds = np.diff(self.targets, axis=0) / H
+        assert np.abs(speeds).max() <= MARGIN * self.speed * (1 + 1e-6)
+        assert np.abs(np.diff(speeds, axis=0) / H).max() <= min(limits.acceleration) * (1 + 1e-6)
+        if self.state is r.State.ENDED:
+            assert (speeds[-1] == 0.0).all()
+            assert self.robot.controller.programs.state != "PLAYING"
+
+
+class Alone(Followed):
+    """The program with nothing but registers, on an arm that follows some periods later."""
+
+    def __init__(self, *, speed=0.5, deceleration=4.0, before=None, lag=LAG, step=H):
+        super().__init__(speed, deceleration, step)
+        self._ints, self._doubles, self._outputs = [0] * 48, [0.0] * 48, [0] * 48
+        functions = {
+            "get_steptime": lambda: H,
+            "sync": lambda: iter([None]),
+            "read_input_integer_register": lambda place: self._ints[place],
+            "read_input_float_register": lambda place: self._doubles[place],
+            "write_output_integer_register": self._outputs.__setitem__,
+            "get_target_joint_positions": lambda: Array(tuple(([HERE] * lag + self.told)[-lag].tolist())),
+            "servoj": self._servoj,
+            "stopj": lambda _: iter([None] * 5),
+            "textmsg": lambda *_: None,
+        }
+        self._machine = Machine(compile_script(self.text, known_signatures()), functions)
+        if before is not None:
+            self.write(*before)
+        self.steps(2)
+
+    def _servoj(self, q, *_):
+        self._tell(q)
+        yield
+
+    def _step(self):
+        if self._machine.running:
+            self._machine.resume(EVALUATIONS - GUIDED)
+
+    def write(self, n, order, *doubles):
+        self._ints[r.NUMBER], self._ints[r.ORDER] = int(n), int(order)
+        self._doubles[r.SETPOINTS :] = map(float, doubles)
+
+    def output(self, place):
+        return self._outputs[place]
+
+
+def packages(path, count, order=RUN, before=0):
+    """The input packages of set-points: rows of a path, from the first on, with the numbers after `before`."""
+    window, made = Window(), []
+    window.number = before
+    for row in path[:count]:
+        window.add(tuple(row))
+        made.append(window.values(order))
+    return made
+
+
+def swings(count, speed, *, rest=30, h=H):
+    """Postures that rest, and then swing with a largest speed [rad/s], shape (count, 6)."""
+    passed = np.maximum(np.arange(count) - rest, 0) * h
+    return HERE + np.outer(speed / 4.0 * np.sin(4.0 * passed) ** 2, (1.0, -0.15, 0.1, 0.2, 0.3, -1.0))
+
+
+def late(random, count, *, base=1.0, jitter=0.6, stalls=0.0, longest=12):
+    """Packages by the tick in which they arrive, in order; a stall, of up to `longest` ticks, holds up the rest."""
+    arrivals, free = [[] for _ in range(count + int(base + jitter) + longest + 3)], 0.0
+    for k in range(count):
+        if random.random() < stalls:
+            free = max(free, k + base + random.integers(2, longest + 1))
+        free = max(free, k + base + jitter * random.uniform(-1.0, 1.0))
+        arrivals[int(np.ceil(free))].append(k)
+    return arrivals
 
 
 def of_path(path, numbers):
@@ -57,20 +243,10 @@ def test_what_a_robot_would_not_take_is_refused(name, value):
         program(**{"run": 1, **GIVEN, name: value})
 
 
-def test_a_package_has_the_newest_set_point_first_and_every_register_once():
-    window = Window()
-    for k in range(6):
-        window.add((float(k),) * 6)
-    assert window.values(RUN)[:2] == (6, RUN)
-    assert window.values(0)[1::6] == (0, 5.0, 4.0, 3.0, 2.0)
-    assert len(r.INPUTS) == len(window.values(RUN))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_numbers_that_begin_anew_change_nothing(seed):
-    arrivals = late(np.random.default_rng(seed), 200, jitter=1.4, stalls=0.02, longest=6)
+def test_numbers_that_begin_anew_change_nothing():
+    arrivals = late(np.random.default_rng(1), 200, jitter=1.4, stalls=0.02, longest=6)
     runs = Alone(), Alone()
-    for robot, before in zip(runs, (0, r.MOST - 100 + seed), strict=True):
+    for robot, before in zip(runs, (0, r.MOST - 100), strict=True):
         robot.play(packages(swings(200, 0.4), 200, before=before), arrivals[:200])
     first, second = (str((run.told, run.at, run.alone, run.output(r.LEFT_OUT), run.state)) for run in runs)
     assert first == second
@@ -91,18 +267,12 @@ def test_on_a_good_link_it_plays_every_set_point_as_it_is(seed, speed, jitter):
     assert robot.ended is r.Ended.SILENCE
 
 
-@examples(50)
-@given(
-    seed=st.integers(0, 2**31),
-    speed=st.floats(0.1, 2.5),
-    jitter=st.floats(0.0, 2.0),
-    stalls=st.floats(0.0, 0.05),
-    repeated=st.floats(0.0, 0.3),
-    left_out=st.floats(0.0, 0.05),
-)
-def test_a_bad_link_shows_by_smooth_detours_that_fade(seed, speed, jitter, stalls, repeated, left_out):
+@examples(30)
+@given(seed=st.integers(0, 2**31), speed=st.floats(0.1, 2.5))
+def test_a_bad_link_shows_by_smooth_detours_that_fade(seed, speed):
     """Packages late by up to 12 periods and then at once, some twice, some never."""
     random, count = np.random.default_rng(seed), 400
+    jitter, stalls, repeated, left_out = random.uniform(0.0, [2.0, 0.05, 0.3, 0.05])
     path = swings(count + 400, 0.9 * speed)
     arrivals = [
         [place for place in come for _ in range(2 if random.random() < repeated else 1)]
@@ -136,13 +306,13 @@ def garbled(random, package, wildness):
     return package
 
 
-@pytest.mark.parametrize("kind", [Alone, OnRobot])
-@examples(25)
+@examples(30)
 @given(seed=st.integers(0, 2**31), speed=st.floats(0.1, 3.0), wildness=st.sampled_from([1e-3, 0.1, 5.0]))
-def test_whatever_comes_it_moves_within_its_limits_and_ends_at_rest(kind, seed, speed, wildness):
+def test_whatever_comes_it_moves_within_its_limits_and_ends_at_rest(seed, speed, wildness):
+    """Every fourth time on a whole robot."""
     random, count = np.random.default_rng(seed), 300
     path = swings(count, 0.9 * speed)
-    robot = kind(speed=speed)
+    robot = (Alone if seed % 4 else OnRobot)(speed=speed)
     sent = packages(path, count)
     newest, last = 0, robot.tick
     for come in late(random, count, jitter=random.uniform(0.0, 3.0), stalls=0.02):
@@ -158,8 +328,7 @@ def test_whatever_comes_it_moves_within_its_limits_and_ends_at_rest(kind, seed, 
     assert len(robot.told) == calls
 
 
-@pytest.mark.parametrize("speed", [0.2, 3.0])
-@pytest.mark.parametrize("moment", [3, 100, 201, 305])
+@pytest.mark.parametrize(("speed", "moment"), [(3.0, 3), (0.2, 201), (3.0, 305)])
 def test_it_brakes_within_40_ms_of_the_last_set_point(speed, moment):
     path = swings(400, speed)
     robot, last = followed(
@@ -182,10 +351,10 @@ LATE = (
 """Periods by which packages are late on a bad link, one a digit."""
 
 
-@pytest.mark.parametrize(("speed", "share"), [(0.05, 0.97), (1.0, 0.97), (1.0, 1.0), (2.5, 1.0)])
+@pytest.mark.parametrize(("speed", "share"), [(0.05, 0.97), (2.5, 1.0)])
 def test_joints_at_their_largest_speed_fall_behind_no_further_once_a_bad_link_is_good(speed, share):
     """On a robot of 125 Hz; neither do they stay behind, since the program may be faster than the set-points."""
-    count, step = 900, 0.008
+    count, step = 400, 0.008
     speeds = np.clip((np.arange(count) - 8) * step * 40.0 * speed, 0.0, share * speed)
     path = HERE + np.outer(np.cumsum(speeds) * step, (1.0, -0.15, 0.1, 0.2, 0.3, -1.0))
     newest = np.maximum.accumulate([k - int(by) for k, by in enumerate(LATE)]).tolist()
@@ -197,26 +366,7 @@ def test_joints_at_their_largest_speed_fall_behind_no_further_once_a_bad_link_is
     assert off[-1] <= 1e-9
 
 
-@pytest.mark.parametrize("together", [2, 3, 4])
-@pytest.mark.parametrize("slip", [0, 1, 2, 3])
-@pytest.mark.parametrize("speed", [0.5, 2.5])
-def test_packages_that_come_together_are_followed_at_the_largest_speed_whenever_they_come(
-    together, slip, speed
-):
-    """All joints are as fast as they may be; from some moment on, packages come later by some periods."""
-    count = 900
-    passed = np.minimum(np.cumsum(np.clip((np.arange(count) - 100) * H * 5.0, 0.0, speed)) * H, 0.7 * speed)
-    path = HERE + np.outer(passed, (1.0, -1.0, 1.0, 1.0, 1.0, -1.0))
-    newest = [(k + 1 - (slip if k > 40 else 0)) // together * together - 1 for k in range(count)]
-    arrivals = [[b] if b > a else [] for a, b in zip([-1, *newest], newest, strict=False)]
-    robot, _ = followed(path, arrivals, count, speed=speed)
-    assert robot.state is r.State.FOLLOWING
-    off = np.abs(np.array(robot.told) - of_path(path, robot.numbers)).max(axis=1)
-    assert off.max() <= 0.03 * speed
-    assert off[-1] <= 1e-3 * speed
-
-
-@pytest.mark.parametrize("lost", [3, 7, 12, 17])
+@pytest.mark.parametrize("lost", [3, 17])
 def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lost):
     path = swings(1000, 0.45)
     robot, _ = followed(path, [[k] for k in range(200)], 600)
@@ -229,42 +379,33 @@ def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lo
 
 
 @pytest.mark.parametrize(
-    ("change", "why"),
+    ("come", "change", "why"),
     [
-        ({1: 0}, r.Ended.ORDERED),
-        ({1: -1}, r.Ended.ORDERED),
-        ({0: 3}, r.Ended.LOST),
-        ({0: 190}, r.Ended.LOST),
-        ({12: float("nan")}, r.Ended.TOO_FAST),
-        ({8: 0.3, 14: 0.3, 20: 0.3, 2: 0.3}, r.Ended.TOO_FAST),
+        ((150, 151, 152), {1: 0}, r.Ended.ORDERED),
+        ((150, 151, 152), {1: -1}, r.Ended.ORDERED),
+        ((150, 151, 152), {0: 3}, r.Ended.LOST),
+        ((150, 151, 152), {0: 190}, r.Ended.LOST),
+        ((150, 151, 152), {12: float("nan")}, r.Ended.TOO_FAST),
+        ((150, 151, 152), {8: 0.3, 14: 0.3, 20: 0.3, 2: 0.3}, r.Ended.TOO_FAST),
+        *[
+            ((None, None, None, 154), dict.fromkeys(range(14, 20), wrong), r.Ended.TOO_FAST)
+            for wrong in (float("nan"), float("-inf"), 1e300, 3.0)
+        ],
     ],
 )
-def test_a_wrong_package_ends_it_and_it_says_why(change, why):
+def test_a_wrong_package_ends_it_and_it_says_why(come, change, why):
+    """After a gap it plays the set-point before the newest, and reads the one before that for the velocity."""
     path = swings(300, 0.4)
     robot, _ = followed(path, [[k] for k in range(150)], 300)
-    for k in (150, 151, 152):
-        package = list(packages(path, 300)[k])
-        for place, value in change.items():
-            package[place] = value
-        robot.write(*package)
+    for k in come:
+        if k is not None:
+            package = list(packages(path, 300)[k])
+            for place, value in change.items():
+                package[place] = value
+            robot.write(*package)
         robot.steps()
     robot.until_ended().assert_kept(robot.tick)
     assert robot.ended is why
-
-
-@pytest.mark.parametrize("wrong", [float("nan"), float("-inf"), 1e300, 3.0])
-def test_a_wrong_set_point_beside_the_one_that_is_played_ends_it(wrong):
-    """After a gap the program also reads the set-point before, for the velocity."""
-    path = swings(300, 0.4)
-    robot, _ = followed(path, [[k] for k in range(150)], 300)
-    robot.steps(3)
-    package = list(packages(path, 300)[154])
-    for at in range(14, 20):  # it plays the last but one
-        package[at] = wrong
-    robot.write(*package)
-    robot.steps(2)
-    robot.until_ended().assert_kept(robot.tick)
-    assert robot.ended is r.Ended.TOO_FAST
     assert np.isfinite(robot.told).all()
 
 
@@ -315,11 +456,9 @@ def test_an_arm_that_does_not_follow_ends_it(lag, why):
     assert robot.ended is (why or r.Ended.NOT)
 
 
-@pytest.mark.parametrize(
-    ("how", "periods", "moment"), [("pause", 25, 90), ("stop", 25, 160), ("pause", 400, 160)]
-)
+@pytest.mark.parametrize(("how", "periods", "moment"), [("pause", 25, 90), ("stop", 25, 160)])
 def test_it_does_not_go_on_after_a_pause(how, periods, moment):
-    """Of more than 40 ms: neither when the sender goes on meanwhile, since what has come counts no more."""
+    """Of more than 40 ms, also if the sender goes on meanwhile: what has come counts no more."""
     path = swings(1500, 0.45)
     sent = packages(path, 1400)
     robot = OnRobot()
@@ -334,8 +473,8 @@ def test_it_does_not_go_on_after_a_pause(how, periods, moment):
     if how == "stop":
         robot.robot.send(UnlockProtectiveStop)
     robot.robot.send(ProgramPlay)
-    robot.play(sent, [[min(robot.tick - 2 + k, 1399)] for k in range(200)])
+    robot.play(sent, [[min(robot.tick - 2 + k, 1399)] for k in range(50)])
     assert robot.state is r.State.ENDED
     assert robot.ended is r.Ended.LOST
     assert len(robot.told) == calls
-    assert (robot.targets[-200:] == still).all()
+    assert (robot.targets[-50:] == still).all()

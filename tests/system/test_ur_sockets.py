@@ -1,111 +1,69 @@
 """Programs that connect to their client and are steered by it: whatever becomes of the client, the arm stops."""
 
 import itertools
-import math
+import signal
 import socket
 import struct
+import sys
+from pathlib import Path
 
+import pytest
+from tests import forked
+from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Wire
-from tests.system.waiting import eventually
+from tests.places import own_address
 
 from tvist_plant.description import load
 
 from .test_ur_lockstep import begin_step, dashboard, lockstep, replayed, running, take_clock
+from .ur_driver import MANNERS
 
-HOME = (-1.60, -1.727, -2.203, -0.808, 1.595, -0.031)
-FAR = (-0.10, *HOME[1:5], 1.469)
+HOST = own_address(51)
 LIMITS = load("ur5e").limits
-PROGRAM = """def driver():
-  global q = get_target_joint_positions()
-  global going = True
-  thread follow():
-    while going:
-      servoj(q, t=0.002, lookahead_time=0.03, gain=2000)
-    end
-    stopj(4)
-  end
-  if not socket_open("{host}", {port}, "driver"):
-    textmsg("nobody listens")
-    halt
-  end
-  got = socket_read_binary_integer(6, "driver", 0)
-  h = run follow()
-  while going:
-    if got[0] == 6:
-      q = [got[1], got[2], got[3], got[4], got[5], got[6]] / 1000000
-      socket_send_int(1, "driver")
-      got = socket_read_binary_integer(6, "driver", 0.1)
-    else:
-      going = False
-    end
-  end
-  join h
-  textmsg("the client has gone")
-end
-"""
+DRIVER = Path(__file__).with_name("ur_driver.py")
+GONE = {"cut", "frozen", "torn"}
+"""Manners after which the program notices that nothing comes any more."""
 
 
-def steer(stream, postures):
-    """Send joint positions, and read what is answered."""
-    for posture in postures:
-        stream.sendall(struct.pack(">6i", *(round(1e6 * angle) for angle in posture)))
-        stream.recv(4, socket.MSG_WAITALL)
-
-
-def cut(stream):
-    """Reset the connection."""
-    stream.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-    stream.close()
-
-
-MANNERS = {
-    "ends": lambda stream: stream.shutdown(socket.SHUT_RDWR),
-    "is cut": cut,
-    "is silent": lambda _: None,
-    "is torn": lambda stream: stream.sendall(b"\1\2\3\4\5"),
-    "asks for absurd joints": lambda stream: stream.sendall(struct.pack(">6i", *[2**31 - 1] * 6)),
-    "jumps far away at once": lambda stream: steer(stream, [FAR] * 300),
-}
-
-
+@pytest.mark.realtime
 def test_whatever_becomes_of_the_client_the_arm_stops_inside_its_limits_and_a_replay_is_equal(tmp_path):
     path = tmp_path / "run.mcap"
-    with lockstep(51, path, start=",".join(map(str, HOME))) as (served, host), Wire(served.endpoint) as wire:
-        wire.listen("event", "state")
-        for manner, becomes in MANNERS.items():
-            seen = len(wire.received["event"])
-            with socket.create_server((host, 0)) as server, Wire(served.endpoint) as stepper:
-                clock = take_clock(stepper)
-                stepper.step(clock, 1)
-                begin_step(stepper, clock, 100_000)  # until this client goes
-                with socket.create_connection((host, 30002)) as script:
-                    script.sendall(PROGRAM.format(host=host, port=server.getsockname()[1]).encode())
-                    stream, _ = server.accept()
-                with stream:
-                    steer(stream, ([a + 0.2 * math.sin(0.01 * n) for a in HOME] for n in range(150)))
-                    becomes(stream)
-                    stopped = wire.wait("event", lambda one: one["kind"] == "program_stopped", since=seen)
-                    wire.until(stopped["tick"] + 260)
-            eventually(lambda: wire.info()["stepper"] is None)
-            events = wire.received["event"][seen:]
-            said = [event["why"] for event in events if event["kind"] == "text"]
-            errors = [event["why"] for event in events if event["kind"] == "warning" and event.get("line")]
-            absurd = manner == "asks for absurd joints"
-            assert (said, bool(errors)) == ([] if absurd else ["the client has gone"], absurd), (
-                manner,
-                events,
-            )
-            assert not errors or "2147.48" in errors[0]
+    with Served("--ur-address", HOST, "--record", str(path)) as served:
+        with Wire(served.endpoint) as wire:
+            wire.listen("event", "state")
+            for manner in MANNERS:
+                seen = len(wire.received["event"])
+                driver = forked.Popen([sys.executable, DRIVER, HOST, manner])
+                wire.wait("event", lambda event: event["kind"] == "program_stopped", since=seen)
+                driver.send_signal(signal.SIGKILL)
+                driver.wait(PATIENCE)
+                events = wire.received["event"][seen:]
+                assert_told(manner, events)
+                tick = wire.received["state"][-1]["tick"]
+                wire.wait("state", lambda state, tick=tick: state["tick"] > tick + 260)
         assert served.end() == 0
     content = replayed(path)
     assert sum(entry.change == "opened" for entry in content.journal) == len(MANNERS)
     for state in content.states:
-        for used, limits in ((state.target_qd, LIMITS.velocity), (state.target_qdd, LIMITS.acceleration)):
-            assert all(abs(one) <= 1.0001 * most for one, most in zip(used, limits, strict=True))
-    of = {state.tick: state for state in content.states}
+        assert all(abs(q) <= 1.0001 * most for q, most in zip(state.target_qd, LIMITS.velocity, strict=True))
+        assert all(
+            abs(q) <= 1.0001 * most for q, most in zip(state.target_qdd, LIMITS.acceleration, strict=True)
+        )
     ends = [event.tick for event in content.events if event.kind == "program_stopped"]
-    assert len(ends) == len(MANNERS)
-    assert all(max(map(abs, of[end + 250].target_qd)) == 0.0 for end in ends)
+    of = {state.tick: state for state in content.states}
+    for end in ends:
+        assert max(map(abs, of[end + 250].target_qd)) == 0.0
+
+
+def assert_told(manner, events):
+    said = [event["why"] for event in events if event["kind"] == "text"]
+    errors = [event["why"] for event in events if event["kind"] == "warning" and event.get("line")]
+    assert said == (["the client has gone"] if manner in GONE or manner == "jumping" else []), (
+        manner,
+        events,
+    )
+    assert bool(errors) == (manner == "absurd"), (manner, events)
+    assert not errors or "2147.48" in errors[0]
 
 
 ECHO = """def echo():

@@ -31,20 +31,10 @@ def run(tmp_path):
     def step(*arguments, python=sys.executable):
         kept = {name: os.environ[name] for name in ("PATH", "HOME", "LANG") if name in os.environ}
         pip = {name: value for name, value in os.environ.items() if name.startswith(("PIP_", "UV_"))}
-        given = {
-            "PYTHON": str(python),
-            "RUNNER_TEMP": str(tmp_path),
-            "GITHUB_OUTPUT": str(tmp_path / "output"),
-        }
-        return subprocess.run(
-            ["bash", str(ACTION / "run.sh"), *map(str, arguments)],
-            env={**kept, **pip, **given},
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-            check=False,
-        )
+        given = {"PYTHON": python, "RUNNER_TEMP": str(tmp_path), "GITHUB_OUTPUT": str(tmp_path / "output")}
+        command = ["bash", ACTION / "run.sh", *arguments]
+        how = {"capture_output": True, "text": True, "timeout": PATIENCE}
+        return subprocess.run(command, check=False, env={**kept, **pip, **given}, cwd=tmp_path, **how)
 
     return step
 
@@ -71,19 +61,16 @@ def test_tests_run_and_the_recordings_of_failed_ones_are_named(run, tmp_path):
     assert [path.name for path in recordings.rglob("*.mcap")] == ["ur5e.mcap"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
+def test_a_wrong_step_is_told_in_a_sentence(run):
+    for arguments, said in (
         ((), "the first argument is missing: must be install, serve, test, programs or stop"),
         (("fly",), "the first argument is fly: must be install, serve, test, programs or stop"),
         (("install",), "install takes one argument: a checkout, a folder with wheels, or a requirement"),
         (("install", "/etc"), "/etc is neither a checkout of tvist nor a folder with wheels"),
         (("stop",), "no robot is served"),
-    ],
-)
-def test_a_wrong_step_is_told_in_a_sentence(run, arguments, said):
-    ran = run(*arguments)
-    assert (ran.returncode, ran.stderr) == (1, f"tvist action: {said}\n")
+    ):
+        ran = run(*arguments)
+        assert (ran.returncode, ran.stderr) == (1, f"tvist action: {said}\n")
 
 
 def test_programs_run_and_their_results_are_named(run, tmp_path):
@@ -95,11 +82,6 @@ def test_programs_run_and_their_results_are_named(run, tmp_path):
     assert 'tests="2" failures="1"' in Path(outputs(tmp_path)["junit"]).read_text(encoding="utf-8")
 
 
-def test_a_robot_that_cannot_start_is_told(run):
-    ran = run("serve", "--payload", "500")
-    assert (ran.returncode, "payload is 500" in ran.stderr) == (1, True)
-
-
 @pytest.mark.nightly
 def test_it_installs_a_checkout_serves_and_tests_in_a_clean_environment(run, tmp_path):
     subprocess.run([sys.executable, "-m", "venv", tmp_path / "clean"], check=True)
@@ -107,10 +89,10 @@ def test_it_installs_a_checkout_serves_and_tests_in_a_clean_environment(run, tmp
     installed = run("install", ROOT, python=python)
     assert installed.returncode == 0, installed.stderr
     for package in ("scipy", "matplotlib", "mujoco"):
-        assert (
-            subprocess.run([python, "-c", f"import {package}"], capture_output=True, check=False).returncode
-            == 1
-        )
+        looked = subprocess.run([python, "-c", f"import {package}"], capture_output=True, check=False)
+        assert looked.returncode == 1
+    refused = run("serve", "--payload", "500", python=python)
+    assert (refused.returncode, "payload is 500" in refused.stderr) == (1, True)
     served = run("serve", "--clock", "lockstep", python=python)
     assert served.returncode == 0, served.stderr
     assert outputs(tmp_path)["endpoint"] == "tcp/127.0.0.1:7447"

@@ -57,21 +57,16 @@ def test_a_cell_stands_around_a_robot(tvist_robot):
     assert tvist_robot.io().actual_digital_input_bits == 8
 
 
-class TestReady:
-    def test_the_first_state_is_that_of_the_arm_at_rest(self, tvist_robot):
-        state = tvist_robot.state()
-        assert state.tick == 0
-        assert state.robot_mode == RobotMode.RUNNING
-        assert state.reference_q == list(tvist_robot.info().poses["Q1"])
-
-    def test_inputs_and_outputs_are_known_at_once(self, tvist_robot):
-        assert tvist_robot.io().actual_digital_output_bits == 0
-
-    def test_it_has_a_log_and_a_recording_of_its_own(self, tvist_robot):
-        with tvist_robot.control("me") as arm:
-            arm.move_j(TARGET)
-        assert "motion_started" in tvist_robot.log.read_text()
-        assert tvist_robot.recording.is_file()
+def test_the_first_state_is_that_of_the_arm_at_rest_and_its_log_and_recording_are_its_own(tvist_robot):
+    state = tvist_robot.state()
+    assert (state.tick, state.robot_mode) == (0, RobotMode.RUNNING)
+    assert state.reference_q == list(tvist_robot.info().poses["Q1"])
+    with tvist_robot.control("me") as arm:
+        motion = arm.move_j(TARGET)
+    assert motion.done > motion.started
+    assert tvist_robot.state().reference_q == TARGET
+    assert "motion_started" in tvist_robot.log.read_text()
+    assert tvist_robot.recording.is_file()
 
 
 class TestTime:
@@ -79,11 +74,9 @@ class TestTime:
         assert tvist_robot.advance(10) == 10
         assert tvist_robot.rest().tick > 10
 
-    def test_passes_by_a_tick_for_each_state_of_an_iterator(self, tvist_robot):
+    def test_passes_by_a_tick_for_each_state_of_an_iterator_and_until_an_event(self, tvist_robot):
         ticks = [state.tick for state in itertools.islice(tvist_robot.states(), 20)]
         assert ticks == list(range(1, 21))
-
-    def test_passes_until_an_event(self, tvist_robot):
         events = tvist_robot.events()
         with tvist_robot.control("me") as arm:
             motion = arm.move_j(TARGET, wait=False)
@@ -91,51 +84,37 @@ class TestTime:
                 pass
         assert motion.ended
 
-    def test_passes_with_control(self, tvist_robot):
-        with tvist_robot.control("me") as arm:
-            motion = arm.move_j(TARGET)
-        assert motion.done > motion.started
-        assert tvist_robot.state().reference_q == TARGET
-
     def test_is_left_to_another_program_that_has_control(self, tvist_robot):
         subprocess.run([sys.executable, "-c", OTHER_PROGRAM, tvist_robot.endpoint], check=True, timeout=300)
         assert tvist_robot.rest().reference_q == TARGET
 
 
-class TestSeveral:
-    def test_robots_of_a_test_are_separate(self, tvist_robots):
-        first, second, third = *tvist_robots(2), *tvist_robots(1)
-        together = (first, second, third)
-        assert [robot.name for robot in together] == ["ur5e-1", "ur5e-2", "ur5e-3"]
-        assert [robot.seed for robot in together] == [0, 1, 2]
-        assert len({robot.endpoint for robot in together}) == len({robot.pid for robot in together}) == 3
-        first.advance(20)
-        second.advance(20)
-        assert first.state().actual_tool_accelerometer != second.state().actual_tool_accelerometer
-        assert third.state().tick == 0
-
-    def test_a_robot_that_is_killed_harms_no_other(self, tvist_robots):
-        killed, other = tvist_robots(2)
-        os.kill(killed.pid, signal.SIGKILL)
-        with pytest.raises(ClientError):
-            killed.advance(10_000)
-        assert other.advance(5) == 5
-
-    def test_a_frozen_robot_can_be_left(self, tvist_robots):
-        (frozen,) = tvist_robots(1)
-        os.kill(frozen.pid, signal.SIGSTOP)
+def test_robots_of_a_test_are_separate_and_one_that_is_killed_or_frozen_harms_no_other(tvist_robots):
+    first, second, third = *tvist_robots(2), *tvist_robots(1)
+    together = (first, second, third)
+    assert [robot.name for robot in together] == ["ur5e-1", "ur5e-2", "ur5e-3"]
+    assert [robot.seed for robot in together] == [0, 1, 2]
+    assert len({robot.endpoint for robot in together}) == len({robot.pid for robot in together}) == 3
+    first.advance(20)
+    second.advance(20)
+    assert first.state().actual_tool_accelerometer != second.state().actual_tool_accelerometer
+    assert third.state().tick == 0
+    os.kill(first.pid, signal.SIGKILL)
+    with pytest.raises(ClientError):
+        first.advance(10_000)
+    os.kill(third.pid, signal.SIGSTOP)
+    assert second.advance(5) == 25
 
 
 class TestMarkers:
     @pytest.mark.tvist_payload(2.0)
     @pytest.mark.tvist_shaper("none")
-    def test_payload_and_shaper(self, tvist_robot):
-        info = tvist_robot.info()
-        assert (info.payload.mass, info.shaper) == (2.0, "none")
-
     @pytest.mark.tvist_state("Q2")
-    def test_pose_to_start_in(self, tvist_robot):
-        assert tvist_robot.state().reference_q == list(tvist_robot.info().poses["Q2"])
+    @pytest.mark.tvist_seed(3)
+    def test_payload_shaper_pose_and_seed(self, tvist_robot):
+        info = tvist_robot.info()
+        assert (info.payload.mass, info.shaper, tvist_robot.seed) == (2.0, "none", 3)
+        assert tvist_robot.state().reference_q == list(info.poses["Q2"])
 
     @pytest.mark.tvist_state(q=TARGET, mode="POWER_OFF")
     def test_fields_to_start_with(self, tvist_robot):
@@ -167,39 +146,24 @@ class TestMarkers:
             tvist_robot.advance(5)
             assert tvist_robot.rest().reference_q == pytest.approx(TARGET)
 
-    @pytest.mark.tvist_seed(3)
-    def test_seed(self, tvist_robot):
-        assert tvist_robot.seed == 3
+
+@pytest.mark.tvist_payload(3.0)
+@pytest.mark.realtime
+def test_ur_s_interfaces_answer_on_their_own_address_and_move_it(tvist_ur):
+    with socket.create_connection((tvist_ur.host, tvist_ur.ports["dashboard"])) as dashboard:
+        assert dashboard.recv(1024).startswith(b"Connected")
+        dashboard.sendall(b"robotmode\n")
+        assert dashboard.recv(1024) == b"Robotmode: RUNNING\n"
+    target = [-1.5, -1.7, -2.2, -0.8, 1.6, 0.0]
+    with socket.create_connection((tvist_ur.host, tvist_ur.ports["secondary"])) as scripts:
+        scripts.sendall(f"movej({target}, a=3, v=1)\n".encode())
+        while tvist_ur.state().reference_q != pytest.approx(target, abs=1e-6):
+            pass
+    assert_settles_within(tvist_ur, 0.5)
+    assert (tvist_ur.info().clock, tvist_ur.info().payload.mass) == ("realtime", 3.0)
 
 
-class TestUr:
-    @pytest.mark.realtime
-    def test_its_interfaces_answer_on_their_own_address(self, tvist_ur):
-        with socket.create_connection((tvist_ur.host, tvist_ur.ports["dashboard"])) as dashboard:
-            assert dashboard.recv(1024).startswith(b"Connected")
-            dashboard.sendall(b"robotmode\n")
-            assert dashboard.recv(1024) == b"Robotmode: RUNNING\n"
-        assert tvist_ur.info().clock == "realtime"
-
-    @pytest.mark.tvist_payload(3.0)
-    @pytest.mark.tvist_shaper("zv")
-    @pytest.mark.realtime
-    def test_ur_rtde_moves_it(self, tvist_ur):
-        control = pytest.importorskip("rtde_control").RTDEControlInterface(tvist_ur.host)
-        target = [-1.2, -1.6, -2.1, -0.9, 1.6, 0.0]
-        try:
-            assert control.moveJ(target, 1.05, 1.4)
-            control.stopScript()
-        finally:
-            control.disconnect()
-        assert_settles_within(tvist_ur, 0.5)
-        assert tvist_ur.info().payload.mass == 3.0
-        assert tvist_ur.state().actual_q == pytest.approx(target, abs=2e-3)
-
-
-class TestWithoutTheServer:
-    def test_the_fixtures_say_what_to_install(self, monkeypatch):
-        monkeypatch.setattr(making, "find_spec", lambda name: None if name == "numba" else object())
-        assert making.unavailable() == (
-            "tvist's fixtures need the server's packages (numba is missing): pip install 'tvist[testing]'"
-        )
+def test_without_the_server_the_fixtures_say_what_to_install(monkeypatch):
+    monkeypatch.setattr(making, "find_spec", lambda name: None if name == "numba" else object())
+    said = "tvist's fixtures need the server's packages (numba is missing): pip install 'tvist[testing]'"
+    assert making.unavailable() == said

@@ -12,16 +12,7 @@ from tvist_lab.replay import replay_file
 
 pytest_plugins = ["pytester"]
 
-ABSENT = (
-    "scipy",
-    "matplotlib",
-    "mujoco",
-    "polars",
-    "marimo",
-    "distributed",
-    "tvist_lab",
-    "tvist_view",
-)
+ABSENT = ("scipy", "matplotlib", "mujoco", "polars", "marimo", "distributed", "tvist_lab", "tvist_view")
 """Packages that the extra `testing` does not bring."""
 HIDDEN = f"""
 import sys
@@ -126,6 +117,7 @@ def light(pytester, monkeypatch):
     return pytester
 
 
+@pytest.mark.nightly
 def test_of_failed_tests_everything_is_kept_and_of_others_nothing(light):
     light.makepyfile(test_it=OUTCOMES)
     ran = light.runpytest_subprocess("--junitxml=report.xml", "-p", "no:cacheprovider")
@@ -141,15 +133,8 @@ def test_of_failed_tests_everything_is_kept_and_of_others_nothing(light):
     recording = Path(named["tvist_recording"])
     assert recording == Path.cwd() / "tvist-recordings" / "test_it.py-test_fails" / "ur5e.mcap"
     assert (named["tvist_seed"], Path(named["tvist_log"]).is_file()) == ("5", True)
-    ran.stdout.fnmatch_lines(
-        [
-            "*does not settle within 0.001 s",
-            "*settling time*",
-            f"recording: {recording}",
-            "seed: * 5",
-            f"next: * tvist log analyze {recording}; tvist log replay {recording}",
-        ]
-    )
+    told = "*does not settle within 0.001 s", "*settling time*", f"recording: {recording}", "seed: * 5"
+    ran.stdout.fnmatch_lines([*told, f"next: * tvist log analyze {recording}; tvist log replay {recording}"])
     assert len(read(recording)) > 100
     assert replay_file(mcap_file.read(recording)).first_difference is None
     assert properties(cases["test_fails_at_the_end"])["tvist_seed"] == "5"
@@ -159,6 +144,7 @@ def test_of_failed_tests_everything_is_kept_and_of_others_nothing(light):
     ]  # fmt: skip
 
 
+@pytest.mark.nightly
 def test_markers_with_wrong_arguments_fail_with_a_sentence(pytester):
     pytester.makepyfile(MISUSES)
     ran = pytester.runpytest_subprocess("--junitxml=report.xml", "--strict-markers")
@@ -171,6 +157,7 @@ def test_markers_with_wrong_arguments_fail_with_a_sentence(pytester):
         assert text.count("\n") == 0, text
 
 
+@pytest.mark.nightly
 def test_two_workers_side_by_side_never_meet(pytester):
     pytester.makepyfile("""
         import pytest
@@ -195,6 +182,7 @@ def test_two_workers_side_by_side_never_meet(pytester):
     assert all("tvist_seed" in properties(case) for case in cases)
 
 
+@pytest.mark.nightly
 @pytest.mark.realtime
 def test_clients_of_ur_rtde_that_are_left_open_do_not_abort_the_tests(pytester):
     """In a failed test, by a fixture, and for good: the robot goes on until they have gone."""

@@ -1,8 +1,7 @@
-"""`python -m tools.release.compiled DIST PYTHON...` adds wheels of `tvist-compiled` to built packages.
+"""`python -m tools.release.compiled DIST PYTHON...`: add wheels of `tvist-compiled` to built packages.
 
-They hold the kernels of a served robot as machine code, each for one Python and one architecture.
-
-They run on any processor of the architecture, and only with the versions of numba and llvmlite that the wheel demands.
+Each holds the kernels of a served robot as machine code for one Python and one architecture. They run on any
+processor of the architecture, but only with the versions of numba and llvmlite that the wheel requires.
 """
 
 import base64
@@ -20,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 NAME, FOLDER = "tvist-compiled", "tvist_compiled"
 SYSTEM = "manylinux_2_17"
-"""The machine code calls no library of the system, but what is in the process already."""
+"""The machine code calls no system library that is not already in the process."""
 ASKED = """
 import json, sys
 from importlib.metadata import version
@@ -39,7 +38,7 @@ Requires-Dist: llvmlite=={llvmlite}
 
 
 def compiled_wheel(dist: Path, python: str) -> Path:
-    """Compile with the packages of a folder, and put the wheel beside them."""
+    """Compile with the packages of a folder, and write the wheel into it; return its path."""
     with tempfile.TemporaryDirectory(prefix="tvist-compiled-") as folder:
         versions, where, kernels = (
             Path(folder) / name for name in ("constraints.txt", "environment", "kernels")
@@ -56,15 +55,9 @@ def compiled_wheel(dist: Path, python: str) -> Path:
 
 
 def written(dist: Path, kernels: dict[str, bytes], tag: str, version: str, numba: str, llvmlite: str) -> Path:
-    """Write a wheel with kernels, by the names of their files, and return where it is.
+    """Write a wheel with kernels, given by file name, into a folder; return its path.
 
-    Args:
-        dist: Folder for it.
-        kernels: The content of each file.
-        tag: The Python that they are for, as wheels name it.
-        version: Version of tvist that they are of.
-        numba: Version of numba that has compiled them.
-        llvmlite: Version of llvmlite.
+    `tag` is the wheel tag of the Python; the versions are those of the packages that compiled the kernels.
     """
     machine = platform.machine()
     tags = f"{tag}-{tag}-{SYSTEM}_{machine}"

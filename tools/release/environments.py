@@ -1,4 +1,4 @@
-"""Clean environments whose own packages are those just built."""
+"""Clean environments that contain the packages just built."""
 
 import os
 import re
@@ -12,11 +12,11 @@ PINNED = re.compile(r"^([\w.-]+==[^ ]+(?: ;[^\\\n]*)?)", re.MULTILINE)
 
 
 class FailedError(Exception):
-    """A program failed; the message is what it said."""
+    """A program failed; the message is its output."""
 
 
 def run(*words: str | Path, cwd: Path, env: dict[str, str] | None = None, seconds: float = 1800) -> str:
-    """Run a program to its end, and return what it printed on stdout."""
+    """Run a program to its end, and return its stdout; raise FailedError if it fails."""
     try:
         ended = subprocess.run(
             [str(word) for word in words],
@@ -30,19 +30,19 @@ def run(*words: str | Path, cwd: Path, env: dict[str, str] | None = None, second
 
 
 def constraints(lock: str) -> str:
-    """Return the versions of a lock as constraints, without its hashes: what is just built has none there."""
+    """Return the versions of a lock file as constraints without hashes, since new builds have none."""
     return "".join(f"{pin.strip()}\n" for pin in PINNED.findall(lock))
 
 
 def clean() -> dict[str, str]:
-    """Return this process' environment without what leads to a checkout, or to kernels of an earlier run."""
+    """Return this process's environment without variables that lead to a checkout or to existing kernels."""
     ours = {"PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "NUMBA_CACHE_DIR"}
     found = {name: value for name, value in os.environ.items() if name not in ours}
     return {**found, "PYTHONUNBUFFERED": "1"}
 
 
 def install(what: str, where: Path, dist: Path, versions: Path, python: str) -> None:
-    """Make an environment of a Python with what a line names, by uv where there is one."""
+    """Create an environment of a Python, and install a requirement in it, with uv if available."""
     run(python, "-m", "venv", "--without-pip", where, cwd=dist)
     uv = shutil.which("uv")
     at: list[str | Path] = ["--python", where / "bin" / "python"]
@@ -53,7 +53,7 @@ def install(what: str, where: Path, dist: Path, versions: Path, python: str) -> 
 
 
 def check_is_built(wheel: Path, where: Path) -> None:
-    """Check that an environment holds the files of a wheel, if it holds its distribution at all."""
+    """Check that an environment has the files of a wheel, if its distribution is installed at all."""
     record = "-".join(wheel.name.split("-")[:2]) + ".dist-info/RECORD"
     for found in where.glob(f"lib/python*/site-packages/{wheel.name.split('-')[0]}-*.dist-info/RECORD"):
         lines = zipfile.ZipFile(wheel).read(record).decode().splitlines()

@@ -1,1 +1,1 @@
-"""The documentation as a site: pages are collected from the repository as they stand, and built by MkDocs."""
+"""The documentation site: pages are collected from the repository and built by MkDocs."""

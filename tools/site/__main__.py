@@ -1,4 +1,4 @@
-"""`python -m tools.site`: builds the site of the documentation, or serves it while it is written."""
+"""`python -m tools.site`: build the documentation site, or serve it while you edit it."""
 
 import argparse
 import subprocess
@@ -10,13 +10,13 @@ from tools.site.tree import ROOT, LinkError
 
 
 def main() -> int:
-    """Build the site strictly, each warning being an error; return MkDocs' exit code."""
+    """Build the site with warnings as errors; return MkDocs' exit code."""
     parser = argparse.ArgumentParser(prog="python -m tools.site", description=__doc__)
     parser.add_argument(
         "--folder",
         type=Path,
         default=ROOT / "build" / "site",
-        help="Folder to write; its html/ holds the site.",
+        help="Write to this folder; its html/ is the site.",
     )
     parser.add_argument(
         "--serve", action="store_true", help="Serve the site on http://127.0.0.1:8000 instead."

@@ -1,6 +1,6 @@
-"""`python -m tools.site.commands FOLDER`: writes a page of each command, made from its own help.
+"""`python -m tools.site.commands FOLDER`: write a page for each command from its help.
 
-This runs where the program is installed; the rest of the site is made without it.
+This runs where the program is installed; the rest of the site does not need it.
 """
 
 import io
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 FOLDER = "commands"
 """Folder of these pages in the site."""
 OVERVIEW = "cli/README.md"
-"""The page that lists the commands."""
+"""Page that lists the commands."""
 OPTION = re.compile(r"(?<!\w)--[a-z][\w-]*")
 NAMED = re.compile(r"`tvist (?P<command>[a-z ]+)`")
 
 
 def page_of(command: str) -> str:
-    """Return where the page of a command, such as `log analyze`, is in the site."""
+    """Return the path in the site of the page of a command, such as `log analyze`."""
     return f"{FOLDER}/{command.replace(' ', '-')}.md"
 
 
 def written(site: Path) -> dict[str, list[str]]:
-    """Write the pages into the sources of the site, and return the commands by group."""
+    """Write the pages into the site's sources, and return the commands by group."""
     command = [str(ROOT / ".venv" / "bin" / "python"), "-m", "tools.site.commands", str(site)]
     made = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
     groups = dict(json.loads(made.stdout))
@@ -46,10 +46,10 @@ def written(site: Path) -> dict[str, list[str]]:
 
 
 class Tables:
-    """Writes the boxes of a help text as tables in Markdown."""
+    """Writes the panels of a help text as Markdown tables."""
 
     def __call__(self, console: "Console", options: "ConsoleOptions", panel: "HelpPanel") -> None:  # noqa: ARG002
-        """Write a box below its title, if there is anything in it."""
+        """Write a panel below its title, unless it is empty."""
         from tvist_cli.help_boxes import named_once
 
         if rows := [_row(named_once(entry)) for entry in panel.entries]:
@@ -76,7 +76,7 @@ def _plain(text: Any) -> str:
 
 
 def page(command: str) -> str:
-    """Return the page of a command in Markdown: what it does, its example, its options."""
+    """Return the Markdown page of a command: description, example, options."""
     from rich.console import Console
 
     from tvist_cli.main import application

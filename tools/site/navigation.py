@@ -1,4 +1,4 @@
-"""The navigation is the index of the documentation, read: its headings are sections, its links are pages."""
+"""Derive the navigation from the documentation's index: its headings are sections, its links are pages."""
 
 import re
 from pathlib import Path
@@ -17,9 +17,8 @@ Section = list[dict[str, Any]]
 def navigation(modules: list[Module], commands: dict[str, list[str]]) -> Section:
     """Return MkDocs' `nav`: the front page, the index with its sections, the commands and the API.
 
-    Lists that the index folds are groups of their section.
-
-    A page that the index names twice is in the section that names it first.
+    Folded lists of the index are groups of their section. A page that the index names twice is in the first
+    section.
     """
     sections: Section = []
     placed = {OVERVIEW}

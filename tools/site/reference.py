@@ -1,6 +1,6 @@
-"""Pages of the API reference, one for each module that other people import, filled from its docstrings.
+"""Pages of the API reference from docstrings: one for each module that users import.
 
-What a module exports from many others is a page for each of these, below the module's.
+A module that exports names from many modules has a further page for each of them.
 """
 
 import ast
@@ -10,11 +10,11 @@ from pathlib import Path
 from tools.site.tree import ROOT
 
 PROGRAMS = {"tvist_cli", "tvist_server", "tvist_view"}
-"""Packages that are run and not imported. Every other package has an API."""
+"""Packages that are run, not imported. Every other package has an API."""
 FOLDER = "api"
 """Folder of these pages in the site."""
 MANY = 15
-"""A module that exports more has a page for each module that it exports from."""
+"""Most exports of a module on a single page."""
 SHOWN = "    options: { show_root_heading: true, show_root_toc_entry: true }\n"
 
 
@@ -29,7 +29,7 @@ class Module:
     about: str
     """First line of its docstring, without the full stop."""
     parts: dict[str, list[str]] = field(default_factory=dict)
-    """What it exports, by the module that it comes from; empty if it all stands on one page."""
+    """Exported names by the module that defines them; empty if all are on one page."""
 
     @property
     def page(self) -> Path:
@@ -38,7 +38,7 @@ class Module:
 
     @property
     def pages(self) -> dict[Path, str]:
-        """Its pages with their text in Markdown, the places that MkDocs fills included."""
+        """Its pages as Markdown with placeholders that MkDocs fills."""
         if not self.parts:
             return {self.page: f"# `{self.name}`\n\n::: {self.name}\n"}
         rows, found = "", dict[Path, str]()
@@ -56,8 +56,7 @@ class Module:
 def modules() -> list[Module]:
     """Return the modules with a page, by name.
 
-    These are the modules that say in `__all__` what they export, in a package without any such module all; never
-    private ones.
+    These are the public modules with an `__all__`; in a package without any such module, all public ones.
     """
     found: list[Module] = []
     for package in sorted(ROOT.glob("*/tvist_*/__init__.py"), key=lambda path: path.parent.name):
@@ -82,7 +81,6 @@ def modules() -> list[Module]:
 
 
 def _exports(tree: ast.Module) -> set[str]:
-    """Names in `__all__`."""
     for node in tree.body:
         if isinstance(node, ast.Assign) and any(
             isinstance(target, ast.Name) and target.id == "__all__" for target in node.targets
@@ -92,7 +90,7 @@ def _exports(tree: ast.Module) -> set[str]:
 
 
 def _origins(tree: ast.Module, exports: set[str]) -> dict[str, list[str]]:
-    """The names of an `__all__`, by the last word of the module that they are imported from."""
+    """Return the names of an `__all__` by the last part of the module from which they are imported."""
     found: dict[str, list[str]] = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module:

@@ -1,4 +1,4 @@
-"""Anchors of headings, as forges make them, so that one link works in both places."""
+"""Anchors of headings in the style of GitHub and similar sites, so that a link works there and on the site."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Where a link leads that is to no page of the site: to a picture, or to the repository."""
+"""Targets of links that are not pages of the site: pictures, and files of the repository."""
 
 import os
 import re
@@ -7,13 +7,13 @@ from pathlib import Path
 from tools.site.tree import ROOT
 
 PICTURES = {".png", ".gif", ".svg", ".webp"}
-"""Endings of files that a browser shows by itself: they are copied."""
+"""Suffixes of files that a browser shows by itself; they are copied."""
 REPOSITORY = os.environ.get("TVIST_REPOSITORY", "")
-"""Address of the repository, to which links to its files lead; without it they are plain text."""
+"""Address of the repository for links to its files; without it they become plain text."""
 
 
 def to_repository(text: str, start: int, end: int, path: Path) -> str:
-    """Return a page's text with a link to a file or folder that is no page changed."""
+    """Return a page's text with a link to a file or folder redirected to the repository."""
     if REPOSITORY:
         kind = "tree" if path.is_dir() else "blob"
         address = f"{REPOSITORY}/{kind}/main/{path.relative_to(ROOT).as_posix()}"
@@ -24,5 +24,5 @@ def to_repository(text: str, start: int, end: int, path: Path) -> str:
 
 
 def way(page: Path, to: Path) -> str:
-    """Return the link from a page to another, both relative to the repository."""
+    """Return the relative link from a page to another."""
     return Path(os.path.relpath(to, page.parent)).as_posix()

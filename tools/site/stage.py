@@ -1,4 +1,4 @@
-"""Writes the site's sources: every page at its path in the repository, its links leading to what the site shows."""
+"""Write the site's sources: every page at its path in the repository, with links adapted to the site."""
 
 import json
 import shutil
@@ -13,10 +13,10 @@ from tools.site.tree import HOME, ROOT, collect, linked, links
 ASSETS = Path(__file__).parent / "assets"
 LOGO = Path("docs/images/logo.svg")
 FIRST = "---\nhide: [navigation, toc]\n---\n\n"
-"""What stands above the front page: it has the whole width."""
+"""Header of the front page, which uses the whole width."""
 TRY = ROOT / "view" / "tvist_view" / "try.html"
 FRAME = '<iframe class="try" src="try.html" title="Try shaping"></iframe>\n\n'
-"""The page to try shaping, which the front page of the site has above its picture."""
+"""The interactive shaping page, which the site's front page shows above its picture."""
 PICTURE = "<picture>"
 
 
@@ -41,7 +41,7 @@ def stage(folder: Path) -> Path:
     _place(to / LOGO).write_bytes((ROOT / LOGO).read_bytes())
     _place(to / TRY.name).write_bytes(TRY.read_bytes())
     shutil.copytree(ASSETS, to / "assets")
-    # The methods of the client exist only at run time: its copy has them in writing.
+    # Some methods of the client exist only at run time; this copy of it contains them as source text.
     described = folder / "described"
     python = str(ROOT / ".venv" / "bin" / "python")
     subprocess.run([python, "-m", "tools.stubs", str(described)], cwd=ROOT, check=True)
@@ -78,7 +78,7 @@ def _with_links_of_the_site(page: Path) -> str:
     for match in reversed(links(text)):
         target, mark, anchor = match["target"].partition("#")
         path = linked(page, target)
-        if path == TRY:  # its anchor says what it shows
+        if path == TRY:  # its anchor selects the scene
             way = sources.way(page.relative_to(ROOT), Path(TRY.name))
             text = text[: match.start()] + way + mark + anchor + text[match.end() :]
         elif path.suffix != ".md" and path.suffix not in sources.PICTURES:

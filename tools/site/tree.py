@@ -1,4 +1,4 @@
-"""Which files become pages of the site: what the front page and the index reach, at the paths of the repository."""
+"""Find the pages of the site: all that the front page and the index reach, at their paths in the repository."""
 
 import re
 from pathlib import Path
@@ -10,16 +10,16 @@ INDEX = ROOT / "docs" / "README.md"
 CODE = re.compile(r"^(?P<indent> *)```.*?^(?P=indent)```$|`[^`\n]+`", re.MULTILINE | re.DOTALL)
 """Fenced blocks and spans of code."""
 LINK = re.compile(r"""(?:(?<=\]\()|(?<= src=")|(?<= srcset="))(?P<target>[^)"\s]+)(?=[)"])""")
-"""Targets of links and images; images also in HTML."""
+"""Targets of links and images, also of images in HTML."""
 OUTSIDE = ("http://", "https://", "mailto:")
 
 
 class LinkError(ValueError):
-    """A page links to something that is not there, or that is outside the repository."""
+    """A page links to a file that does not exist or is outside the repository."""
 
 
 def links(text: str) -> list[re.Match[str]]:
-    """Return the links and images of a page that are not code, each a match with a group `target`."""
+    """Return the links and images of a page, except in code, as matches with a group `target`."""
     code = [match.span() for match in CODE.finditer(text)]
     return [
         match
@@ -30,7 +30,7 @@ def links(text: str) -> list[re.Match[str]]:
 
 
 def linked(page: Path, target: str) -> Path:
-    """Return the file or folder that a link of a page leads to; a folder with a README is that README."""
+    """Return the file or folder that a link leads to; for a folder with a README, the README."""
     path = (page.parent / target).resolve() if target else page
     if not path.is_relative_to(ROOT) or not path.exists():
         raise LinkError(f"{page.relative_to(ROOT)} links to {target}, which is no file of the repository")
@@ -38,7 +38,7 @@ def linked(page: Path, target: str) -> Path:
 
 
 def collect() -> tuple[list[Path], list[Path]]:
-    """Return what the front page and the index reach over any number of links: pages, and all other files."""
+    """Return the pages and the other files that the front page and the index reach directly or indirectly."""
     pages, others, waiting = {HOME, INDEX}, set[Path](), [HOME, INDEX]
     while waiting:
         page = waiting.pop()

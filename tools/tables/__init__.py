@@ -1,1 +1,1 @@
-"""The pages of the documentation with measured tables, made from what the commands print with `--json`."""
+"""Documentation pages with measured tables, generated from the `--json` output of commands."""

@@ -1,6 +1,6 @@
-"""`python -m tools.tables PAGE [RESULT.json]`: makes a page of the documentation with measured tables.
+"""`python -m tools.tables PAGE [RESULT.json]`: generate a documentation page with measured tables.
 
-Without a result, which is what the page's command prints with `--json`, it runs that command, which may take hours.
+Without a result, the output of the page's command with `--json`, it runs that command, which may take hours.
 """
 
 import json
@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def main() -> None:
-    """Make the page that the command line names."""
+    """Generate the page given on the command line."""
     if len(sys.argv) not in (2, 3) or sys.argv[1] not in PAGES:
         sys.exit(f"usage: python -m tools.tables {'|'.join(PAGES)} [RESULT.json]")
     name = sys.argv[1]

@@ -6,7 +6,7 @@ from tvist_lab.study.columns import Column, Entry, cells, titles
 
 
 def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, left: int | None = None) -> str:
-    """Return a table, without a line's end behind it, whose first `left` columns are aligned to the left; None: all."""
+    """Return a table without a final newline; the first `left` columns (None: all) are left-aligned."""
     left = len(columns) if left is None else left
     rule = ["---"] * left + ["---:"] * (len(columns) - left)
     heads = [column.replace("\n", " ") for column in columns]
@@ -14,5 +14,5 @@ def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, lef
 
 
 def in_markdown(entries: Iterable[Entry], columns: Sequence[Column], *, left: int = 1) -> str:
-    """Return a table, of which the first columns are text."""
+    """Return a table whose first `left` columns are text."""
     return markdown_table(titles(columns), cells(entries, columns), left=left)

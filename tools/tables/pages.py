@@ -1,4 +1,4 @@
-"""What the templates of the pages need besides the result of their command."""
+"""The documentation pages with tables: path, command, and the data of their templates."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,11 +30,11 @@ METHOD = Column(
     "method",
     lambda one: f"{one['delay_ms']:.0f}, {one['peak_reduction_percent']:.1f}, {one['still_after_ms']:.0f}",
 )
-"""A cell of the table of the paper's methods."""
+"""Cell of the table of the paper's methods."""
 BOTH = Column("less", lambda one: "/".join(cells([one], (robustness.LESS, robustness.WORST))[0]))
-"""A cell with the median and the 5th percentile of the reduction."""
+"""Cell with the median and the 5th percentile of the reduction."""
 FINE, ALIKE = ("-5 %", "+5 %"), ("zv_3_modes_frozen_at_end",)
-"""Errors that the page of robustness leaves out, and shapers that it has by another name."""
+"""Errors that the robustness page leaves out, and shapers that it shows by another name."""
 LEFT_OUT = ("worst arm", "moving", "q̇/limit", "µs")
 """Columns of `tvist study bench` that its page leaves out."""
 
@@ -94,15 +94,15 @@ class Page:
     """A page of the documentation."""
 
     path: str
-    """Where it is in the repository."""
+    """Path in the repository."""
     command: str
-    """The command whose result it shows."""
+    """Command whose result it shows."""
     more: Callable[[dict[str, Any]], dict[str, Any]]
     """Returns what its template needs besides the result."""
     files: str = ""
-    """Options for the other files that belong to the page."""
+    """Options for further files of the page."""
     result: str = ""
-    """Where the result is kept; empty if it is not."""
+    """Path of the stored result; empty if it is not stored."""
 
 
 PAGES = {
@@ -131,16 +131,11 @@ PAGES = {
         "docs/results/leaderboard.json",
     ),
 }
-"""The pages by name, which is also that of their template."""
+"""The pages by name, which is also the name of their template."""
 
 
 def page_of(name: str, result: dict[str, Any]) -> str:
-    """Return a page.
-
-    Args:
-        name: One of `PAGES`.
-        result: What its command prints with `--json`.
-    """
+    """Return a page of `PAGES`; `result` is the output of its command with `--json`."""
     environment = Environment(  # noqa: S701  this is Markdown
         loader=PackageLoader("tools.tables", "templates"), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, keep_trailing_newline=True,

@@ -1,4 +1,4 @@
-"""How well the friction of motors that stick has to be known: moves of `ur5e_stiction` by controllers in error."""
+"""How exactly stiction has to be known: moves of `ur5e_stiction` by controllers with wrong friction parameters."""
 
 from functools import partial
 
@@ -26,7 +26,7 @@ BELIEFS = {
     "F_c -20 %, others +20 %": {"coulomb_friction": 0.8, **dict.fromkeys(STICTION, 1.2)},
     "F_c +20 %, others -20 %": {"coulomb_friction": 1.2, **dict.fromkeys(STICTION, 0.8)},
 }
-"""What the controller has wrong: factors of its parameters, see `rubbed`."""
+"""Errors of the controller: factors of its parameters, see `rubbed`."""
 ROBOT = load("ur5e_stiction")
 
 STUDY = Study(

@@ -1,4 +1,4 @@
-"""The machines that programs may connect to."""
+"""The machines that URScript programs may open sockets to."""
 
 import ipaddress
 import re
@@ -8,16 +8,12 @@ from tvist_server.option_values import StartError
 
 LOCALHOST = "localhost"
 _NAME = re.compile(r"(?!.*(^|\.)\d+$)[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
-"""Host names. The last part is no number, since the whole would be a mistyped address."""
+"""Host names. The last label must not be a number: that would be a mistyped IP address."""
 IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 class AllowedHosts:
-    """IP addresses, networks and names that the server allows, besides the machine that sent a program.
-
-    Raises:
-        StartError: One is none of these.
-    """
+    """IP addresses, networks and host names that programs may connect to; raise StartError for an invalid entry."""
 
     def __init__(self, given: Sequence[str]) -> None:
         for text in given:
@@ -29,13 +25,12 @@ class AllowedHosts:
         self._networks = [network for text in given if (network := _network(text)) is not None]
 
     def allows(self, name: str, address: str, origin: str | None) -> bool:
-        """Return whether a program may connect to an address, which stands for a machine that it names.
+        """Return whether a program from `origin` (None: unknown) may connect to `address`, found for `name`.
 
-        The program comes from `origin`; None if that is unknown. The loopback interface is open to programs
-        that came from there, and if it is given itself.
+        The loopback interface is open only to programs from this machine, or if it is listed itself.
         """
         to, sender = _ip(address), None if origin is None else _ip(origin)
-        if _is_here(to):  # a name or a wide network does not open it by the way
+        if _is_here(to):  # a name or a wide network must not open it as a side effect
             named = name == LOCALHOST and name in self._names
             inside = any(network.is_loopback and to in network for network in self._networks)
             return named or inside or (sender is not None and sender.is_loopback)
@@ -43,7 +38,7 @@ class AllowedHosts:
 
 
 def _ip(text: str) -> IpAddress:
-    """An address without its zone; an IPv4 address in IPv6's form counts as such."""
+    """Parse an address without its zone, and unwrap an IPv4-mapped IPv6 address."""
     found = ipaddress.ip_address(text.partition("%")[0])
     return getattr(found, "ipv4_mapped", None) or found
 

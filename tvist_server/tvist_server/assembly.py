@@ -1,4 +1,4 @@
-"""The parts of a server: robots, their interfaces, and what drives them."""
+"""Builds the parts of a server: robots, their interfaces and their clocks."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,11 +21,7 @@ if TYPE_CHECKING:
 def made_robot(
     setup: Setup, config: ServeConfig, observe: Callable[[Controller], Sink] | None, *, several: bool
 ) -> ServedRobot:
-    """Return a robot that is about to be served; see `Server`.
-
-    Raises:
-        StartError: It cannot be.
-    """
+    """Create a robot to serve; raise StartError if that is impossible."""
     path = None
     if config.record is not None:
         path = recording_of(config.record, setup.name) if several else Path(config.record)
@@ -37,13 +33,9 @@ def made_robot(
 
 
 def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Return the endpoints to listen on, and the settings that protect them.
-
-    Raises:
-        StartError: An endpoint is none, or other machines could reach an unprotected one.
-    """
+    """Return the endpoints to listen on and the settings that protect them; StartError for unprotected exposure."""
     check_endpoints("connect", config.connect)
-    # A router checks the certificates of those who reach the robot through it.
+    # The router checks the certificates of clients that reach the robot through it.
     return guarded(
         config.endpoints,
         names,
@@ -54,11 +46,7 @@ def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dic
 
 
 def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrInterfaces":
-    """Return UR's interfaces of a robot, whose number gives their address.
-
-    Raises:
-        StartError: Other machines could reach them unprotected, or they cannot be there.
-    """
+    """Create the UR interfaces of a robot by its index; StartError if others could reach them unprotected."""
     from tvist_server.gateways.ur.interfaces import UrInterfaces
     from tvist_server.gateways.ur.rtde.inputs import matching
 
@@ -80,11 +68,7 @@ def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrIn
 
 
 def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
-    """Check that an arm that gives the tick is alone, and that nothing else is to give it.
-
-    Raises:
-        StartError: It is not.
-    """
+    """Raise StartError if a plant sets the tick and either it is not alone or another clock is configured."""
     if not any(robot.driven.pace for robot in robots):
         return
     if config.clock != "realtime" or config.speed != 1.0:
@@ -98,10 +82,7 @@ def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
 
 
 def make_clocks(config: ServeConfig, robots: Sequence[ServedRobot]) -> list[Clock]:
-    """Create one clock for all robots in real time, one for each robot in lockstep.
-
-    In lockstep no message may be lost, so a robot waits for its slow clients, and must not delay other robots.
-    """
+    """Create one clock for all robots in real time; in lockstep one each, since waiting for clients delays others."""
     if config.clock == "realtime":
         driven = [robot.driven for robot in robots]
         return [Realtime(driven, PERIOD, config.speed, priority=config.realtime_priority)]

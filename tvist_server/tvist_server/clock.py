@@ -1,7 +1,4 @@
-"""Clocks of served robots: the wall clock, or a client's steps.
-
-In both cases one thread owns a controller, and other threads reach the controller through a queue of jobs.
-"""
+"""Clocks of served robots, the wall clock or a client's steps; one thread owns a controller and takes jobs."""
 
 import contextlib
 import ctypes
@@ -25,77 +22,58 @@ log = logging.getLogger(__name__)
 LONGEST_SLEEP = 0.1
 """Longest sleep of the tick thread before it checks whether it should end [s]."""
 LONGEST_TICK = 1.5
-"""Longest wait at the end for a tick in progress [s]: a call of somebody's own arm may never return, and in lockstep
-a client may have stopped reading.
-"""
+"""Longest wait for a tick at shutdown [s]: a plug-in arm, or in lockstep a client, may block it for ever."""
 REPEAT_EVERY = 1.0
-"""Time after which a robot in lockstep publishes its last state again, if there was no step meanwhile [s]."""
+"""Time without a step after which a robot in lockstep republishes its last state [s]."""
 SET_TIMER_SLACK = 29
-"""Option of prctl for the timer slack: the largest delay with which a thread may be woken, in nanoseconds."""
+"""`prctl` option: timer slack, the largest delay of a wake-up [ns]."""
 
 
 class Mailbox:
-    """A robot as seen by a clock: its host, and the jobs to do between two of its ticks.
-
-    Args:
-        host: The controller.
-        patience: Returns how long a step may wait for a socket that a program reads [s].
-        pace: Waits until the arm begins its next tick, at most the time that it is given [s], and returns whether it
-            has; None if a clock gives the tick.
-        interval: Time between two ticks of an arm that counts by its own clock those that are missing [s]; None if it
-            has none.
-    """
+    """A robot as a clock sees it: its host, and the jobs to do between two ticks."""
 
     def __init__(
         self,
         host: Host,
-        patience: Callable[[], float] = float,
-        pace: Callable[[float], bool] | None = None,
-        interval: float | None = None,
+        patience: Callable[[], float] = float,  # how long a step may wait for a socket [s]
+        pace: Callable[[float], bool] | None = None,  # waits up to a time [s] for the arm's tick
+        interval: float | None = None,  # tick of an arm that counts its own missed ticks [s]
     ) -> None:
         self.host, self.pace, self.interval = host, pace, interval
         self._patience = patience
         self.jobs = Jobs()
         self.ending = False
-        """Whether a step in progress has to end."""
+        """Whether a step in progress must end."""
         self.lateness = Lateness()
         self.overload: Overload | None = None
-        """Count of the ticks that were due; None if a client advances time."""
+        """Counts missed ticks; None if a client advances time."""
 
     def post(self, do: Do, client: str | None = None) -> None:
-        """Queue a job for the controller's thread, before its next tick. Callable from any thread; does not block.
-
-        Args:
-            do: Job to do.
-            client: Client that sent it, if known.
-        """
+        """Queue a job from `client` for before the next tick, from any thread, without blocking."""
         self.jobs.post(do, client)
 
     def guarded(self, do: Do) -> None:
-        """Do something of the robot; an exception that its host does not survive ends the robot alone."""
+        """Run a function; an exception in it ends this robot only."""
         try:
             do()
         except Exception:
-            log.exception("a robot ticks no more")
-            self.end("the robot ticks no more, because of an error: see the log")
+            log.exception("a robot has stopped ticking")
+            self.end("the robot has stopped ticking because of an error: see the log")
 
     def turn(self) -> None:
-        """Do the jobs that wait, and tick."""
+        """Do the waiting jobs and tick."""
         self.guarded(self.jobs.do_waiting)
         if self.host.failure is None:
             self.guarded(self.host.tick)
 
     def end(self, why: str) -> None:
-        """Let the robot tick no more; its arm is left without it."""
+        """Stop ticking and release the arm."""
         self.host.failure = why
-        with contextlib.suppress(Exception):  # each arm is left, whatever the others do
+        with contextlib.suppress(Exception):  # every arm must be released, whatever happens to the others
             self.host.leave_arm()
 
     def attend(self, stepper: str | None) -> bool:
-        """Between the ticks of a client's step, do the jobs of others; return whether the step may continue.
-
-        If a program waits for data, wait for them a while: time must not pass before anyone could send them.
-        """
+        """Do other clients' jobs between a step's ticks, also to wait for data; return whether to go on."""
         self.jobs.do_others(stepper)
         while not self.ending and (left := self._patience()) > 0.0:
             self.jobs.do_next_other(stepper, left)
@@ -103,11 +81,7 @@ class Mailbox:
 
 
 class Clock(ABC):
-    """A thread that runs jobs and ticks.
-
-    Args:
-        robots: Robots to tick.
-    """
+    """A thread that runs the robots' jobs and ticks."""
 
     def __init__(self, robots: Sequence[Mailbox]) -> None:
         self._robots = robots
@@ -121,7 +95,7 @@ class Clock(ABC):
     def close(self) -> None:
         """End the thread: a step ends before its next tick; in real time, all waiting jobs are done first.
 
-        A thread that an arm, or a client that has stopped reading, does not let go is left to the end of the process.
+        A thread that an arm or a stalled client blocks is abandoned to the end of the process.
         """
         self._running = False
         for robot in self._robots:
@@ -136,7 +110,7 @@ class Clock(ABC):
 
     @abstractmethod
     def punctuality(self, robot: Mailbox) -> Punctuality | None:
-        """Lateness of a robot's ticks since the last call; None if time does not pass by itself."""
+        """Return the lateness of a robot's ticks since the last call; None if a client advances time."""
 
     def _guarded(self) -> None:
         try:
@@ -144,20 +118,16 @@ class Clock(ABC):
         except BaseException:  # the thread must not end silently
             log.exception("the controller's thread ended")
             for robot in self._robots:
-                robot.end("the controller's thread ended by an error: see the log")
+                robot.end("the controller's thread has ended because of an error: see the log")
 
     @abstractmethod
     def _run(self) -> None: ...
 
 
 class Lockstep(Clock):
-    """Time passes when a client steps; every second, the robot may publish its last state again for new clients.
+    """Time passes when a client steps it. Every robot has its own thread, since a step can take long.
 
-    Each robot has a thread of its own, since a step can take long and must not delay the clients of other robots.
-
-    Args:
-        robot: The robot.
-        repeat: Publishes the robot's last state again, unless time has passed since the call before.
+    If nobody steps, `repeat` republishes the last state every second, for new clients.
     """
 
     def __init__(self, robot: Mailbox, repeat: Do) -> None:
@@ -169,7 +139,7 @@ class Lockstep(Clock):
         """Return None, since a client advances time."""
 
     def _run(self) -> None:
-        # By a deadline of its own: other jobs, such as telemetry, may come in every second, too.
+        # The deadline is absolute, because other jobs, such as telemetry, may also arrive every second.
         due = time.monotonic() + REPEAT_EVERY
         while self._running:
             self._robots[0].guarded(partial(self._jobs.do_next, max(0.0, due - time.monotonic())))
@@ -179,22 +149,15 @@ class Lockstep(Clock):
 
 
 class Realtime(Clock):
-    """Ticks at every period of the monotonic clock, for all robots in one thread, by a `Schedule`; or of one arm's.
-
-    Args:
-        robots: Robots to tick.
-        period: Tick [s].
-        speed: Simulation speed relative to real time [-].
-        priority: Whether to ask the system for real-time priority.
-    """
+    """Ticks of all robots in one thread, at every period of the monotonic clock, or of one arm."""
 
     def __init__(
         self,
         robots: Sequence[Mailbox],
-        period: float,
-        speed: float = 1.0,
+        period: float,  # [s]
+        speed: float = 1.0,  # simulation time per real time [-]
         *,
-        priority: bool = False,
+        priority: bool = False,  # whether to request real-time priority
     ) -> None:
         super().__init__(robots)
         self._period = period / speed
@@ -204,15 +167,15 @@ class Realtime(Clock):
         self._priority = priority
         self._asked = threading.Event()
         self.granted: list[str] = []
-        """What the system has granted the thread, in words; complete after `start`."""
+        """What the system granted to the thread; complete after `start`."""
 
     def start(self) -> None:
-        """Start the thread, and wait until it has asked for what it is to have."""
+        """Start the thread, and wait until its priority and its timer slack are set."""
         super().start()
         self._asked.wait()
 
     def punctuality(self, robot: Mailbox) -> Punctuality:
-        """Lateness since the last call."""
+        """Return the lateness since the last call."""
         return robot.lateness.look()
 
     def _run(self) -> None:
@@ -252,7 +215,7 @@ class Realtime(Clock):
             robot.guarded(robot.jobs.do_waiting)
 
     def _begins(self, robot: Mailbox, pace: Callable[[float], bool]) -> bool:
-        """Wait until the arm begins its next tick; one that fails there has it from this clock, and stops."""
+        """Wait for the arm's next tick. If the arm fails, this clock gives the tick, so that the robot can stop."""
         try:
             return pace(LONGEST_SLEEP)
         except PlantError as error:
@@ -261,16 +224,15 @@ class Realtime(Clock):
             return True
 
     def _do_without_tick(self, robot: Mailbox, silent: bool) -> bool:
-        """Answer the clients of an arm that has fallen silent, and tell them once; return True."""
+        """Answer the clients of an arm that does not tick, and warn them once; return True."""
         robot.guarded(robot.jobs.do_waiting)
-        if not silent and robot.interval is None:  # a robot that is watched says by itself when it is lost
+        if not silent and robot.interval is None:  # a watched robot reports by itself that it is lost
             robot.host.warn(
-                "the arm does not begin its next tick: time stands still, and it obeys no command"
+                "the arm does not start its next tick: time stands still, and commands have no effect"
             )
         return True
 
     def _ask(self) -> None:
-        """Ask the system for what belongs to the calling thread."""
         _wake_sharply()
         if self._priority and take_priority():
             self.granted.append(f"real-time priority {PRIORITY}")
@@ -281,6 +243,6 @@ def _nothing() -> None:
 
 
 def _wake_sharply() -> None:
-    """Ask for exact wake-ups of the calling thread; by default the system may delay them by 50 µs."""
-    with contextlib.suppress(OSError, AttributeError):  # elsewhere ticks are that much later
+    """Request exact wake-ups of the calling thread; by default Linux may delay them by 50 µs."""
+    with contextlib.suppress(OSError, AttributeError):  # other systems: ticks are later by that much
         ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)

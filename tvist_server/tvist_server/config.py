@@ -40,34 +40,29 @@ from tvist_server.watching.watched_robot import WatchedRobot
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 SPEED_CAP = 0.5
-"""Largest speed of a robot that is moved, unless another is given [rad/s]."""
+"""Default speed limit of a real robot that tvist moves [rad/s]."""
 TOOL_IN_WORLD = 1.0
-"""Mass on the flange in a scene if the profile has none: its sensor does not feel what the wrist touches [kg]."""
+"""Default mass on the flange in a scene [kg]: without one, the sensor would not feel what the wrist touches."""
 _REAL = ("enable_motion", "speed_cap", "tcp", "servo_lag")
 MOST_LAG, LEAST_GAIN = 0.15, 50.0
-"""Largest time and smallest gain of a `servoj` that can be compensated [s, 1/s²]."""
+"""Largest lag [s] and smallest gain [1/s²] of a `servoj` that can be compensated."""
 _INSTEAD = {
     "name": "leave name out, since several robots are named after their files",
     "robot": "add it to the list of robots",
 }
-"""What to do with a key that excludes `robots`."""
+"""Advice for a key that excludes `robots`."""
 T = TypeVar("T")
 
 
 class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The options, and what they make: setups of robots, folders, endpoints."""
+    """The options, and the setups, folders and endpoints that follow from them."""
 
     def setups(self) -> list[Setup]:
-        """Return the initial setup of every robot's controller.
-
-        Raises:
-            StartError: See `setup`.
-            UserFileError: See `setup`.
-        """
+        """Return the initial setup of every robot's controller; raises as `setup` does."""
         if self.robots is None:
             return [self.setup()]
         found = members(self.robots, MOST * self.workers)
-        # Each robot starts as it would alone, apart from the noise.
+        # Robots of the same file differ only in name and noise.
         starts: dict[str, Setup] = {}
         for member in found:
             if member.robot not in starts:
@@ -83,11 +78,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         ]
 
     def program_folder(self, name: str) -> ProgramFolder | None:
-        """Return the folder with a robot's programs; None if there is none.
-
-        Raises:
-            StartError: `programs` is not a folder.
-        """
+        """Return the folder of a robot's programs, None if there is none; raise StartError if it is not a folder."""
         if self.programs is None:
             return None
         if not Path(self.programs).is_dir():
@@ -95,11 +86,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return ProgramFolder.of(Path(self.programs), name)
 
     def dump_folder(self) -> Path:
-        """Return the folder for the last second before a failure.
-
-        Raises:
-            StartError: `dump` is not a folder, so that this second would be lost.
-        """
+        """Return the folder for the record of the last second before a failure; raise StartError if it is not one."""
         if self.dump is None:
             try:
                 return Path(tempfile.gettempdir())
@@ -112,11 +99,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return Path(self.dump)
 
     def keep_ticks(self) -> int | None:
-        """Return the number of ticks that a recording keeps at least; None if it keeps all.
-
-        Raises:
-            StartError: `keep` is no duration, or nothing is recorded.
-        """
+        """Return the least number of ticks to keep in the recording (None: all); StartError if `keep` is invalid."""
         if self.keep is None:
             return None
         if self.record is None:
@@ -128,11 +111,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return AllowedHosts(self.ur_allow)
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
-        """Return address and ports of UR's interfaces, and of a gripper, of the robot with this index.
-
-        Raises:
-            StartError: `ur_address` is not an IP address, or too few addresses follow it.
-        """
+        """Return address and ports of a robot's UR interfaces, by its index; StartError if there is no such address."""
         try:
             first = ipaddress.ip_address(self.ur_address)
             address = first + number
@@ -147,18 +126,18 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Endpoints to listen on: those of `listen`, or the default; none by default if robots connect to a router."""
+        """Endpoints to listen on: `listen`, or the default one; without `listen`, none if `connect` is given."""
         return (() if self.connect else (DEFAULT_ENDPOINT,)) if self.listen is None else self.listen
 
     @property
     def place(self) -> str:
-        """The place at which clients reach the robots, in words."""
+        """Where clients reach the robots, for messages."""
         places = [f"on {', '.join(self.endpoints)}"] if self.endpoints else []
         places += [f"through the router at {', '.join(self.connect)}"] if self.connect else []
         return " and ".join(places) + (f" in namespace {self.namespace}" if self.namespace else "")
 
     def command_line(self, command: str, name: str) -> str:
-        """Return the command line that reaches a robot from this machine."""
+        """Return the command line that runs `command` for a robot from this machine."""
         words = ["tvist", command]
         first = (*self.endpoints, *self.connect)[0]
         if first != DEFAULT_ENDPOINT:
@@ -173,7 +152,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
 
         Raises:
             StartError: A value contradicts another one, or names something that does not exist.
-            UserFileError: A file that is named has the wrong kind of content.
+            UserFileError: A named file has the wrong kind of content.
         """
         try:
             chosen, description = self.profile_in_force, load(self.robot)
@@ -218,21 +197,17 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return setup
 
     def _check_real(self, *, real: bool) -> None:
-        """Check that nothing is asked of a robot of UR's that it cannot do, and that what is for one has one.
-
-        Raises:
-            ValueError: It is, or has none.
-        """
+        """Raise ValueError if an option needs a real UR robot and there is none, or is impossible with one."""
         if not real:
             given = [name for name in _REAL if getattr(self, name)]
             if given:
-                raise ValueError(f"{given[0]} is for a robot of UR's: give --plant ur://ADDRESS, too")
+                raise ValueError(f"{given[0]} needs a real UR robot: also give --plant ur://ADDRESS")
             return
         asked: dict[str, object] = {
             "adapt": self.adapt, "cell": self.cell, "state": self.state, "truth": self.truth or None,
             "robots": self.robots,
         }  # fmt: skip
-        what = "only knows what its own controller tells"
+        what = "is not simulated"
         if not self.enable_motion:
             asked |= {
                 "shaper": self.shaper, "start": self.start, "speed_cap": self.speed_cap,
@@ -246,12 +221,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
     def _plant(
         self, cell: Cell | None, description: RobotDescription, calibration: Calibration | None
     ) -> OwnPlant | None:
-        """Find the plant, or the scene in which the arm stands; None for the simulated arm of the robot file.
-
-        Raises:
-            ValueError: There is none, or both are given.
-            UserFileError: See `load_plant`.
-        """
+        """Return the plant, or the scene around the arm; None: the simulated arm. ValueError for a contradiction."""
         world = self._scene(cell)
         if world is not None:
             if self.plant is not None or self.hidden is not None:
@@ -276,15 +246,11 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return OwnPlant(str(where), "", moved)
 
     def _scene(self, cell: Cell | None) -> str | None:
-        """Scene in which the arm stands: that which is given, or else that of the cell; None for none."""
+        """Return the scene around the arm: the option's, or else the cell's; None: no scene."""
         return self.world or (None if cell is None else cell.world)
 
     def _lag(self, calibration: Calibration | None) -> ServoLag | None:
-        """Return the lag of a robot that is moved: the one given, or the calibration's.
-
-        Raises:
-            ValueError: It is none.
-        """
+        """Return the lag of a real robot from the option or else the calibration; ValueError if it is out of range."""
         if self.servo_lag == "simulated":
             return ServoLag.simulated()
         if self.servo_lag is not None:
@@ -306,17 +272,17 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
 
     @property
     def profile_in_force(self) -> ProfileName | None:
-        """Profile that gives the defaults; None for those of a robot without a profile."""
+        """Profile that gives the defaults; None: no profile."""
         return self.profile or ("ursim" if self.ur and not self.enable_motion else None)
 
     def _described(self, description: RobotDescription, profile: Profile) -> RobotDescription:
-        """Return the robot with the sensors and the floor that it is to have."""
+        """Return the robot with the chosen sensors and floor."""
         if _either(self.quiet, profile.quiet):
             description = description.quiet()
         return description if _either(self.floor, profile.floor) else description.without_floor()
 
     def _declared(self, description: RobotDescription, profile: Profile, cell: Cell | None) -> Payload:
-        """Return the declared payload: the tool of the cell, unless another mass is given."""
+        """Return the declared payload: the option's mass, or else the cell's tool or the profile's mass."""
         if self.payload is None and cell is not None and cell.tools:
             return as_declared(cell.tools[0])
         mass = _either(self.payload, profile.payload)
@@ -326,11 +292,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def from_mapping(content: object, source: str) -> ServeConfig:
-    """Check a mapping of values and convert it; messages name its source.
-
-    Raises:
-        StartError: A key is unknown, a value is out of range, or one key excludes another.
-    """
+    """Convert a map to a configuration; StartError names `source` and the unknown, invalid or excluded key."""
     if isinstance(content, dict) and content.get("robots") is not None:
         for key, instead in _INSTEAD.items():
             if content.get(key) is not None:
@@ -342,5 +304,4 @@ def from_mapping(content: object, source: str) -> ServeConfig:
 
 
 def _either(given: T | None, default: T) -> T:
-    """Return what is given, or else the default."""
     return default if given is None else given

@@ -1,4 +1,4 @@
-"""Orderly shutdown on the signals SIGINT, SIGTERM, SIGHUP and SIGQUIT, and of processes whose parent has died."""
+"""Orderly shutdown by a signal, or when the parent process dies."""
 
 import contextlib
 import faulthandler
@@ -10,14 +10,11 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 
 LONGEST = 4.5
-"""Longest time in which a shutdown may do its work in order [s]."""
+"""Longest time for an orderly shutdown [s]."""
 
 
 def ending_signals() -> list[signal.Signals]:
-    """Return the signals that shut this process down.
-
-    SIGHUP is left out if it is already ignored: a process started with `nohup` must outlive the terminal.
-    """
+    """Return the signals that shut this process down: not SIGHUP if it is ignored, as after `nohup`."""
     ends = [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         ends.append(signal.SIGHUP)
@@ -25,11 +22,11 @@ def ending_signals() -> list[signal.Signals]:
 
 
 def end_like_interrupted() -> None:
-    """Let the other signals that shut this process down do what Control+C does; a second one ends it at once."""
+    """Let the other shutdown signals act as Control+C; a second signal ends the process at once."""
 
     def interrupt(number: int, _frame: FrameType | None) -> None:
         signal.signal(number, signal.SIG_DFL)
-        if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a script's background
+        if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a background job of a script
             signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.raise_signal(signal.SIGINT)
 
@@ -39,12 +36,12 @@ def end_like_interrupted() -> None:
 
 
 def limit_shutdown() -> None:
-    """End this process in `LONGEST`, also if a thread keeps the interpreter's lock; stderr shows what hangs."""
+    """End this process within `LONGEST`, even if a thread holds the interpreter's lock; stderr shows what hangs."""
     faulthandler.dump_traceback_later(LONGEST, exit=True, file=2)
 
 
 def end_with_parent() -> None:
-    """End this process, which `multiprocessing` has started, as soon as its parent has died, even of SIGKILL."""
+    """End this child process of `multiprocessing` when its parent dies, even by SIGKILL."""
     import multiprocessing.connection
 
     parent = multiprocessing.parent_process()
@@ -58,15 +55,15 @@ def end_with_parent() -> None:
 
 
 class SignalExit(SystemExit):
-    """A signal's exit, which code that takes an exit for a failure can tell from one of somebody's file."""
+    """Exit because of a signal; distinct from a SystemExit that a user's file raises."""
 
 
 class Ending:
-    """A shutdown requested by a signal.
+    """A shutdown that a signal requests. Construct it in the main thread.
 
-    Once this is constructed, in the main thread, signals no longer end the process by themselves. The first signal
-    requests a shutdown, which `at_once` or `hear` carries out; further signals are ignored, so that they cannot
-    interrupt it. After `LONGEST` the process ends in any case.
+    From then on, signals do not end the process directly. The first one requests the shutdown, which
+    `at_once` or `hear` carries out. Later ones are ignored so that they cannot interrupt it; after `LONGEST`
+    the process ends in any case.
     """
 
     def __init__(self) -> None:
@@ -79,12 +76,7 @@ class Ending:
 
     @contextlib.contextmanager
     def at_once(self) -> Iterator[None]:
-        """While the body runs, let a signal raise an exception there, so that the body can clean up.
-
-        Raises:
-            SystemExit: A signal other than SIGINT has come; exit code 0.
-            KeyboardInterrupt: SIGINT has come.
-        """
+        """Let a signal raise in the body: KeyboardInterrupt for SIGINT, else SystemExit with code 0."""
         self._raises = True
         try:
             if self._wish is not None:
@@ -94,19 +86,15 @@ class Ending:
             self._raises = False
 
     def hear(self, heard: Callable[[], object]) -> None:
-        """Set a function to call in the main thread when a signal comes, or now if one has come already.
-
-        Args:
-            heard: The function; it may raise RuntimeError if the shutdown is already over.
-        """
+        """Set a function that the main thread calls at a signal, or now if one has come; it may raise RuntimeError."""
         self._heard = heard
         if self._wish is not None:
             heard()
 
     def request(self) -> None:
-        """Request the shutdown from within the process; callable from any thread once `hear` was called."""
+        """Request the shutdown, from any thread, after `hear`."""
         if self._heard is not None:
-            with contextlib.suppress(RuntimeError):  # the loop is closed: it has ended already
+            with contextlib.suppress(RuntimeError):  # the loop is closed: the shutdown is over
                 self._heard()
 
     @property
@@ -120,11 +108,11 @@ class Ending:
         return self._wish == signal.SIGINT
 
     def close(self) -> None:
-        """Ignore the signals until the process ends, since the interpreter removes its handlers before that."""
+        """Ignore the signals until the process ends, because the interpreter removes its handlers earlier."""
         report = sys.unraisablehook
 
         def report_others(unraisable: "sys.UnraisableHookArgs") -> None:
-            # Python reports a signal that comes just when it begins to be ignored.
+            # Python reports a signal that arrives while its handler is being replaced.
             if "ignored due to race condition" not in str(unraisable.exc_value):
                 report(unraisable)
 

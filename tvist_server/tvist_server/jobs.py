@@ -1,4 +1,4 @@
-"""Jobs that wait for the thread that owns a controller."""
+"""Jobs for the thread that owns a controller."""
 
 from collections import deque
 from collections.abc import Callable
@@ -15,12 +15,7 @@ class _Job(NamedTuple):
 
 
 class Jobs:
-    """Jobs in the order in which they came.
-
-    One of them may be a client's step, which takes long. Jobs that other clients send meanwhile are done between two
-    ticks of the step. Jobs of the stepping client itself wait until its step has ended, so that they keep their
-    order.
-    """
+    """Jobs in order of arrival. During a client's step, jobs of others are done between its ticks, its own after it."""
 
     def __init__(self) -> None:
         self._new: SimpleQueue[_Job] = SimpleQueue()
@@ -28,25 +23,16 @@ class Jobs:
         """Jobs that wait for the end of a step; they precede all new ones."""
 
     def post(self, do: Do, client: str | None = None) -> None:
-        """Add a job. May be called from any thread; does not block.
-
-        Args:
-            do: Job to do.
-            client: Client that sent it; None if it is unknown or no client did.
-        """
+        """Add a job, from any thread, without blocking; `client` sent it, if known."""
         self._new.put(_Job(do, client))
 
     def do_waiting(self) -> None:
-        """Do the jobs that are waiting now; later ones wait for the next call, so that a flood cannot delay a tick."""
+        """Do the jobs that wait now; later ones wait for the next call, so that a flood cannot delay a tick."""
         for _ in range(self._new.qsize()):
             self._new.get().do()
 
     def do_next(self, timeout: float) -> bool:
-        """Do the next job; return False if none arrived in time.
-
-        Args:
-            timeout: Longest wait for a job [s].
-        """
+        """Do the next job; return False if none arrives within `timeout` [s]."""
         if self._behind:
             self._behind.popleft().do()
             return True
@@ -58,21 +44,12 @@ class Jobs:
         return True
 
     def do_others(self, stepper: str | None) -> None:
-        """Within a client's step, do the jobs of others and set aside those of the stepping client.
-
-        Args:
-            stepper: The stepping client.
-        """
+        """Within a client's step, do the jobs of other clients and set aside those of the stepping client."""
         for _ in range(self._new.qsize()):
             self._do_other(self._new.get(), stepper)
 
     def do_next_other(self, stepper: str | None, timeout: float) -> None:
-        """Within a client's step, wait for a job, and do it or set it aside.
-
-        Args:
-            stepper: The stepping client.
-            timeout: Longest wait [s].
-        """
+        """Within a client's step, wait up to `timeout` [s] for a job, and do it or set it aside."""
         with suppress(Empty):
             self._do_other(self._new.get(timeout=timeout), stepper)
 

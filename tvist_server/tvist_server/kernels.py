@@ -1,4 +1,4 @@
-"""Compile the kernels of a served robot ahead, several parts of them at once, each in a process of its own."""
+"""Compiles the kernels of a served robot in advance, several parts at once in separate processes."""
 
 import gc
 import os
@@ -40,9 +40,9 @@ from tvist_server.punctual import processors
 MOVE_TICKS = 1000
 """Longest time of a motion that uses kernels [ticks]."""
 LOOK = 0.5
-"""Time between two looks at what is on disk [s]."""
+"""Time between two checks of what is on disk [s]."""
 FILTERS = (("elastic", 1), ("auto", 1), ("zv", 1), ("none", 2))
-"""Shapers, each with a number of modes, that together use the kernels of all."""
+"""Shapers, each with a number of modes, that together use all kernels of shapers."""
 STUDIES = {"all_to_drives", "drive", "mean_delay", "play", "product_taps", "shape_all"}
 """Kernels that no served robot calls."""
 KERNELS = tuple(kernel for kernel in kernels if kernel.name.rpartition(".")[2] not in STUDIES)
@@ -50,11 +50,11 @@ KERNELS = tuple(kernel for kernel in kernels if kernel.name.rpartition(".")[2] n
 
 
 class KernelsError(RuntimeError):
-    """A process that compiles has failed, or could not keep what it compiled."""
+    """A compiling process failed, or could not store its result."""
 
 
 def compiled() -> int:
-    """Return how many of `KERNELS` are on disk; if some are not, the start of a robot takes long."""
+    """Return how many of `KERNELS` are on disk; if some are missing, the start of a robot takes long."""
     return len(held(KERNELS))
 
 
@@ -68,12 +68,9 @@ def warm_up() -> None:
 
 
 def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> None:
-    """Compile every kernel that a served robot calls, unless its machine code is on disk already.
+    """Compile every kernel of a served robot that is not on disk, in so many processes (None: one per processor).
 
-    So many processes compile at once; None: one on each processor of this process.
-
-    Raises:
-        KernelsError: Some could not be compiled or kept.
+    `tell` gets the progress. Raise KernelsError if a kernel could not be compiled or stored.
     """
     waiting, running, said = list(PARTS), list[_Process](), ""
     try:
@@ -87,7 +84,7 @@ def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> Non
             for process in [process for process in running if process.poll() is not None]:
                 running.remove(process)
                 said = _said(process) or said
-    finally:  # a signal may have ended this
+    finally:  # even if a signal interrupts
         for process in running:
             process.kill()
             process.communicate()
@@ -99,14 +96,14 @@ _Process = subprocess.Popen[bytes]
 
 
 def _begin(part: str) -> _Process:
-    """Compile a part in a process, which ends with this one."""
+    """Start a process that compiles a part and ends with this one."""
     command = [sys.executable, "-m", "tvist_server.kernels", part]
     pipe = subprocess.PIPE
     return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT)  # noqa: S603
 
 
 def _said(process: _Process) -> str:
-    """Return what has failed in a process that has ended."""
+    """Return the error of a process that has ended; empty if it succeeded."""
     said = process.communicate()[0].decode(errors="replace").strip()
     if process.returncode == 0:
         return ""
@@ -114,7 +111,7 @@ def _said(process: _Process) -> str:
 
 
 def _line() -> None:
-    """The control line and the simulated arm: what a tick needs."""
+    """Compile the control line and the simulated arm: all that a tick needs."""
     setup = from_mapping({"clock": "lockstep", "truth": True, "adapt": "payload"}, "configuration").setup()
     arm, still = FlexibleArm(setup.description, body(setup.payload)), np.zeros(setup.description.joints)
     arm.reset(DriveCommand(still, still, still))
@@ -128,7 +125,7 @@ def _line() -> None:
     assert isinstance(control, Accepted)
     assert control.token is not None
     token = control.token
-    host.subscribe("state", bytes)  # has states encoded
+    host.subscribe("state", bytes)  # makes the host encode states
     bent = (0.2, -1.4, 1.7, -1.8, -1.5, 0.3)
     found = ask(ForwardKinematics(q=bent))
     assert isinstance(found, ToolPose)
@@ -154,7 +151,7 @@ def _line() -> None:
 
 
 def _plans() -> None:
-    """Filters, inverse kinematics, in closed form and by iteration, and plans along a path."""
+    """Compile filters, inverse kinematics (closed form and iterative) and plans along a path."""
     setup = _setup("ur5e")
     filters = Planner(setup).filters
     filters.first()
@@ -178,17 +175,19 @@ def _setup(robot: str) -> Setup:
 
 
 PARTS: dict[str, Callable[[], None]] = {"line": _line, "plans": _plans}
-"""What compiles each part, for as long as the other; the line begins with the arm, and finds its filters on disk."""
+"""Compiles each part in about equal times; the line starts with the arm, and finds its filters on disk."""
 
 
 def _end_with_parent() -> None:
-    os.read(sys.stdin.fileno(), 1)  # ends when the parent does; sys.stdin would lock the interpreter's end
+    os.read(
+        sys.stdin.fileno(), 1
+    )  # returns when the parent ends; sys.stdin would block the interpreter's exit
     os._exit(1)
 
 
 def _main() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    gc.set_threshold(100_000)  # numba makes many objects that stay
+    gc.set_threshold(100_000)  # numba makes many permanent objects
     PARTS[sys.argv[1]]()
     if unkept:
         folder, why = next(reversed(unkept.items()))

@@ -19,7 +19,7 @@ class Punctuality:
     p99_us: float
     max_us: float
     load: float
-    """Share of the time in which ticks and the jobs between them were carried out [-]."""
+    """Share of the time spent in ticks and the jobs between them [-]."""
 
 
 class Lateness:
@@ -32,12 +32,12 @@ class Lateness:
         self._looked, self._looked_at = 0, time.monotonic()
 
     def note(self, late: float) -> None:
-        """Add a tick that began late by this much [s]."""
+        """Add a tick's lateness [s]."""
         self._late[self._count % KEPT] = late
         self._count += 1
 
     def worked(self, seconds: float) -> None:
-        """Add the time that a tick and the jobs before it took [s]."""
+        """Add the duration of a tick and the jobs before it [s]."""
         self._worked += seconds
 
     def look(self) -> Punctuality:

@@ -1,4 +1,4 @@
-"""Reads what the options of a start give: files, durations, numbers, postures and lists of robots."""
+"""Parses values of start options: files, durations, numbers, postures and lists of robots."""
 
 import math
 import re
@@ -31,21 +31,11 @@ _DURATION = re.compile(r"\s*(?P<number>\d+(\.\d+)?)\s*(?P<unit>s|min|h)\s*", re.
 
 
 class StartError(ValueError):
-    """A file or an option is invalid; the message names it, the key, the value and what is allowed."""
+    """A file or an option is invalid; the message gives name, key, value and what is allowed."""
 
 
 def read_start_file(path: str | Path, what: str, kind: type[T]) -> T:
-    """Read a TOML file, or a JSON file if its name ends in .json, and check its content.
-
-    Args:
-        path: Path of the file.
-        what: Kind of file, for messages: "cell".
-        kind: Type of the content.
-
-    Raises:
-        StartError: The file cannot be read, or a key is unknown, missing or out of range.
-        UserFileError: The file is not text, too large or nested too deeply.
-    """
+    """Read a TOML or .json file and check its content; StartError or UserFileError if it is invalid."""
     try:
         is_json = Path(path).suffix == ".json"
         return checked(parse_json(read_bytes(path, what)) if is_json else read_toml(path, what), kind)
@@ -58,7 +48,7 @@ def read_start_file(path: str | Path, what: str, kind: type[T]) -> T:
 
 
 def ticks_of(text: str, name: str) -> int:
-    """Return the number of ticks of a duration such as `90s`, `10min` or `2h`, which is that of an option."""
+    """Return the number of ticks of a duration such as `90s`, `10min` or `2h`; `name` is the option."""
     found = _DURATION.fullmatch(text)
     seconds = 0.0 if found is None else float(found["number"]) * SECONDS[found["unit"].lower()]
     if not 1.0 <= seconds <= LONGEST:
@@ -69,7 +59,7 @@ def ticks_of(text: str, name: str) -> int:
 
 
 def posture(start: str | tuple[float, ...], description: "RobotDescription") -> tuple[float, ...]:
-    """Return the joint angles of a pose's name, or of angles separated by commas [rad]."""
+    """Return the joint angles of a pose, given by its name or as angles separated by commas [rad]."""
     if not isinstance(start, str):
         return start
     for name, pose in description.poses.items():
@@ -85,7 +75,7 @@ def posture(start: str | tuple[float, ...], description: "RobotDescription") -> 
 
 
 def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[float, ...]:
-    """Return the numbers of an option, given as such or separated by commas."""
+    """Return the numbers of an option, given as a tuple or as text separated by commas."""
     try:
         numbers = tuple(map(float, given.split(",") if isinstance(given, str) else given))
     except ValueError:
@@ -97,7 +87,7 @@ def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[f
 
 @dataclass(frozen=True)
 class Member:
-    """One of the robots that `robots` lists."""
+    """One of the robots listed in `robots`."""
 
     robot: str
     """Name of a robot that comes with the package, or path of a robot file."""
@@ -106,10 +96,7 @@ class Member:
 
 
 def members(text: str, most: int = MOST) -> list[Member]:
-    """Return the robots of a list such as `ur5e*2,other.toml`: ROBOT[*COUNT], separated by commas.
-
-    A robot is named after its file. A robot that is listed several times gets a number: `ur5e-1`, `ur5e-2`.
-    """
+    """Return the robots of a list such as `ur5e*2,other.toml`, named after their files: ur5e-1, ur5e-2, other."""
     robots: list[str] = []
     for entry in text.split(","):
         robot, star, count = entry.strip().partition("*")
@@ -141,7 +128,7 @@ def members(text: str, most: int = MOST) -> list[Member]:
 
 
 def recording_of(record: str, name: str) -> Path:
-    """Return the file that one of several robots records into: `out-ur5e-3.mcap` for `out.mcap`."""
+    """Return the recording file of one of several robots: `out-ur5e-3.mcap` for `out.mcap`."""
     path = Path(record)
     return path.with_name(f"{path.stem}-{name}{path.suffix}")
 

@@ -1,38 +1,27 @@
-"""Whether a robot is overloaded, as `telemetry` of the protocol defines it. Here is no clock: ticks are counted."""
+"""Detects overload of a robot, as the protocol's `telemetry` defines it, from counted ticks without a clock."""
 
 BEGINS, BEGINS_AFTER = 0.20, 2
-"""Share of the ticks due in a second that must be missed [-], and number of such seconds in a row, for it to begin."""
+"""Share of a second's due ticks that must be missed [-], and number of such seconds in a row, to enter overload."""
 ENDS, ENDS_AFTER = 0.05, 5
-"""Share that fewer must be missed than [-], and number of such seconds in a row, for it to end."""
+"""Share below which missed ticks must fall [-], and number of such seconds in a row, to leave overload."""
 
 
 class Overload:
-    """Counts a robot's ticks: those due, and those missed. A second is as many due ticks as it contains.
+    """Counts a robot's due and missed ticks, `period` apart [s], in seconds measured in due ticks.
 
-    A pause of the whole machine makes one long second, in which almost all were missed, so it alone is no overload.
-
-    Args:
-        period: Distance of two deadlines [s].
+    A pause of the whole machine is one long second with almost all ticks missed, which alone is no overload.
     """
 
     def __init__(self, period: float) -> None:
         self.due_per_second = 1.0 / period
         self.due = self.missed = 0
-        """Ticks since the start."""
         self.overloaded = False
-        self._due = self._missed = 0  # when the present second began
-        self._since = 0, 0  # when the present overload began
+        self._due = self._missed = 0  # when the present second started
+        self._since = 0, 0  # when the present overload started
         self._seconds = 0
 
     def note(self, missed: int) -> str | None:
-        """Count a tick that begins.
-
-        Args:
-            missed: Number of ticks that its schedule reports as missed: this one, and those left out before it.
-
-        Returns:
-            A sentence if the overload begins or ends.
-        """
+        """Count a tick and the `missed` ones that its schedule reports; return a message if overload starts or ends."""
         self.due += max(1, missed)
         self.missed += missed
         due, missed = self.due - self._due, self.missed - self._missed

@@ -1,4 +1,4 @@
-"""A temporary folder that is removed even after its process was killed, at the latest by the next one."""
+"""A temporary folder that is removed even if its process is killed, at the latest by the next one."""
 
 import contextlib
 import os
@@ -10,17 +10,13 @@ _PREFIX = "tvist-own-"
 
 
 class OwnFolder:
-    """A folder that only this user can enter, until `close`.
+    """A folder that only this user can enter, until `close`; locked while this process or a fork of it lives.
 
-    It is locked while this process lives, or one that was forked from it. The folders of this user that nobody holds
-    any more were left by processes that were killed; they are removed first.
-
-    Raises:
-        OSError: There is no folder for temporary files.
+    Unlocked folders of this user are left over from killed processes and are removed first. May raise OSError.
     """
 
     def __init__(self) -> None:
-        import fcntl  # which Windows does not have
+        import fcntl  # Windows does not have it
 
         temporary = Path(tempfile.gettempdir())
         for left in temporary.glob(f"{_PREFIX}*"):
@@ -31,7 +27,7 @@ class OwnFolder:
         self.path = made.rename(temporary / f"{_PREFIX}{made.name.removeprefix('.tvist-')}")
 
     def remove(self) -> None:
-        """Remove the folder, whoever uses it."""
+        """Remove the folder, even if it is in use."""
         shutil.rmtree(self.path, ignore_errors=True)
 
     def close(self) -> None:
@@ -45,7 +41,7 @@ class OwnFolder:
 def _remove_unless_held(folder: Path) -> None:
     import fcntl
 
-    with contextlib.suppress(OSError):  # another user's, or held
+    with contextlib.suppress(OSError):  # another user's, or locked
         lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         try:
             if os.fstat(lock).st_uid == os.geteuid():

@@ -1,4 +1,4 @@
-"""Thread that plans motions next to the controller's thread."""
+"""Plans motions in a thread beside the controller's thread."""
 
 import logging
 import threading
@@ -20,11 +20,11 @@ from tvist_server.gateways.base import Answer
 log = logging.getLogger(__name__)
 
 MAX_WAITING = 16
-"""Commands that may wait to be planned or wait behind one that is being planned."""
+"""Number of commands that may wait for planning, their own or that of an earlier command."""
 MAX_ASKING = 8
-"""Waiting commands above which a question is refused, so that whoever asks leaves room for who has control."""
+"""Number of waiting commands above which questions are refused, to leave room for the client in control."""
 TRIES = 10
-"""Number of plans that may become out of date before one is made in the controller's thread."""
+"""Number of outdated plans after which the controller's thread plans itself."""
 CLOSE_WAIT = 1.0
 """Longest time to finish the current plan at close [s]."""
 
@@ -49,28 +49,20 @@ class _Waiting(NamedTuple):
 
 
 class PlanAhead:
-    """Passes commands to the controller in their order; those that take long to plan come with a finished plan.
+    """Passes commands to the controller in order, with a finished plan if planning takes long.
 
-    A plan is based on the state that the controller's thread tells when the command's turn has come. If something that
-    the plan depends on has changed by the time the controller gets it, it is made again. A command waits while an
-    earlier one is being planned, unless it only renews the lease. A command that stops the arm is carried out at once,
-    and again in its turn: so it ends the present motion, and also a motion that was sent before it and would begin
-    after it.
-
-    Args:
-        host: The controller.
-        planner: Makes plans; used by this thread only.
-        post: Queues a job for the controller's thread.
-        complete: Adds what a command names but does not contain, such as a file, or refuses it; used by this thread
-            only.
+    A plan starts from the controller's state when the command's turn comes; if something that it depends on
+    has changed when the controller gets it, it is made again. Commands wait while an earlier one is planned,
+    except renewals of the lease. A command that stops the arm is carried out at once and again in its turn,
+    so that it ends both the present motion and any motion that was sent before it and would start after it.
     """
 
     def __init__(
         self,
         host: Host,
-        planner: Planner,
-        post: Callable[[Callable[[], None]], None],
-        complete: Callable[[Admitted], Admitted | Refused] | None = None,
+        planner: Planner,  # used only by this thread
+        post: Callable[[Callable[[], None]], None],  # queues a job for the controller's thread
+        complete: Callable[[Admitted], Admitted | Refused] | None = None,  # adds a file or refuses
     ) -> None:
         self._host, self._planner, self._post, self._complete = host, planner, post, complete
         self._lock = threading.Lock()
@@ -80,16 +72,16 @@ class PlanAhead:
         self._thread = threading.Thread(target=self._run, name="tvist-plan", daemon=True)
 
     def start(self) -> None:
-        """Start to plan; commands that were submitted before wait until now."""
+        """Start planning; earlier commands wait until now."""
         self._thread.start()
 
     def end(self) -> None:
-        """Refuse the waiting commands and all further ones."""
+        """Refuse the waiting and all further commands."""
         self._closing = True
         self._queue.put(None)
 
     def close(self) -> None:
-        """Wait for the thread to end; to be called before the controller's thread ends."""
+        """Wait for the thread to end; call this before the controller's thread ends."""
         if self._thread.is_alive():
             self._thread.join(CLOSE_WAIT)
 
@@ -99,12 +91,7 @@ class PlanAhead:
         return self._count
 
     def submit(self, admitted: Admitted, answer: Answer) -> None:
-        """Have a command carried out. May be called from any thread; does not block.
-
-        Args:
-            admitted: The command.
-            answer: Takes the reply, in the controller's thread.
-        """
+        """Queue a command, from any thread, without blocking; `answer` takes the reply in the controller's thread."""
         row = COMMANDS[type(admitted.command)]
         stops, asks = row.stops, row.asks
         with self._lock:
@@ -122,8 +109,8 @@ class PlanAhead:
 
     def _run(self) -> None:
         try:
-            with _REHEARSING:  # the robots of a process share what the first of them makes
-                self._planner.rehearse_scripts()  # hundreds of milliseconds, for which no start waits
+            with _REHEARSING:  # the robots of a process share what the first of them compiles
+                self._planner.rehearse_scripts()  # takes hundreds of milliseconds, which must not delay the start
         except Exception:  # motions need no program
             log.exception("programs cannot be compiled")
         while (waiting := self._queue.get()) is not None:
@@ -162,23 +149,20 @@ class PlanAhead:
         self._post(lambda: waiting.answer(self._host.carry_out(waiting.admitted)))
 
     def _reply(self, question: Command, answer: Answer) -> None:
-        """Answer a question, which anyone may ask: it does not reach the controller or its journal."""
+        """Answer a question, which anyone may ask: it reaches neither the controller nor its journal."""
         found = self._planner.plan(question, self._present()).found
         assert isinstance(found, Posture | ToolPose | RefusalError)
         reply = found.reply if isinstance(found, RefusalError) else found
         self._post(lambda: answer(reply))
 
     def _present(self) -> Snapshot:
-        """The present state, which only the controller's thread may read.
-
-        It does so just before a tick, so that most plans are ready long before the next.
-        """
+        """Return the present state; the controller's thread reads it, just before a tick."""
         present = SimpleQueue[Snapshot]()
         self._post(lambda: present.put(self._host.controller.snapshot()))
         return present.get()
 
     def _take(self, waiting: _Waiting, plan: Plan) -> bool:
-        """Carry out a command with its plan, if that still applies; runs in the controller's thread."""
+        """Carry out a command with its plan, if the plan still applies; runs in the controller's thread."""
         if not self._host.controller.plans.hold(plan):
             return False
         waiting.answer(self._host.carry_out(waiting.admitted, plan))
@@ -186,4 +170,4 @@ class PlanAhead:
 
 
 def _nobody(reply: Reply) -> None:
-    """Ignore the reply, since the sender has already got one."""
+    """Ignore the reply, because the sender already has one."""

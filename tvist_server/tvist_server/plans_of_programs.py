@@ -1,4 +1,4 @@
-"""Thread that plans the motions of programs next to the controller's thread."""
+"""Plans the motions of programs in a thread beside the controller's thread."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -10,25 +10,22 @@ from tvist_protocol.commands import Command
 
 
 class PlansOfPrograms:
-    """Plans what the controller orders. The controller takes each plan at a tick that does not depend on this thread.
+    """Plans commands for the controller in a thread of its own, the only user of `planner`.
 
-    A program's line begins a fixed number of ticks after it is called, so a run is the same on every machine. If a plan
-    takes longer than that, the controller waits for it, and its ticks are late.
-
-    Args:
-        planner: Makes plans; used by this thread only.
+    A program line starts a fixed number of ticks after its call, so a run is the same on every machine. If a
+    plan takes longer, the controller waits for it and its ticks are late.
     """
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
         self._thread = ThreadPoolExecutor(1, "tvist-program-plans")
-        # Begun by the tick thread, it would inherit its priority.
+        # If the tick thread started it, it would inherit that thread's priority.
         self._thread.submit(int)
 
     def order(self, command: Command, now: Snapshot) -> Callable[[], Plan]:
-        """Have a command planned on a state; returns what waits for the plan."""
+        """Start planning a command from a state; return a function that waits for the plan."""
         return self._thread.submit(self._planner.plan, command, now).result
 
     def close(self) -> None:
-        """Finish the current plan; to be called after the controller's thread has ended."""
+        """Finish the current plan; call this after the controller's thread has ended."""
         self._thread.shutdown(cancel_futures=True)

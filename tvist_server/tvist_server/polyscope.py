@@ -1,8 +1,4 @@
-"""Programs that PolyScope has saved, as text in URScript.
-
-A saved program is XML. What `polyscope_nodes` does not translate would change what the program does, so a program that
-has it is refused.
-"""
+"""Translates programs saved by PolyScope (XML) to URScript; one with unknown nodes is refused."""
 
 from tvist_plant.user_file import UserFileError, xml
 from tvist_protocol.errors import short
@@ -12,11 +8,7 @@ _HEADER_ENDS = "# HEADER_END"
 
 
 def script_of(name: str, data: bytes) -> str:
-    """Return the text of a program.
-
-    Raises:
-        UserFileError: It is not XML, or has nodes that are not understood.
-    """
+    """Return the text of a program; raise UserFileError if it is not XML or has unknown nodes."""
     tree = xml(data)
     main = tree.find("./children/MainProgram")
     if main is None or main.find("./children/*") is None:
@@ -49,11 +41,7 @@ def program(name: str, body: str) -> str:
 
 
 def with_external_control(text: str, sent: str) -> str:
-    """Put the text that a client has sent in the place of the nodes External Control.
-
-    Its header, which ends with the line `# HEADER_END`, comes first in the program, since its functions may not stand
-    inside a loop.
-    """
+    """Replace the External Control nodes by a client's text; its header goes first, as functions cannot be in loops."""
     header, mark, part = sent.partition(_HEADER_ENDS)
     if not mark:
         header, part = "", sent
@@ -62,7 +50,7 @@ def with_external_control(text: str, sent: str) -> str:
 
 
 def _only_defines(body: str) -> bool:
-    """Whether a text has definitions alone: repeated, it would compute for ever without doing anything."""
+    """Return whether a text contains only definitions: repeating it would compute for ever without any effect."""
     from tvist_urscript import tree
     from tvist_urscript.errors import ScriptError
     from tvist_urscript.parsing import parse
@@ -70,7 +58,7 @@ def _only_defines(body: str) -> bool:
     try:
         statements = parse(f"{body}\n") if EXTERNAL_CONTROL not in body else [None]
         return all(isinstance(one, tree.Function) for one in statements)
-    except ScriptError:  # compiling tells where
+    except ScriptError:  # compiling it reports the error
         return False
 
 

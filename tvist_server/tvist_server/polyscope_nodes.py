@@ -1,7 +1,7 @@
-"""The nodes of a program that PolyScope has saved, as lines in URScript.
+"""Translates the nodes of a program saved by PolyScope to lines of URScript.
 
-Translated is what was found in saved programs: Script, Wait for a time, Assignment of an expression, If and Else, Loop
-with a condition, Move with Waypoints, Popup, Halt, Folder, Comment, External Control, and nodes that are suppressed.
+Supported nodes: Script, Wait for a time, Assignment of an expression, If and Else, Loop with a condition,
+Move with Waypoints, Popup, Halt, Folder, Comment, External Control, and suppressed nodes.
 """
 
 import re
@@ -14,28 +14,21 @@ from tvist_plant.user_file import is_name
 EXTERNAL_CONTROL = (
     'popup("Play this program from the machine that controls it.", title="External Control", blocking=True)'
 )
-"""Line that stands for a node External Control until the program is played; see `with_external_control`."""
+"""Placeholder of an External Control node until the program is played; see `with_external_control`."""
 _EXTERNAL = "com.fzi.externalcontrol.ExternalControlNode"
 _SIGNS = {"≟": "==", "≠": "!="}
-"""PolyScope's signs in expressions that URScript writes otherwise."""
+"""PolyScope's signs in expressions that URScript writes differently."""
 _MOVES = {"MoveJ": "movej", "MoveL": "movel"}
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _STEP = re.compile(r"(\w+)(?:\[(\d{1,6})\])?")
 _MOST_REFERENCES = 100
-"""Longest chain of references, of which a file may have endless ones."""
+"""Longest chain of references; a file may contain endless ones."""
 _LONGEST_REFERENCE = 1000
-"""Most characters of one: as many as the deepest element needs that a file may have."""
+"""Longest reference [characters]: enough for the deepest element that a file may have."""
 
 
 class Nodes:
-    """Translates the nodes of one program.
-
-    Attributes:
-        missing: What was found that cannot be translated, in the order of the program.
-
-    Args:
-        root: The program.
-    """
+    """Translates the nodes of one program, whose tree is `root`; `missing` lists what it cannot translate, in order."""
 
     def __init__(self, root: ET.Element) -> None:
         self.missing: list[str] = []
@@ -47,16 +40,16 @@ class Nodes:
                 count[child.tag] += 1
                 self._parents[child], self._places[parent, child.tag, count[child.tag]] = parent, child
         self._known: dict[ET.Element, str] = {}
-        """Names of variables: each reference is followed once, however many lead to it."""
+        """Names of variables, so that each reference is resolved only once."""
         self._number = 0
 
     def lines(self, nodes: list[ET.Element]) -> Iterator[str]:
-        """Translate nodes beside each other."""
+        """Translate sibling nodes."""
         for place, node in enumerate(nodes):
             yield from self._node(node, nodes[place + 1 : place + 2])
 
     def values(self, variables: list[ET.Element]) -> Iterator[str]:
-        """Translate the values that variables have first."""
+        """Translate the initial values of variables."""
         for variable in variables:
             yield f"global {self._variable(variable)} = {self._expression(variable)}"
 
@@ -154,7 +147,7 @@ class Nodes:
         return "".join(parts)
 
     def _variable(self, node: ET.Element | None) -> str:
-        """Name of a variable, which may stand elsewhere in the program: `../../Assignment[2]/variable`."""
+        """Return the name of a variable, which may be a reference such as `../../Assignment[2]/variable`."""
         passed, found = list[ET.Element](), ""
         while node is not None and not found and len(passed) < _MOST_REFERENCES:
             passed.append(node)

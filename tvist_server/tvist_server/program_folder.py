@@ -1,4 +1,4 @@
-"""Folder with programs that clients load by their names."""
+"""Folder with programs that clients load by name."""
 
 import zlib
 from pathlib import Path, PurePosixPath
@@ -15,38 +15,32 @@ from tvist_protocol.replies import Refused
 from tvist_server.polyscope import script_of
 
 SCRIPT, URP = ".script", ".urp"
-"""Endings of the files. A script is text in URScript; a .urp file is the same, or a file that PolyScope has saved."""
+"""File endings. A script is URScript text; a .urp file is the same, or a program saved by PolyScope."""
 _GZIP: Final = b"\x1f\x8b"
 _XML: Final = b"<"
 
 
 class ProgramFolder:
-    """The programs in a folder, which is looked at whenever a client loads one or asks for their names."""
+    """The programs in a folder, which is read whenever a client loads one or lists them."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     @classmethod
     def of(cls, path: Path, robot: str) -> "ProgramFolder":
-        """Return the folder of one robot: the one of its name in another folder if there is such, else that folder."""
+        """Return one robot's folder: the subfolder of its name if there is one, else `path` itself."""
         own = path / robot
         return cls(own if own.is_dir() else path)
 
     def names(self) -> list[str]:
-        """Names of the files; without a folder there are none."""
+        """Return the names of the files; none if there is no folder."""
         try:
             return sorted(entry.name for entry in self.path.iterdir() if entry.suffix in {SCRIPT, URP})
         except OSError:
             return []
 
     def read(self, name: str) -> str | None:
-        """Return the text of a program; None if there is no such file.
-
-        Folders before its name are ignored. `X.urp` also finds `X.script`.
-
-        Raises:
-            UserFileError: The file is not a program that the controller can run.
-        """
+        """Return a program's text, ignoring its path (None: no such file); UserFileError if it is not a program."""
         file = PurePosixPath(name).name
         candidates = [file, file.removesuffix(URP) + SCRIPT] if file.endswith(URP) else [file]
         for candidate in candidates:
@@ -57,16 +51,13 @@ class ProgramFolder:
                 data = read_bytes(path, "program")
             except FileNotFoundError:
                 continue
-            except (OSError, ValueError) as error:  # a name may have characters that no file's name has
+            except (OSError, ValueError) as error:  # a name may contain characters that no file name can
                 raise UserFileError(f"program {str(path)!r} cannot be read: {error}") from error
             return _checked(path, _text(path, data))
         return None
 
     def complete(self, admitted: Admitted) -> Admitted | Refused:
-        """Add the text to a command that loads a program of the folder; any other command remains as it is.
-
-        The robot and its journal thus get the program as it was when it was loaded.
-        """
+        """Add the text to a command that loads a program of the folder, so that the journal contains it."""
         command = admitted.command
         if not isinstance(command, ProgramLoad) or command.text is not None:
             return admitted
@@ -87,11 +78,7 @@ class ProgramFolder:
 
 
 def _text(path: Path, data: bytes) -> str:
-    """Text of a program file.
-
-    Raises:
-        UserFileError: It is neither text nor a simple program of PolyScope.
-    """
+    """Return the text of a program file; raise UserFileError if it is neither text nor a simple PolyScope program."""
     if data.startswith(_GZIP):
         unpack = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
         try:

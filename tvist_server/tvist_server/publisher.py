@@ -1,7 +1,6 @@
-"""Publisher of one robot: passes states, events and figures to the gateways, in the controller's thread.
+"""Passes one robot's states, events and figures to the gateways, in the controller's thread.
 
-In real time no gateway blocks: Zenoh drops what finds no room, and UR's interfaces count what they drop. In lockstep,
-where no state may be lost, gateways wait for clients, between two ticks. What no gateway takes is not made.
+In real time no gateway blocks; in lockstep gateways wait for clients between two ticks, since no state may be lost.
 """
 
 import logging
@@ -17,13 +16,13 @@ log = logging.getLogger(__name__)
 
 
 class Publisher(Sink):
-    """A sink that passes everything to gateways; one that fails does not keep messages from the others."""
+    """Passes everything to the gateways; a failing gateway does not affect the others."""
 
     def __init__(self) -> None:
         self._gateways: Sequence[Gateway] = ()
 
     def want_truth(self, wanted: bool) -> None:
-        """Note whether somebody subscribes to what a real robot cannot measure; from any thread."""
+        """Note whether a client subscribes to `truth`; from any thread."""
         self.wants_truth = wanted
 
     def open(self, gateways: Sequence[Gateway]) -> None:

@@ -1,4 +1,4 @@
-"""What is asked of the system so that ticks are on time; what it refuses is logged, and the robot runs without it."""
+"""Requests to the system that make ticks punctual; if one is refused, this is logged and the robot runs without it."""
 
 import contextlib
 import logging
@@ -23,23 +23,23 @@ def processors() -> int:
 
 
 def waited_us() -> float:
-    """Return how long the calling thread, ready to run, has waited for a processor [µs]; 0 if that is not counted."""
+    """Return how long the calling thread, ready to run, has waited for a processor [µs]; 0 if that is unknown."""
     with contextlib.suppress(OSError):
         return int(Path("/proc/thread-self/schedstat").read_text().split()[1]) / 1e3
     return 0.0
 
 
 def take_priority() -> bool:
-    """Give the calling thread real-time priority (SCHED_FIFO); return whether it has it now.
+    """Give the calling thread real-time priority (SCHED_FIFO); return whether that succeeded.
 
-    The recorders come next. If another program took the processor from one that holds the interpreter's lock,
-    the calling thread would wait for that program. What may take long, such as planning, stays behind other programs.
+    The recorders get the next lower one: if another program displaced a recorder that holds the interpreter's
+    lock, the calling thread would wait for that program. Slow work such as planning keeps normal priority.
     """
     if sys.platform != "linux":
         log.warning("real-time priority is only for Linux, so the control loop runs at normal priority")
         return False
     try:
-        # A thread that one of these starts, such as to write a file, inherits nothing.
+        # Threads that these start, such as to write a file, inherit nothing.
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
         os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
         for thread in threading.enumerate():

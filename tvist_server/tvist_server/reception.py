@@ -1,4 +1,4 @@
-"""Reception of a robot's messages, in the network's threads."""
+"""Receives a robot's messages in the network's threads."""
 
 import threading
 from collections.abc import Callable
@@ -13,51 +13,42 @@ from tvist_server.gateways.base import Answer, Desk
 
 
 class Post(Protocol):
-    """Queues a job for the controller's thread, before its next tick. Callable from any thread; does not block."""
+    """Queues a job for the controller's thread, before its next tick; from any thread, without blocking."""
 
     def __call__(self, do: Callable[[], None], client: str | None = None, /) -> None:
-        """Take a job, and the client that sent it, if known."""
+        """Take a job and the client that sent it, if known."""
 
 
 CarryOut = Callable[[Admitted, Answer], None]
-"""Has a command carried out and answered in the controller's thread. Callable from any thread; does not block."""
+"""Queues a command for the controller's thread and answers it; from any thread, without blocking."""
 
 
 class Reception(Desk):
-    """The desk of one robot: admits valid messages, and rejects others at once without involving the controller.
-
-    Args:
-        host: The controller; only its thread-safe methods are called here.
-        post: Queues a job for the controller's thread.
-        carry_out: Carries out commands that were admitted.
-        complete_info: Adds to an encoded `info` what the controller does not know, in the thread that answers clients.
-    """
+    """The desk of one robot: admits valid messages and rejects others at once, without the controller."""
 
     def __init__(
         self,
-        host: Host,
+        host: Host,  # only its thread-safe methods are called here
         post: Post,
         carry_out: CarryOut,
-        complete_info: Callable[[bytes], bytes] | None = None,
+        complete_info: Callable[[bytes], bytes] | None = None,  # adds to an encoded `info`
     ) -> None:
         self._host, self._post, self._carry_out = host, post, carry_out
         self._complete_info = complete_info
         self._lock = threading.Lock()
         self._presence = Presence()
         self.commands_refused = 0
-        """Number of rejected commands."""
         self.setpoints_refused = 0
-        """Number of rejected set-points."""
 
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; the reply comes from another thread, or at once if the command is rejected."""
-        # Read without a lock: the controller replaces its standing as a whole. A lease may end before the command gets
-        # its turn, so the tick thread checks it again.
+        # No lock is needed: the controller replaces `standing` as a whole. A lease may end before the
+        # command's turn, so the tick thread checks it again.
         standing = self._host.standing
         self._hand_in(admit(data, standing.lease, standing.clock), answer)
 
     def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
-        """Take a command; `answer` as for `request`, and `origin` is the IP address of the machine that sent it."""
+        """Take a command; `answer` as for `request`, `origin` is the IP address of the machine that sent it."""
         standing = self._host.standing
         admitted = admit_command(command, standing.lease, standing.clock)
         self._hand_in(admitted if isinstance(admitted, Refused) else admitted._replace(origin=origin), answer)
@@ -72,12 +63,12 @@ class Reception(Desk):
         self._post(tell)
 
     def holder(self) -> str | None:
-        """Client that has control; None if no client has it."""
+        """Return the client that has control; None: no client."""
         lease = self._host.standing.lease
         return None if lease is None else lease.client
 
     def setpoint(self, data: bytes) -> None:
-        """Pass a set-point on; without a valid lease it is counted and dropped, since set-points are not answered."""
+        """Pass a set-point on; without a valid lease, count and drop it, since set-points are not answered."""
         lease = self._host.standing.lease
         setpoint = admit_setpoint(data, lease)
         if setpoint is None or lease is None:
@@ -95,11 +86,11 @@ class Reception(Desk):
         """Note that a client's liveliness token, or its session, has disappeared."""
         with self._lock:
             self._presence.gone(client, session)
-        if self._host.standing.sessions_of(client):  # control that is being given to it now: see _unless_gone
+        if self._host.standing.sessions_of(client):  # _unless_gone handles control that is being granted now
             self._post(lambda: self._host.client_gone(client, session))
 
     def session_gone(self, session: str) -> None:
-        """Note that a session has ended, even if other sessions hold liveliness tokens of the same clients."""
+        """Note that a session has ended, even if other sessions hold tokens of the same clients."""
         with self._lock:
             clients = self._presence.clients_of(session)
         for client in clients:
@@ -128,7 +119,7 @@ class Reception(Desk):
             return error.reply
 
     def _unless_gone(self, client: str, answer: Answer) -> Answer:
-        """Answer a command that gives a client control or the clock, and revoke it if the client has disconnected."""
+        """Answer a command that grants a client control or the clock, and revoke it if the client has disconnected."""
 
         def answered(reply: Reply) -> None:
             for session in self._host.standing.sessions_of(client):

@@ -1,4 +1,4 @@
-"""One robot of a server: its controller, and everything that connects it to clock, network and file."""
+"""One robot of a server: its controller, and its connections to clock, network and file."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -37,52 +37,41 @@ if TYPE_CHECKING:
     from tvist_server.recording.recorder import Recorder
 
 LOCAL = "127.0.0.1"
-"""Address of this machine, from which commands of this process come."""
+"""Address of this machine, from which this process's own commands come."""
 
 
 class ServedRobot:
-    """A robot with everything of its own; robots share only the process, the tick thread and the network.
+    """A robot with its own resources; robots share only the process, the tick thread and the network.
 
-    Args:
-        setup: Initial setup.
-        record: File to record into.
-        dump: Folder for the last second before a failure.
-        observe: Makes a further sink of the controller's messages.
-        programs: Folder with programs that clients load by their names.
-        hosts: Machines that programs may connect to, besides the one that sent them [none].
-        keep: Number of ticks that the recording keeps at least; None keeps all.
-
-    Raises:
-        ValueError: The setup is invalid.
-        RecordingError: The recording cannot be written.
+    Raise ValueError if the setup is invalid, RecorderError if the recording cannot be written.
     """
 
     def __init__(
         self,
         setup: Setup,
-        record: Path | None,
-        dump: Path,
-        observe: Callable[[Controller], Sink] | None = None,
-        programs: ProgramFolder | None = None,
-        hosts: AllowedHosts | None = None,
-        keep: int | None = None,
+        record: Path | None,  # file to record into
+        dump: Path,  # folder for the last second before a failure
+        observe: Callable[[Controller], Sink] | None = None,  # makes a further sink
+        programs: ProgramFolder | None = None,  # programs that clients load by name
+        hosts: AllowedHosts | None = None,  # besides the sender of a program
+        keep: int | None = None,  # least number of ticks in the recording; None: all
     ) -> None:
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
         self._realtime = not lockstep
         self._waited_us = 0.0
         plant = setup.made_plant()
-        setup = setup.standing(plant)  # with the limits of a robot that has its own
+        setup = setup.standing(plant)  # adopts the limits of a real robot
         # When a client advances time, nothing is late, and plans are made when they are needed.
         self._plans = None if lockstep else PlansOfPrograms(Planner(setup))
         self.controller = Controller(setup, plant, None if self._plans is None else self._plans.order)
         self.setup = setup = self.controller.setup
         if self._realtime:
             warm_up()
-        info_of(self.controller)  # computes the slowest part of the description once, before the first tick
+        info_of(self.controller)  # caches the slowest part of the description before the first tick
         self.recorder: Recorder | None = None
         if record is not None:
-            from tvist_server.recording import recorder  # with the library that writes
+            from tvist_server.recording import recorder  # imports the MCAP library
 
             self.recorder = recorder.Recorder(
                 record,
@@ -95,33 +84,32 @@ class ServedRobot:
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins())
         self.publisher = Publisher()
-        """Passes its messages to the gateways."""
+        """Passes the robot's messages to the gateways."""
         self._looked_at = self.controller.report.tick
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
-        """Gateway for the sockets of programs."""
         self._studies = Studies() if self._realtime and setup.adapt else None
         if self._studies is None:
             experience = experience_of(setup)
         else:
-            planner = Planner(setup)  # used by the studies' thread alone
+            planner = Planner(setup)  # used only by the studies' thread
             experience = experience_of(setup, self._studies.later, planner.for_lesson)
         self._host = Host(
             self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience,
             survives=True,
         )  # fmt: skip
-        plant = self.controller.cycle.plant  # also where the setup has none
+        plant = self.controller.cycle.plant  # the default plant if the setup has none
         knows = plant.truth() is not None
         self.want_truth = self.publisher.want_truth if knows and not setup.truth else None
-        """To be told whether a client on this machine wants the truth; None if it is published anyway, or unknown."""
+        """Takes whether a local client wants `truth`; None if it is always published or unknown."""
         self.driven = Mailbox(
             self._host,
             self.sockets.patience,
             plant.wait if plant.can(Plant.wait) else None,
             plant.interval() if isinstance(plant, RealArm) and (plant.watched or plant.supervised) else None,
         )
-        """The robot as seen by the clock."""
+        """The robot as the clock sees it."""
         self._plan_ahead = (
             None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post, self._complete)
         )
@@ -132,7 +120,7 @@ class ServedRobot:
             carry_out,
             None if programs is None else programs.listed,
         )
-        """Desk that gateways pass messages to."""
+        """Desk to which gateways pass messages."""
         self._gateways: Sequence[Gateway] = ()
 
     def open(self, gateways: Sequence[Gateway]) -> None:
@@ -141,16 +129,13 @@ class ServedRobot:
         self.publisher.open(gateways)
 
     def request(self, command: Command) -> Reply:
-        """Carry out a command of this process, in the controller's thread or before the clock starts.
-
-        What is done before the first tick does not depend on how fast this machine is.
-        """
+        """Carry out a command of this process, in the controller's thread or, reproducibly, before the first tick."""
         return self._host.request(encode(command), LOCAL)
 
     def repeat(self) -> None:
         """Publish the state again for new clients, unless time has passed; in the controller's thread."""
         report = self.controller.report
-        # A robot that is stepped publishes newer ones by itself, and to its clients an old one would look like a tick.
+        # A robot that is stepped publishes newer states; its clients would mistake an old one for a tick.
         if report.tick == self._looked_at:
             self.publisher.repeat(report, self.controller.io())
         self._looked_at = report.tick
@@ -170,8 +155,6 @@ class ServedRobot:
 
         self.driven.post(carry_out, client)
 
-    # ------------------------------------------------------------------ figures and shutdown
-
     @property
     def newest(self) -> State | None:
         """State of the last tick, from any thread; None before the first tick."""
@@ -179,36 +162,36 @@ class ServedRobot:
         return report.state if report.tick > 0 else None
 
     def start(self) -> None:
-        """Start to plan; to be called before the clock starts."""
+        """Start planning; call this before the clock starts."""
         if self._plan_ahead is not None:
             self._plan_ahead.start()
 
     async def let_in(self) -> None:
-        """Let clients in; the robot ticks already."""
+        """Admit clients; the robot ticks already."""
         for gateway in self._gateways:
             await gateway.open()
 
     async def let_out(self) -> None:
-        """Let no more clients in, and disconnect those that would stay."""
+        """Admit no more clients, and disconnect the present ones."""
         for gateway in self._gateways:
             await gateway.shut()
 
     def cancel_plans(self) -> None:
-        """Begin no further plan, since the robot is about to end."""
+        """Refuse further plans before shutdown."""
         if self._plan_ahead is not None:
             self._plan_ahead.end()
 
     def stop_planning(self) -> None:
-        """Wait for the current plan to finish; to be called before the clock ends."""
+        """Wait for the current plan; call this before the clock ends."""
         if self._plan_ahead is not None:
             self._plan_ahead.close()
 
     def leave_arm(self) -> None:
-        """Leave an arm that has power without it; the controller's thread has ended."""
+        """Release an arm that has power; the controller's thread has ended."""
         self._host.leave_arm()
 
     def close(self) -> None:
-        """Close its gateways; the controller's thread has ended."""
+        """Close the gateways; the controller's thread has ended."""
         if self._plans is not None:
             self._plans.close()
         if self._studies is not None:
@@ -222,17 +205,18 @@ class ServedRobot:
         return self._host.failure
 
     def tell_telemetry(self, clock: Clock) -> None:
-        """Publish the server's own figures on this robot; called in the controller's thread."""
+        """Publish the server's own figures about this robot, in the controller's thread."""
         punctuality = clock.punctuality(self.driven)
 
         def tell() -> None:
-            # Use the current io, not the last published one: a program may have been played since, before the next
-            # tick.
-            if self.driven.pace is not None:  # while it is silent, new clients still get a state
+            # The present io, not the last published one: a program may have been played since.
+            if self.driven.pace is not None:  # new clients of a silent arm still get a state
                 self.repeat()
             io = self.controller.io()
             self.publisher.telemetry(self._telemetry(punctuality), io)
-            if self.recorder is not None and self._realtime:  # recordings of equal runs in lockstep are equal
+            if (
+                self.recorder is not None and self._realtime
+            ):  # recordings of equal runs in lockstep must be equal
                 self.recorder.io(io)
 
         self.driven.post(tell)
@@ -275,12 +259,11 @@ class ServedRobot:
             self.recorder.close()
 
     def discard_recording(self) -> None:
-        """Remove a recording that never began: the empty file would only block the next attempt."""
+        """Remove a recording that never started, because its file would block the next attempt."""
         if self.recorder is not None:
             self.recorder.discard()
 
     def _hear(self, news: SocketNews) -> None:
-        """Tell the controller what happened to a socket of a program."""
 
         def hear() -> None:
             self.sockets.note(news)
@@ -289,12 +272,7 @@ class ServedRobot:
         self.driven.post(hear)
 
     def ask_gripper(self, request: bytes, answer: Callable[[bytes], None]) -> None:
-        """Have a request to the cell's gripper carried out before the next tick; callable from any thread.
-
-        Args:
-            request: The request.
-            answer: Takes the answer, in the controller's thread.
-        """
+        """Carry out a request to the cell's gripper before the next tick; `answer` runs in the controller's thread."""
         self.driven.post(lambda: answer(self._host.ask_gripper(request)))
 
     def warn(self, why: str) -> None:

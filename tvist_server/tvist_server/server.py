@@ -31,58 +31,48 @@ if TYPE_CHECKING:
     from tvist_server.gateways.ur.interfaces import UrInterfaces
 
 LEAVE = 0.6
-"""Longest time that clients have at shutdown to read pending messages [s]."""
+"""Longest time for clients to read pending messages at shutdown [s]."""
 
 
 INSTANCE_BYTES = 4
-"""Random bytes that tell the tokens of this run from those of earlier ones."""
+"""Number of random bytes that distinguish the tokens of this run from earlier ones."""
 
 
 class Recording(NamedTuple):
-    """Where a recording is, and whether it is complete."""
+    """Location and completeness of a recording."""
 
     place: str
-    """Where it is, in words."""
+    """Description of its location."""
     dropped: int
-    """Number of messages that it had no room for."""
+    """Number of messages dropped because the queue was full."""
     error: str | None
-    """What has ended it early."""
+    """Reason why it ended early; None: it did not."""
 
 
 class Server:
     """One or more robots on the network.
 
-    Args:
-        config: Configuration of the robots.
-        observe: Makes an observer of a robot's messages, which then tells people about it instead of the console.
-        share: The robots that this process serves, if others serve the rest [all of them].
-        prepare: What takes long before the robots are made; it is given a function that takes its progress. Clients
-            hear meanwhile that the robots are starting.
-
-    Raises:
-        StartError: The configuration is invalid.
-        RecordingError: A recording cannot be written.
-        GatewayError: The server cannot listen on an endpoint.
+    Raise StartError for an invalid configuration, RecorderError or GatewayError if a recording or an endpoint fails.
     """
 
     def __init__(
         self,
         config: ServeConfig,
-        observe: Callable[[Controller], Sink] | None = None,
-        share: Share | None = None,
-        prepare: Prepare | None = None,
+        observe: Callable[[Controller], Sink] | None = None,  # used instead of the console
+        share: Share | None = None,  # robots of this process; None: all
+        prepare: Prepare | None = None,  # does slow work before the robots are made
     ) -> None:
         setups = config.setups()
         check_together(config, len(setups))
         several = len(setups) > 1
         share = Share(range(len(setups))) if share is None else share
         setups = [setups[number] for number in share.numbers]
-        if config.clock == "realtime":  # equal runs in lockstep are equal, tokens included
+        if config.clock == "realtime":  # equal runs in lockstep must be equal, including tokens
             setups = [replace(setup, instance=secrets.token_hex(INSTANCE_BYTES)) for setup in setups]
         self._observed = observe is not None
         self.granted: list[str] = []
-        """What the system has granted so that ticks are on time, in words; complete after `start`."""
-        # A process that others reach through the first one needs no protection of its own.
+        """What the system granted to make ticks punctual; complete after `start`."""
+        # A process that others reach through the first one needs no protection.
         listen, guard = (
             protected(config, [setup.name for setup in setups]) if share.router is None else ([], {})
         )
@@ -90,7 +80,7 @@ class Server:
         self.metrics: Metrics | None = None
         """Figures for Prometheus; None if they are not published."""
         self.left = True
-        """Whether the network is closed after `close`. Zenoh may still wait for a client that has stopped reading."""
+        """Whether the network is closed after `close`; Zenoh may still wait for a client that has stopped reading."""
         lockstep, starting = config.clock != "realtime", Starting()
         self._network = Network(
             listen,
@@ -115,30 +105,20 @@ class Server:
             self._clocks = make_clocks(config, self.robots)
             self._interfaces: list[UrInterfaces] = []
             self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
-            """Address and ports of each robot's UR interfaces; empty if they are not open."""
+            """Address and ports of each robot's UR interfaces; empty if they are closed."""
             for number, robot in zip(share.numbers, self.robots, strict=True):
                 robot.open(self._gateways(robot, config, number))
-        except BaseException:  # a signal, too
+        except BaseException:  # including a signal
             self.discard()
             raise
 
     def share_control(self, host: str, token: str) -> None:
-        """Let clients of UR's interfaces act with control that this process holds; to be called before `start`.
-
-        Args:
-            host: Address of the clients; the lease must be held in the name `ur-ADDRESS`.
-            token: Token of the lease.
-        """
+        """Let UR clients at the address `host` use a lease that this process holds as `ur-ADDRESS`; before `start`."""
         for interfaces in self._interfaces:
             interfaces.adopt(host, token)
 
     def _tell_router(self, where: str, there: bool) -> None:
-        """Tell clients, console and recording that the router was lost or is back."""
-        why = (
-            "is back"
-            if there
-            else "was lost, and with it the clients behind it; the robot looks for it again"
-        )
+        why = "is back" if there else "and to its clients was lost; the robot tries to reconnect"
         for robot in self.robots:
             robot.warn(f"the connection to the router at {where} {why}")
 
@@ -153,7 +133,7 @@ class Server:
 
     def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
         name, desk, lockstep = robot.setup.name, robot.reception, config.clock != "realtime"
-        # Who can only be on this machine may see the arm bend; what goes over a network is asked for with `truth`.
+        # Without the option `truth`, that topic is offered only if all clients are on this machine.
         local = not config.connect and all(map(is_local, config.endpoints))
         wanted = robot.want_truth if local else None
         gateways: list[Gateway] = [
@@ -171,15 +151,12 @@ class Server:
             gateways.append(ConsoleGateway(self._console, name, partial(config.command_line, name=name)))
         return gateways
 
-    # ------------------------------------------------------------------ life
-
     def start(self) -> None:
-        """Start the clocks and begin to answer clients."""
-        # The objects created so far live until the end: the garbage collector need not look at them again.
+        """Start the clocks and answer clients."""
+        # The objects created before live until the end: the garbage collector need not visit them again.
         gc.collect()
         gc.freeze()
-        # A thread that wants the interpreter's lock waits this long before it asks for it. Python's default, 5 ms, is
-        # longer than a tick, and another thread may hold the lock when the tick thread wakes up.
+        # Time after which the tick thread demands the interpreter's lock; the default, 5 ms, exceeds a tick.
         sys.setswitchinterval(1e-4)
         self._console.start()
         for robot in self.robots:
@@ -192,7 +169,7 @@ class Server:
         """Shut down in order: stop the clocks, close the recordings, deliver pending messages to clients that read."""
         for robot in self.robots:
             robot.cancel_plans()
-        # A planning thread waits for jobs of the tick thread, so it ends while that thread still runs.
+        # A planning thread waits for jobs of the tick thread, so it must end first.
         for robot in self.robots:
             robot.stop_planning()
         for clock in self._clocks:
@@ -206,7 +183,7 @@ class Server:
         gc.unfreeze()
 
     def _leave(self) -> None:
-        """Leave the arms, and close the network. A client that has stopped reading can delay this for ten seconds."""
+        """Release the arms and close the network. A client that has stopped reading can delay this for ten seconds."""
         try:
             for robot in self.robots:
                 robot.leave_arm()
@@ -220,12 +197,7 @@ class Server:
                 self._network.close()
 
     async def run(self, ready: Callable[[], None], ending: Ending) -> None:
-        """Serve until a signal comes or all robots have failed; `failure` then says why.
-
-        Args:
-            ready: Function to call once the robots tick and answer.
-            ending: The shutdown requested by signals.
-        """
+        """Serve until a signal comes or all robots have failed (see `failure`); call `ready` once the robots answer."""
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
         self.start()
@@ -249,7 +221,7 @@ class Server:
 
     @property
     def ur_clients(self) -> int:
-        """Number of connections to UR's interfaces that are open now."""
+        """Number of open connections to UR's interfaces."""
         return sum(interfaces.clients for interfaces in self._interfaces)
 
     @property
@@ -259,7 +231,7 @@ class Server:
 
     @property
     def recordings(self) -> list[Recording]:
-        """What became of the recordings, after `close`."""
+        """The recordings, after `close`."""
         recorders = [robot.recorder for robot in self.robots if robot.recorder is not None]
         return [
             Recording(
@@ -271,7 +243,7 @@ class Server:
         ]
 
     def _tell_telemetry(self) -> None:
-        # In lockstep each robot has a clock of its own.
+        # In lockstep each robot has its own clock.
         clocks = self._clocks if len(self._clocks) > 1 else self._clocks * len(self.robots)
         for robot, clock in zip(self.robots, clocks, strict=True):
             robot.tell_telemetry(clock)

@@ -1,4 +1,4 @@
-"""How the robots of one server are spread over processes, and which options that excludes."""
+"""Distribution of a server's robots over processes, and the options that it excludes."""
 
 import multiprocessing
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from tvist_server.config import ServeConfig
 from tvist_server.option_values import StartError
 
 LOCAL = "unixsock-stream/"
-"""Beginning of the endpoints that only the server's own processes may use if there are several."""
+"""Prefix of the endpoints reserved for the server's own processes."""
 
 
 @dataclass(frozen=True)
@@ -16,23 +16,19 @@ class Share:
     """The robots that one of several processes serves."""
 
     numbers: range
-    """Places of the robots in the list of all."""
+    """Indices of the robots in the list of all."""
     router: str | None = None
-    """Endpoint of the process that clients connect to; None if this process has the endpoints of the configuration."""
+    """Endpoint of the process that clients connect to; None if this process has the configured endpoints."""
 
 
 def shares(robots: int, workers: int) -> list[range]:
-    """Return the robots of each process: neighbours, and nowhere more than one more than elsewhere."""
+    """Return the robots of each process: consecutive ones, in parts whose sizes differ by at most one."""
     bounds = [worker * robots // workers for worker in range(workers + 1)]
     return [range(first, last) for first, last in pairwise(bounds)]
 
 
 def check_together(config: ServeConfig, robots: int) -> None:
-    """Check durations and folders, and what the options of network and processes ask of each other.
-
-    Raises:
-        StartError: They exclude each other, or one of them is wrong.
-    """
+    """Check durations, folders, and the options for network and processes; StartError if one is wrong or excluded."""
     config.keep_ticks()
     config.dump_folder()
     config.program_folder(config.name)

@@ -1,4 +1,4 @@
-"""The files that a robot starts with: cells, states, shapers and calibrations."""
+"""Loads the files that a robot starts with: cells, states, shapers and calibrations."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +23,7 @@ ShaperChoice = Annotated[str, Meta(min_length=1, max_length=4096)]
 
 
 def read_cell(path: str) -> Cell:
-    """Read a cell; a scene that it names is a file beside it, unless one of that name comes with the package."""
+    """Read a cell; its scene is one of the package's, or a file beside the cell."""
     cell = read_start_file(path, "cell", Cell)
     if cell.world is not None and cell.world not in scenes():
         cell = msgspec.structs.replace(cell, world=str(Path(path).parent / cell.world))
@@ -35,7 +35,7 @@ def read_cell(path: str) -> Cell:
 
 
 class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Content of a state file, the fields of `simulation.reset`; one that is None keeps the value of the `Setup`."""
+    """Content of a state file, the fields of `simulation.reset`; None keeps the value of the `Setup`."""
 
     q: Joints | None = None
     """Joint angles at which the arm rests [rad]."""
@@ -62,28 +62,19 @@ class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 def shaped_by(setup: Setup, shaper: str) -> Setup:
-    """Return a setup with another shaper, given by its name or as FILE.py:NAME, which is then loaded.
-
-    Raises:
-        OwnFileError: The file contains no such shaper, or it fails for this arm's modes.
-        UserFileError: FILE.py is not a text file, or too large.
-    """
+    """Return a setup with another shaper, by name or FILE.py:NAME; OwnFileError or UserFileError if that fails."""
     if not is_file(shaper):
         return replace(setup, shaper=shaper)
     own = load_own(shaper)
     modes = own.shaper.modes if isinstance(own.shaper, FirShaper) else 1
-    if modes <= (source := setup.source()).most:  # else it is refused where a filter is made
+    if modes <= (source := setup.source()).most:  # otherwise making the filter refuses it
         check_for(own, source.estimator(modes, setup.payload), setup.description.joints)
     known = setup.own_shapers if own in setup.own_shapers else (*setup.own_shapers, own)
     return replace(setup, shaper=own.name, own_shapers=known)
 
 
 def calibration_for(name: str | None, description: RobotDescription) -> Calibration | None:
-    """Load a calibration for a robot.
-
-    Its name is that of one that comes with the package, a file that `tvist identify` made, or `none`; None stands for
-    the one that comes with the package for this model.
-    """
+    """Load a calibration: one of the package's, a file, or `none`; None: the package's for this model."""
     model = description.robot.model
     name = calibrations.default_for(model) if name is None else name
     if name is None:

@@ -13,9 +13,9 @@ InterfaceName = Literal[
 ]  # fmt: skip
 """Name of one of UR's interfaces, or of that of a cell's gripper."""
 MOST_JOINTS = 6
-"""Joints that a package of UR's interfaces has room for; those that an arm does not have are 0 in it."""
+"""Number of joints in packages of UR's interfaces; missing joints are 0."""
 WITHOUT_JOINTS: frozenset[InterfaceName] = frozenset({"dashboard", "interpreter"})
-"""Interfaces that send no values of joints, so that an arm may have any number of them."""
+"""Interfaces without joint values, which suit any number of joints."""
 Port = Annotated[int, Meta(ge=0, le=65535)]
 
 
@@ -32,23 +32,15 @@ class UrPorts(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     secondary_read_only: Port = 30012
     realtime_read_only: Port = 30013
     gripper: Port = PORT
-    """Port of the gripper, which only a robot with a cell has."""
+    """Port of the gripper, for a robot with a cell."""
 
     def open(self) -> dict[InterfaceName, int]:
-        """Return the port of each of UR's interfaces that is open."""
+        """Return the ports of UR's open interfaces."""
         named = msgspec.structs.asdict(self)
         return {interface: port for interface, port in named.items() if port and interface != "gripper"}  # type: ignore[misc]
 
     def check_joints(self, robot: str, joints: int) -> None:
-        """Check that the open interfaces can send the values of all joints of a robot.
-
-        Args:
-            robot: Name of the robot.
-            joints: Number of its joints.
-
-        Raises:
-            ValueError: They cannot; without this check, clients would see an arm that lacks its last joints.
-        """
+        """Raise ValueError if an open interface cannot send all joints, because clients would miss the last ones."""
         limited = [interface for interface in self.open() if interface not in WITHOUT_JOINTS]
         if joints > MOST_JOINTS and limited:
             closing = " ".join(f"--ur-port {interface}=off" for interface in limited)

@@ -1,4 +1,4 @@
-"""One of several processes that serve robots: it does what the first process tells it, and ends with it."""
+"""One of several processes that serve robots: it obeys the first process and ends with it."""
 
 import asyncio
 import os
@@ -27,7 +27,7 @@ from tvist_server.spread import Share
 from tvist_server.ur_ports import InterfaceName
 
 END = 3.5
-"""Longest wait for a process to end its recordings and leave [s]; then it is killed."""
+"""Longest wait for a process to close its recordings and end [s]; then it is killed."""
 REACHED = 15.0
 """Longest wait until clients reach all robots [s]."""
 
@@ -43,7 +43,7 @@ class Refused:
 
 @dataclass(frozen=True)
 class Made:
-    """The robots exist, and nothing ticks yet."""
+    """The robots exist but do not tick yet."""
 
     ur: list[tuple[str, dict[InterfaceName, int]]]
     """Address and ports of each robot's UR interfaces."""
@@ -70,14 +70,14 @@ News = Refused | Made | Ready | Ended
 
 @dataclass(frozen=True)
 class First:
-    """The first process, from another one."""
+    """The first process, as seen from another one."""
 
     pipe: Connection
     died: Callable[[], None]
-    """Clean up what it has left behind."""
+    """Cleans up after it."""
 
     def told(self) -> Any:
-        """Wait for its word; False if it has died, or wants no robots."""
+        """Wait for its message; False if it has died or wants no robots."""
         try:
             return self.pipe.recv()
         except (EOFError, OSError):
@@ -95,10 +95,9 @@ class First:
 def meet_clients(
     config: ServeConfig, names: Sequence[str], listen: Sequence[str], guard: Mapping[str, Any], first: First
 ) -> None:
-    """Be the process that clients connect to: a router for the others, which answers for robots that are starting.
+    """Run the process that clients connect to: a router, which also answers for robots that are starting.
 
-    The conversation: it says `Made`; it is told progress; told that all robots are ready, it says `Ready` once it
-    reaches them; told that it is over, it says `Ended`.
+    It reports `Made`, receives progress, reports `Ready` once it reaches all robots, and `Ended` when told to end.
     """
     place, starting = config.namespace or "", Starting()
     try:
@@ -133,7 +132,7 @@ def meet_clients(
         if word is not True:
             starting.note(*word)
             continue
-        if not config.connect:  # else clients reach them through another router
+        if not config.connect:  # otherwise clients reach them through another router
             reached.wait(REACHED)
         network.forget()
         first.say(Ready())
@@ -144,14 +143,13 @@ def meet_clients(
 
 
 def work(config: ServeConfig, share: Share, first: First) -> None:
-    """Serve robots until the first process says that it is over, or has died.
+    """Serve robots until the first process ends it or dies.
 
-    The conversation: told to begin, this process makes its robots and says `Made`; told to go on, it starts them and
-    says `Ready`; told to end, it says `Ended`. Signals are the first process's to hear: a terminal sends them to all
-    processes.
+    Told to begin, it makes its robots and reports `Made`; told to go on, it starts them and reports `Ready`; told to
+    end, it reports `Ended`. It ignores signals, which a terminal sends to all processes: the first one handles them.
     """
     ending = Ending()
-    ending.close()  # hears no signals
+    ending.close()  # ignores signals
     if not first.told():
         return
     try:
@@ -170,7 +168,7 @@ def work(config: ServeConfig, share: Share, first: First) -> None:
 
     def end() -> None:
         first.told()
-        limit_shutdown()  # whoever would kill it by then may have died
+        limit_shutdown()  # the process that would kill this one may have died
         ending.request()
 
     asyncio.run(server.run(ready, ending))

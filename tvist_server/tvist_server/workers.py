@@ -1,8 +1,7 @@
 """Several processes that serve robots behind one endpoint.
 
-Clients connect to a process without robots. It is a router, to which the others connect over a socket that nobody else
-can open. Each robot ticks in one of the others, as it would in a process of its own. The first process has no network,
-since a process with threads should not fork.
+Clients connect to a process without robots, a router to which the others connect over a private socket. The
+first process has no network, because a process with threads should not fork.
 """
 
 import contextlib
@@ -42,24 +41,17 @@ class WorkersError(Exception):
 
 @dataclass
 class _Worker:
-    """One of the other processes, as the first one sees it."""
-
     who: str
-    """Which one it is, with its robots, in words."""
+    """Description of the process and its robots."""
     process: multiprocessing.process.BaseProcess
     pipe: Connection
     told: Ended | None = None
-    """What it said at its end."""
 
 
 class Workers:
     """The first process: it starts the others, and ends with them.
 
-    Raises:
-        StartError: The configuration is invalid.
-        UserFileError: A file that is named has the wrong kind of content.
-        GatewayError: The server cannot listen on an endpoint.
-        WorkersError: A process cannot serve its robots.
+    May raise StartError, UserFileError or GatewayError, or WorkersError if a process cannot serve its robots.
     """
 
     def __init__(self, config: ServeConfig, prepare: Prepare | None = None) -> None:
@@ -69,9 +61,8 @@ class Workers:
         self._listen, self._guard = protected(config, self._names)
         self._config = config
         self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
-        """Address and ports of each robot's UR interfaces; empty if they are not open."""
+        """Address and ports of each robot's UR interfaces; empty if they are closed."""
         self.recordings: list[Recording] = []
-        """What became of the recordings, after `run`."""
         self._folder = OwnFolder()
         self._front: list[_Worker] = []
         """The process that clients connect to."""
@@ -89,16 +80,12 @@ class Workers:
                 worker.pipe.send(True)
             for worker in self._workers:
                 self.ur += self._made(worker).ur
-        except BaseException:  # a signal, too
+        except BaseException:  # including a signal
             self.close()
             raise
 
     def run(self, ready: Callable[[], None], ending: Ending) -> None:
-        """Serve until a signal comes.
-
-        Raises:
-            WorkersError: A process has died or a robot has stopped; all others were ended in order.
-        """
+        """Serve until a signal comes; WorkersError if a process or robot stops, after the others have ended."""
         heard, wake = multiprocessing.Pipe(duplex=False)
         ending.hear(lambda: wake.send(None))
         why: str | None = None
@@ -125,10 +112,10 @@ class Workers:
             failures = self.close()
         said = [*([why] if why is not None else []), *failures]
         if said:
-            raise WorkersError("; ".join(said) + ": the other robots were stopped, too")
+            raise WorkersError("; ".join(said) + ": the other robots were also stopped")
 
     def close(self) -> list[str]:
-        """End the other processes, then the network; return what went wrong. A second call does nothing."""
+        """End the other processes, then the network; return the failures. A second call does nothing."""
         failures: list[str] = []
         for group in (self._workers, self._front):  # clients read until the robots have ended
             for worker in group:
@@ -139,8 +126,6 @@ class Workers:
         self._folder.close()
         return failures
 
-    # ------------------------------------------------------------------ start
-
     def _fork(self) -> None:
         for needed, name in (
             (self._config.ur, "gateways.ur.interfaces"),
@@ -149,7 +134,7 @@ class Workers:
             if needed:
                 import_module(f"tvist_server.{name}")
         gc.collect()
-        gc.freeze()  # what exists stays shared memory: the collector writes to no object that it does not look at
+        gc.freeze()  # keeps memory shared: the collector writes to every object that it visits
         parts = shares(len(self.setups), self._config.workers)
         pipes = [multiprocessing.Pipe() for _ in parts]
         router = None if self._config.connect else self._inside
@@ -168,7 +153,7 @@ class Workers:
 
     @property
     def _inside(self) -> str:
-        """Endpoint for the processes; the folder is this user's alone."""
+        """Endpoint for the processes, in a folder that only this user can enter."""
         return f"{LOCAL}{self._folder.path / 'robots'}"
 
     def _open(self) -> _Worker:
@@ -201,7 +186,7 @@ class Workers:
         self._tell_front((done, total))
 
     def _tell_front(self, word: object) -> None:
-        with contextlib.suppress(OSError):  # it has died, which `run` tells
+        with contextlib.suppress(OSError):  # it has died, which `run` reports
             self._front[0].pipe.send(word)
 
     def _made(self, worker: _Worker) -> Made:
@@ -212,10 +197,7 @@ class Workers:
             raise StartError(news.why)
         raise WorkersError(self._why(worker, news))
 
-    # ------------------------------------------------------------------ life and end
-
     def _news(self, worker: _Worker) -> News | None:
-        """Return what a process says; None if it has died."""
         try:
             news: News = worker.pipe.recv()
         except (EOFError, OSError):
@@ -226,7 +208,6 @@ class Workers:
         return news
 
     def _why(self, worker: _Worker, news: News | None) -> str:
-        """Say why a process serves its robots no more."""
         if isinstance(news, Refused):
             return news.why
         if isinstance(news, Ended) and news.failure is not None:
@@ -241,7 +222,7 @@ class Workers:
         return f"{worker.who} {how}"
 
     def _end(self, worker: _Worker) -> list[str]:
-        """Wait for the end of a process that was told to end; return what went wrong."""
+        """Wait for the end of a process that was told to end; return failures."""
         already = worker.told is not None or not worker.process.is_alive()
         while worker.told is None and worker.pipe.poll(END) and self._news(worker) is not None:
             pass
@@ -257,7 +238,7 @@ class Workers:
 def _begin(
     do: Callable[[First], None], first: Connection, others: Sequence[Connection], folder: OwnFolder
 ) -> None:
-    """Run in a new process: close the pipes of other processes and ignore signals, then do the work."""
+    """Run in a new process: close the pipes of other processes, ignore signals, then do the work."""
     for end in others:
         end.close()
     signals = Ending()  # from now on a signal ends only the first process
@@ -266,10 +247,7 @@ def _begin(
 
 
 def _rehearse(setup: Setup) -> None:
-    """Compile and load what a robot needs, so that the other processes have it, and share its memory.
-
-    Somebody's own arm is not touched: only the process that serves it makes it.
-    """
+    """Compile and load what a robot needs, for the forked processes to share; a plug-in arm is not made here."""
     setup = replace(setup, plant=None)
     warm_up()
     planner = Planner(setup)

@@ -1,4 +1,4 @@
-"""URScript, the language of UR robots: compiled to Python and run tick by tick, with no robot, clock or thread."""
+"""URScript, the language of UR robots: compiled to Python and run tick by tick, without robot, clock or thread."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from tvist_urscript.compiler import compile_script
 
 _PLACES = {"check": "tvist_urscript.checker", "compile_script": "tvist_urscript.compiler"}
-"""Module of what is imported when it is first used: a robot starts without what compiles programs."""
+"""Modules of names that are imported on first use, so that a robot starts without loading the compiler."""
 
 
 def __getattr__(name: str) -> object:

@@ -1,4 +1,4 @@
-"""Print what is wrong with a script: `python -m tvist_urscript FILE`."""
+"""Print the errors of a script: `python -m tvist_urscript FILE`."""
 
 import re
 import sys
@@ -13,13 +13,13 @@ CALL = re.compile(r"(?P<name>\w+)\s*\(")
 ARRAYS = {read: Signature(parameters("n")) for read, _ in BUILT_IN_ARRAYS.values()} | {
     write: Signature(parameters("n", "value")) for _, write in BUILT_IN_ARRAYS.values() if write
 }
-"""The robot's functions that `digital_out[0]` and the like call."""
+"""Robot functions that `digital_out[0]` and similar expressions call."""
 
 
 def main(arguments: list[str]) -> int:
-    """Return the exit code: 0 if the script can run, 1 if it has errors, 2 without a file.
+    """Return the exit code: 0 if the script can run, 1 if it has errors, 2 without a readable file.
 
-    A function that neither the script nor the language has is taken to be the robot's.
+    A function that neither the script nor the language defines is assumed to be the robot's.
     """
     if len(arguments) != 1 or arguments[0].startswith("-"):
         print("usage: python -m tvist_urscript FILE", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""What the operators compute: numbers, and lists of them as vectors and matrices."""
+"""The operators, for numbers and for lists of them as vectors and matrices."""
 
 import math
 import operator
@@ -23,11 +23,11 @@ from tvist_urscript.values import (
 )
 
 MOST_PRODUCTS = 2744
-"""Most multiplications in one product of matrices: two of 14 by 14."""
+"""Largest number of multiplications in a product of matrices: two of 14 by 14."""
 
 Number: TypeAlias = int | float
 Work: TypeAlias = Callable[[int], None]
-"""Function that is told how many elements are about to be computed."""
+"""Called with the number of elements that are about to be computed."""
 
 
 def total(a: Number, b: Number) -> Number:
@@ -55,7 +55,7 @@ def quotient(a: Number, b: Number) -> Number:
 
 
 def combine(of: Callable[[Any, Any], Value], a: Value, b: Value, done: str, work: Work) -> Value:
-    """Apply a function to numbers, to the elements of lists of equal length, or of a list and a number."""
+    """Apply a function to two numbers, two lists of equal length, or a list and a number."""
     if type(a) is Array and type(b) is Array:
         return _elementwise(of, a, b, done, work)
     if type(a) in NUMBERS:
@@ -88,7 +88,7 @@ def _elementwise(of: Callable[[Any, Any], Value], a: Array, b: Array, done: str,
 
 
 def multiply(a: Value, b: Value, work: Work) -> Value:
-    """Return a * b of numbers, a number and a list, equally long lists by elements, matrices and vectors."""
+    """Return a * b of numbers, a number and a list, lists of equal length (elementwise), matrices and vectors."""
     if type(a) in NUMBERS:
         if type(b) in NUMBERS:
             return _product(a, b)  # type: ignore[arg-type]
@@ -113,7 +113,7 @@ def rest(a: Number, b: Number) -> Number:
 
 
 def negate(a: Value, work: Work) -> Value:
-    """Return -a of a number, or of a list by elements."""
+    """Return -a of a number or, elementwise, of a list."""
     if type(a) is float:
         return -a
     if type(a) is int:
@@ -126,7 +126,7 @@ def negate(a: Value, work: Work) -> Value:
 def _scaled(
     a: Array, by: Number, of: Callable[[Any, Any], Value], work: Work, *, turned: bool = False
 ) -> Array:
-    """Compute `of(x, by)` of each element x of a list and of the lists inside it; `of(by, x)` if it is turned."""
+    """Compute `of(x, by)`, or `of(by, x)` if turned, for each element x of a list and of lists in it."""
     work(len(a.items))
     if of in _PLAIN and only_numbers(a) and not (of is quotient and (turned or by == 0)):
         plain, numbers = _PLAIN[of], a.items
@@ -168,7 +168,7 @@ def _whole(values: Iterable[Any]) -> Array:
 
 
 def _dot(a: list[Number], b: tuple[Number, ...]) -> Number:
-    # Not sum(), which rounds otherwise in later Pythons.
+    # Not sum(), which rounds differently in later Pythons.
     dot = reduce(operator.add, map(operator.mul, a, b))
     return whole(dot) if type(dot) is int else dot
 
@@ -180,7 +180,7 @@ def _numbers(a: Array) -> list[Number]:
 
 
 def matrix(a: Array) -> list[list[Number]] | None:
-    """Return the rows of a list of lists of numbers, None for a list without lists."""
+    """Return the rows of a list of lists of numbers; None for a list without lists."""
     if LISTS.isdisjoint(map(type, a.items)):
         return None
     rows: list[list[Number]] = []
@@ -194,4 +194,4 @@ def matrix(a: Array) -> list[list[Number]] | None:
 _PLAIN: dict[Any, Callable[[Any, Any], Any]] = {
     total: operator.add, difference: operator.sub, _product: operator.mul, quotient: operator.truediv
 }  # fmt: skip
-"""What these do with numbers, but for integers beyond 32 bits."""
+"""Python's operators for these functions, except for integers beyond 32 bits."""

@@ -1,4 +1,4 @@
-"""The tree of a script, built bottom-up while it is parsed: no recursion, whatever a text nests."""
+"""Build a script's tree bottom-up while it is parsed, without recursion, so that nesting cannot overflow the stack."""
 
 import re
 from typing import Any, Literal, TypeVar
@@ -10,11 +10,11 @@ from tvist_urscript.errors import no_program
 from tvist_urscript.values import HIGHEST, LONGEST_TEXT, to_bytes, whole
 
 DEEPEST = 100
-"""Most levels of expressions inside each other; a block counts as BLOCK of them."""
+"""Most levels of nested expressions; a block counts as BLOCK levels."""
 BLOCK = 4
 
 _LABEL = re.compile(r'\$[ \t]*(\d+)[ \t]*"(.*?)"(?:[ \t]+"\w+")*[ \t\r]*(?:#.*)?', re.ASCII)
-"""A label: its number, its name, and words such as "noBreak" that mean nothing here. A name may contain quotes."""
+"""A label: number, name (which may contain quotes), and words such as "noBreak", which are ignored."""
 
 Children = list[Any]
 T = TypeVar("T", bound=tree.Node)

@@ -1,4 +1,4 @@
-"""What is wrong with a script, without running it."""
+"""Find errors in a script without running it."""
 
 import re
 from collections.abc import Iterator
@@ -12,16 +12,16 @@ from tvist_urscript.signatures import Signatures
 
 
 def check(text: str, signatures: Signatures) -> list[ScriptError]:
-    """Return the errors of a script in the order of the text, empty where it can run.
+    """Return the errors of a script in the order of the text; an empty list if it can run.
 
-    Of a text that is no program it is one, the first token that does not fit; of a program all unknown names and all
-    calls that do not fit their functions.
+    If the text is not a program, this is one error, at the first token that does not fit. Otherwise it is all
+    unknown names, and all calls that do not fit their functions.
     """
     return translate(text, signatures)[1]
 
 
 def unportable(text: str) -> list[ScriptError]:
-    """Return what runs here and not on a robot of UR's, of a script that `check` has no errors of."""
+    """Return what runs here but not on a real UR robot, for a script without errors."""
     program, *inner = scopes(program_of(text))
     assigned = [node for node in _nodes(program.function) if isinstance(node, tree.Assign)]
     own = program.globals - {node.target.name for node in assigned if node.qualifier == "global"}
@@ -38,7 +38,7 @@ def unportable(text: str) -> list[ScriptError]:
 
 
 def _nodes(*roots: object) -> Iterator[tree.Node]:
-    """Yield nodes and all below them, in the order of the text."""
+    """Yield nodes and all nodes below them, in the order of the text."""
     waiting = list(reversed(roots))
     while waiting:
         one = waiting.pop()
@@ -50,7 +50,7 @@ def _nodes(*roots: object) -> Iterator[tree.Node]:
 
 
 def _framed_short(text: str) -> list[ScriptError]:
-    """Return the first `end` in column 1 that does not end what has begun: a robot takes the program to end there."""
+    """Return the first `end` in column 1 that ends an inner block: a real robot takes the program to end there."""
     from tvist_urscript.parsing import parse
 
     lines, begun = text.split("\n"), 0

@@ -1,4 +1,4 @@
-"""From the tree of a script to Python's code: one generator function for each function of the script."""
+"""Compile a script's tree to Python code: one generator function for each function of the script."""
 
 import ast
 import re
@@ -20,11 +20,11 @@ def compile_script(text: str, signatures: Signatures, after: Script | None = Non
     Args:
         text: The script as it was sent.
         signatures: The built-in functions of the controller; the language's own are known.
-        after: Program, or the last statements added to it, that the text is added to, see `Machine.add`. Then it may
-            have statements and functions, and it can use all that was defined before.
+        after: Program, or the last statements added to it, to which the text is added (see `Machine.add`).
+            The text may then consist of statements and functions, and use everything defined before.
 
     Raises:
-        ScriptError: The first thing that is wrong in the order of the text.
+        ScriptError: The first error in the order of the text.
     """
     script, errors = translate(text, signatures, after)
     if errors:
@@ -36,7 +36,7 @@ def compile_script(text: str, signatures: Signatures, after: Script | None = Non
 def translate(
     text: str, signatures: Signatures, after: Script | None = None
 ) -> tuple[Script | None, list[ScriptError]]:
-    """Compile a program and return it, or what is wrong with it in the order of the text."""
+    """Compile a program; return it, or None and its errors in the order of the text."""
     from tvist_urscript.library import PURE
 
     known = {**{name: entry[0] for name, entry in PURE.items()}, **signatures}
@@ -77,7 +77,7 @@ def translate(
 
 
 def program_of(text: str) -> tree.Function:
-    """Return a script's tree: its `def` or `sec`, or its statements as one."""
+    """Return a script's tree: its `def` or `sec`, or its statements as one function."""
     statements = _parsed(text)
     head = statements[0]
     if not isinstance(head, tree.Function) or not (
@@ -93,7 +93,7 @@ def program_of(text: str) -> tree.Function:
 
 
 def _is_called_alone(head: tree.Function, statements: list[tree.Statement]) -> bool:
-    """Whether all that follows a `def` is one call of it, as post-processors write a program for a socket."""
+    """Whether a `def` is followed only by a call of it, as post-processors write a program for a socket."""
     match statements[1:]:
         case [tree.Evaluate(value=tree.Call(name=name, arguments=[], runs=False))]:
             return head.kind == "def" and name == head.name and not head.parameters
@@ -102,7 +102,6 @@ def _is_called_alone(head: tree.Function, statements: list[tree.Statement]) -> b
 
 
 def _statements(text: str) -> tree.Function:
-    """Statements and functions that are added to a program."""
     statements = _parsed(text, several=True)
     for statement in statements:
         if isinstance(statement, tree.Function) and statement.kind == "sec":
@@ -111,7 +110,7 @@ def _statements(text: str) -> tree.Function:
 
 
 def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
-    from tvist_urscript.parsing import parse  # with the library that parses, which no start waits for
+    from tvist_urscript.parsing import parse  # loads the parser library, so not at the start
 
     statements = parse(text, several=several)
     if not statements:
@@ -120,7 +119,7 @@ def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
 
 
 def _together(text: str, statements: list[tree.Statement]) -> tree.Function:
-    """Statements as a program, which the last function among them names, or else the first word."""
+    """Make a program of statements, named after the last function among them, or else after the first word."""
     head = statements[0]
     names = [statement.name for statement in statements if isinstance(statement, tree.Function)]
     word = re.search(r"^[ \t]*([A-Za-z_]\w*)", text, re.MULTILINE)
@@ -129,7 +128,7 @@ def _together(text: str, statements: list[tree.Statement]) -> tree.Function:
 
 
 def _last_lines(body: list[tree.Statement]) -> Iterator[int]:
-    """Lines after which a function does nothing but end."""
+    """Yield the lines after which a function does nothing but end."""
     for statement in reversed(body):
         match statement:
             case tree.Function() | tree.Label() | tree.Return(value=None) | tree.Word(word="halt" | "pass"):
@@ -144,6 +143,6 @@ def _last_lines(body: list[tree.Statement]) -> Iterator[int]:
 
 
 def _code(made: ast.FunctionDef) -> CodeType:
-    """Compile one function alone: what holds the interpreter's lock is no longer than that."""
+    """Compile one function alone, so that the interpreter's lock is held only briefly."""
     module = compile(ast.Module([made], []), FILE, "exec", dont_inherit=True, optimize=0)
     return next(constant for constant in module.co_consts if isinstance(constant, CodeType))

@@ -1,8 +1,8 @@
-"""What a call of a function takes from the budget of its program.
+"""Costs of function calls, which are taken from a program's budget.
 
-The unit is the time of an operator on two numbers, 0.15 µs where the weights were measured: there a budget of 2000
-takes 0.3 ms, or 0.5 ms if all of it works on lists. The weights are times of calls in this unit, rounded up. They never
-change with the machine: equal programs get equally far in a tick everywhere.
+The unit is the time of an operator on two numbers, 0.15 µs where the weights were measured: a budget of 2000
+takes 0.3 ms there, or 0.5 ms if all of it works on lists. Costs are times of calls in this unit, rounded up.
+They do not depend on the machine, so equal programs get equally far in a tick everywhere.
 """
 
 from collections.abc import Callable
@@ -12,10 +12,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def costs(evaluations: int) -> Callable[[F], F]:
-    """Return a decorator for a function whose calls take many times as long as an operator.
+    """Return a decorator for a function whose call takes many times as long as an operator.
 
     Args:
-        evaluations: What a call takes from the budget, in proportion to its time; without the decorator it takes one.
+        evaluations: Cost of a call, in proportion to its time; without the decorator it is 1.
     """
 
     def note(function: F) -> F:

@@ -1,4 +1,4 @@
-"""What is wrong with a script, and where."""
+"""Errors of a script, with their positions."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ class ScriptError(Exception):
         line: Line of the script as it was given, from 1.
         column: Column of the first character of the token at fault, from 1; a tab counts as one.
         text: The error in the controller's words, such as `compile_error_name_not_found:x:`.
-        internal: What a built-in function has raised if it does not blame the script, for a log; else None.
+        internal: For a log, the exception of a built-in function if the script is not to blame; else None.
     """
 
     def __init__(self, line: int, column: int, text: str, internal: Exception | None = None) -> None:
@@ -25,22 +25,22 @@ class ScriptError(Exception):
 
 
 class Fault(Exception):  # noqa: N818  it becomes a ScriptError where it is called
-    """A function cannot do what a script asks of it.
+    """A function cannot do what a script requests.
 
-    Built-in functions raise it with a text for people; the machine adds the position of the call.
+    Built-in functions raise it with a readable text; the machine adds the position of the call.
     """
 
 
 def name_not_found(name: str) -> str:
-    """Return the words by which clients recognize an unknown name."""
+    """Return the text by which clients recognize an unknown name."""
     return f"compile_error_name_not_found:{name}:"
 
 
 def syntax_error(line: int, why: str) -> str:
-    """Return the words by which clients recognize a text that is no program."""
+    """Return the text by which clients recognize a syntax error."""
     return f"syntax_error_on_line:{line}:{why}:"
 
 
 def no_program(at: Any, why: str) -> ScriptError:
-    """Return the error of a text that is no program, at a token or a node of its tree."""
+    """Return a syntax error at a token or a node of the tree."""
     return ScriptError(at.line, at.column, syntax_error(at.line, why))

@@ -1,4 +1,7 @@
-"""Expressions of a script as Python's: arithmetic by functions that check the operands, comparisons by Python's own."""
+"""Translate expressions of a script to Python's.
+
+Arithmetic becomes calls of functions that check the operands; comparisons become Python's own.
+"""
 
 import ast
 from collections.abc import Callable, Sequence
@@ -11,9 +14,9 @@ from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
 
 MOST_OPERATIONS = 1000
-"""Most evaluations of one statement, within which nothing can interrupt it."""
+"""Most evaluations of one statement, since nothing can interrupt it."""
 START = 20
-"""Evaluations that the start of a thread costs, which limits the threads that start in a tick."""
+"""Cost of starting a thread, which limits how many threads start in a tick."""
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
 ORDER: dict[str, type[ast.cmpop]] = {"<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE}
@@ -26,28 +29,20 @@ Report = Callable[[tree.Node, str], None]
 
 
 class Expressions:
-    """Translates expressions.
-
-    Attributes:
-        scope: The names that the present function can use.
-        cost: Evaluations of what has been translated since it was set to 0.
-        works: Whether the code translated since it was reset may work on lists, which takes more than `cost`.
-        used: Built-in functions that the script calls.
-        constants: Lists and default values, by the names that compiled functions have for them.
-    """
+    """Translates expressions."""
 
     def __init__(self, signatures: Signatures, report: Report) -> None:
         self.signatures = signatures
         self.report = report
-        self.scope: Scope
-        self.cost = 0
-        self.works = False
-        self.used: set[str] = set()
-        self.constants: dict[str, object] = {}
+        self.scope: Scope  # the names that the present function can use
+        self.cost = 0  # evaluations of everything translated since it was reset
+        self.works = False  # whether code translated since the reset may work on lists, which costs more
+        self.used: set[str] = set()  # built-in functions that the script calls
+        self.constants: dict[str, object] = {}  # lists and default values, by their names in compiled code
         self.globals: set[str] = set()
 
     def value(self, node: tree.Expression) -> ast.expr:  # noqa: C901, PLR0911  one for each kind of node
-        """Translate an expression for its value."""
+        """Translate an expression whose value is needed."""
         match node:
             case tree.Constant():
                 return Position.of(node).constant(node.value)
@@ -76,7 +71,7 @@ class Expressions:
                 return at.invert(at.invert(self.test(node)))
 
     def test(self, node: tree.Expression) -> ast.expr:
-        """Translate an expression of which only the truth matters."""
+        """Translate an expression of which only the truth is needed."""
         match node:
             case tree.Logic(operator="xor"):
                 at = Position.of(node)
@@ -122,7 +117,7 @@ class Expressions:
         return at.call(function, left, right)
 
     def listing(self, node: tree.Listing) -> ast.expr:
-        """Translate a list; one of constants is made once."""
+        """Translate a list; a list of constants is created only once."""
         at = Position.of(node)
         if len(node.items) > LONGEST:
             self.report(node, f"a list of {len(node.items)} elements is too long: the limit is {LONGEST}")
@@ -146,7 +141,7 @@ class Expressions:
         return name
 
     def index(self, node: tree.Index) -> ast.expr:
-        """Translate an element, or a pose: `p[...]` with six expressions is one."""
+        """Translate an element, or a pose: `p[...]` with six expressions."""
         value, indices = node.value, node.indices
         at = Position(*first(indices[0]))
         is_p = isinstance(value, tree.Name) and value.name == "p"
@@ -176,7 +171,7 @@ class Expressions:
         return at.call("posed", at.tuple([self.value(item) for item in node.indices]))
 
     def built_in_array(self, node: tree.Expression) -> str | None:
-        """Return the name of the controller's array that an expression refers to; None if it is another expression."""
+        """Return the name of the controller's array that an expression refers to; None for other expressions."""
         if (
             isinstance(node, tree.Name)
             and node.name in BUILT_IN_ARRAYS
@@ -194,7 +189,7 @@ class Expressions:
         return self.call(tree.Call(node.line, node.column, name, given), built_in=True)
 
     def call(self, node: tree.Call, *, built_in: bool = False) -> ast.expr:
-        """Translate a call, of a function of the script before one of the controller."""
+        """Translate a call; functions of the script hide those of the controller."""
         at = Position.of(node)
         self.cost += 1
         scope = None if built_in else self.scope.find(node.name)
@@ -226,9 +221,9 @@ class Expressions:
         return at.waiting(call) if signature.blocks else call
 
     def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
-        """Put the arguments of a call into the order of the parameters; they are computed in the order of the text.
+        """Put a call's arguments into the order of the parameters, but compute them in the order of the text.
 
-        A parameter is its name, and the name of its default where it has one.
+        A parameter is a tuple of its name and the name of its default, or None if it has none.
         """
         at = Position.of(node)
         given: dict[str, ast.expr] = {}
@@ -300,7 +295,7 @@ class Expressions:
         return at.call("member", self.value(node.value), at.constant(node.name))
 
     def method(self, node: tree.Method) -> ast.expr:
-        """Translate `a.name(arguments)`, of which only the controller knows what it is."""
+        """Translate `a.name(arguments)`, which only the controller can evaluate."""
         at = Position.of(node)
         self.cost += 1 + len(node.arguments)
         value = self.value(node.value)
@@ -324,7 +319,7 @@ def first(node: tree.Expression | tree.Step) -> tuple[int, int]:
 
 
 def _arranged(at: Position, given: dict[str, ast.expr], names: list[str]) -> list[ast.expr]:
-    """Return the arguments of a call, which Python computes in the order in which they are given."""
+    """Return the arguments in the order of the parameters; Python computes them in the given order."""
     if list(given) == names or all(isinstance(value, ast.Constant | ast.Name) for value in given.values()):
         return [given[name] for name in names]
     places = {name: place for place, name in enumerate(given)}

@@ -1,4 +1,4 @@
-"""What a Python exception in compiled code means to the author of the script."""
+"""Translate Python exceptions in compiled code to errors of the script."""
 
 import re
 from itertools import islice
@@ -9,10 +9,10 @@ from typing import Any
 from tvist_urscript.errors import Fault, ScriptError
 
 FILE = "<urscript>"
-"""The file name of compiled code, by which a traceback's frames are known."""
+"""File name of compiled code, which identifies its frames in a traceback."""
 
 LONGEST_REASON = 200
-"""Characters that an error's text takes of an exception that is no fault of the script."""
+"""Most characters of an internal exception's text in an error."""
 
 _KINDS = {
     "int": "an integer",
@@ -30,7 +30,7 @@ class TooDeep(Fault):
 
 
 def failure(error: Exception) -> ScriptError:
-    """Return the error of the script, at the position where compiled code raised it."""
+    """Return the script's error, at the position where compiled code raised it."""
     if isinstance(error, ScriptError):
         return error
     places = _places(error.__traceback__)
@@ -39,19 +39,19 @@ def failure(error: Exception) -> ScriptError:
 
 
 def position_of(steps: Any) -> tuple[int, int] | None:
-    """Return the position at which a generator waits in compiled code, None where it has not begun or has ended."""
+    """Return the position at which a generator waits in compiled code; None if it has not started or has ended."""
     frames = _frames(steps)
     return _position(frames[-1].f_code, frames[-1].f_lasti) if frames else None
 
 
 def line_of(steps: Any) -> int | None:
-    """Return the line of `position_of`, which is found a hundred times as fast."""
+    """Return the line of `position_of`, a hundred times as fast."""
     frames = _frames(steps)
     return frames[-1].f_lineno or 1 if frames else None
 
 
 def all_lines_of(steps: Any) -> set[int]:
-    """Return the lines at which a generator, and the functions that it has called, wait in compiled code."""
+    """Return the lines at which a generator and the functions that it has called wait in compiled code."""
     return {frame.f_lineno or 1 for frame in _frames(steps)}
 
 
@@ -62,7 +62,7 @@ def name_of(steps: Any) -> str | None:
 
 
 def _frames(steps: Any) -> list[FrameType]:
-    """Return the frames of compiled code in which a generator, and the functions that it has called, wait."""
+    """Return the compiled code's frames in which a generator and the functions that it has called wait."""
     found = []
     while (frame := getattr(steps, "gi_frame", None)) is not None:
         if frame.f_code.co_filename == FILE and frame.f_lasti >= 0:
@@ -87,7 +87,7 @@ def _position(code: CodeType, instruction: int) -> tuple[int, int]:
 
 
 def _is_internal(error: Exception) -> bool:
-    """Whether an exception comes out of what a built-in function has called, and is no answer to its arguments."""
+    """Whether an exception comes from code that a built-in function calls, so that the arguments are not to blame."""
     *_, frame = [frame for frame, _ in walk_tb(error.__traceback__)]
     module = frame.f_globals.get("__name__", __name__)  # compiled code belongs to no module
     return not (isinstance(error, Fault | RecursionError) or module.startswith("tvist_urscript"))

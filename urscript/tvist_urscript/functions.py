@@ -1,4 +1,4 @@
-"""Functions of a script as Python's generator functions."""
+"""Translate functions of a script to Python's generator functions."""
 
 import ast
 
@@ -8,17 +8,17 @@ from tvist_urscript.pieces import DEPTH, MISSING, Position
 from tvist_urscript.statements import Statements
 
 DEEPEST_CALLS = 200
-"""Most calls of functions inside each other."""
+"""Most nested calls of functions."""
 MOST_PARAMETERS = 255
 """Most parameters of one function."""
 MOST_FUNCTIONS = 2000
 """Most functions and threads of a program."""
 MOST_STATEMENTS = 4000
-"""Most statements of one function: while Python compiles it, no other thread of the process runs."""
+"""Most statements of one function; while Python compiles it, no other thread of the process runs."""
 MOST_NODES = 10_000
 """Most operations, names, calls and statements of one function, for the same reason."""
 PART, PART_NODES = 200, 1000
-"""Size at which a part of a long main function ends: in statements, and in what MOST_NODES counts."""
+"""Largest part of a long main function, in statements and in the nodes that MOST_NODES counts."""
 
 
 class Functions(Statements):

@@ -1,4 +1,4 @@
-"""Elements of lists, poses and matrices: reading one, and copying a list with another value for one."""
+"""Read elements of lists, poses and matrices, and copy a list with another value for one element."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ def member(value: Value, name: str) -> Value:
 def replaced(new: Value, indices: tuple[Any, ...], value: Value, work: Work) -> Array:
     """Return a copy of a list with another value for the element at these indices.
 
-    Copying four elements counts as one evaluation.
+    Copying four elements costs one evaluation.
     """
     step = indices[0]
     if type(step) is tuple:  # a member's name

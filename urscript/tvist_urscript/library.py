@@ -1,4 +1,4 @@
-"""The functions of the language that need no robot."""
+"""The built-in functions of the language, which need no robot."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -65,12 +65,12 @@ WEIGHTS = {
     "to_str": 3,
     "transpose": 1,
 }
-"""Functions that take the elements of the lists they are given from the budget, and how often each counts."""
+"""Functions whose cost depends on their list arguments: cost per element."""
 
 ANEW: Mapping[str, Callable[[], Callable[..., Any]]] = MappingProxyType({"random": numbers.generator})
-"""Functions that remember something: what makes one for each program."""
+"""Functions with state: factories that create one for each program."""
 
 PURE: Mapping[str, tuple[Signature, Callable[..., Any]]] = MappingProxyType(
     {name: (signature(function, linear=name in WEIGHTS), function) for name, function in _FUNCTIONS.items()}
 )
-"""Each with its signature. The machine adds them to the functions of the controller."""
+"""Each function with its signature; the machine adds them to the functions of the controller."""

@@ -1,4 +1,4 @@
-"""Where a statement ends: indentation and most line breaks have no meaning."""
+"""Find the ends of statements: indentation and most line breaks have no meaning."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from tvist_urscript.errors import no_program
 LONGEST_NAME = 255
 """Longest name [characters]."""
 MOST_BRACKETS = 100
-"""Most brackets inside each other."""
+"""Most nested brackets."""
 END = "_NEWLINE"
 
 _OPENS = frozenset(("LPAR", "LSQB"))
@@ -18,30 +18,30 @@ _GOES_ON = frozenset(
     ("PLUS", "MINUS", "STAR", "SLASH", "PERCENT", "COMPARISON", "EQUAL", "AND", "OR", "XOR", "NOT",
      "COMMA", "COLON", "RUN")
 )  # fmt: skip
-"""Tokens after which a line break ends no statement, as none is complete."""
+"""Tokens after which a line break does not end a statement, since it is incomplete."""
 _BEGINS = frozenset(
     ("DEF", "SEC", "THREAD", "IF", "WHILE", "RETURN", "KILL", "JOIN", "BREAK", "CONTINUE", "PASS", "HALT",
      "ENTER_CRITICAL", "EXIT_CRITICAL", "GLOBAL", "LOCAL", "END", "ELIF", "ELSE")
 )  # fmt: skip
-"""Tokens before which a statement ends without a line break: ur_rtde sends `global a =`, then `0  global b = 1`."""
+"""Tokens before which a statement ends even without a line break: ur_rtde sends `0 global b = 1`."""
 _COMPLETE = frozenset(
     ("NAME", "NUMBER", "TEXT", "TRUE", "FALSE", "NONE", "RPAR", "RSQB", "PASS", "BREAK", "CONTINUE", "HALT",
      "ENTER_CRITICAL", "EXIT_CRITICAL", "END")
 )  # fmt: skip
-"""Tokens after which no expression goes on with a name or `run`: it can only begin the next statement of the line."""
+"""Tokens after which a name or `run` can only start the next statement on the same line."""
 _AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL", "DOT"))
-"""Tokens that follow the name with which a statement begins."""
+"""Tokens that may follow the name with which a statement starts."""
 
 
 class Lines:
-    """Turns the tokens of a text into those of the grammar, where each statement has one end."""
+    """Converts the tokens of a text to those of the grammar, in which every statement has one end."""
 
     always_accept = (END,)
 
     def __init__(self, *, several: bool) -> None:
         self._several = several
 
-    def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
+    def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, since texts can be long
         """Drop line breaks inside statements, and add the ends of statements that no line break marks."""
         brackets = 0
         last = END
@@ -79,7 +79,7 @@ class Lines:
 
 
 def _named(tokens: Iterator[Token]) -> Iterator[Token]:
-    """Make names of the words after a point, and of `sec` in brackets: `time().sec`, `struct(sec=1)`."""
+    """Turn words after a point, and `sec` in brackets, into names: `time().sec`, `struct(sec=1)`."""
     last, brackets = END, 0
     for token in tokens:
         brackets += (token.type in _OPENS) - (token.type in _CLOSES)
@@ -89,7 +89,7 @@ def _named(tokens: Iterator[Token]) -> Iterator[Token]:
 
 
 def _parted(tokens: Iterator[Token]) -> Iterator[Token]:
-    """Add an end between two statements of a line, as UR's interpreter mode has them: `a = 1 textmsg(a)`."""
+    """Add an end between two statements on a line, as in UR's interpreter mode: `a = 1 textmsg(a)`."""
     last = END
     name: Token | None = None
     try:
@@ -107,7 +107,7 @@ def _parted(tokens: Iterator[Token]) -> Iterator[Token]:
                 yield token
             last = token.type
     except UnexpectedInput:
-        if name is not None:  # it is the first thing that is wrong
+        if name is not None:  # the first error
             yield name
         raise
     if name is not None:
@@ -115,6 +115,6 @@ def _parted(tokens: Iterator[Token]) -> Iterator[Token]:
 
 
 def _after(token: Token) -> Token:
-    """Return an empty end of statement at the end of a token, the last one of the text."""
+    """Return an end of statement without text behind a token, the last one of the text."""
     line, column = token.end_line, token.end_column
     return Token(END, "", token.end_pos, line, column, line, column)

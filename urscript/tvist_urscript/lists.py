@@ -1,4 +1,4 @@
-"""The functions of lists, vectors and matrices."""
+"""Built-in functions of lists, vectors and matrices."""
 
 import math
 
@@ -65,7 +65,7 @@ def integer_to_binary_list(x: Value) -> Array:
 
 
 def binary_list_to_integer(l: Value) -> int:
-    """Return the integer of at most 32 bits, the lowest first; 32 of them are a signed number."""
+    """Return the integer of at most 32 bits, the lowest first; 32 bits are a signed number."""
     bits = array(l, "the argument of binary_list_to_integer").items
     if len(bits) > _BITS:
         raise Fault(f"an integer has at most {_BITS} bits, not {len(bits)}")
@@ -92,7 +92,7 @@ def transpose(m: Value) -> Array:
 
 @costs(80)
 def inv(m: Value) -> Array:
-    """Return the inverse of a pose or of a square matrix, by Gauss and Jordan with pivots."""
+    """Return the inverse of a pose or of a square matrix, by Gauss-Jordan elimination with pivoting."""
     if type(m) is Pose:
         return pose_inv(m)
     rows = _matrix(m, "inv")

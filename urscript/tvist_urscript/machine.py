@@ -1,4 +1,4 @@
-"""Runs a compiled script, a tick at a time."""
+"""Run a compiled script, one tick at a time."""
 
 import sys
 from collections.abc import Callable, Generator, Mapping
@@ -16,9 +16,9 @@ from tvist_urscript.threads import MOST_THREADS, Thread
 from tvist_urscript.values import Value
 
 EVALUATIONS = 2000
-"""Budget of a tick: evaluations of all threads together."""
+"""Budget of a tick, in evaluations of all threads together."""
 PATIENCE = 1_000_000
-"""Evaluations of a thread without waiting for time to pass, or reading what has come, after which it is endless."""
+"""Evaluations after which a thread that neither waits nor reads from outside counts as an endless loop."""
 OVERDRAFT = 2000
 """Most evaluations by which one statement may exceed the budget."""
 
@@ -26,31 +26,31 @@ _MISSING = object()
 Steps = Generator[Any, None, Any]
 
 
-class Halted(Exception):  # noqa: N818  no error: the script has said `halt`
-    """Raised by `halt` to unwind the thread that runs; the machine then ends all threads."""
+class Halted(Exception):  # noqa: N818  no error: the script has executed `halt`
+    """Raised by `halt` to unwind the running thread; the machine then ends all threads."""
 
 
 class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
-    """Raised to unwind the thread that runs, since it has killed itself or a thread that it belongs to."""
+    """Raised to unwind the running thread if it has killed itself or one of its ancestors."""
 
 
 class Machine:
-    """A program that runs: its threads, its variables and its budget.
+    """A running program: its threads, variables and budget.
 
     Attributes:
-        left: What is left of the budget of this tick; compiled code takes from it.
+        left: Budget left in this tick; compiled code takes from it.
         thread: Number of the thread that runs now, or ran last; 0 is the main thread.
         halted: Whether it has ended by `halt`.
-        label: Number and name of the label that the main thread has passed last; None before the first.
+        label: Number and name of the last label that the main thread has passed; None before the first.
 
     Args:
         script: The program.
         functions: The built-in functions that the script calls, without those of `PURE`.
-        finish: Called as a blocking function before a thread waits for another (`join`, `enter_critical`), and at
-            its regular end.
+        finish: Called as a blocking function before a thread waits for another (`join`, `enter_critical`),
+            and at its regular end.
 
     Raises:
-        ValueError: The script calls a function that is not given.
+        ValueError: The script calls a function that is not in `functions`.
     """
 
     def __init__(
@@ -84,12 +84,12 @@ class Machine:
 
     @property
     def living(self) -> list[int]:
-        """Numbers of the threads that have not ended, in the order of their age."""
+        """Numbers of the threads that have not ended, oldest first."""
         return [thread.number for thread in self._threads if not thread.ended]
 
     @property
     def at_end(self) -> bool:
-        """Whether nothing follows the built-in function that runs, neither in its thread nor where that is joined."""
+        """Whether nothing follows the running built-in function, neither in its thread nor in one that joins it."""
         thread, lines = self._running, set[int]()
         frame: FrameType | None = sys._getframe()  # noqa: SLF001
         while frame is not None:
@@ -112,26 +112,24 @@ class Machine:
         return self._line
 
     def missed(self, number: int) -> bool:
-        """Return whether a thread could not go on in the last tick, since the budget was spent."""
+        """Return whether a thread could not continue in the last tick because the budget was spent."""
         thread = self._find(number) if number else self._main
         return thread is not None and (thread.owes > 0 or thread in self._missed)
 
     def place(self, number: int) -> tuple[str, int]:
-        """Return the name and the present line of a thread that has begun."""
+        """Return the name and the present line of a thread that has started."""
         thread = self._find(number) if number else self._main
         steps = None if thread is None else thread.steps
         return name_of(steps) or self.script.name, line_of(steps) or 1
 
     def resume(self, budget: int = EVALUATIONS) -> int:
-        """Run all threads for one tick.
-
-        Threads that did not get their turn in the last tick come first, then all in the order of their age.
+        """Run all threads for one tick: first those without a turn in the last tick, then the others by age.
 
         Args:
             budget: Evaluations that they may use together.
 
         Returns:
-            What is left of the budget; below 0 if a statement took more, for the next ticks to pay.
+            The rest of the budget; below 0 if a statement took more, which the next ticks have to pay.
 
         Raises:
             ScriptError: A thread has failed, in the script or in a built-in function. All threads have ended.
@@ -139,7 +137,7 @@ class Machine:
         self.left, self._held = budget, False
         missed, self._missed = self._missed, []
         self._turns = missed + [thread for thread in self._threads if thread not in missed]
-        for thread in self._turns:  # it grows where a thread starts another
+        for thread in self._turns:  # it grows when a thread starts another
             if thread.ended:
                 continue
             short = self._held or self.left <= 0 or self.left < min(thread.owes, budget)
@@ -150,35 +148,35 @@ class Machine:
         while self._held and (over := [one for one in self._threads if one.joins and one.joins.ended]):
             if not all_lines_of(over[0].steps) <= self.script.last_lines:
                 break
-            self._turn(over[0])  # nothing follows there but the end
+            self._turn(over[0])  # only its end follows
         return self.left
 
     def hold(self) -> None:
-        """Give no further thread a turn in this tick; the one that runs goes on to its next statement that waits."""
+        """Give no further thread a turn in this tick; the running one continues to its next waiting statement."""
         self._held = True
 
     def end(self) -> None:
         """End all threads: GeneratorExit reaches the blocking functions in which they wait.
 
         Raises:
-            ScriptError: A blocking function has failed at that. All threads have ended.
+            ScriptError: A blocking function has failed in the process. All threads have ended.
         """
         threads, self._threads = self._threads, []
         failed: Exception | None = None
         for thread in reversed(threads):
             try:
                 self._close(thread)
-            except Exception as error:  # noqa: BLE001  the others have to end as well
+            except Exception as error:  # noqa: BLE001  the other threads have to end, too
                 failed = failed or error
         if failed is not None:
             raise failure(failed) from failed
 
     def progress(self) -> None:
-        """Note that the thread that runs has got something from outside, so it is not in an endless loop."""
+        """Note that the running thread has received something from outside, so its loop is not endless."""
         self._running.spent = 0
 
     def charge(self, work: int) -> None:
-        """Take what depends on the values from the budget, such as the elements of a list.
+        """Take a cost that depends on values, such as the number of list elements, from the budget.
 
         Raises:
             Fault: One statement does too much.
@@ -191,7 +189,7 @@ class Machine:
         try:
             self._step(thread)
         except Exception as error:
-            with suppress(ScriptError):  # what went wrong first is what the author has to know
+            with suppress(ScriptError):  # only the first error matters to the author
                 self.end()
             if isinstance(error, ScriptError):
                 raise
@@ -218,9 +216,9 @@ class Machine:
             self._waits(thread, why, before)
 
     def _waits(self, thread: Thread, cost: int | None, before: int) -> None:
-        """Note that a thread waits for time, or for a budget that can bear the cost of its next statements.
+        """Note that a thread waits for time or, if `cost` is given, for a budget that can pay its next statements.
 
-        Before its turn, `before` was left of the budget.
+        `before` is what was left of the budget before its turn.
         """
         if cost is None:
             thread.spent = 0
@@ -229,7 +227,7 @@ class Machine:
             return
         thread.owes = cost
         thread.spent += before - (self.left + cost)
-        self.left = min(self.left + cost, 0)  # it has not been carried out
+        self.left = min(self.left + cost, 0)  # these statements have not run yet
         if thread.spent >= PATIENCE:
             line, column = position_of(thread.steps) or (1, 1)
             raise ScriptError(
@@ -272,12 +270,12 @@ class Machine:
         """Add statements to the program and run them in its main thread, which calls this.
 
         Args:
-            script: Statements that were compiled after the program and what has been added to it so far.
-            title: What they are called in errors.
+            script: Statements compiled after the program and everything added to it before.
+            title: Name of the statements in errors.
 
         Raises:
             ScriptError: They have failed.
-            ValueError: They call a function that is not given.
+            ValueError: They call a function that the machine does not have.
         """
         self._names.include(script)
         self._main.added = True
@@ -294,7 +292,7 @@ class Machine:
         self._main.spent = 0  # many short statements are no endless loop
 
     def forget(self, before: int) -> None:
-        """Forget what was added: threads end, functions and variables that the program does not have are unknown.
+        """Remove everything that was added: threads, functions, and variables that the program does not have.
 
         Args:
             before: Number of the first scope that is kept.
@@ -304,7 +302,7 @@ class Machine:
             self._close(thread)
         self._names.forget(before, self.script.scope.globals)
 
-    # What compiled code calls.
+    # Compiled code calls these.
 
     def _run(self, function: Callable[[int], Steps]) -> int:
         if len(self._threads) >= MOST_THREADS:
@@ -348,7 +346,7 @@ class Machine:
     def _enter(self) -> Steps:
         thread = self._running
         if self._holder is not None and self._holder is not thread:
-            yield from self._finish()  # before it is in line, as it gets no turn then
+            yield from self._finish()  # before it queues, since it then gets no turn
         thread.critical += 1
         if self._holder is None:
             self._holder = thread

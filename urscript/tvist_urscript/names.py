@@ -1,4 +1,4 @@
-"""Scopes: which variable or function a name in a script refers to."""
+"""Scopes, which determine the variable or function that a name in a script refers to."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -12,39 +12,29 @@ BUILT_IN_ARRAYS: dict[str, tuple[str, str]] = {
     "analog_in": ("get_analog_in", ""),
     "analog_out": ("get_analog_out", "set_analog_out"),
 }
-"""Arrays of the controller, and the functions that read and write an element; the second is empty for inputs."""
+"""Arrays of the controller, and the functions that read and write an element ("" if it cannot be written)."""
 
 METHOD = "."
-"""The built-in function that a call of a method is: it gets the object, the method's name and the arguments."""
+"""Built-in function that method calls use; it gets the object, the method's name and the arguments."""
 
 
 @dataclass(eq=False)
 class Scope:
     """The names that one function of a script can use.
 
-    A variable is local if it is a parameter, if `local` has declared it further up, or if no global has its name.
-    Every variable that is assigned on the outermost level is global. A function can call its own functions and those of
-    the functions around it, but not use the local variables of these.
-
-    Attributes:
-        function: The function.
-        outer: Scope of the function around it; None for the outermost level.
-        number: Number of the scope in its program, which makes the names of compiled functions unique.
-        globals: Names of global variables, in one set for all scopes of the program.
-        functions: Scopes of the functions that are defined directly inside it, by name.
-        twice: Functions inside it whose name is defined a second time, which is an error.
-        assigned: Variables that are assigned in it without `global`.
-        local: Its parameters, and the variables that `local` has declared so far in its translation.
+    A variable is local if it is a parameter, if `local` has declared it further up, or if no global has its
+    name. Every variable assigned on the outermost level is global. A function can call its own inner
+    functions and those of the functions around it, but cannot use local variables of the latter.
     """
 
     function: tree.Function
-    outer: "Scope | None"
-    number: int
-    globals: set[str]
-    functions: dict[str, "Scope"] = field(default_factory=dict)
-    twice: list[tree.Function] = field(default_factory=list)
-    assigned: set[str] = field(default_factory=set)
-    local: set[str] = field(default_factory=set)
+    outer: "Scope | None"  # of the function around it; None for the outermost level
+    number: int  # makes the names of compiled functions unique
+    globals: set[str]  # global variables, one set for all scopes of the program
+    functions: dict[str, "Scope"] = field(default_factory=dict)  # of its direct inner functions, by name
+    twice: list[tree.Function] = field(default_factory=list)  # inner functions defined twice, an error
+    assigned: set[str] = field(default_factory=set)  # variables assigned in it without `global`
+    local: set[str] = field(default_factory=set)  # parameters, and variables already declared `local`
 
     @property
     def code_name(self) -> str:
@@ -52,7 +42,7 @@ class Scope:
         return f"f{self.number}_{self.function.name}"
 
     def variable(self, name: str) -> Literal["local", "global"] | None:
-        """Return whether a name refers to a local or a global variable here; None if no variable has it."""
+        """Return whether a name refers to a local or a global variable here; None if there is none."""
         if name in self.local:
             return "local"
         if name in self.globals:
@@ -78,7 +68,7 @@ class Scope:
 
 
 def outline(scope: Scope) -> Scope:
-    """Return a copy of an outermost scope for statements that are added later, without the bodies of its functions."""
+    """Return a copy of an outermost scope, without function bodies, for statements that are added later."""
     known = {
         name: Scope(replace(inner.function, body=[]), None, inner.number, set())
         for name, inner in scope.functions.items()
@@ -89,8 +79,7 @@ def outline(scope: Scope) -> Scope:
 def scopes(program: tree.Function, before: Scope | None = None, number: int = 0) -> list[Scope]:
     """Return the scopes of a program: its outermost level, then its functions in the order of the text.
 
-    Statements that are added to a program have the outermost scope of the program before them; `number` is
-    that of the first scope.
+    Added statements use the outermost scope `before` of their program; `number` is that of the first scope.
     """
     shared: set[str] = set() if before is None else set(before.globals)
     found: list[Scope] = []

@@ -1,4 +1,4 @@
-"""The names that the compiled code of one program uses."""
+"""The global names of one program's compiled code."""
 
 import re
 from collections.abc import Callable, Collection, Mapping
@@ -18,8 +18,8 @@ _NUMBERED = re.compile(r"[fc](\d+)_")
 class Namespace:
     """The functions, constants and variables of a program and of the statements that are added to it.
 
-    They are what scripts may call beside the functions of `PURE`, what takes the elements of a list from the
-    budget, and what compiled code calls of the machine that runs it.
+    `functions` are built-in, besides those of `PURE`; `charge` takes a cost from the budget; `machine` has
+    the names that compiled code uses of its machine.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Namespace:
         return self._names[name]
 
     def include(self, script: Script) -> None:
-        """Make the functions of a script, and what they use, known to compiled code."""
+        """Add the functions of a script and what they use."""
         self._names |= script.constants
         for name in script.used:
             self._names[f"b_{name}"] = self._built_in(name)
@@ -47,7 +47,7 @@ class Namespace:
             self._names[code.co_name] = FunctionType(code, self._names)
 
     def forget(self, before: int, variables: Collection[str]) -> None:
-        """Forget what was included after the program."""
+        """Remove everything that was included after the program, except scopes from `before` on."""
         for name in self._names.keys() - self._own:
             found = _NUMBERED.match(name)
             of_variable = name.startswith("g_") and name[2:] not in variables
@@ -71,14 +71,14 @@ class Namespace:
             self._charge(weight * sum(argument.size for argument in arguments if isinstance(argument, Array)))
             result = function(*arguments)
             if isinstance(result, Array):
-                self._charge(result.size // 3)  # made at once, not one by one
+                self._charge(result.size // 3)  # cheaper, since all elements are created at once
             return result
 
         return charged
 
 
 def _operators(work: Work) -> Mapping[str, Callable[..., Any]]:
-    """Return the operators of a machine, which tell it how many elements of lists they work on.
+    """Return the operators of a machine, which charge for list elements through `work`.
 
     Two floats, the most frequent case, take the shortest way.
     """

@@ -1,4 +1,4 @@
-"""The functions of numbers."""
+"""Built-in functions of numbers."""
 
 import math
 from collections.abc import Callable
@@ -29,17 +29,17 @@ sqrt = _real("sqrt", math.sqrt, "a number that is not negative")
 
 
 def d2r(d: Value) -> float:
-    """Return an angle, which is given in degrees, in radians."""
+    """Convert an angle from degrees to radians."""
     return math.radians(number(d, "the argument of d2r"))
 
 
 def r2d(r: Value) -> float:
-    """Return an angle, which is given in radians, in degrees."""
+    """Convert an angle from radians to degrees."""
     return math.degrees(number(r, "the argument of r2d"))
 
 
 def atan2(x: Value, y: Value) -> float:
-    """Return the angle of the point whose first argument is opposite, and whose second is adjacent [rad]."""
+    """Return the angle [rad] whose opposite side is the first argument and whose adjacent side is the second."""
     return math.atan2(number(x, "the first argument of atan2"), number(y, "the second argument of atan2"))
 
 
@@ -79,7 +79,7 @@ def _integer(name: str, of: Callable[[float], int], f: Value) -> int:
 
 
 def generator() -> Callable[[], float]:
-    """Return `random` for a program that begins: numbers from 0 to below 1, the same ones in each run."""
+    """Return a `random` for a new program: numbers from 0 to below 1, the same sequence in each run."""
     dice = Random(0)  # noqa: S311  nothing secret
 
     def random() -> float:

@@ -1,4 +1,4 @@
-"""From the text of a script to its tree."""
+"""Parse the text of a script to its tree."""
 
 from functools import cache
 from typing import Any, cast
@@ -104,7 +104,7 @@ _NEWLINE: "\n"
 %ignore /[ \t\r\f]+/
 %ignore /#[^\n]*/
 """
-"""For lark; `lines.py` has made every line break that is left the end of a statement."""
+"""Grammar for lark; `lines.py` has already reduced line breaks to the ends of statements."""
 
 
 @cache
@@ -120,7 +120,7 @@ def _parser(*, several: bool) -> Lark:
 
 
 def parse(text: str, *, several: bool = False) -> list[tree.Statement]:
-    """Return the statements of a text on its outermost level; `several` may follow each other on a line."""
+    """Return the statements of a text on its outermost level; with `several`, a line may have more than one."""
     try:
         return cast("list[tree.Statement]", _parser(several=several).parse(text))
     except VisitError as error:
@@ -136,7 +136,7 @@ def _unfit(text: str, error: UnexpectedInput) -> ScriptError:
         character = text[error.pos_in_stream or 0]
         why = 'a text has no closing "' if character == '"' else f"unexpected character {character!r}"
         return no_program(error, why)
-    if isinstance(error, UnexpectedToken) and str(error.token):  # the end of the text is a token without any
+    if isinstance(error, UnexpectedToken) and str(error.token):  # the end of the text is an empty token
         token: Token = error.token
         what = "end of the line" if str(token) == "\n" else f"'{_shortened(token)}'"
         return no_program(token, f"unexpected {what}")

@@ -1,4 +1,4 @@
-"""Small parts of Python's tree, each with a position of the script."""
+"""Build nodes of Python's tree with positions in the script."""
 
 import ast
 from typing import Any
@@ -7,20 +7,16 @@ from tvist_urscript.tree import Node
 
 LOAD, STORE = ast.Load(), ast.Store()
 HERE, MISSING, DEPTH = "machine", "MISSING", "depth"
-"""Names that compiled functions use: the machine, a missing argument, depth."""
+"""Names in compiled functions: the machine, a missing argument, the depth of calls."""
 
 
 class Position:
-    """A position in the script; its methods return nodes of Python's tree that have this position.
-
-    Attributes:
-        given: The keywords that every node of Python's tree takes.
-    """
+    """A position in the script; its methods return nodes of Python's tree with this position."""
 
     __slots__ = ("given",)
 
     def __init__(self, line: int, column: int) -> None:
-        self.given: dict[str, Any] = {
+        self.given: dict[str, Any] = {  # keywords that every node of Python's tree takes
             "lineno": line,
             "col_offset": column,
             "end_lineno": line,
@@ -45,7 +41,7 @@ class Position:
         return ast.Call(self.name(name), list(arguments), [], **self.given)
 
     def waiting(self, value: ast.expr) -> ast.YieldFrom:
-        """Return `yield from value`: it passes on the ticks of a generator, whose result is its value."""
+        """Return `yield from value`, which passes on a generator's ticks and returns its result."""
         return ast.YieldFrom(value, **self.given)
 
     def tuple(self, items: list[ast.expr]) -> ast.Tuple:
@@ -73,9 +69,9 @@ class Position:
         return ast.Compare(left, [operator], [right], **self.given)
 
     def charge(self, cost: int, *, check: bool) -> list[ast.stmt]:
-        """Return statements that take a cost from the budget, and that yield it if the budget is spent then.
+        """Return statements that take a cost from the budget and, with `check`, yield it if the budget is spent.
 
-        Without `check` they never yield. The machine charges what is yielded to a later tick.
+        The machine charges a yielded cost to a later tick.
         """
         if cost == 0 and not check:
             return []

@@ -1,4 +1,4 @@
-"""The functions of poses. Rotations are unit quaternions, which are accurate near 0 and near π."""
+"""Built-in functions of poses; rotations are unit quaternions, which are accurate near 0 and near π."""
 
 import math
 from typing import Any, TypeAlias
@@ -29,7 +29,7 @@ def _pose(position: Vector, turn: Quaternion) -> Pose:
 
 @costs(30)
 def pose_trans(p_from: Value, p_from_to: Value) -> Pose:
-    """Return p_from_to, which is given in the frame p_from, in the frame of p_from itself."""
+    """Return p_from_to, given in the frame p_from, in the frame in which p_from is given."""
     (x, y, z), turn = _parts(p_from, "p_from")
     offset, inner = _parts(p_from_to, "p_from_to")
     dx, dy, dz = turned(turn, offset)
@@ -77,7 +77,7 @@ def point_dist(p_from: Value, p_to: Value) -> float:
 
 @costs(40)
 def interpolate_pose(p_from: Value, p_to: Value, alpha: Value) -> Pose:
-    """Return the pose on the line and the shortest rotation between two, at the share alpha."""
+    """Return the pose at the share alpha of the line and the shortest rotation between two poses."""
     a, turn = _parts(p_from, "p_from")
     b, second = _parts(p_to, "p_to")
     share = float(number(alpha, "alpha"))
@@ -89,7 +89,7 @@ def interpolate_pose(p_from: Value, p_to: Value, alpha: Value) -> Pose:
 
 @costs(30)
 def wrench_trans(T_from_to: Value, w_from: Value) -> Array:
-    """Return a wrench at the origin of the frame "from", seen from and at the frame "to".
+    """Return a wrench given at the origin of frame "from", expressed in and at the origin of frame "to".
 
     F' = Rᵀ F and M' = Rᵀ (M - t x F), where t and R are those of T_from_to.
     """
@@ -129,7 +129,7 @@ def quaternion(rotation: Vector) -> Quaternion:
     """Return the quaternion of a rotation vector [rad]: (cos θ/2, sin(θ/2)/θ r)."""
     x, y, z = rotation
     angle = math.hypot(x, y, z)
-    # sin(θ/2)/θ = 1/2 - θ²/48 + ..., whose second term is below the last bit here
+    # sin(θ/2)/θ = 1/2 - θ²/48 + ...; below this angle, the second term is below the last bit
     scale = math.sin(angle / 2) / angle if angle > 1e-8 else 0.5
     return (math.cos(angle / 2), x * scale, y * scale, z * scale)
 
@@ -145,7 +145,7 @@ def rotation_vector(turn: Quaternion) -> Vector:
 
 
 def product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the rotation b followed by a, both in fixed axes."""
+    """Return the rotation b followed by a, both about fixed axes."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     return (
@@ -157,13 +157,13 @@ def product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def inverse(a: Quaternion) -> Quaternion:
-    """Return the conjugate, which turns back."""
+    """Return the conjugate, which is the inverse rotation."""
     w, x, y, z = a
     return (w, -x, -y, -z)
 
 
 def turned(a: Quaternion, v: Vector) -> Vector:
-    """Return a vector that a rotation has turned: v + 2 u x (u x v + w v)."""
+    """Rotate a vector: v + 2 u x (u x v + w v)."""
     w, x, y, z = a
     u = (x, y, z)
     inner = cross(u, v)
@@ -185,7 +185,7 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def to_rpy(a: Quaternion) -> Vector:
-    """Return roll, pitch and yaw; roll is 0 where pitch is ±π/2 and only a sum of both is known."""
+    """Return roll, pitch and yaw [rad]; if pitch is ±π/2, only their sum is determined, and roll is 0."""
     w, x, y, z = a
     across = math.hypot(1 - 2 * (y * y + z * z), 2 * (x * y + w * z))
     pitch = math.atan2(2 * (w * y - x * z), across)

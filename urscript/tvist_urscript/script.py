@@ -1,4 +1,4 @@
-"""A compiled script; what compiles it is imported with the first."""
+"""A compiled script, in a module that does not import the compiler."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,20 +11,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Script:
-    """A compiled script. It can run any number of times.
+    """A compiled script, which can run any number of times.
 
     Attributes:
-        name: The name of its program; of one without `def` the first word.
-        secondary: It is a `sec`, which runs beside the program.
-        text: What it was compiled from.
-        main: The name of its main function.
-        functions: The code of its functions.
+        name: Name of its program; without a `def`, its first word.
+        secondary: Whether it is a `sec`, which runs beside the program.
+        text: Text that it was compiled from.
+        main: Name of its main function.
+        functions: Code of its functions.
         constants: Values that the code uses by name.
-        used: The built-in functions that it calls.
-        scope: What names mean on its outermost level.
-        scopes: Number of its scopes, with those of the program that it is added to.
-        idle: It only defines functions, so it ends at once.
-        last_lines: Lines of its functions after which nothing follows in them.
+        used: Built-in functions that it calls.
+        scope: Meaning of the names on its outermost level.
+        scopes: Number of its scopes, including those of the program that it is added to.
+        idle: Whether it only defines functions, so that it ends at once.
+        last_lines: Lines of its functions after which they do nothing but end.
     """
 
     name: str
@@ -40,5 +40,5 @@ class Script:
     last_lines: frozenset[int] = frozenset()
 
     def forgetting(self, last: "Script") -> "Script":
-        """Return the program for later statements, which know nothing of what was added up to the last one."""
+        """Return the program for later statements, which cannot use anything added up to `last`."""
         return replace(self, scopes=last.scopes)

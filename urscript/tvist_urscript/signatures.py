@@ -1,4 +1,4 @@
-"""What is known of a function when a script is compiled: its parameters, whether it waits, what it costs."""
+"""Signatures of functions for the compiler: parameters, whether they block, cost."""
 
 import inspect
 from collections.abc import Callable, Generator, Mapping
@@ -10,7 +10,7 @@ from tvist_urscript.values import Value
 
 
 class _Required:
-    """The default of a parameter without one."""
+    """Default of a parameter that has none."""
 
     def __repr__(self) -> str:
         return "REQUIRED"
@@ -21,7 +21,7 @@ REQUIRED: Final = _Required()
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a function and its value where a call does not give one."""
+    """A parameter of a function, and its value if a call does not give one."""
 
     name: str
     default: Value | _Required = REQUIRED
@@ -33,11 +33,11 @@ class Signature:
 
     Attributes:
         parameters: In their order; those with defaults are the last ones.
-        blocks: It is a generator function. Each bare `yield` inside it waits for the next tick; what it returns is the
-            value of the call.
+        blocks: Whether it is a generator function. Each bare `yield` in it waits for the next tick; its
+            return value is the value of the call.
         cost: Evaluations that a call takes from the budget.
-        linear: Elements of the lists that it takes and gives are taken from the budget as well. The machine sees to it
-            for the functions that it adds itself.
+        linear: Whether the elements of list arguments and results are taken from the budget as well. The
+            machine does this for the functions that it adds itself.
     """
 
     parameters: tuple[Parameter, ...]
@@ -47,7 +47,7 @@ class Signature:
 
     @property
     def required(self) -> int:
-        """Number of the parameters without a default."""
+        """Number of parameters without a default."""
         return sum(parameter.default is REQUIRED for parameter in self.parameters)
 
 
@@ -55,10 +55,10 @@ Signatures = Mapping[str, Signature]
 
 
 def signature(function: Callable[..., Any], *, linear: bool = False) -> Signature:
-    """Return how scripts call a function of Python: with its parameters by their names, and its defaults.
+    """Return how scripts call a Python function: its parameters' names and defaults, and its cost by `costs`.
 
-    It blocks if it returns a generator, by its annotation or, without one, because it is a generator function. Its cost
-    is that of `costs`.
+    It blocks if its annotation says that it returns a generator or, without one, if it is a generator
+    function.
 
     Args:
         function: A function, or a method of an object. Scripts always give all arguments, in order.
@@ -82,7 +82,7 @@ def signature(function: Callable[..., Any], *, linear: bool = False) -> Signatur
 
 
 def names(functions: type) -> list[str]:
-    """Return the names of the public methods of a class, in the order of the class."""
+    """Return the names of the public methods of a class, in their order."""
     return [
         name
         for name, method in vars(functions).items()
@@ -91,16 +91,16 @@ def names(functions: type) -> list[str]:
 
 
 def signatures(functions: type) -> dict[str, Signature]:
-    """Return how scripts call the public methods of a class, by name and in the order of the class."""
-    # Bound to anything: scripts do not give `self`.
+    """Return the signatures of the public methods of a class by name, in their order."""
+    # Bound to any object, since scripts do not give `self`.
     return {name: signature(vars(functions)[name].__get__(functions)) for name in names(functions)}
 
 
 def parameters(*required: str, **defaults: Value) -> tuple[Parameter, ...]:
-    """Return the parameters of a function that has no method of its own: `parameters("q", a=1.4, v=1.05)`.
+    """Return the parameters of a function that has no method: `parameters("q", a=1.4, v=1.05)`.
 
     Args:
-        required: Names of those that every call gives.
+        required: Names of parameters that every call gives.
         defaults: Names and defaults of the others.
     """
     return (*map(Parameter, required), *(Parameter(name, value) for name, value in defaults.items()))

@@ -1,4 +1,4 @@
-"""Translates statements of a script into statements of Python, which also charge their costs to the budget."""
+"""Translate statements of a script to Python's, which also charge their costs to the budget."""
 
 import ast
 from itertools import count
@@ -13,34 +13,29 @@ from tvist_urscript.signatures import Signatures
 PIECE = 40
 """Evaluations after which code without loops checks whether the budget is spent."""
 MOST_LOOPS = 15
-"""Most loops inside each other: CPython allows 20 nested blocks."""
+"""Most nested loops: CPython allows 20 nested blocks."""
 LINK = 15
-"""Most branches of one `if` of Python; a longer chain of `elif` is split, since Python nests each in the one before."""
+"""Most branches of one Python `if`; a longer `elif` chain is split, since Python nests each in the one before."""
 
 Branch = tuple[tree.Expression, list[tree.Statement]]
 Link = tuple[Position, ast.expr, list[ast.stmt]]
 
 
 class Statements(Expressions):
-    """Translates statements.
-
-    Attributes:
-        loops: Number of loops around the present statement.
-        is_part: Whether the statement is in a part of a long main function, see `Functions.function`. A part returns
-            True if the program has executed `return` in it.
-    """
+    """Translates statements."""
 
     def __init__(self, signatures: Signatures, report: Report) -> None:
         super().__init__(signatures, report)
-        self.loops = 0
+        self.loops = 0  # number of loops around the present statement
+        # Whether the statement is in a part of a long main function, which returns True after a `return`.
         self.is_part = False
         self.temporary = count()
 
     def block(self, body: list[tree.Statement], since: int, cost: int = 0) -> tuple[list[ast.stmt], int]:
-        """Translate statements; return them and the most evaluations since the budget was checked.
+        """Translate statements; return them and the most evaluations since the budget was last checked.
 
-        Before them it is `since`; `cost` is that of the code before, such as conditions, which is still to be
-        charged.
+        Before them this number is `since`; `cost` is the cost of code before them, such as conditions, not
+        yet charged.
         """
         result: list[ast.stmt] = []
         piece: list[ast.stmt] = []
@@ -90,7 +85,7 @@ class Statements(Expressions):
         return result, since
 
     def limited(self, statement: tree.Statement) -> int:
-        """Return the cost of the present statement, and report it as an error if it exceeds MOST_OPERATIONS."""
+        """Return the cost of the present statement; report an error if it exceeds MOST_OPERATIONS."""
         if self.cost > MOST_OPERATIONS:
             self.report(
                 statement,
@@ -101,7 +96,7 @@ class Statements(Expressions):
     def branches(self, statement: tree.If, test: ast.expr, since: int) -> tuple[list[ast.stmt], int]:
         """Translate the branches of an `if`, whose first condition is charged already; see `block`.
 
-        Each branch charges the cost of the conditions that are evaluated before it.
+        Each branch charges the conditions evaluated before it.
         """
         at = Position.of(statement)
         chains = [
@@ -111,7 +106,7 @@ class Statements(Expressions):
             links, cost, latest, since = self.links(statement, chains[0], test, since, 0)
             otherwise, ends = self.block(statement.otherwise, since, cost)
             return _chained(links, otherwise), max(latest, ends)
-        # Python nests each `elif` in the one before, and not deep: a variable tells whether a branch has been taken.
+        # Python limits the depth to which `elif` nest, so a variable records that no branch has been taken yet.
         searching = f"t{next(self.temporary)}"
         result: list[ast.stmt] = [at.assign(searching, at.constant(True))]
         latest, cost = since, 0
@@ -136,10 +131,10 @@ class Statements(Expressions):
     def links(
         self, statement: tree.If, chain: list[Branch], test: ast.expr, since: int, cost: int
     ) -> tuple[list[Link], int, int, int]:
-        """Translate the branches of one chain, see LINK, whose first condition is charged already.
+        """Translate one chain of branches (see LINK), whose first condition is charged already.
 
         Return them, the cost to charge if none is taken, the largest `since` at the end of any, and that if
-        none is.
+        none is taken.
         """
         links: list[Link] = []
         latest = since
@@ -155,7 +150,7 @@ class Statements(Expressions):
         return links, cost, latest, since
 
     def loop(self, statement: tree.While, test: ast.expr, cost: int) -> ast.stmt:
-        """Translate a loop, which checks the budget at the beginning of each turn."""
+        """Translate a loop, which checks the budget at the start of each iteration."""
         at = Position.of(statement)
         self.loops += 1
         if self.loops > MOST_LOOPS:
@@ -191,7 +186,7 @@ class Statements(Expressions):
                 raise AssertionError(statement)
 
     def word(self, statement: tree.Word, at: Position) -> list[ast.stmt]:
-        """Translate a statement that is a keyword alone, such as `break`."""
+        """Translate a statement that consists of a keyword, such as `break`."""
         match statement.word:
             case "pass":
                 return []
@@ -207,7 +202,7 @@ class Statements(Expressions):
                 return [at.statement(at.call(statement.word))]
 
     def assign(self, statement: tree.Assign, at: Position) -> ast.stmt:
-        """Translate an assignment. The value is computed before the variable is read or declared."""
+        """Translate an assignment; the value is computed before the variable is read or declared."""
         name, indices = statement.target.name, statement.indices
         plain = [index for index in indices if not isinstance(index, tree.Step)]
         if indices and len(plain) == len(indices) and self.built_in_array(statement.target):
@@ -223,7 +218,7 @@ class Statements(Expressions):
             self.works = True
             places = at.tuple(
                 [
-                    # Nothing else that a script has is a tuple.
+                    # A tuple marks a member, since no value of a script is one.
                     at.tuple([at.constant(index.name)]) if isinstance(index, tree.Step) else self.value(index)
                     for index in indices
                 ]

@@ -1,4 +1,4 @@
-"""The functions of texts. Positions count bytes of UTF-8 from 0."""
+"""Built-in functions of strings; positions count UTF-8 bytes from 0."""
 
 import re
 
@@ -13,7 +13,7 @@ DECIMAL = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 
 @costs(20)
 def str_cat(op1: Value, op2: Value) -> str:
-    """Return two values as one text."""
+    """Return two values as one string."""
     whole_text = to_str(op1) + to_str(op2)
     return short(whole_text if whole_text.isascii() else to_text(to_bytes(whole_text)))
 
@@ -24,7 +24,7 @@ def str_len(str: Value) -> int:
 
 
 def str_empty(str: Value) -> bool:
-    """Whether a text has no byte."""
+    """Return whether a string has no bytes."""
     return not text(str, "the argument of str_empty")
 
 
@@ -37,7 +37,7 @@ def str_at(src: Value, index: Value) -> str:
 
 
 def str_find(src: Value, target: Value, start_from: Value = 0) -> int:
-    """Return the position at which a text is found, -1 where it is not."""
+    """Return the position of a string in another one; -1 if it does not occur."""
     string, wanted = to_bytes(text(src, "src of str_find")), to_bytes(text(target, "target of str_find"))
     start = integer(start_from, "start_from of str_find")
     _check_start(start, string)
@@ -45,7 +45,7 @@ def str_find(src: Value, target: Value, start_from: Value = 0) -> int:
 
 
 def str_sub(src: Value, index: Value, len: Value = -1) -> str:
-    """Return a part of a text; the whole rest where the length is negative or too large."""
+    """Return a part of a string; all of the rest if the length is negative or too large."""
     string, start = to_bytes(text(src, "src of str_sub")), integer(index, "the index of str_sub")
     size = integer(len, "len of str_sub")
     _check_start(start, string)
@@ -53,7 +53,7 @@ def str_sub(src: Value, index: Value, len: Value = -1) -> str:
 
 
 def to_num(str: Value) -> int | float:
-    """Return the number that a text writes, in decimal or, with 0x before it, hexadecimal digits."""
+    """Return the number in a string, in decimal digits or, after 0x, in hexadecimal ones."""
     if type(str) is int or type(str) is float:
         return str
     written = text(str, "the argument of to_num")
@@ -76,6 +76,6 @@ def _outside(place: int, string: bytes) -> Fault:
 
 
 def check(condition: Value) -> None:
-    """Do nothing if a condition is true; `assert` in a script."""
+    """Raise Fault if a condition is false; this is `assert` in a script."""
     if not condition:
         raise Fault("an assertion has failed")

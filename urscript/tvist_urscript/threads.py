@@ -10,37 +10,24 @@ MOST_THREADS = 100
 
 @dataclass(eq=False)
 class Thread:
-    """A thread of a script.
+    """A thread of a script."""
 
-    Attributes:
-        number: 0 for the main thread; others count on, and a number never comes again.
-        steps: The generator that runs it, None when it has ended.
-        parent: The thread that has started it, or the nearest thread before that which has not ended; None for the main
-            thread.
-        critical: How many critical sections it is in.
-        spent: Evaluations since it has waited for time to pass, or has got something from outside.
-        owes: Evaluations of what it does first in its next turn, which that tick has to bear.
-        joins: The thread for whose end it waits.
-        added: Whether it was started by statements that were added to the program, or is the main thread and runs such
-            statements now.
-    """
-
-    number: int
-    steps: Generator[Any, None, Any] | None
-    parent: "Thread | None"
-    critical: int = 0
-    spent: int = 0
-    owes: int = 0
-    joins: "Thread | None" = None
-    added: bool = False
+    number: int  # 0 for the main thread; numbers are never reused
+    steps: Generator[Any, None, Any] | None  # runs it; None when it has ended
+    parent: "Thread | None"  # the thread that started it, or that one's nearest living ancestor
+    critical: int = 0  # number of critical sections it is in
+    spent: int = 0  # evaluations since it waited for time to pass or received something from outside
+    owes: int = 0  # evaluations of its first statements in its next turn, charged to that tick
+    joins: "Thread | None" = None  # the thread for whose end it waits
+    added: bool = False  # whether it belongs to added statements, or as the main thread runs them now
 
     @property
     def ended(self) -> bool:
-        """Whether the thread has come to its end, or was killed."""
+        """Whether the thread has ended or was killed."""
         return self.steps is None
 
     def descends_from(self, other: "Thread") -> bool:
-        """Return whether this thread is the other, or was started by it, directly or by threads in between."""
+        """Return whether this thread is the other one or one of its descendants."""
         thread: Thread | None = self
         while thread is not None:
             if thread is other:
@@ -49,9 +36,9 @@ class Thread:
         return False
 
     def leave(self, others: "Iterable[Thread]") -> None:
-        """Mark the thread as ended, and make its parent the parent of the threads that it has started.
+        """Mark the thread as ended, and hand the threads that it started to its parent.
 
-        So `kill` of the parent still reaches them, and the ended thread need not be kept.
+        `kill` of the parent thus still reaches them, and the ended thread need not be kept.
         """
         self.steps = None
         for other in others:

@@ -1,4 +1,4 @@
-"""A script as a tree. Each node has the position of the token that an error of it names."""
+"""A script as a tree, whose nodes have the positions of the tokens that errors refer to."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -6,24 +6,17 @@ from typing import Literal
 
 @dataclass(slots=True)
 class Node:
-    """A part of a script.
+    """A part of a script."""
 
-    Attributes:
-        line: Line of its token, from 1.
-        column: Column of its token, from 1.
-        depth: Levels of nodes below it.
-        size: Number of nodes with those below it, without constants and without functions.
-    """
-
-    line: int
-    column: int
-    depth: int = field(default=1, init=False)
-    size: int = field(default=1, init=False)
+    line: int  # of its token, from 1
+    column: int  # likewise
+    depth: int = field(default=1, init=False)  # levels of nodes below it
+    size: int = field(default=1, init=False)  # nodes including those below it, except constants and functions
 
 
 @dataclass(slots=True)
 class Constant(Node):
-    """A number, a text, True, False or None."""
+    """A number, a string, True, False or None."""
 
     value: int | float | bool | str | None
 
@@ -44,7 +37,7 @@ class Listing(Node):
 
 @dataclass(slots=True)
 class Index(Node):
-    """`a[i]` or `m[i, j]`; or a pose, where the name is `p` and there are six: the names decide."""
+    """`a[i]` or `m[i, j]`, or a pose if the name is `p` and there are six indices."""
 
     value: "Expression"
     indices: list["Expression"]
@@ -76,7 +69,7 @@ class Step(Node):
 
 @dataclass(slots=True)
 class Argument(Node):
-    """An argument of a call, with its name where it is given by name."""
+    """An argument of a call, with its name if it is given by name."""
 
     name: str | None
     value: "Expression"
@@ -121,7 +114,7 @@ Expression = Constant | Name | Listing | Index | Member | Method | Call | Unary 
 
 @dataclass(slots=True)
 class Assign(Node):
-    """`target = value`, with `global` or `local` before it; `indices` lead to an element or a member of the target."""
+    """`target = value`, perhaps after `global` or `local`; `indices` lead to an element or a member of the target."""
 
     target: Name
     indices: list[Expression | Step]
@@ -138,7 +131,7 @@ class Evaluate(Node):
 
 @dataclass(slots=True)
 class If(Node):
-    """An `if` with its `elif` and `else`: a condition and statements for each branch."""
+    """`if` with its `elif` and `else`: a condition and statements for each branch."""
 
     branches: list[tuple[Expression, list["Statement"]]]
     otherwise: list["Statement"]
@@ -169,7 +162,7 @@ class Handle(Node):
 
 @dataclass(slots=True)
 class Word(Node):
-    """A statement that is a keyword alone."""
+    """A statement that consists of a keyword."""
 
     word: Literal["break", "continue", "halt", "pass", "enter_critical", "exit_critical"]
 

@@ -1,7 +1,7 @@
-"""The values of a script: numbers, booleans, texts and None as Python's own, lists and poses as immutable arrays.
+"""The values of a script: Python's own numbers, booleans, strings and None; lists and poses as immutable arrays.
 
-As no value can change, an assignment and an argument are by value without a copy; an assignment to an element gives the
-variable a new list.
+Since no value can change, assignments and arguments are by value without a copy; an assignment to an element
+gives the variable a new list.
 """
 
 from collections.abc import Iterable, Iterator
@@ -13,13 +13,13 @@ from tvist_urscript.errors import Fault
 LONGEST = 1000
 """Most elements of a list."""
 LARGEST = 4000
-"""Most elements of a list, with those of the lists inside it."""
+"""Most elements of a list, including those of nested lists."""
 DEEPEST = 20
-"""Most lists inside each other."""
+"""Most levels of nested lists."""
 LONGEST_TEXT = 1023
-"""Longest text, in bytes of UTF-8."""
+"""Longest string, in bytes of UTF-8."""
 LOWEST, HIGHEST = -(2**31), 2**31 - 1
-"""Integers have 32 bits; a result beyond them is a float."""
+"""Range of integers, which have 32 bits; a result outside it is a float."""
 
 
 class Array:
@@ -27,11 +27,12 @@ class Array:
 
     Attributes:
         items: Its elements.
-        size: Number of its elements, with those of the lists inside it.
-        depth: Lists inside each other, with itself.
+        size: Number of its elements, including those of nested lists.
+        depth: Levels of nesting, 1 for a list without lists.
 
     Raises:
-        Fault: It has more than LONGEST elements, or more than LARGEST with those inside, or is more than DEEPEST deep.
+        Fault: It has more than LONGEST elements, more than LARGEST with nested ones, or more than DEEPEST
+            levels.
     """
 
     __slots__ = ("depth", "items", "size")
@@ -100,7 +101,7 @@ class Pose(Array):
 
 
 class Struct(Array):
-    """Values with names, which can be reached by their places as well.
+    """Values with names, which can also be accessed by index.
 
     Attributes:
         names: Names of its elements.
@@ -141,19 +142,19 @@ KINDS: dict[type, str] = {
 
 
 def kind(value: object) -> str:
-    """Say what a value is, for messages."""
+    """Name the type of a value, for messages."""
     return KINDS.get(type(value), "a value of the controller")
 
 
 def number(value: Any, what: str) -> int | float:
-    """Return a value that has to be a number."""
+    """Return the value if it is a number; raise Fault, which names `what`, otherwise."""
     if type(value) is float or type(value) is int:
         return value
     raise Fault(f"{what} has to be a number, not {kind(value)}")
 
 
 def integer(value: Any, what: str) -> int:
-    """Return a value that has to be a whole number; 3.0 is one, since `/` gives floats."""
+    """Return the value as an integer, also if it is a float such as 3.0, since `/` gives floats; else raise Fault."""
     if type(value) is int:
         return value
     if type(value) is float and value.is_integer() and LOWEST <= value <= HIGHEST:
@@ -164,29 +165,29 @@ def integer(value: Any, what: str) -> int:
 
 
 def _exactly(wanted: type[T], value: Any, what: str, called: str) -> T:
-    """Return a value that has to be of a type, and of none derived from it."""
+    """Return the value if its type is exactly the wanted one; else raise Fault."""
     if type(value) is wanted:
         return value
     raise Fault(f"{what} has to be {called}, not {kind(value)}")
 
 
 def text(value: Any, what: str) -> str:
-    """Return a value that has to be a text."""
+    """Return the value if it is a string; else raise Fault."""
     return _exactly(str, value, what, "a text")
 
 
 def array(value: Any, what: str) -> Array:
-    """Return a value that has to be a list; a pose is none."""
+    """Return the value if it is a list and no pose; else raise Fault."""
     return _exactly(Array, value, what, "a list")
 
 
 def pose(value: Any, what: str) -> Pose:
-    """Return a value that has to be a pose."""
+    """Return the value if it is a pose; else raise Fault."""
     return _exactly(Pose, value, what, "a pose")
 
 
 def vector(value: Any, what: str) -> tuple[float, ...]:
-    """Return the elements of a list of numbers or of a pose."""
+    """Return the elements of a list of numbers or of a pose; else raise Fault."""
     if not isinstance(value, Array):
         raise Fault(f"{what} has to be a list of numbers, not {kind(value)}")
     if only_numbers(value):
@@ -195,7 +196,7 @@ def vector(value: Any, what: str) -> tuple[float, ...]:
 
 
 def check_size(size: int) -> None:
-    """Refuse a list with too many elements, those of its lists included."""
+    """Raise Fault for too many elements, including those of nested lists."""
     if size > LARGEST:
         raise Fault(
             f"a list with {size} elements, those of its lists included, is too large: the limit is {LARGEST}"
@@ -203,17 +204,17 @@ def check_size(size: int) -> None:
 
 
 def only_numbers(value: Array) -> bool:
-    """Return whether a list has numbers alone, which need no checks one by one."""
+    """Return whether a list contains only numbers, which need no individual checks."""
     return NUMBERS.issuperset(map(type, value.items))
 
 
 def whole(value: int) -> int | float:
-    """Return an integer of 32 bits as it is, a larger one as a float."""
+    """Return an integer as it is if it has 32 bits, else as a float."""
     return value if LOWEST <= value <= HIGHEST else float(value)
 
 
 def short(value: str) -> str:
-    """Return a text that is not too long."""
+    """Return a string; raise Fault if it is too long."""
     size = len(value) if value.isascii() else len(to_bytes(value))
     if size > LONGEST_TEXT:
         raise Fault(f"a text of {size} bytes is too long: the limit is {LONGEST_TEXT}")
@@ -221,7 +222,7 @@ def short(value: str) -> str:
 
 
 def to_bytes(value: str) -> bytes:
-    """Return a text in UTF-8; parts of a character, which Python writes as surrogates, are the bytes that they were."""
+    """Encode a string as UTF-8; surrogates, which stand for parts of a character, become the original bytes."""
     try:
         return value.encode(errors="surrogateescape")
     except UnicodeEncodeError:
@@ -229,16 +230,16 @@ def to_bytes(value: str) -> bytes:
 
 
 def to_text(value: bytes) -> str:
-    """Return the text that bytes in UTF-8 are; parts of a character become surrogates."""
+    """Decode UTF-8; parts of a character become surrogates."""
     return value.decode(errors="surrogateescape")
 
 
 @costs(20)
 def to_str(val: Value) -> str:
-    """Write a value as the controller does: floats with six decimals, without zeros at their end.
+    """Format a value as the controller does: floats with up to six decimals, without trailing zeros.
 
     Raises:
-        Fault: The text is too long.
+        Fault: The string is too long.
     """
     return short(_written(val))
 

@@ -1,4 +1,4 @@
-// Bundles src/ and try/ into an HTML file each, which loads nothing: page.html.gz, which is served, and try.html of ../tvist_view, with their licences beside them.
+// Bundle src/ and try/ into one self-contained HTML file each, page.html.gz and try.html of ../tvist_view, and collect the licences.
 import { readFileSync, writeFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
@@ -16,7 +16,7 @@ async function one(folder, entry, name) {
     loader: { ".css": "text", ".svg": "text" },
     write: false,
   });
-  // A script in a page ends at the first "</script", also inside a string.
+  // A script in a page ends at the first "</script", even inside a string.
   const script = bundled.outputFiles[0].text.replaceAll("</script", "<\\/script").trim();
   const style = (await build({ entryPoints: [`${folder}/style.css`], bundle: true, minify: true, write: false })).outputFiles[0].text.trim();
   const page = readFileSync(`${folder}/page.html`, "utf8")

@@ -1,1 +1,1 @@
-"""The live page: a robot in three dimensions, its plots and its controls, as one more client."""
+"""The live page: a client that shows a robot in 3D with its plots and controls."""

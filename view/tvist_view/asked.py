@@ -1,4 +1,4 @@
-"""What a tab may ask, as its messages are read."""
+"""Messages that a tab may send."""
 
 from typing import Annotated
 
@@ -13,15 +13,15 @@ class Asked(Struct, tag_field="do", frozen=True, forbid_unknown_fields=True):
 
 
 class Setting(Asked, frozen=True):
-    """A message that changes a setting, also while the arm moves."""
+    """A message that changes a setting; it is also accepted while the arm moves."""
 
 
 class Seen(Asked, tag="seen", frozen=True):
-    """The last picture has been drawn: the next one may come."""
+    """The tab has drawn the last frame and is ready for the next one."""
 
 
 class Stop(Asked, tag="stop", frozen=True):
-    """Stop the arm, whoever moves it."""
+    """Stop the arm, no matter which client moves it."""
 
 
 class Take(Asked, tag="take", frozen=True):
@@ -39,14 +39,14 @@ class Show(Asked, tag="robot", frozen=True):
 
 
 class Move(Asked, tag="move", frozen=True):
-    """Go to a named pose, if the arm is not there, and on to another."""
+    """Go to the named pose `first`, unless the arm is there, and on to `last`."""
 
     first: str
     last: str
 
 
 class Compare(Asked, tag="compare", frozen=True):
-    """Make a motion without and with a shaper."""
+    """Run a motion without and with a shaper."""
 
     first: str
     last: str
@@ -54,14 +54,14 @@ class Compare(Asked, tag="compare", frozen=True):
 
 
 class Jog(Asked, tag="jog", frozen=True):
-    """Jog a joint for the next moment; the page says it again and again while its button is down."""
+    """Jog a joint for a moment; the page repeats the message while its button is down."""
 
     joint: Annotated[int, Meta(ge=0)]
     direction: Annotated[float, Meta(ge=-1.0, le=1.0)]
 
 
 class Shape(Setting, tag="shape", frozen=True):
-    """Choose the shaper, and how many modes it suppresses; None: as many as before."""
+    """Choose the shaper, and how many modes it suppresses; None keeps the number."""
 
     shaper: str
     modes: Annotated[int, Meta(ge=1)] | None = None
@@ -74,7 +74,7 @@ class Speed(Setting, tag="speed", frozen=True):
 
 
 class Declare(Setting, tag="declare", frozen=True):
-    """Declare a mass as payload [kg]."""
+    """Declare a payload mass [kg]."""
 
     mass: Mass
 
@@ -99,4 +99,4 @@ Message = (
     Seen | Stop | Take | Give | Show | Move | Compare | Jog | Shape | Speed | Declare | Carry | Fault | Ready
 )
 read = msgspec.json.Decoder(Message).decode
-"""Reads a message; raises `msgspec.ValidationError` or `msgspec.DecodeError`."""
+"""Decodes a message; raises `msgspec.ValidationError` or `msgspec.DecodeError`."""

@@ -1,4 +1,4 @@
-"""What a tab asks for is done here; a motion without and with a shaper, one after the other, among it."""
+"""Carry out the requests of tabs, including a comparison of a motion without and with a shaper."""
 
 import asyncio
 import contextlib
@@ -22,14 +22,14 @@ from tvist_view.pilot import Doing, Pilot, go, motion
 from tvist_view.signals import moves, signals_of
 
 REST = 500
-"""Ticks after a motion that are looked at, half of which let the arm come to rest before one."""
+"""Ticks recorded after a motion; before it, the arm comes to rest for half as many."""
 POINTS = 600
-"""Points of a curve that the page draws."""
+"""Points of a curve on the page."""
 
 
 @dataclass
 class Run:
-    """Everything that the robot said during one motion."""
+    """Everything that the robot published during one motion."""
 
     states: list[State] = field(default_factory=list)
     truths: list[Truth] = field(default_factory=list)
@@ -37,10 +37,12 @@ class Run:
 
 
 Verdict = Mapping[str, float | None]
-"""What shaping has changed about the largest acceleration after the stop [m/s²] and about rest: `before`, `after`,
-`less_percent`, `earlier_ms`; None is not measurable."""
+"""Change of the largest acceleration after the stop [m/s²] and of the time to rest; None if not measurable.
+
+Keys: `before`, `after`, `less_percent`, `earlier_ms`.
+"""
 Judge = Callable[[Run, Run], Verdict]
-"""Measures a motion without and with the shaper."""
+"""Compares a motion without and with the shaper."""
 
 
 def beside(
@@ -52,16 +54,10 @@ def beside(
     tell: Callable[[str | None], None],
     done: Callable[[dict[str, Any]], None],
 ) -> Doing:
-    """Make a motion without and with a shaper, judge both, and leave the shaper as it was.
+    """Run a motion between two poses [rad] without and with a shaper, judge both, and restore the shaper.
 
-    Args:
-        robot: The robot.
-        look: What it looks like.
-        poses: Joint angles at the start and at the end of the motion [rad].
-        shaper: Name of the shaper.
-        judge: Measures both.
-        tell: Called with what happens now, and with None at the end.
-        done: Called with the result for the page.
+    `tell` is called with the present step in words, and with None at the end; `done` with the result for the
+    page.
     """
     start, end = poses
 
@@ -83,7 +79,7 @@ def beside(
             done({**verdict, "with": shaper, **_curves(look, *runs)})
         finally:
             tell(None)
-            with contextlib.suppress(RefusedError, ClientError, ProtocolError):  # the robot may have gone
+            with contextlib.suppress(RefusedError, ClientError, ProtocolError):  # the robot may be gone
                 await arm.set_shaper(info.shaper, modes=info.modes)
 
     return run
@@ -105,7 +101,7 @@ def _gathered(robot: Robot) -> Iterator[Run]:
 
 
 def _curves(look: Look, *runs: Run) -> dict[str, Any]:
-    """|α| of both motions over the time since each began, and when the reference of the first one stopped."""
+    """|α| of both motions over the time since their starts, and when the reference of the first one stopped."""
     signals = [signals_of(look, run.states, {truth.tick: truth for truth in run.truths}) for run in runs]
     spans = [moves(one) or (one.time[0], one.time[0]) for one in signals]
     stop = round(float(spans[0][1] - spans[0][0]), 4)
@@ -114,7 +110,7 @@ def _curves(look: Look, *runs: Run) -> dict[str, Any]:
     ]
     last = max(time[-1] for time, _ in shown)
     grid = np.linspace(0.0, last, POINTS)
-    # The largest value in each step, so that no peak is lost between two points.
+    # Take the largest value in each step, so that no peak is lost between two points.
     curves = []
     for time, alpha in shown:
         out = np.zeros(POINTS)
@@ -126,24 +122,21 @@ def _curves(look: Look, *runs: Run) -> dict[str, Any]:
 
 @dataclass
 class Doer:
-    """Moves one robot as its tabs ask.
-
-    Attributes:
-        comparing: What a comparison does now, in words; None: there is none.
-    """
+    """Moves one robot as its tabs request."""
 
     robot: Robot
     look: Look
     pilot: Pilot
     judge: Judge
     say: Callable[[str], None]
-    """Says a sentence to all tabs."""
+    """Shows a message in all tabs."""
     result: Callable[[dict[str, Any]], None]
-    """Shows the result of a comparison to all tabs."""
+    """Shows the result of a comparison in all tabs."""
     comparing: str | None = None
+    """Present step of a comparison, in words; None if there is none."""
 
     async def do(self, info: Info, tab: int, message: asked.Message) -> None:
-        """Do what a tab asks for."""
+        """Carry out a tab's request."""
         pilot = self.pilot
         match message:
             case asked.Stop():
@@ -185,7 +178,7 @@ class Doer:
 
 
 def _setting(pilot: Pilot, info: Info, message: asked.Setting) -> piloting.Doing:
-    """What changes a setting as a tab asks."""
+    """Return the action for a setting that a tab requests."""
     match message:
         case asked.Shape(shaper, modes):
             return lambda arm: arm.set_shaper(shaper, modes=modes or info.modes)

@@ -1,4 +1,4 @@
-"""What a tab is told of a robot: how it is described, its state in words, and the way to a real arm."""
+"""Describe a robot to a tab: model, state in words, and the checklist for a real arm."""
 
 from typing import Any
 
@@ -10,12 +10,12 @@ from tvist_protocol.stream import Event, State
 from tvist_view.look import Look
 from tvist_view.meshes import Meshes
 
-NO_TRUTH = "this robot does not tell how it bends; a simulated one tells pages on its own machine"
-REAL = "a real arm does not tell how it bends"
+NO_TRUTH = "this robot does not publish how it bends; simulated robots do, for pages on the same machine"
+REAL = "a real arm does not report how it bends"
 USUAL = ("auto", "zv")
-"""Shapers of which the first that the robot has is compared with none, while none is in use."""
+"""Shapers to compare with none while none is in use; the first one that the robot has."""
 MOVES = 0.05
-"""A joint of a robot that is watched moves above this [rad/s]."""
+"""Joint velocity above which a watched robot counts as moving [rad/s]."""
 STOPS = {"protective_stop", "safety_stop"}
 
 Step = tuple[bool, str, str]
@@ -23,7 +23,7 @@ Step = tuple[bool, str, str]
 
 
 def described(info: Info, look: Look, robots: list[str], meshes: Meshes) -> dict[str, Any]:
-    """What a tab needs to know of a robot before it can show it."""
+    """Return everything that a tab needs to know of a robot before it can show it."""
     real = info.watched is not None or info.moved is not None
     faults = FAULTS if "simulation.inject" in info.commands and not real else {}
     return {
@@ -45,12 +45,12 @@ def described(info: Info, look: Look, robots: list[str], meshes: Meshes) -> dict
 
 
 def usual(info: Info) -> str:
-    """The shaper that is compared with none while none is in use."""
+    """Return the shaper to compare with none while none is in use."""
     return next((name for name in USUAL if name in info.shapers), info.shapers[-1])
 
 
 def pairs(poses: list[str]) -> list[tuple[str, str]]:
-    """Motions between named poses: the paper's three for three of them."""
+    """Return motions between named poses; with three poses, the three motions of the paper."""
     if len(poses) < 2:
         return []
     first, second, *more = poses
@@ -60,7 +60,7 @@ def pairs(poses: list[str]) -> list[tuple[str, str]]:
 
 
 def state_in_words(state: State, info: Info, io: Io | None) -> dict[str, Any]:
-    """Modes, the reason of a stop, and the program that runs."""
+    """Return modes, the reason of a stop, and the running program."""
     mode, safety = _word(RobotMode, state.robot_mode), _word(SafetyMode, state.safety_mode)
     return {
         "robot_mode": mode,
@@ -73,7 +73,7 @@ def state_in_words(state: State, info: Info, io: Io | None) -> dict[str, Any]:
 
 
 def _program(io: Io | None) -> str:
-    """The program that runs or is paused, and where it is; empty if there is none."""
+    """Return the program that runs or is paused, and its present line; empty if there is none."""
     if io is None or io.program is None or io.program_state == "STOPPED":
         return ""
     label = "" if io.program_label is None else f" “{io.program_label.name}”"
@@ -88,7 +88,7 @@ def _word(kind: type[RobotMode] | type[SafetyMode], number: int) -> str:
 
 
 class RealArm:
-    """What a robot at the end of the line has been seen to do since the page shows it."""
+    """What a real robot has done since the page shows it."""
 
     def __init__(self) -> None:
         self._seen: set[str] = set()
@@ -98,11 +98,11 @@ class RealArm:
         self._seen.add("stop" if event.kind in STOPS else event.kind)
 
     def compared(self) -> None:
-        """Note that a motion was compared without and with the shaper."""
+        """Note that a comparison without and with the shaper has been made."""
         self._seen.add("compared")
 
     def steps(self, info: Info, state: State, io: Io | None) -> list[Step]:
-        """Return the steps of a robot that is watched or moved through its own controller; none of any other."""
+        """Return the checklist of a robot that is watched or moved through its own controller; empty for others."""
         if io is not None and io.program_state == "PLAYING":
             self._seen.add("program")
         if max(map(abs, state.target_qd)) > MOVES:
@@ -115,11 +115,15 @@ class RealArm:
 
     def _watched(self, info: Info, state: State, *, well: bool) -> list[Step]:
         there = state.robot_mode != RobotMode.DISCONNECTED
-        again = "serve it again with --enable-motion and --calibration: this page goes on with it"
+        again = "restart its server with --enable-motion and --calibration; this page then reconnects"
         return [
-            (there, f"Connect {info.watched}", "see that it is on, and that this machine reaches it"),
+            (there, f"Connect {info.watched}", "check that it is on and that this machine can reach it"),
             (well, "Release its brakes and stops", "at its teach pendant"),
-            ("moved" in self._seen, "Let it move", "by its own programs; how its tool shakes is below"),
+            (
+                "moved" in self._seen,
+                "Let it move",
+                "with its own programs; the plot below shows the vibration",
+            ),
             _identify(info, str(info.watched)),
             (False, "Move it from here", again),
         ]
@@ -128,14 +132,14 @@ class RealArm:
         seen, cap = self._seen, max(info.limits.velocity)
         why = info.stop.why if info.stop is not None else ""
         checked = "model, payload, tool, mounting, remote control, angles and safety are checked"
-        by_itself = "stop its program or press its emergency stop, read here why it stands, and hold it again"
+        by_itself = "stop its program or press its emergency stop, read the reason here, and hold it again"
         return [
             (well, f"Hold {info.moved}: {checked}", why),
             _identify(info, str(info.moved)),
             (
                 "motion_done" in seen,
                 f"Move it: no joint turns faster than {cap:.2g} rad/s (--speed-cap)",
-                "take control, see that its way is clear, and press a motion",
+                "take control, check that its path is clear, and press a motion",
             ),
             ("motion_stopped" in seen, "Stop it in a motion", "press STOP"),
             ("stop" in seen and well, "Stop it at the robot", by_itself),
@@ -149,6 +153,6 @@ class RealArm:
 
 
 def _identify(info: Info, place: str) -> Step:
-    """The step to a calibration of its own."""
+    """Return the step for the robot's own calibration."""
     own = info.calibration is not None and info.calibration.shipped is False
     return own, "Identify it", f"tvist identify {place}, then serve it with --calibration"

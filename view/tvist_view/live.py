@@ -1,4 +1,4 @@
-"""The page of robots on the network: a client that takes the latest state and never holds up a robot."""
+"""The page of robots on the network; as a client it takes the latest state and never delays a robot."""
 
 import asyncio
 
@@ -12,11 +12,11 @@ from tvist_view.stage import Tab, page
 from tvist_view.watcher import Watcher
 
 MOST_SHOWN = 8
-"""Largest number of robots that tabs show at once: each has a session of those that servers have for all clients."""
+"""Most robots that tabs show at once, since each takes one of a server's limited sessions."""
 
 
 class LivePage:
-    """The page: each tab shows one robot, and all tabs that show a robot share its connection."""
+    """Serves tabs: each shows one robot, and all tabs that show the same robot share its connection."""
 
     def __init__(self, place: Place, first: str, judge: Judge, *, factor: float = 100.0) -> None:
         self._place, self._first, self._judge = place, first, judge
@@ -25,7 +25,7 @@ class LivePage:
         self.page = page({"kind": "live", "factor": factor})
 
     async def run(self) -> None:
-        """Look for the first robot until cancelled, whether a tab is open or not."""
+        """Look for the first robot until cancelled, even if no tab is open."""
         try:
             await self._robot(self._first).task
         finally:
@@ -38,7 +38,7 @@ class LivePage:
         return self._shown[name]
 
     async def meet(self, tab: Tab) -> None:
-        """Serve a tab until it goes."""
+        """Serve a tab until it is closed."""
         watcher = Watcher(tab)
         shown = self._robot(self._first)
         shown.come(watcher)
@@ -48,7 +48,7 @@ class LivePage:
                 try:
                     message = asked.read(text)
                 except msgspec.MsgspecError as error:
-                    watcher.say(f"the page asked for what cannot be done: {error}")
+                    watcher.say(f"the page sent an invalid message: {error}")
                     continue
                 if isinstance(message, asked.Seen):
                     watcher.free = True
@@ -57,7 +57,7 @@ class LivePage:
                 elif message.name not in {self._first, *shown.robots}:
                     watcher.say(f"there is no robot {message.name}: choose one of {', '.join(shown.robots)}")
                 elif message.name not in self._shown and len(self._shown) >= MOST_SHOWN:
-                    watcher.say(f"tabs show {MOST_SHOWN} robots already, the most at once: close one")
+                    watcher.say(f"tabs already show {MOST_SHOWN} robots, the maximum: close one first")
                 else:
                     await self._leave(shown, watcher)
                     shown = self._robot(message.name)
@@ -67,7 +67,7 @@ class LivePage:
             await self._leave(shown, watcher)
 
     async def _leave(self, shown: ShownRobot, watcher: Watcher) -> None:
-        """Let a tab go; the connection of a robot that no tab shows any more ends, unless it is the first one."""
+        """Detach a tab; close the connection of a robot that no tab shows, unless it is the first one."""
         await shown.go(watcher)
         if not shown.watchers and shown.name != self._first and self._shown.get(shown.name) is shown:
             del self._shown[shown.name]

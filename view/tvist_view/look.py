@@ -1,4 +1,4 @@
-"""What the page draws: how a robot looks, and where it is at one tick, as plain numbers."""
+"""What the page draws, as plain numbers: a robot's shape, and its position at one tick."""
 
 import math
 from collections.abc import Sequence
@@ -22,13 +22,13 @@ class GeometryError(ValueError):
 
 @dataclass(frozen=True)
 class Look:
-    """How one robot looks."""
+    """Shape of a robot: its geometry and payload."""
 
     geometry: Geometry
     payload: Payload
 
     def __post_init__(self) -> None:
-        """Check that it can be drawn."""
+        """Raise GeometryError if it cannot be drawn."""
         geometry = self.geometry
         if geometry.version != GEOMETRY_VERSION:
             raise GeometryError(
@@ -68,18 +68,18 @@ class Look:
         return sum(map(math.hypot, self.geometry.a, self.geometry.d))
 
     def packed(self) -> dict[str, Any]:
-        """What the page is told."""
+        """Return the message for the page."""
         return {
             "geometry": msgspec.to_builtins(self.geometry),
             "payload": {"mass": self.payload.mass, "com": self.payload.com},
         }
 
     def row(self, state: State, truth: Truth | None) -> list[float]:
-        """Where the arm is at a tick, 4 joints + 4 bending links values [rad], and 6 for each body of its world.
+        """Return the arm's position at a tick: 4 joints + 4 bending links values [rad], and 6 per body of its world.
 
-        They are motor angles, reference, static gear deflection and the rest of it, and both again for the two angles
-        of each link that bends. Without truth the arm is stiff. An older server does not tell the static part; it
-        counts as zero. Bodies whose place is unknown are nowhere (NaN).
+        These are motor angles, reference, static gear deflection and its dynamic rest, then static part and
+        rest for the two angles of each link that bends. Without truth the arm is stiff. Older servers do not
+        send the static part, which then counts as zero. Bodies whose pose is unknown are NaN.
         """
         bends = 2 * len(self.geometry.bending)
         bodies = [math.nan] * (0 if self.geometry.world is None else 6 * len(self.geometry.world.bodies))

@@ -1,4 +1,4 @@
-"""Moves a robot for the tabs of the page: one of them has control, and a jog lasts as long as it is heard of."""
+"""Moves a robot for the tabs of the page: one tab has control, and jogs stop when their messages stop."""
 
 import asyncio
 import contextlib
@@ -16,13 +16,13 @@ from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.values import Payload
 
 DEADMAN_S = 0.25
-"""Silence of the tab that jogs after which the arm is stopped [s]."""
+"""Time without jog messages after which the arm is stopped [s]."""
 JOG_PERIOD = 0.02
 """Time between two set-points of a jog [s]."""
 JOG_SPEED = 0.25
-"""Share of a joint's velocity limit with which it is jogged [-]."""
+"""Jog speed as a share of the joint's velocity limit [-]."""
 JOG_ACCELERATION = 1.5
-"""Acceleration at the beginning of a jog [rad/s²]."""
+"""Acceleration at the start of a jog [rad/s²]."""
 
 SPEED = 1.5
 """Velocity of motions between poses [rad/s]."""
@@ -32,19 +32,14 @@ Doing = Callable[[Arm], Awaitable[Any]]
 
 
 class Pilot:
-    """Control of one robot, lent to one tab at a time. Everything is called in one event loop.
+    """Control of one robot, lent to one tab at a time; all methods are called in one event loop.
 
-    Args:
-        robot: The robot.
-        client: Name under which control is taken.
-        say: Called with a sentence for people when something was refused or lost.
-
-    Attributes:
-        client: Name under which control is taken.
-        holder: Number of the tab that has control; None: no tab.
+    `client` is the name under which control is taken; `say` is called with a message if something was refused
+    or lost.
     """
 
     holder: int | None
+    """Number of the tab that has control; None if no tab has."""
 
     def __init__(self, robot: Robot, client: str, say: Say) -> None:
         self._robot, self.client, self._say = robot, client, say
@@ -54,12 +49,12 @@ class Pilot:
         self._task: asyncio.Task[None] | None = None
         self._jog = (0, 0.0)
         self._jog_until = self._jog_heard = 0.0
-        self._jog_barred = False  # until the button is let go
+        self._jog_barred = False  # until the button is released
         self._jogging: asyncio.Task[None] | None = None
         self._changing = asyncio.Lock()
 
     async def take(self, tab: int) -> bool:
-        """Take control for a tab; tell if it has it now."""
+        """Take control for a tab; return whether it has control now."""
         async with self._changing:
             if self.holder is not None:
                 if self.holder != tab:
@@ -68,9 +63,7 @@ class Pilot:
             stack = AsyncExitStack()
             try:
                 if await self._robot.clock() != "realtime":
-                    raise MisuseError(
-                        "a client steps the time of this robot, and the page never does: it only watches"
-                    )
+                    raise MisuseError("a client steps the time of this robot, so this page can only show it")
                 self._arm = await stack.enter_async_context(self._robot.control(self.client))
             except (RefusedError, ClientError, ProtocolError) as error:
                 self._say(str(error))
@@ -79,7 +72,7 @@ class Pilot:
             return True
 
     async def give_back(self, tab: int) -> None:
-        """Stop what this tab moves, and give control back. Another tab's control stays."""
+        """Stop the tab's motion and give its control back; another tab's control stays."""
         async with self._changing:  # waits for control that is being taken
             if self.holder != tab:
                 return
@@ -92,18 +85,18 @@ class Pilot:
                 await _close(held)
 
     async def heard(self, control: str | None) -> None:
-        """Compare with who has control by the robot's word: it may have taken it away."""
+        """Give control back if the robot reports that this page no longer has it."""
         if self.holder is not None and not self._changing.locked() and control != self.client:
-            self._say("the robot has ended this page's control")
+            self._say("this page has lost control of the robot")
             await self.give_back(self.holder)
 
     @property
     def busy(self) -> bool:
-        """Whether a motion or a jog of a tab is under way."""
+        """Whether a motion or a jog of a tab is running."""
         return any(task is not None and not task.done() for task in (self._task, self._jogging))
 
     async def stop(self) -> None:
-        """Stop the arm, whoever moves it: that needs no control."""
+        """Stop the arm, no matter which client moves it; this needs no control."""
         self._jog_until, self._jog_barred = 0.0, True
         if self._task is not None:
             self._task.cancel()  # a motion may have a further leg
@@ -113,7 +106,7 @@ class Pilot:
             self._say(str(error))
 
     def do(self, tab: int, doing: Doing) -> bool:
-        """Do something with the arm for the tab that has control, one thing at a time; tell if it was begun."""
+        """Start an action for the tab that has control, one at a time; return whether it was started."""
         if self.holder != tab or self._arm is None:
             self._say("this tab does not have control: take it first")
             return False
@@ -124,7 +117,7 @@ class Pilot:
         return True
 
     async def set(self, tab: int, doing: Doing) -> bool:
-        """Change a setting for the tab that has control, also while the arm moves; tell if it was changed."""
+        """Change a setting for the tab that has control, even while the arm moves; return whether it was changed."""
         if self.holder != tab or self._arm is None:
             self._say("this tab does not have control: take it first")
             return False
@@ -136,14 +129,14 @@ class Pilot:
         return True
 
     def jog(self, tab: int, joint: int, direction: float) -> None:
-        """Jog a joint for the next quarter of a second; call it again and again while the button is down."""
-        # The page shows who has control; a sentence for each message would be too many.
+        """Jog a joint for the next quarter of a second; call it repeatedly while the button is down."""
+        # The page shows which tab has control; a message for each call would be too many.
         if self.holder != tab or self._arm is None:
             return
         now = asyncio.get_running_loop().time()
         pressed = now - self._jog_heard > DEADMAN_S or self._jog != (joint, direction)
         self._jog_heard, self._jog = now, (joint, direction)
-        # The next message moves the arm, so that a hidden tab, whose messages are a second apart, never does.
+        # Only the second message moves the arm, so that a hidden tab, whose messages are a second apart, never does.
         if pressed:
             self._jog_barred = False
             return
@@ -154,12 +147,12 @@ class Pilot:
             self._jogging = self._begin(self._play_jog(self._arm))
 
     async def where(self) -> list[float]:
-        """Joint angles of the shaped reference now [rad]."""
+        """Return the joint angles of the present shaped reference [rad]."""
         return list((await self._robot.state()).target_q)
 
     async def make_ready(self, arm: Arm) -> None:
-        """Release what a client can release, and switch the power on; say what remains."""
-        if (await self._robot.info()).moved is None:  # what a robot's own controller says is released there
+        """Release what a client can release, and switch the power on; show what remains to be done."""
+        if (await self._robot.info()).moved is None:  # stops of a real robot are released at the robot
             await arm.inject("normal")
         await make_ready(self._robot, arm, power_on=True)
         found = await look(self._robot)
@@ -167,7 +160,7 @@ class Pilot:
             self._say(found.sentence)
 
     async def gone(self, tab: int) -> None:
-        """A tab was closed or has lost its connection."""
+        """Handle that a tab was closed or has lost its connection."""
         await self.give_back(tab)
 
     def _begin(self, doing: Awaitable[Any]) -> asyncio.Task[None]:
@@ -205,7 +198,7 @@ class Pilot:
                     await asyncio.sleep(max(due - loop.time(), 0.0))
                 stopped = True
                 await self._robot.stop()
-                while True:  # the stop ends the stream, of which the block hears by an event
+                while True:  # wait for the event that the stop has ended the stream
                     await asyncio.sleep(JOG_PERIOD)
                     servo.check()
         except StreamStoppedError:
@@ -214,19 +207,19 @@ class Pilot:
 
 
 async def _close(held: AsyncExitStack) -> None:
-    """Give control back, if it is still there to be given."""
+    """Give control back, if the robot is still there."""
     with contextlib.suppress(RefusedError, ClientError):
         await held.aclose()
 
 
 async def go(arm: Arm, q: Sequence[float]) -> None:
-    """Move to joint angles, no faster than the robot lets any joint turn: a real arm may have a low cap."""
+    """Move to joint angles within the robot's velocity limits, which may be low for a real arm."""
     limits = (await arm.robot.info()).limits
     await arm.move_j(q, velocity=min(SPEED, *limits.velocity))
 
 
 def motion(poses: Sequence[Sequence[float]]) -> Doing:
-    """A motion through poses: to the first one, if the arm is not there, and on to the last."""
+    """Return a motion to the first pose, unless the arm is there, and on through the others."""
 
     async def run(arm: Arm) -> None:
         for place, q in enumerate(poses):
@@ -238,7 +231,7 @@ def motion(poses: Sequence[Sequence[float]]) -> Doing:
 
 
 def carry(mass: float) -> Doing:
-    """Let a simulated arm carry another mass [kg], which is not declared; it stands at rest then."""
+    """Let a simulated arm at rest carry another mass [kg] without declaring it."""
 
     async def run(arm: Arm) -> None:
         await arm.reset(payload=_scaled((await arm.robot.info()).payload, mass))
@@ -247,7 +240,7 @@ def carry(mass: float) -> Doing:
 
 
 def declare(mass: float) -> Doing:
-    """Declare another mass as the payload [kg]."""
+    """Declare another payload mass [kg]."""
 
     async def run(arm: Arm) -> None:
         payload = _scaled((await arm.robot.info()).payload, mass)
@@ -257,7 +250,7 @@ def declare(mass: float) -> Doing:
 
 
 def _scaled(payload: Payload, mass: float) -> Payload:
-    """A payload of the same shape; where nothing is carried yet, a steel disc of 10 cm."""
+    """Return a payload of the same shape with another mass; if there is none yet, a steel disc of 10 cm."""
     if payload.mass <= 0.0:
         across, along = 0.05**2 / 4 * mass, 0.05**2 / 2 * mass
         return make_payload(mass, (0.0, 0.0, 0.03), (across, 0.0, 0.0, across, 0.0, along))

@@ -12,13 +12,9 @@ from tvist_view.track import Track
 def playback(
     tracks: Sequence[Track], title: str, *, factor: float = 1.0, result: dict[str, Any] | None = None
 ) -> str:
-    """A page that plays runs back; it needs no server.
+    """Return a page, which needs no server, that plays runs with a common clock.
 
-    Args:
-        tracks: The runs; their times are those of one clock.
-        title: What the page is called.
-        factor: Magnification of the bending to begin with.
-        result: What the comparison of two runs says, as `said` makes it; None: nothing.
+    `factor` is the initial magnification of the bending; `result` is the verdict on two runs, from `said`.
     """
     start = min(track.start for track in tracks)
     return page(
@@ -33,11 +29,11 @@ def playback(
 
 
 def said(verdict: Verdict, shaper: str, motion: str) -> dict[str, Any]:
-    """A verdict as the page writes it in large figures."""
+    """Return a verdict in the form in which the page shows it."""
     return {**verdict, "with": shaper, "motion": motion}
 
 
 async def meet(tab: Tab) -> None:
-    """Wait until a tab goes that has all it needs."""
+    """Wait until a tab closes, since it already has everything it needs."""
     async for _ in tab:
         await asyncio.sleep(0)

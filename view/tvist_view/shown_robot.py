@@ -1,4 +1,4 @@
-"""A robot on the network that tabs show: found, described, heard while somebody looks, and moved."""
+"""A robot on the network that tabs show: found, described, subscribed to while a tab shows it, and moved."""
 
 import asyncio
 import contextlib
@@ -29,13 +29,13 @@ from tvist_view.watcher import Watcher
 log = logging.getLogger("tvist.view")
 
 INFO_S = 1.0
-"""Time between two looks at who has control [s]."""
+"""Time between two queries of which client has control [s]."""
 RETRY_S = 2.0
 """Time between two attempts to find the robot [s]."""
 MOST_ASKED = 16
-"""Largest number of things that are done for a tab at once; what it asks for then waits."""
+"""Most requests of a tab that are carried out at once; further ones wait."""
 TOLD = {"protective_stop", "safety_stop", "warning", "lease_lost"}
-"""Kinds of events whose reason the page says."""
+"""Kinds of events whose reason the page shows."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Place:
 
 
 class ShownRobot:
-    """A robot that tabs show; it is looked for until the task is cancelled."""
+    """A robot that tabs show; it is searched until its task is cancelled."""
 
     def __init__(self, place: Place, name: str, judge: Judge, meshes: Meshes) -> None:
         self._place, self.name, self._judge, self._meshes = place, name, judge, meshes
@@ -66,25 +66,25 @@ class ShownRobot:
         self._described: dict[str, Any] = {}
         self._absent = f"Looking for robot {name} at {place.endpoint} …"
         self.robots: list[str] = []
-        """Names of all robots at the endpoint, as of the last time that this one was found."""
+        """Names of all robots at the endpoint when this one was last found."""
         self.task = asyncio.create_task(self._run())
 
     def come(self, watcher: Watcher) -> None:
-        """A tab shows this robot now."""
+        """Attach a tab to this robot."""
         self.watchers.add(watcher)
         watcher.robot = self
         self._introduce(watcher)
         self._listen()
 
     async def go(self, watcher: Watcher) -> None:
-        """A tab does not show it any more: its motion is stopped, its control given back."""
+        """Detach a tab: stop its motion and give its control back."""
         self.watchers.discard(watcher)
         watcher.robot = None
         if self._doer is not None:
             await self._doer.pilot.gone(watcher.tab.number)
         if watcher.tasks:
             await asyncio.wait(watcher.tasks)
-            if self._doer is not None:  # one may have taken control meanwhile
+            if self._doer is not None:  # a task may have taken control meanwhile
                 await self._doer.pilot.gone(watcher.tab.number)
         self._listen()
 
@@ -112,7 +112,7 @@ class ShownRobot:
             await asyncio.sleep(RETRY_S)
 
     def _away(self, sentence: str, why: str) -> None:
-        """Say why there is no robot, once."""
+        """Show why there is no robot, once."""
         self._described = {}
         if sentence != self._absent:
             self._absent = sentence
@@ -121,10 +121,9 @@ class ShownRobot:
                 self._introduce(watcher)
 
     async def _shows(self, robot: Robot, info: Info) -> None:
-        """Show the robot until it has gone."""
         if info.geometry is None:
             raise GeometryError(
-                f"a {info.model} on a server of version {info.version} does not tell its geometry: update the server"
+                f"a {info.model} on a server of version {info.version} does not send its geometry: update the server"
             )
         look = Look(info.geometry, info.payload)
         place = self._place
@@ -146,7 +145,7 @@ class ShownRobot:
                 await pilot.give_back(pilot.holder)
 
     def _listen(self) -> None:
-        """Hear the robot while a tab shows it: its truth is computed for those who want it only."""
+        """Subscribe to the robot while a tab shows it: servers compute the truth only for subscribers."""
         if not self.watchers:
             self._deaf()
         elif self._robot is not None and self.running is not None and not self._ends:
@@ -164,23 +163,23 @@ class ShownRobot:
             end()
 
     async def _ask(self, robot: Robot, pilot: Pilot) -> None:
-        """Ask once a second who has control, and which shaper is in use."""
+        """Query every second which client has control and which shaper is in use."""
         while True:
-            with contextlib.suppress(AnswerTimeoutError):  # slow is not gone
+            with contextlib.suppress(AnswerTimeoutError):  # a slow robot is still there
                 holder = pilot.holder
                 self._info = await robot.info()
-                # Control that was taken since the question is not in the answer.
+                # The answer does not contain control that was taken since the query.
                 if holder == pilot.holder:
                     await pilot.heard(self._info.control)
             await asyncio.sleep(INFO_S)
 
     def status(self, tab: int) -> dict[str, Any] | None:
-        """What the bar of a tab says; None before the first state."""
+        """Return the content of a tab's status bar; None before the first state."""
         info, doer, running = self._info, self._doer, self.running
         if info is None or doer is None or running is None or running.state is None:
             return None
         pilot, only = doer.pilot, info.watched
-        watched = f"{only} is only watched: nothing here moves or stops it."
+        watched = f"{only} is only watched: this page cannot move or stop it."
         return {
             **state_in_words(running.state, info, self._io),
             "control": _control(pilot, tab, info.control) if only is None else watched,
@@ -211,7 +210,7 @@ class ShownRobot:
             watcher.say(sentence)
 
     async def do(self, watcher: Watcher, message: asked.Message) -> None:
-        """Do what a tab asks for."""
+        """Carry out a tab's request."""
         doer, info = self._doer, self._info
         if doer is None or info is None:
             watcher.say("there is no robot now")

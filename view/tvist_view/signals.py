@@ -12,50 +12,48 @@ from tvist_protocol.stream import State, Truth
 from tvist_view.look import Floats, Look
 
 RESTS = 1e-9
-"""Change of a reference within a tick that counts as none [rad]."""
+"""Change of a reference within a tick that counts as rest [rad]."""
 MOVING = 1e-3
-"""Acceleration of a reference from which on it moves, in a recorded motion [rad/s²]."""
+"""Acceleration above which a reference counts as moving, in a recorded motion [rad/s²]."""
 BRAKES_S = 0.02
-"""Time after the shaped reference has stopped within which the tool still brakes [s]."""
+"""Time after the stop of the shaped reference during which the tool still decelerates [s]."""
 KEPT = 3000
 """Samples of a running robot that are kept: six seconds."""
 LATE = 50
-"""Ticks after which a truth that has not come is not waited for."""
+"""Ticks after which a missing truth is no longer awaited."""
 
 
 @dataclass(frozen=True)
 class Signals:
-    """Samples in the order of time; T of them."""
+    """T samples in the order of time."""
 
     time: Floats
     """Simulation time, shape (T,) [s]."""
     alpha: Floats
     """|α|, acceleration of the tool without gravity, shape (T,) [m/s²].
 
-    Free of noise if the robot tells the truth, and then NaN at a tick whose truth is missing; else measured.
+    If the robot publishes the truth, it is free of noise, and NaN at ticks whose truth is missing; else it is
+    measured.
     """
     acceleration: Floats
     """Largest |q̈| over the joints of the shaped reference, shape (T,) [rad/s²]."""
     unshaped: Floats
-    """The same of the reference before the shaper, shape (T,) [rad/s²]."""
+    """The same for the reference before the shaper, shape (T,) [rad/s²]."""
 
     def largest_alpha(self) -> float:
-        """Largest |α| that is known, 0 without any [m/s²]."""
+        """Return the largest known |α|, 0 if none is known [m/s²]."""
         return float(np.nan_to_num(self.alpha).max(initial=0.0))
 
     def between(self, start: float, end: float) -> "Signals":
-        """The samples of a span of time, both ends included."""
+        """Return the samples of a span of time, both ends included."""
         first, last = np.searchsorted(self.time, (start, end + 1e-9))
         return Signals(**{name: values[first:last] for name, values in vars(self).items()})
 
 
 def signals_of(look: Look, states: Sequence[State], truths: Mapping[int, Truth]) -> Signals:
-    """The signals of states in the order of time.
+    """Return the signals of states in the order of time.
 
-    Args:
-        look: The robot.
-        states: Its states.
-        truths: Its truths by their ticks; without any, the tool's acceleration is the measured one.
+    `truths` has the truths by tick; if it is empty, the tool's acceleration is the measured one.
     """
     time = np.array([state.timestamp for state in states])
     if truths:
@@ -78,7 +76,7 @@ def signals_of(look: Look, states: Sequence[State], truths: Mapping[int, Truth])
 
 
 class Running:
-    """The newest signals and the newest moment of a running robot, whose states and truths come in any order."""
+    """The latest signals and state of a running robot, whose states and truths arrive in any order."""
 
     def __init__(self, look: Look) -> None:
         self._look = look
@@ -86,17 +84,17 @@ class Running:
         self._truths: dict[int, Truth] = {}
         self.kept: deque[tuple[float, float, float, float]] = deque(maxlen=KEPT)
         self.count = 0
-        """Number of samples since the beginning."""
+        """Number of samples since the start."""
         self.state: State | None = None
         self._shown: State | None = None
 
     @property
     def has_truth(self) -> bool:
-        """Whether the robot tells its truth."""
+        """Whether the robot publishes its truth."""
         return bool(self._truths)
 
     def add(self, message: State | Truth) -> None:
-        """Keep a message; an earlier tick than the last one's is that of a robot that has started anew."""
+        """Keep a message; a tick earlier than the last one's means that the robot has restarted."""
         if isinstance(message, Truth):
             self._truths[message.tick] = message
             if len(self._truths) > 4 * LATE:
@@ -104,7 +102,7 @@ class Running:
             return
         if self.state is not None and message.tick <= self.state.tick:
             if message.tick == self.state.tick:
-                return  # told again
+                return  # published again
             self._states.clear()
             self._truths.clear()
             self.kept.clear()
@@ -114,14 +112,14 @@ class Running:
             self._states.popleft()
 
     def row(self) -> list[float] | None:
-        """Where the arm is, at the newest tick of which everything is known; None before the first one."""
+        """Return the arm's position at the latest tick that is completely known; None before the first one."""
         shown = self._shown if self._shown is not None else self.state
         return None if shown is None else self._look.row(shown, self._truths.get(shown.tick))
 
     def update(self) -> None:
-        """Compute the signals of what has come."""
+        """Compute the signals of the messages received."""
         states = list(self._states)
-        if self._truths:  # a state waits for its truth, and those after it with it
+        if self._truths:  # a state waits for its truth, and later states wait, too
             known = itertools.takewhile(
                 lambda state: state.tick in self._truths or self._is_late(state), states
             )
@@ -129,7 +127,7 @@ class Running:
         if len(states) < 3:
             return
         found = signals_of(self._look, states, self._truths)
-        # The first and the last have no second difference: they are the middle ones of another time.
+        # The first and the last sample have no second difference; other updates compute theirs.
         for sample in zip(*(values[1:-1].tolist() for values in vars(found).values()), strict=True):
             self.kept.append(sample)
             self.count += 1
@@ -141,25 +139,25 @@ class Running:
         return self.state is not None and state.tick < self.state.tick - LATE
 
     def since(self, count: int) -> list[list[float]]:
-        """Columns of the samples after a number of them: time, |α|, |q̈| before and after the shaper."""
+        """Return the samples after the first `count` as columns: time, |α|, |q̈| before and after the shaper."""
         new = min(self.count - count, len(self.kept))
         rows = list(self.kept)[len(self.kept) - new :]
         return [[round(row[place], 4) for row in rows] for place in (0, 1, 3, 2)]
 
     def signals(self) -> Signals:
-        """All that is kept."""
+        """Return all samples that are kept."""
         columns = np.array(self.kept).reshape(-1, 4).T
         return Signals(*columns)
 
 
 def moves(signals: Signals) -> tuple[float, float] | None:
-    """Times at which the reference before the shaper accelerates first and last [s]; None if it does not."""
+    """Return the first and the last time at which the unshaped reference accelerates [s]; None if it does not."""
     moving = signals.time[signals.unshaped > MOVING]
     return (float(moving[0]), float(moving[-1])) if len(moving) else None
 
 
 def rests_since(signals: Signals) -> tuple[float, float] | None:
-    """Times at which the reference and the shaped reference of the last motion came to rest [s]; None: not yet."""
+    """Return when the reference and the shaped reference of the last motion came to rest [s]; None if they move."""
     moving = np.flatnonzero(signals.unshaped > RESTS / 0.002**2)
     shaped = np.flatnonzero(signals.acceleration > RESTS / 0.002**2)
     if not len(moving) or not len(shaped) or shaped[-1] >= len(signals.time) - 2:
@@ -168,7 +166,7 @@ def rests_since(signals: Signals) -> tuple[float, float] | None:
 
 
 def after_stop(signals: Signals) -> str:
-    """What the last stop was like, in words; empty while there is none."""
+    """Describe the vibration after the last stop in words; empty if there is none yet."""
     rests = rests_since(signals)
     if rests is None:
         return ""
@@ -178,11 +176,9 @@ def after_stop(signals: Signals) -> str:
 
 
 def up_in_flange(q: Floats, turns: Sequence[Floats]) -> Floats:
-    """The upward direction in the frame of the flange, shape (T, 3).
+    """Return the upward direction in the flange's frame, shape (T, 3).
 
-    Args:
-        q: Joint angles, shape (T, joints) [rad].
-        turns: Rotation of each link's frame in that of its joint, shape (3, 3).
+    `q` are joint angles, shape (T, joints) [rad]; `turns` are `Look.turns`.
     """
     up = np.tile([0.0, 0.0, 1.0], (len(q), 1))
     for angle, turn in zip(q.T, turns, strict=True):
@@ -192,7 +188,7 @@ def up_in_flange(q: Floats, turns: Sequence[Floats]) -> Floats:
 
 
 def _second_difference(time: Floats, q: Floats) -> Floats:
-    """Largest |q̈| over the joints, by central differences; zero at both ends and over holes."""
+    """Largest |q̈| over the joints, by central differences; zero at both ends and at gaps."""
     out = np.zeros(len(time))
     if len(time) > 2:
         step = np.diff(time)

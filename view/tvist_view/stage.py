@@ -1,4 +1,4 @@
-"""The page's server: one page, and a WebSocket for each tab. Only this machine reaches it, unless told otherwise."""
+"""The page's server: one page, and a WebSocket for each tab. By default only this machine can reach it."""
 
 import gzip
 import ipaddress
@@ -20,13 +20,13 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 LARGEST = 16 * 2**20
-"""Largest message of a page [byte]; a picture of a film is the largest that there is."""
+"""Largest message from a page [byte]; the largest ones are frames of a film."""
 WAITS_S = 1.0
-"""How long a tab may take to say goodbye when the page ends [s]."""
+"""How long a tab may take to close its connection when the server ends [s]."""
 
 
 _QUIET = logging.getLogger("tvist.view.stage")
-_QUIET.setLevel(logging.CRITICAL)  # a browser that opens a connection and leaves is no error
+_QUIET.setLevel(logging.CRITICAL)  # it is no error if a browser opens a connection and leaves
 
 
 class StageError(RuntimeError):
@@ -40,27 +40,22 @@ class Tab:
         self.number, self._connection = number, connection
 
     async def send(self, kind: str, content: Mapping[str, Any]) -> None:
-        """Send a message; wait while the tab is slow. To one that has gone nothing is sent."""
+        """Send a message, and wait while the tab is slow; do nothing if the tab is gone."""
         try:
             await self._connection.send(msgspec.json.encode({"type": kind, **content}).decode())
         except ConnectionClosed:
             return
 
     def __aiter__(self) -> AsyncIterator[str | bytes]:
-        """What the tab says, until it goes."""
         return aiter(self._connection)
 
 
 Meet = Callable[[Tab], Awaitable[None]]
-"""Serves one tab until it goes."""
+"""Serves one tab until it is closed."""
 
 
 def page(boot: Mapping[str, Any]) -> str:
-    """The page as one text that loads nothing.
-
-    Args:
-        boot: What kind of page it is, and what it needs to know at once.
-    """
+    """Return the page as one self-contained text; `boot` is what it needs to know at the start."""
     said = json.dumps(msgspec.to_builtins(boot)).replace("<", "\\u003c")
     return _page().replace('id="boot">{}', f'id="boot">{said}')
 
@@ -80,15 +75,10 @@ async def open_stage(
     insecure: bool = False,
     parts: Callable[[str], bytes | None] = lambda _: None,
 ) -> AsyncIterator[str]:
-    """Serve a page; the address of it is the value of the block.
+    """Serve a page; the value of the block is its address. Raise StageError if that is impossible.
 
-    Args:
-        page: The page.
-        meet: Called for each tab.
-        address: Address to listen on.
-        port: Port to listen on; 0 takes a free one.
-        insecure: Serve other machines, too: whoever opens the page can move the robot.
-        parts: Content of a path that the page asks for, such as a mesh; None: there is none.
+    `meet` is called for each tab. With `insecure`, other machines may use the page, and anyone who opens it
+    can move the robot. `parts` returns the content of other paths, such as meshes, or None.
     """
     if not is_local(address) and not insecure:
         raise StageError(
@@ -125,7 +115,7 @@ async def open_stage(
                 sock=listening,
                 process_request=answer,
                 max_size=LARGEST,
-                compression=None,  # it would cost more than the way through this machine
+                compression=None,  # costs more than it saves within one machine
                 close_timeout=WAITS_S,
                 logger=_QUIET,
             ):
@@ -141,15 +131,15 @@ def _found(kind: str, content: bytes) -> Response:
     headers = Headers(
         {"Content-Type": kind, "Content-Length": str(len(content)), "Cache-Control": "no-store"}
     )
-    headers["Content-Security-Policy"] = "frame-ancestors 'none'"  # another site could lead clicks to buttons
+    headers["Content-Security-Policy"] = "frame-ancestors 'none'"  # against clickjacking
     return Response(200, "OK", headers, content)
 
 
 def _may(request: Request, *, anywhere: bool) -> bool:
-    """Whether a request comes from the page itself, or from a program.
+    """Whether a request comes from the page itself or from a program.
 
-    A browser lets any site open a WebSocket to this machine, and names the site in the header Origin. A site whose
-    name leads to this machine is told by the header Host.
+    Browsers let any site open a WebSocket to this machine, with the site in the header Origin. The header
+    Host reveals a site whose name resolves to this machine.
     """
     origin, host = request.headers.get("Origin"), request.headers.get("Host", "")
     named = urlsplit(f"//{host}").hostname or ""
@@ -159,7 +149,7 @@ def _may(request: Request, *, anywhere: bool) -> bool:
 
 
 def is_local(address: str) -> bool:
-    """Whether an address is of this machine alone."""
+    """Return whether an address belongs to this machine only."""
     try:
         return ipaddress.ip_address(address).is_loopback
     except ValueError:

@@ -1,4 +1,4 @@
-"""A robot's run, recorded."""
+"""A recorded run of a robot."""
 
 import base64
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from tvist_view.look import Look
 from tvist_view.signals import Signals, signals_of
 
 EVERY = 5
-"""Ticks between two rows that the page gets: between them it draws what is between."""
+"""Ticks between two rows for the page, which interpolates."""
 MOVES = 1e-7
-"""Change of a reference within a tick from which on it moves [rad]."""
+"""Change of a reference within a tick above which it counts as moving [rad]."""
 SET = 0.05
-"""Change of a reference within a tick from which on it was set elsewhere, as by a reset [rad]."""
+"""Change of a reference within a tick above which it counts as a jump, for example by a reset [rad]."""
 CALM = 50
-"""Ticks of rest from which on a motion has ended."""
+"""Ticks of rest after which a motion has ended."""
 
 
 class TrackError(ValueError):
@@ -27,27 +27,23 @@ class TrackError(ValueError):
 
 @dataclass(frozen=True)
 class Shown:
-    """What a robot looks like, and what it is called."""
+    """A robot's label and shape."""
 
     label: str
     look: Look
 
 
 class Track:
-    """One robot's run.
+    """One robot's run; a state without a truth is drawn stiff.
 
-    Args:
-        shown: What it looks like.
-        states: Its states in the order of their ticks.
-        truths: Its truths; a state without one is drawn stiff.
-        origin: Simulation time from which the run counts [s].
+    `states` are in the order of their ticks; times count from the simulation time `origin` [s].
     """
 
     def __init__(
         self, shown: Shown, states: Sequence[State], truths: Sequence[Truth], origin: float = 0.0
     ) -> None:
         if not states:
-            raise TrackError("there is no state in it, so there is nothing to show")
+            raise TrackError("the recording contains no state, so there is nothing to show")
         self.shown, self._states, self._origin = shown, states, origin
         self._truths = {truth.tick: truth for truth in truths}
         self.has_truth = bool(self._truths)
@@ -56,17 +52,17 @@ class Track:
 
     @property
     def start(self) -> float:
-        """Time of the first moment [s]."""
+        """Time of the first state [s]."""
         return self._states[0].timestamp - self._origin
 
     @property
     def end(self) -> float:
-        """Time of the last moment [s]."""
+        """Time of the last state [s]."""
         return self._states[-1].timestamp - self._origin
 
     @property
     def stops(self) -> list[float]:
-        """Times at which the reference before the shaper came to rest for a while [s]."""
+        """Times at which the unshaped reference came to rest for a while [s]."""
         q = np.array([state.reference_q for state in self._states])
         change = np.abs(np.diff(q, axis=0, prepend=q[:1])).max(axis=1)
         moves = (change > MOVES) & (change < SET)
@@ -74,11 +70,7 @@ class Track:
         return [float(self.signals.time[end]) for end in ends if not moves[end + 1 : end + CALM].any()]
 
     def packed(self, start: float) -> dict[str, Any]:
-        """What the page is told: rows of poses and samples of signals, as base64 of 32-bit floats.
-
-        Args:
-            start: Time from which the page counts [s].
-        """
+        """Return the message for the page: rows and signals as base64 of 32-bit floats, times from `start` [s]."""
         states = self._states[::EVERY]
         rows = [self.shown.look.row(state, self._truths.get(state.tick)) for state in states]
         signals = vars(self.signals) | {"time": self.signals.time - start}

@@ -1,4 +1,4 @@
-"""A tab of the live page, and what it has been told."""
+"""A tab of the live page, and what has been sent to it."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -9,13 +9,13 @@ from tvist_view.signals import Running, after_stop
 from tvist_view.stage import Tab
 
 FRAME_S = 1.0 / 30.0
-"""Time between two pictures [s]."""
+"""Time between two frames [s]."""
 NOTES_EVERY = 6
-"""Pictures between two looks at what the last stop was like."""
+"""Frames between two updates of the note on the last stop."""
 
 
 async def pictures() -> AsyncIterator[int]:
-    """Count pictures from 0, each when it is due; a picture that comes too late delays those after it."""
+    """Count frames from 0, each when it is due; a late frame delays the following ones."""
     loop = asyncio.get_running_loop()
     count, due = 0, loop.time()
     while True:
@@ -30,36 +30,36 @@ class Watched(Protocol):
 
     @property
     def running(self) -> Running | None:
-        """What it does; None while it is away."""
+        """Its live data; None while the robot is away."""
 
     def status(self, tab: int) -> dict[str, Any] | None:
-        """What the bar of a tab says; None before the first state."""
+        """Return the content of a tab's status bar; None before the first state."""
 
 
 @dataclass(eq=False)
 class Watcher:
-    """A tab, and what it has been told."""
+    """A tab, and what has been sent to it."""
 
     tab: Tab
     robot: Watched | None = None
     waiting: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
     tasks: set[asyncio.Task[Any]] = field(default_factory=set)
-    """What is being done for it."""
+    """Its requests that are being carried out."""
     status: dict[str, Any] = field(default_factory=dict)
     count: int = 0
     free: bool = True
-    """Whether the tab has drawn its last picture. What waits in a slow browser would delay all that comes later."""
+    """Whether the tab has drawn its last frame; frames queued in a slow browser would delay everything after them."""
 
     def put(self, kind: str, content: dict[str, Any]) -> None:
-        """Have a message sent with the next picture."""
+        """Queue a message for the next frame."""
         self.waiting.append((kind, content))
 
     def say(self, sentence: str) -> None:
-        """Say a sentence."""
+        """Show a notice."""
         self.put("notice", {"text": sentence})
 
     async def tell(self) -> None:
-        """Tell the tab what is new, picture by picture; a slow tab gets fewer."""
+        """Send the tab what is new, frame by frame; a slow tab gets fewer frames."""
         note = ""
         async for number in pictures():
             waiting, self.waiting = self.waiting, []

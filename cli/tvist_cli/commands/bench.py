@@ -1,4 +1,4 @@
-"""`tvist bench`: how many robots this machine runs, how late these are, and how fast it computes one."""
+"""`tvist bench`: how fast this machine computes a robot, how many it can run, and how late their ticks are."""
 
 from typing import Annotated, Any
 
@@ -14,14 +14,14 @@ TERMS = {
 
 
 def bench(*, seconds: float = 10.0, shaper: Annotated[str, SHAPERS] = "zv", json: bool = False) -> None:
-    """Measure how many robots this machine runs in real time, how late they are, and how fast it computes one.
+    """Measure how many robots this machine runs in real time, how late their ticks are, and how fast one computes.
 
-    The figures hold under the machine's current load. A served robot has a recorder and a client that reads every
-    state; of several robots, a client on another core reads every state.
+    The figures hold for the machine's present load. A recorder and a client that reads every state are
+    attached to a single served robot; for several robots, a client on another core reads every state.
 
     Args:
-        seconds: Seconds of each measurement of a served robot; 0 serves none, and tells how fast a tick is computed.
-        shaper: Shaper of the robots, by its name.
+        seconds: Measure each served robot for this many seconds; 0 serves none and measures only the computation.
+        shaper: Give the robots this shaper.
         json: Print one JSON object.
     """
     from tvist_lab.bench.speed import speed

@@ -1,4 +1,4 @@
-"""`tvist check`: check that a robot answers and is ready to be moved."""
+"""`tvist check`: check that a robot answers and is ready to move."""
 
 import math
 from typing import Annotated
@@ -18,20 +18,18 @@ def check(
     wait: Annotated[list[float] | None, Parameter(consume_multiple=(0, 1), allow_repeating=False)] = None,
     json: bool = False,
 ) -> None:
-    """Check that a served robot answers and is ready to be moved, without changing anything.
+    """Check that a served robot answers and is ready to move, without changing anything.
 
-    Without a name, and if there are several robots but no ur5e, it is the first, and all of them are listed.
-
-    Exit code 0: it answers, ticks on time, refuses commands without control, has power, and its safety system allows
-    motion.
-    Exit code 1: one of these does not hold; the message says why and what to do next.
+    If no name is given and there are several robots but no ur5e, the command checks the first and lists them all. Exit
+    code 0: the robot answers, ticks on time, refuses commands from clients without control, has power, and its safety
+    system allows motion. Exit code 1: one of these does not hold; the message gives the reason and the next step.
 
     Args:
         at: Where the robot is.
-        alive: Check only that the server answers and, in real time, ticks. A robot that has stopped passes, too, so
-            that an orchestrator does not kill one that somebody is about to unlock.
-        wait: Try again for this many seconds while no robot answers or it is starting; without a number, until it is
-            ready.
+        alive: Check only that the server answers and, in real time, ticks. A stopped robot passes as well, so
+            that an orchestrator does not kill a robot that somebody is about to unlock.
+        wait: Try again for this many seconds while no robot answers or the robot is starting; without a
+            number, until it is ready.
         json: Print one JSON object.
     """
     seconds = 0.0 if wait is None else wait[0] if wait else math.inf

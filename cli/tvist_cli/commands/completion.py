@@ -1,12 +1,12 @@
-"""`tvist completion`: print the script by which a shell completes commands, options and the values of options."""
+"""`tvist completion`: print the script with which a shell completes commands, options and values."""
 
 from typing import Literal
 
 
 def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
-    """Print the script by which a shell completes the commands, options and values of tvist.
+    """Print the script with which a shell completes the commands, options and values of tvist.
 
-    It completes the names of shapers, robots, poses and profiles that come with the package, and files.
+    It completes files and the names of the shapers, robots, poses and profiles that come with the package.
 
     For bash, add this line to ~/.bashrc: eval "$(tvist completion bash)"
 
@@ -15,7 +15,7 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
     For fish, write it to ~/.config/fish/completions/tvist.fish.
 
     Args:
-        shell: Shell that will read the script.
+        shell: Write the script for this shell.
     """
     from tvist_cli.main import OF_GROUPS, application  # which imports nothing of the commands before
 
@@ -23,5 +23,5 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
     # cyclopts' script for bash takes `bench` in `tvist study bench` for the command `bench`.
     of_group = f'[[ -z "${{cmd_path[0]}}" || " {" ".join(OF_GROUPS)} " == *" ${{cmd_path[*]}} "* ]]'
     script = script.replace('if [[ " $all', f'if {of_group} && [[ " $all')
-    # zsh reads the file as the body of a function when something is completed for the first time.
+    # On the first completion, zsh executes the file as the body of a function.
     print(script, end='\n_cyclopts_tvist "$@"\n' if shell == "zsh" else "")

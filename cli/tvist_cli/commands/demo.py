@@ -1,4 +1,4 @@
-"""`tvist demo`: the paper's experiment, on a robot served in real time or simulated as fast as possible."""
+"""`tvist demo`: run the paper's experiment on a served robot in real time, or simulate it as fast as possible."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,11 +19,10 @@ if TYPE_CHECKING:
     from tvist_lab.studies.paper.served import Served
 
 PORT = 8080
-"""Port of the page of --view."""
+"""Port of the page that --view opens."""
 FOLDER = Path("tvist-demo")
-"""Folder for recording and figures."""
 ANSWERED = "Q1-Q3"
-"""Motion of the overview: on its way the arm's frequency doubles, and its vibration is seen to ring."""
+"""Motion of the overview figure: the arm's frequency doubles along it, and the ringing is easy to see."""
 
 
 def demo(
@@ -39,22 +38,23 @@ def demo(
     look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
-    """Run the paper's motions, unshaped and shaped: once over Zenoh in real time, and say what happened.
+    """Run the paper's motions unshaped and shaped, once over Zenoh in real time, and print the result.
 
-    With --runs, instead simulate them as fast as possible, and print the paper's tables beside ours.
+    With --runs, the motions are simulated as fast as possible instead, and the paper's tables are printed
+    beside those of the simulation.
 
     Args:
-        output: Folder for the recording and figures 12 to 16 [tvist-demo]; with --runs, folder for figures 1 to 4, 7, 8
-            and 12 to 16 and the spectrogram of a ring-down, those of motions being the first arm's [none are drawn].
-        seed: Seed of sensor noise and gear errors; with --runs, of the first repetition.
+        output: Write the recording and figures 12 to 16 to this folder [tvist-demo]. With --runs, write figures 1 to
+            4, 7, 8, 12 to 16 and the spectrogram of a ring-down [none]; figures of motions show the first arm.
+        seed: Set the seed of sensor noise and gear errors; with --runs, of the first repetition.
         tables: Print the paper's tables beside those of this run as well.
         view: Show the motions afterwards on a web page, with the arm's bending drawn 100 times larger.
-        runs: Simulate as fast as possible, with this number of repetitions, each with other noise and gear errors.
-        robot: With --runs, name of a robot that comes with the package, or path of a robot file, to be the only arm
-            [ur5e, which was fitted to Table 1, and ur5e_stiction, which was tuned to Table 2 as well].
-        calibration: With --runs, name of a calibration that comes with the package, or path of a calibration file, with
-            polynomials [that of each arm]; without --robot, ur5e is then the only arm.
-        baselines: With --runs, run the baselines for comparison as well, on the first arm.
+        runs: Simulate this number of repetitions as fast as possible, each with other noise and gear errors.
+        robot: With --runs, simulate only this arm: the name of a robot that comes with the package, or the
+            path of a robot file [ur5e, fitted to Table 1, and ur5e_stiction, tuned to Table 2 as well].
+        calibration: With --runs, use this calibration with polynomials: a name that comes with the package,
+            or the path of a file [that of each arm]; without --robot, only ur5e is simulated.
+        baselines: With --runs, also run the baselines for comparison on the first arm.
         look: How to write the figures.
         json: Print one JSON object with all results.
     """
@@ -126,7 +126,7 @@ def _in_real_time(
 
 
 def _figures(result: "Served", folder: Path, look: FigureOptions) -> Path:
-    """Draw the paper's figures and an overview that shows the answer at a glance; return the latter's path."""
+    """Draw the paper's figures and the overview; return the path of the overview."""
     from tvist_lab.studies.paper.figures import draw, overview
 
     with look.into(folder) as save:
@@ -136,7 +136,7 @@ def _figures(result: "Served", folder: Path, look: FigureOptions) -> Path:
 
 
 def _say(result: "Served", overview: Path, recording: Path) -> None:
-    """Print the answer, and four commands that work as they stand, each in one line to be copied."""
+    """Print the answer and four commands that can be copied as they are, each on one line."""
     from tvist_lab.studies.paper.answer import answer, checks, terms
 
     for line in answer(result.report, ANSWERED):

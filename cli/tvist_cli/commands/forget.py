@@ -1,4 +1,4 @@
-"""`tvist forget`: undo what a served robot has learnt of its payload."""
+"""`tvist forget`: discard what a served robot has learnt about its payload."""
 
 import asyncio
 
@@ -13,10 +13,10 @@ def forget(
     at: Connection = LOCAL,
     json: bool = False,
 ) -> None:
-    """Take control of a served robot, and undo what it has learnt of its payload.
+    """Take control of a served robot and discard what it has learnt about its payload.
 
-    A robot served with --adapt payload then moves as an arm that carries the declared payload, until its motions tell
-    it otherwise again. If another client has control, the command fails with exit code 1 and changes nothing.
+    A robot served with --adapt payload then moves as if it carried the declared payload, until its motions show
+    otherwise again. If another client has control, the command fails with exit code 1 and changes nothing.
 
     Args:
         at: Where the robot is.

@@ -1,4 +1,4 @@
-"""`tvist identify`: a robot's vibration, its payload or its twin, from jogs, from a position interface or from logs."""
+"""`tvist identify`: find a robot's modes, payload or twin from jogs or logs."""
 
 import re
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from tvist_cli.output import default_output
 
 ENDPOINT = re.compile(r"(tcp|tls|udp|quic|ws|unixsock-stream)/.+")
 HEAVIEST = 100.0
-"""Largest mass of a payload that is accepted [kg]."""
+"""Largest payload mass that the command accepts [kg]."""
 
 
 def identify(
@@ -36,40 +36,43 @@ def identify(
     look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
-    """Fit springs and drives to how an arm rings and write a calibration; or weigh its payload, or fit a twin.
+    """Fit springs and drives to an arm's ring-downs and write a calibration; or weigh its payload, or fit a twin.
 
-    A served robot, at tcp/HOST:PORT, sweeps slowly for its friction and makes a dozen jogs, chosen as those that tell
-    most. Without a source, a robot is simulated in this process as fast as possible. A robot of UR's, at ur://ADDRESS,
-    takes positions and tells its angles and the accelerometer of its tool: a plan of small moves is shown as a table
-    and a picture, and nothing moves before you agree. Logs move nothing: the stops of everyday motions are used.
+    A served robot at tcp/HOST:PORT makes slow sweeps to measure friction, and a dozen jogs, chosen for the
+    information they give. Without a source, a robot is simulated in this process as fast as possible. A UR
+    robot at ur://ADDRESS takes positions and sends its joint angles and the accelerometer of its tool: the
+    command first shows the planned small moves as a table and a picture, and asks before anything moves. With
+    logs nothing moves: the command uses the stops of everyday motions.
 
-    Where 38 ring-downs or more with one payload cover the workspace, the calibration has the polynomials of the paper,
-    too. The report says how sure each value is, at which amplitude the modes were measured, in how much of the
-    workspace they are known, and which three jogs would tell most.
+    If 38 or more ring-downs with one payload cover the workspace, the calibration also has the polynomials of
+    the paper. The report gives the uncertainty of each value, the amplitude at which the modes were measured,
+    the part of the workspace in which they are known, and the three jogs that would add most.
 
-    --payload without a mass makes no calibration, but finds mass and centre of mass of the payload from the joint
-    torques. --twin makes a robot file that tvist serve --robot runs: springs, dampers, gains, friction and payload are
-    fitted until the simulated arm makes each motion of the logs as the robot did, which takes some minutes.
+    --payload without a mass writes no calibration; it finds the mass and centre of mass of the payload from
+    the joint torques. --twin writes a robot file for tvist serve --robot: springs, dampers, gains, friction
+    and payload are fitted until the simulated arm repeats each motion of the logs, which takes some minutes.
 
     Args:
-        sources: Endpoint of a served robot, ur://ADDRESS[:PORT], or recordings and logs of a robot.
+        sources: Use this robot or these files: the endpoint of a served robot, ur://ADDRESS[:PORT], or
+            recordings and logs of one robot.
         at: Where a served robot is.
-        output: File to write [calibration.json; with --twin robot.toml, if there is none yet].
-        robot: Robot file, or name of one that comes with the package [in this process and for ur:// ur5e, else the one
-            whose model the robot or the logs name].
-        payload: Mass of the disc that the arm carries, in kg [what the robot or the logs say]; 0,5 makes a simulated
-            arm carry one after the other [in this process: nothing and the robot file's]. Without a mass: weigh it.
-        declare: With --payload: declare the payload that was found to the robot.
-        ring_downs: Number of jogs.
-        seed: Seed of the choice of jogs and, in this process, of noise and gear errors.
+        output: Write the result to this file [calibration.json; with --twin robot.toml, if there is none yet].
+        robot: Start from this robot file, or the name of one that comes with the package [ur5e in this
+            process and for ur://, else the model that the robot or the logs name].
+        payload: Assume a disc of this mass in kg [as declared by the robot or the logs]; with 0,5 a simulated
+            arm carries one after the other [nothing, then the payload of the robot file]. Without a mass:
+            weigh the payload.
+        declare: With --payload, declare the identified payload to the robot.
+        ring_downs: Make this number of jogs.
+        seed: Set the seed for the choice of jogs and, in this process, for noise and gear errors.
         yes: Move the robot at ur:// without asking.
-        columns: Names of a CSV's columns if they are not RTDE's; see tvist log analyze.
-        twin: Fit a robot file to logs. They need the robot's targets; ten motions are few, twenty with different loads
-            are good.
-        check: Log whose motions the twin has to predict and does not see, repeatable [each motion of the logs in turn,
-            left out of the fit].
-        figures: Folder to write figures to: what was measured against what fits without it tell and, in this process,
-            maps of the lowest mode's frequency and damping over the workspace, identified against true.
+        columns: Name the columns of a CSV whose names are not RTDE's; see tvist log analyze.
+        twin: Fit a robot file to logs, which must contain the robot's targets. Ten motions are few; twenty
+            with different loads are good.
+        check: Predict the motions of this log with the twin and leave them out of the fit, repeatable [each
+            motion of the logs is left out in turn].
+        figures: Write figures to this folder: measured against predicted by fits without that ring-down and, in this
+            process, maps of the lowest mode's frequency and damping over the workspace, identified against true.
         look: How to write the figures.
         json: Print one JSON object.
     """
@@ -121,7 +124,7 @@ def identify(
 def _masses_and_sources(
     payload: list[str] | None, sources: Sequence[str]
 ) -> tuple[tuple[float, ...] | None, list[str]]:
-    """Separate masses and sources: --payload may have no value and then takes the sources that follow it."""
+    """Separate masses and sources: a --payload without a value takes the sources that follow it."""
     masses, found = None, list(sources)
     for word in payload or []:
         try:

@@ -1,4 +1,4 @@
-"""`tvist keys`: certificates for a robot and its clients."""
+"""`tvist keys`: create certificates for a robot and its clients."""
 
 import re
 from dataclasses import dataclass, field
@@ -44,19 +44,19 @@ def keys(
     days: int = 365,
     json: bool = False,
 ) -> None:
-    """Create a certificate authority, a certificate for a robot and one for each client; existing files are kept.
+    """Create a certificate authority and certificates for a robot and its clients; keep files that exist.
 
     Give FOLDER to tvist serve --security, and FOLDER/NAME to --security of the client called NAME.
 
     Args:
-        folder: Folder to create the files in.
-        robot: Name of the robot; required the first time.
-        host: Host name or IP address under which clients reach the robot, repeatable; required the first time.
-        operator: Name of a client that may move the robot, repeatable.
-        viewer: Name of a client that may only watch the robot, repeatable.
-        member: Name of a robot, or of a namespace of robots, that connects to the router of this folder, repeatable.
-        uplink: Name of another router that connects to the router of this folder, repeatable.
-        days: Number of days that the new certificates are valid.
+        folder: Create the files in this folder.
+        robot: Set the robot's name; required the first time.
+        host: Add a host name or IP address under which clients reach the robot, repeatable; required the first time.
+        operator: Add a client of this name that may move the robot, repeatable.
+        viewer: Add a client of this name that may only watch the robot, repeatable.
+        member: Add a robot, or a namespace of robots, that connects to the router of this folder, repeatable.
+        uplink: Add another router that connects to the router of this folder, repeatable.
+        days: Make the new certificates valid for this number of days.
         json: Print one JSON object.
     """
     if not 1 <= days <= 3650:
@@ -89,17 +89,16 @@ def keys(
 
 
 def _next(folder: Path, asked: dict[str, Role]) -> list[str]:
-    """Return the next steps: how to use the new files."""
     return [
         f"robot:  tvist serve --security {folder} --listen tls/ADDRESS:7447",
         *(f"{name}:  tvist check tls/HOST:7447 --security {folder / name}" for name in asked),
-        f"whoever has {folder / AUTHORITY_KEY} can create operators; the robot does not need it, so store it elsewhere",
+        f"anyone with {folder / AUTHORITY_KEY} can create operators; the robot does not need it: store it elsewhere",
     ]
 
 
 @dataclass
 class _KeyRing:
-    """A folder of keys. `look` changes nothing and raises if `make` would stop half way."""
+    """A folder of keys; `look` changes nothing and raises if `make` would stop half way."""
 
     folder: Path
     days: int
@@ -108,7 +107,7 @@ class _KeyRing:
     roles: dict[str, Role] = field(default_factory=dict)
 
     def look(self, robot: str | None, hosts: tuple[Host, ...], asked: dict[str, Role]) -> None:
-        """Check that nothing is missing and that no existing file differs from what was asked for."""
+        """Check that nothing is missing and that existing files agree with the request."""
         there = [(self.folder / name).exists() for name in (AUTHORITY, AUTHORITY_KEY)]
         if there == [True, False]:
             why = f"{self.folder / AUTHORITY_KEY} is missing: put it back to create more certificates"
@@ -135,7 +134,7 @@ class _KeyRing:
                     f"{name} already has the role {given}: use another name, or edit {self.folder / CLIENTS}"
                 )
             if given is None and (self.folder / name).exists():
-                # A client whose line was deleted still has its certificate: a new line would let it in again.
+                # A client whose line was deleted still has its certificate; a new line would admit it again.
                 raise Failure(
                     f"{self.folder / name} exists but {CLIENTS} does not list {name}: use another name"
                 )

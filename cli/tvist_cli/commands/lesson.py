@@ -1,4 +1,4 @@
-"""`tvist lesson`: a page on which to try shaping."""
+"""`tvist lesson`: open a page for trying out input shaping."""
 
 import os
 import sys
@@ -10,10 +10,10 @@ from tvist_cli.output import out
 
 
 def lesson() -> None:
-    """Open a page on which to try shaping: a mass on a spring, an arm that folds, a shaper of your own, a UR5e.
+    """Open a page for trying out shaping: a mass on a spring, an arm that folds, a shaper of your own, a UR5e.
 
-    The page is one file that computes in the browser, without a server or a network; the command says where it is, to
-    be copied.
+    The page is one file that computes in the browser, without server or network. The command prints its path,
+    so that you can copy it.
     """
     page = Path(str(files("tvist_view").joinpath("try.html")))
     out.print(f"the page is the file {page}: open it in any browser, or copy it to wherever it is wanted")

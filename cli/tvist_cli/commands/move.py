@@ -1,4 +1,4 @@
-"""`tvist move`: move a served robot to one pose."""
+"""`tvist move`: move a served robot to a pose."""
 
 import asyncio
 from typing import Annotated, Any
@@ -14,7 +14,7 @@ from tvist_client.readiness import look
 from tvist_protocol.errors import RefusedError
 
 BENT = "0,-1.57,1.57,-1.57,-1.57,0"
-"""A posture of arms like UR's that is far from any singular one [rad]."""
+"""Joint angles of UR-like arms that are far from any singularity [rad]."""
 
 
 def move(
@@ -34,20 +34,21 @@ def move(
     """Move a served robot to a pose and print how long it took; Control+C stops the motion.
 
     Args:
-        target: Name of a pose in the robot file that begins with a letter, such as Q1, or joint angles in rad separated
-            by commas: -0.5,-3.1,0,-1.57,0,0. With --line, the tool's position x,y,z in m in the base frame, or its
-            position and rotation vector x,y,z,rx,ry,rz in m and rad; with three numbers it keeps its orientation.
+        target: Move to this pose: a name from the robot file that begins with a letter, such as Q1, or joint
+            angles in rad separated by commas: -0.5,-3.1,0,-1.57,0,0. With --line, give the tool's position
+            x,y,z in m in the base frame, or position and rotation vector x,y,z,rx,ry,rz in m and rad; with
+            three numbers the tool keeps its orientation.
         line: Move the tool on a straight line to the target.
-        by: Read the target of --line as the distance dx,dy,dz in m from the present position, in the base frame:
-            --line --by 0,0,-0.1 moves the tool 0.1 m down.
+        by: Read the target of --line as a displacement dx,dy,dz in m in the base frame: --line --by 0,0,-0.1
+            moves the tool 0.1 m down.
         at: Where the robot is.
         degrees: Read the target's angles in degrees; the limits stay in rad.
-        velocity: Velocity limit of every joint in rad/s [1.5], or of the tool in m/s with --line [0.25].
-        acceleration: Acceleration limit of every joint in rad/s² [2], or of the tool in m/s² with --line [1.2].
-        jerk: Jerk limit of every joint in rad/s³ [100], or of the tool in m/s³ with --line [60].
-        duration: Duration of the motion in s before shaping, instead of these three limits; if it is too short for the
-            arm, the motion takes longer.
-        shaper: Shaper to select before the motion.
+        velocity: Limit the velocity of every joint in rad/s [1.5], or of the tool in m/s with --line [0.25].
+        acceleration: Limit the acceleration of every joint in rad/s² [2], or of the tool in m/s² with --line [1.2].
+        jerk: Limit the jerk of every joint in rad/s³ [100], or of the tool in m/s³ with --line [60].
+        duration: Make the motion take this time in s before shaping, instead of setting the three limits; it
+            takes longer if the arm cannot do that.
+        shaper: Select this shaper before the motion.
         json: Print one JSON object.
     """
     given = _limits(velocity=velocity, acceleration=acceleration, jerk=jerk, duration=duration)
@@ -99,7 +100,7 @@ def move(
 
 
 def _limits(**given: float | None) -> dict[str, Any]:
-    """The limits that the user has set, or the duration instead."""
+    """Return the limits that the user has set, or the duration instead."""
     limits = {name: value for name, value in given.items() if value is not None}
     if "duration" in limits and len(limits) > 1:
         raise Failure(f"--{next(iter(limits))} and --duration exclude each other: give one of them", code=2)
@@ -107,7 +108,7 @@ def _limits(**given: float | None) -> dict[str, Any]:
 
 
 def _numbers(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float, ...]:
-    """Check the target before the robot is asked for anything, and return its numbers with --line."""
+    """Check the target before the robot is contacted; return its numbers with --line, else nothing."""
     if line:
         return tool_numbers(target, by=by, degrees=degrees)
     if by:
@@ -120,7 +121,7 @@ def _numbers(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float
 async def _line(
     arm: Arm, numbers: tuple[float, ...], limits: dict[str, Any], *, by: bool, joints: int
 ) -> Motion:
-    """Move the tool to a position, with an orientation or its own, or by a distance."""
+    """Move the tool to a position or by a displacement; with three numbers it keeps its orientation."""
     goal = numbers
     if len(numbers) == 3:
         x, y, z, *turn = await arm.robot.forward_kinematics()
@@ -136,6 +137,6 @@ async def _line(
 
 
 async def _stop(arm: Arm) -> None:
-    """Bring the robot to rest, whether or not the motion has been answered."""
+    """Bring the robot to rest, even if the motion has not been answered yet."""
     await arm.stop()
     await arm.robot.rest()

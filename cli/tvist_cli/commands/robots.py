@@ -1,4 +1,4 @@
-"""`tvist robots`: the arms that there are, what is known of them, and how well their vibration is suppressed."""
+"""`tvist robots`: list the available arms, or measure how well their vibration is suppressed."""
 
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from tvist_plant.description import RobotDescription
 
 VARIED = 50.0
-"""Largest percentage by which --vary changes stiffness: a spring must not vanish."""
+"""Largest value of --vary [%]: a spring must not vanish."""
 
 
 def robots(
@@ -22,18 +22,18 @@ def robots(
     seed: int = 0,
     json: bool = False,
 ) -> None:
-    """List the arms that come with the package: size, payload, what is measured, what is assumed, and calibrations.
+    """List the arms that come with the package: size, payload, calibrations, and which values are measured or assumed.
 
     Args:
-        robot: Names of robots that come with the package, or paths of robot files (TOML or URDF), to tell all that is
-            known of each [every robot that comes with the package, in a table].
-        measure: Let each arm make random moves with its rated payload, unshaped and with the shaper auto, and compare
-            its modes with its calibration and its sag with gravity over stiffness. An arm without a calibration is
-            identified first.
-        random: Number of random moves for each measurement.
-        vary: Percentage by which all springs are stiffer and softer in two further measurements, before each of which
-            the arm is identified again.
-        seed: Seed of moves, identification and gear errors.
+        robot: Show all that is known about these robots: names that come with the package, or paths of robot
+            files (TOML or URDF) [a table of every robot that comes with the package].
+        measure: Let each arm make random moves with its rated payload, unshaped and with the shaper auto, and
+            compare its modes with its calibration and its sag with gravity over stiffness. An arm without a
+            calibration is identified first.
+        random: Make this number of random moves for each measurement.
+        vary: Measure twice more, with all springs stiffer and softer by this percentage; the arm is
+            identified again each time.
+        seed: Set the seed of moves, identification and gear errors.
         json: Print one JSON object.
     """
     from tvist_lab.studies.arms.about import about
@@ -57,7 +57,7 @@ def robots(
 def _measured(
     name: str, description: "RobotDescription", known: dict[str, Any], moves: int, vary: float, seed: int
 ) -> list[dict[str, Any]]:
-    """Measure an arm as its file describes it, and stiffer and softer; empty if it has too few joints for auto."""
+    """Measure an arm as described, stiffer, and softer; return nothing if it has too few joints for auto."""
     from tvist_controller.sources.calibrations import load
     from tvist_lab.identification.ring_downs import IdentificationError
     from tvist_lab.studies.arms.measure import ALONE, measure

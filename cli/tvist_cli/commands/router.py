@@ -1,4 +1,4 @@
-"""`tvist router`: a router for a fleet."""
+"""`tvist router`: run a router for a fleet."""
 
 import asyncio
 
@@ -18,14 +18,14 @@ def router(
     """Run a Zenoh router until Control+C: robots started with --connect and their clients reach each other through it.
 
     Args:
-        listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
-        connect: Endpoint of another router to connect to, repeatable, such as that of another hall.
-        rate: Pass on at most this many states of each robot per second, repeatable: 10, or 10@INTERFACE for what leaves
-            through one network interface [all]. Commands, events and telemetry are not reduced.
-        robot: Robot that --rate is about, repeatable: [NAMESPACE/]NAME, or [NAMESPACE/]NAME*COUNT for NAME-1 to
-            NAME-COUNT. Robots that are not listed share the rate of one.
-        security: Folder made by tvist keys with the roles of robots, clients and routers. The endpoint is then
-            tls/ADDRESS:PORT.
+        listen: Listen on this Zenoh endpoint, repeatable [tcp/127.0.0.1:7447].
+        connect: Connect to another router at this endpoint, such as that of another hall, repeatable.
+        rate: Pass on at most this many states of each robot per second, repeatable: 10, or 10@INTERFACE for
+            one network interface [all]. Commands, events and telemetry are not reduced.
+        robot: Apply --rate to this robot, repeatable: [NAMESPACE/]NAME, or [NAMESPACE/]NAME*COUNT for NAME-1
+            to NAME-COUNT. All robots that are not listed share the rate of one.
+        security: Use this folder made by tvist keys, with the roles of robots, clients and routers. The
+            endpoint is then tls/ADDRESS:PORT.
         insecure: Accept remote connections without TLS; anyone can move the robots, and act as one.
     """
     from tvist_server.ending import Ending

@@ -1,4 +1,4 @@
-"""`tvist run`: run programs in URScript, each on a robot of its own."""
+"""`tvist run`: run URScript programs, each on a new robot."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +13,7 @@ OPTIONS = {
     "robot", "profile", "payload", "overload", "adapt", "shaper", "shape_servo", "plant", "hidden", "start",
     "seed", "record", "truth", "listen", "ur", "ur_allow", "cell", "world",
 }  # fmt: skip
-"""Options of `tvist serve` that one robot which ends with its program can do with."""
+"""Options of `tvist serve` that make sense for one robot that ends with its program."""
 NO_LIMITS = Limits()
 
 
@@ -31,38 +31,38 @@ def run(
     json: bool = False,
     **given: Any,
 ) -> None:
-    """Run a program in URScript on a robot of its own, print its messages as they come, and end with an exit code.
+    """Run a URScript program on a new robot, print its messages as they come, and end with an exit code.
 
     Exit code 0: the program ended by itself, within all limits. Exit code 1: it does not compile; an error, a
-    protective stop, a safety stop, a client or --timeout ended it; or it broke a limit, or differs from --baseline.
-    Errors in the program are printed as FILE:LINE:COLUMN: text. Exit code 2: the command line is wrong, or the file
-    cannot be read.
+    protective stop, a safety stop, a client or --timeout ended it; or it exceeded a limit, or differs from
+    --baseline. Errors in the program are printed as FILE:LINE:COLUMN: text. Exit code 2: the command line is
+    wrong, or the file cannot be read.
 
-    The program runs in real time, on a robot that other programs can reach as if tvist serve ran it. Popups do not
-    hold it up: they are printed and closed. With --lockstep several programs run, one after the other, each on a
-    fresh robot.
+    The program runs in real time, on a robot that other programs can reach as if tvist serve ran it. Popups
+    do not pause it: they are printed and closed. With --lockstep, several programs run one after the other,
+    each on a new robot.
 
-    With --check, nothing runs. Errors are what keeps a program from starting: wrong syntax, unknown names, and calls
-    that do not fit their functions. A function of UR's robots that tvist does not simulate is a warning: the program
-    starts, and ends with an error when it calls that function.
+    With --check, nothing runs. An error is anything that keeps a program from starting: wrong syntax, unknown
+    names, and calls with wrong arguments. A UR function that tvist does not simulate is a warning: the
+    program starts, and ends with an error when it calls that function.
 
     Args:
-        file: Program to run, or programs to run in lockstep or to check; - reads the standard input.
-        check: Look for errors without running anything: each is a line FILE:LINE:COLUMN: text. Exit code 0: there is
-            none. Exit code 1: there is at least one. Exit code 2: a file cannot be read.
-        lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real time. A
-            program that waits for a client then waits for ever: see --input and --timeout. It can open sockets only to
-            the gripper of a cell.
-        inputs: Input to set before the start as NAME=VALUE, repeatable. NAME is digital_input_N, input_bit_register_N,
-            input_int_register_N or input_double_register_N.
-        timeout: End the run after this time in s as the robot counts it, with exit code 1 [the program may run for
-            ever].
+        file: Run this program, or with --lockstep or --check these programs; - reads the standard input.
+        check: Look for errors without running anything, and print each as FILE:LINE:COLUMN: text. Exit code
+            0: there is none. Exit code 1: there is at least one. Exit code 2: a file cannot be read.
+        lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real
+            time. A program that waits for a client then waits for ever: see --input and --timeout. It can
+            open sockets only to the gripper of a cell.
+        inputs: Set an input before the start with NAME=VALUE, repeatable. NAME is digital_input_N,
+            input_bit_register_N, input_int_register_N or input_double_register_N.
+        timeout: End the run with exit code 1 after this time in s on the robot's clock [no limit].
         limits: What the runs must keep.
-        junit: File to write the results to as JUnit XML, with a test case for each program.
-        baseline: What an earlier --json of the same programs printed in lockstep: fail if times, stops, shake, speeds
-            or warnings differ beyond rounding, and say which.
-        config: TOML file with any options of tvist serve for one robot; options on the command line take precedence.
-        json: Print one JSON object at the end instead of messages; of several programs, it has a list of programs.
+        junit: Write the results to this file as JUnit XML, with a test case for each program.
+        baseline: Compare with this file, the --json output of an earlier lockstep run of the same programs;
+            fail if times, stops, shake, speeds or warnings differ beyond rounding, and list the differences.
+        config: Read options of tvist serve for one robot from this TOML file; options on the command line
+            take precedence.
+        json: Print one JSON object at the end instead of messages; for several programs it contains a list.
         given: Fields of `ServeConfig`.
     """
     from tvist_cli.program_runs import check_scripts

@@ -19,13 +19,13 @@ def serve(
 ) -> None:
     """Run one or more robots on the network until Control+C, SIGTERM, SIGQUIT or the terminal closes.
 
-    The first start after an installation or an update compiles what a robot computes at every tick and in its plans for
-    this processor. Machine code is kept in the user's cache folder, or in the folder that NUMBA_CACHE_DIR names.
+    The first start after an installation or update compiles the robot's computations and plans for this processor. The
+    machine code is kept in the user's cache folder, or in the folder that NUMBA_CACHE_DIR names.
 
     Args:
-        compile_only: Only compile, so that no start has to, in as many processes as the number says [one on each
-            processor]; serve nothing.
-        config: TOML file with any of the other options; options on the command line take precedence.
+        compile_only: Compile now and serve nothing, so that later starts are quick; a number sets the number
+            of processes [one for each processor].
+        config: Read any of the other options from this TOML file; options on the command line take precedence.
         given: Fields of `ServeConfig`.
     """
     from tvist_cli.serving import compile_all, serve_robots

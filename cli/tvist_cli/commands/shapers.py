@@ -1,4 +1,4 @@
-"""`tvist shapers`: the catalogue of input shapers."""
+"""`tvist shapers`: list the input shapers, or compute their sensitivity."""
 
 import math
 from pathlib import Path
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 F_D = 10.0
 """Damped frequency of the mode in the list [Hz]."""
 ERRORS = (-40.0, 60.0)
-"""Range of the errors of --sensitivity [%]."""
+"""Range of frequency errors for --sensitivity [%]."""
 BANDS = {"5": 0.05, "10": 0.1}
 """Residual vibration that bounds each band [-], by its percentage."""
 TOUCHING = 1.0 + 1e-4
@@ -43,15 +43,15 @@ def shapers(
     """List the input shapers that a robot can use, with their properties for one mode.
 
     Args:
-        f_d: Damped frequency of the mode in Hz.
-        zeta: Damping ratio of the mode.
-        shaper: FILE.py:NAME, repeatable: run that file and list the shaper in it, too.
-        sensitivity: Instead of the list, compute what these shapers, names or FILE.py:NAME, leave of the vibration
-            of a mode whose frequency they assume wrongly [zv zvd ei].
-        errors: With --sensitivity, lowest and highest percentage by which the assumed frequency is too high.
-        output: With --sensitivity, JSON file to write the curves to.
-        figures: Folder to write figures to: residual vibration for a wrong frequency, and settling time against delay;
-            with --sensitivity, the curves.
+        f_d: Set the damped frequency of the mode in Hz.
+        zeta: Set the damping ratio of the mode.
+        shaper: Add the shaper FILE.py:NAME to the list, repeatable; the file is executed.
+        sensitivity: Compute instead the residual vibration of these shapers, names or FILE.py:NAME, if they
+            assume a wrong frequency [zv zvd ei].
+        errors: With --sensitivity, set the lowest and highest percentage by which the assumed frequency is too high.
+        output: With --sensitivity, write the curves to this JSON file.
+        figures: Write figures to this folder: residual vibration for a wrong frequency, and settling time
+            against delay; with --sensitivity, the curves.
         look: How to write the figures.
         json: Print one JSON object.
     """
@@ -158,7 +158,7 @@ def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
 
 
 def _band(impulses: "Impulses", f_d: float, V: float, zeta: float) -> list[float | None] | None:
-    """Lowest and highest ratio; None if the assumed frequency is not in the band, or for a band without an end."""
+    """Return the band's lowest and highest f/f_d; None if f_d is outside, or as the highest if it has no end."""
     from tvist_shaping import band
 
     low, high = (f / f_d for f in band(impulses, f_d, zeta, V * TOUCHING))

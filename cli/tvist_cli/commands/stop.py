@@ -1,4 +1,4 @@
-"""`tvist stop`: stop one robot or all, whoever has control."""
+"""`tvist stop`: stop one robot or all, even if another client has control."""
 
 import asyncio
 from typing import Annotated
@@ -20,17 +20,17 @@ def stop(
     at: Connection = LOCAL,
     json: bool = False,
 ) -> None:
-    """Stop a served robot at once, whoever has control, and say what was stopped.
+    """Stop a served robot at once, even if another client has control, and print what was stopped.
 
-    It ends motions, streams of set-points, and programs that may move the arm. Exit code 0: the arm is at rest; in
-    lockstep it will be after the next steps. Exit code 1: the robot does not answer, refuses, or a
-    client has moved it again; the message says why.
+    The command ends motions, streams of set-points, and programs that may move the arm. Exit code 0: the arm
+    is at rest, or in lockstep will be after the next steps. Exit code 1: the robot does not answer, refuses,
+    or a client has moved it again; the message gives the reason.
 
-    Whoever has control keeps it and can move the robot again. With --all, each robot's answer is reported; the exit
-    code is 1 if one did not answer or refused, and 0 if all have stopped.
+    The client that has control keeps it and can move the robot again. With --all, the answer of each robot is
+    printed; the exit code is 0 if all have stopped and 1 if one did not answer or refused.
 
     Args:
-        robot: Name of the robot, as with --name, or NAMESPACE/NAME.
+        robot: Stop the robot of this name, as with --name, or NAMESPACE/NAME.
         everyone: Stop all robots that the router or server reaches; with --namespace, those in it or below it.
         at: Where the robot is.
         json: Print one JSON object.

@@ -1,4 +1,4 @@
-"""`tvist unlock`: make a stopped robot ready to be moved again."""
+"""`tvist unlock`: make a stopped robot ready to move again."""
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, told
@@ -15,12 +15,12 @@ def unlock(
     """Take control of a served robot and clear what keeps it from moving.
 
     The command restarts a safety system that found a violation or failed, unlocks a protective stop, and checks for
-    0.3 s of simulation time that the robot stays ready. A client cannot release a safeguard or emergency stop. The exit
-    code is 0 if the robot is then ready to be moved; otherwise it is 1, and a message says why and what to do.
+    0.3 s of simulation time that the robot stays ready. A client cannot release a safeguard stop or an emergency stop.
+    Exit code 0: the robot is ready to move. Exit code 1: it is not; the message gives the reason and the next step.
 
     Args:
         at: Where the robot is.
-        power_on: If the arm has no power, switch it on and release the brakes.
+        power_on: Switch the arm on and release the brakes if it has no power.
         json: Print one JSON object.
     """
     with told():

@@ -1,4 +1,4 @@
-"""`tvist view`: a page with a robot in three dimensions, its plots and its controls."""
+"""`tvist view`: show a robot in three dimensions on a web page, with plots and controls."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +14,7 @@ from tvist_cli.tracks import MAGNIFY, Shows, compared, recorded, repeated
 from tvist_client.robot import NAME
 
 LONGEST_S = 120.0
-"""Longest recording that is written as HTML [s]."""
+"""Longest recording that can be written as HTML [s]."""
 
 
 def view(
@@ -31,19 +31,20 @@ def view(
 ) -> None:
     """Show a robot on a web page: the arm in three dimensions, its bending magnified, plots and controls.
 
-    ENDPOINT is that of a served robot, which the page shows live, or the name of a recording, which it plays back.
-    --compare needs neither: it simulates the same motion with two or three shapers and shows the arms beside each
-    other. Without a name, a live page begins with the robot ur5e.
+    If ENDPOINT is that of a served robot, the page shows the robot live; if it is the name of a recording,
+    the page plays it back. --compare needs neither: it simulates the same motion with two or three shapers
+    and shows the arms side by side. Without a name, a live page starts with the robot ur5e.
 
     Args:
         at: Where the robot is, or the MCAP file.
-        beside: Of a recording, show the motion that it holds without and with a shaper, both at once.
-        compare: Two or three shapers to simulate and to show beside each other: --compare none auto.
-        robot: Name of the robot to simulate with --compare, or path of a robot file.
-        magnify: Factor by which bending is drawn larger at first, 1 to 300.
-        html: HTML file to write the comparison or the recording to, instead of showing a page; it needs no server.
-        address: Address on which the page is served.
-        port: Port on which the page is served; 0 takes a free one.
+        beside: Show the motion of a recording without and with a shaper at the same time.
+        compare: Simulate two or three shapers and show them side by side: --compare none auto.
+        robot: With --compare, simulate this robot: a name that comes with the package, or the path of a robot file.
+        magnify: Draw bending larger by this factor at first, 1 to 300.
+        html: Write the comparison or the recording to this HTML file, which needs no server, instead of
+            showing a page.
+        address: Serve the page on this address.
+        port: Serve the page on this port; 0 takes a free one.
         insecure: Serve the page to other machines; anyone who opens it can move the robot.
     """
     if not 1.0 <= magnify <= 300.0:

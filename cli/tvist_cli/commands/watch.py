@@ -1,4 +1,4 @@
-"""`tvist watch`: show live in the terminal what a robot, or many, are doing."""
+"""`tvist watch`: show in the terminal what one or many robots are doing."""
 
 import asyncio
 import contextlib
@@ -24,11 +24,11 @@ from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import Event, State, Telemetry
 
 EVERY = 0.1
-"""Time between two looks at states [s]."""
+"""Time between two readings of states [s]."""
 FLEET_EVERY = 1.0
-"""Time between two looks at a fleet [s]."""
+"""Time between two readings of a fleet [s]."""
 STALE_S = 1.0
-"""Age of a newest state from which on it is shown in red [s]."""
+"""Age above which a newest state is shown in red [s]."""
 
 
 def watch(
@@ -40,18 +40,17 @@ def watch(
 ) -> None:
     """Show modes, rate, load, joints, accelerometer, estimates and events of a served robot until Control+C.
 
-    If the robot is not ready to move, the second line says why, even if it stopped before the command started.
-
-    Without a name, and if there are several robots, show them all in a table, each with its modes, who has control, its
-    rate and its load; with a namespace, those in or below it.
+    If the robot is not ready to move, the second line gives the reason, even if it stopped before the command
+    started. If there are several robots and no name is given, the command shows all of them in a table, each
+    with its modes, the client in control, its rate and its load; with a namespace, only those in or below it.
 
     Args:
         at: Where the robot is, or the robots are.
         states: Show the newest states of all robots that a key with wildcards selects, one line each:
             `tvist/*/state`, or `**/tvist/*/state` for all namespaces.
         seconds: Stop after this many seconds.
-        json: Print each event, and the state ten times a second, as one JSON object per line; of several robots, one
-            object a second.
+        json: Print each event, and the state ten times a second, as one JSON object per line; for several
+            robots, one object a second.
     """
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
@@ -87,7 +86,6 @@ def _only_robot(at: Connection) -> Connection | None:
 
 
 async def _watch_robot(at: Connection, *, json: bool) -> None:
-    """Show a robot for ever."""
     with waiting(f"waiting for {at.name} at {at.endpoint}"):
         found = await at.robot()
     async with found as robot:
@@ -108,7 +106,7 @@ async def _watch_robot(at: Connection, *, json: bool) -> None:
 
 
 async def _watch_fleet(at: Connection, *, json: bool) -> None:
-    """Show all robots that a router or server reaches for ever: how they are, and what keeps them from being moved."""
+    """Show all robots that a router or server reaches until cancelled: their state and what keeps them from moving."""
     async with Fleet(at.endpoint, security=at.security, namespace=at.namespace) as fleet:
         await fleet.listen()
         with contextlib.nullcontext() if json else Live(console=out, auto_refresh=False) as live:
@@ -122,7 +120,7 @@ async def _watch_fleet(at: Connection, *, json: bool) -> None:
 
 
 async def _watch_states(states: ManyStates, *, json: bool) -> None:
-    """Show the newest states of all robots that a key selects, for ever."""
+    """Show the newest states of all robots that a key selects until cancelled."""
     async with states:
         with contextlib.nullcontext() if json else Live(console=out, auto_refresh=False) as live:
             since = time.monotonic()
@@ -139,7 +137,7 @@ async def _watch_states(states: ManyStates, *, json: bool) -> None:
 
 
 class _Standing:
-    """Whether the robot may be moved, and why not; asked again whenever its modes change or it stops."""
+    """Whether the robot can be moved, and why not; asked again whenever its modes change or it stops."""
 
     def __init__(self, robot: Robot, unlock: str) -> None:
         self._robot, self._unlock = robot, unlock
@@ -247,7 +245,7 @@ def _states_table(states: ManyStates, seconds: float) -> Table:
 
 
 def _columns(*numbers: str, words: tuple[str, ...] = ()) -> Table:
-    """Return an empty table: columns of words, the names of robots never cut, then columns of numbers."""
+    """Return an empty table with text columns and then number columns; robot names are never cut."""
     drawn = Table(show_edge=False, pad_edge=False)
     for title in words:
         drawn.add_column(title, no_wrap=title == "robot")
@@ -257,13 +255,7 @@ def _columns(*numbers: str, words: tuple[str, ...] = ()) -> Table:
 
 
 def _watch_for(seconds: float | None, watching: Coroutine[Any, Any, None], meanwhile: str) -> None:
-    """Watch until the time is over or Control+C ends it, which is a failure with exit code 130.
-
-    Args:
-        seconds: Longest time [s]; None: until Control+C.
-        watching: What watches, and shows what it sees.
-        meanwhile: What goes on without it, such as "the robot keeps running".
-    """
+    """Watch for `seconds`, or with None until Control+C, which raises a Failure that tells what keeps running."""
     began = time.monotonic()
     with told(), contextlib.suppress(TimeoutError):
         try:

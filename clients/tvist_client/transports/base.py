@@ -11,7 +11,7 @@ Topic = Literal["state", "event", "truth", "telemetry", "io"]
 
 
 class Transport(ABC):
-    """A connection to one robot. It is used from one event loop, on which its callbacks run too."""
+    """A connection to one robot, used from one event loop, on which its callbacks run too."""
 
     @abstractmethod
     async def request(self, data: bytes, timeout_s: float) -> bytes:
@@ -19,7 +19,7 @@ class Transport(ABC):
 
         Args:
             data: Encoded command.
-            timeout_s: How long the robot may take [s].
+            timeout_s: Longest wait for the answer [s].
 
         Raises:
             NotConnectedError: The robot does not answer, or disconnected meanwhile.
@@ -29,11 +29,7 @@ class Transport(ABC):
 
     @abstractmethod
     def put_setpoint(self, data: bytes) -> None:
-        """Send an encoded set-point, which is not answered.
-
-        Raises:
-            NotConnectedError: The transport is closed.
-        """
+        """Send an encoded set-point, which is not answered; raise NotConnectedError if the transport is closed."""
 
     @abstractmethod
     async def info(self) -> bytes:
@@ -49,7 +45,7 @@ class Transport(ABC):
 
     @abstractmethod
     async def announce(self, client: str) -> None:
-        """Announce a client's presence, until `withdraw` was called as often or this transport is closed."""
+        """Announce a client's presence, until `withdraw` was called as often or the transport is closed."""
 
     @abstractmethod
     async def withdraw(self, client: str) -> None:

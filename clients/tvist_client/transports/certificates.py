@@ -1,6 +1,6 @@
-"""Authentication of a client by a folder with its certificate, as `tvist keys` makes one for each client.
+"""Authentication of a client by a folder with its certificate, made by `tvist keys`.
 
-authority.pem    certificate of the authority that signed the robot's
+authority.pem    certificate of the authority that signed the robot's certificate
 client.pem       the client's certificate, and
 client.key       its private key
 """
@@ -19,22 +19,15 @@ from tvist_client.errors import NotConnectedError
 
 AUTHORITY, CERTIFICATE, KEY = "authority.pem", "client.pem", "client.key"
 OPEN_MS = 15_000
-"""Longest time to open a session [ms]. A server accepts no client for 100 ms after each failed handshake, so a
-hundred connections that are given up at once make the next client wait for 10 s.
-"""
+"""Longest time to open a session [ms], because a hundred connections abandoned at once delay the next one by 10 s."""
 PROBE_S = 4.0
-"""Longest time to find out why there is no connection [s]: twice what a robot without certificates waits for the end
-of what it takes for a message.
-"""
+"""Longest wait in a probe [s]: twice what a robot without certificates waits for the rest of a supposed message."""
 
 Folder = str | os.PathLike[str]
 
 
 def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
-    """Return the settings of a Zenoh session with the certificate in a client's folder, by path.
-
-    Without a folder, they are those for a server without certificates.
-    """
+    """Return the settings of a Zenoh session with the certificate in a client's folder; empty without a folder."""
     encrypted = endpoint.startswith("tls/")
     if security is None:
         if encrypted:
@@ -61,10 +54,10 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
 
 
 def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") -> str | None:
-    """Return why no session could be opened, judged by a handshake of our own, since Zenoh does not report it.
+    """Return why no session could be opened, found by a separate handshake, because Zenoh does not report it.
 
-    This blocks for at most three times `PROBE_S`. None is returned if the cause is another one, such as that no server
-    listens. `whose` says what listens there.
+    This blocks for at most three times `PROBE_S`; None: another cause, such as that no server listens. `whose` is for
+    messages.
     """
     protocol, _, address = re.split("[?#]", endpoint)[0].partition("/")
     if protocol not in {"tcp", "tls"}:
@@ -73,7 +66,7 @@ def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") ->
         encrypted, failure = _handshake(address, security)
     except ssl.SSLError as error:
         return f"{security} does not contain a certificate and its key ({error.reason or error})"
-    except (OSError, ValueError):  # nobody listens there, or says anything
+    except (OSError, ValueError):  # nothing listens or answers there
         return None
     said = None
     if not encrypted and security is not None:
@@ -93,21 +86,16 @@ def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") ->
 
 
 def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | None]:
-    """Return whether TLS is spoken there, and what ended the handshake.
-
-    Raises:
-        ssl.SSLError: The folder's files are damaged.
-        OSError: Nobody listens there, or says anything.
-    """
+    """Return whether the peer uses TLS, and the error that ended the handshake; may raise ssl.SSLError or OSError."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    if security is None:  # nothing is sent, so that it does not matter to whom
+    if security is None:  # nothing is sent, so any peer is acceptable
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     else:
         context.load_verify_locations(Path(security) / AUTHORITY)
         context.load_cert_chain(Path(security) / CERTIFICATE, Path(security) / KEY)
     where, encrypted = urlsplit(f"//{address}"), False
     with socket.create_connection((where.hostname or "", where.port or 0), PROBE_S) as plain:
-        # Not `wrap_socket`: it leaves the socket open if the peer has reset the connection already.
+        # Not `wrap_socket`: it leaves the socket open if the peer has already reset the connection.
         received, to_send = ssl.MemoryBIO(), ssl.MemoryBIO()
         link = context.wrap_bio(received, to_send, server_hostname=where.hostname)
         try:
@@ -120,7 +108,7 @@ def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | N
             if not encrypted:
                 raise
         except OSError as error:
-            alert = "ALERT" in (getattr(error, "reason", None) or "")  # only who speaks TLS sends one
+            alert = "ALERT" in (getattr(error, "reason", None) or "")  # only a peer that uses TLS sends one
             return encrypted or alert or isinstance(error, ssl.SSLCertVerificationError), error
     return encrypted, None
 
@@ -128,7 +116,7 @@ def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | N
 def _carry(
     step: Callable[[], object], plain: socket.socket, received: ssl.MemoryBIO, to_send: ssl.MemoryBIO
 ) -> None:
-    """Carry bytes between a socket and TLS until a step of it is done."""
+    """Carry bytes between a socket and TLS until one of its steps is done."""
     while True:
         with contextlib.suppress(ssl.SSLWantReadError):
             step()

@@ -1,4 +1,4 @@
-"""Mailbox that passes messages from the network's threads to the event loop."""
+"""Passes messages from the network's threads to the event loop."""
 
 import asyncio
 import logging
@@ -10,15 +10,11 @@ log = logging.getLogger(__name__)
 Callback = Callable[[bytes], None]
 
 MAX_WAITING = 10_000
-"""Messages that may wait while the loop is busy: 20 s of states, about 10 MB."""
+"""Number of messages that may wait while the loop is busy: 20 s of states, about 10 MB."""
 
 
 class Inbox:
-    """Passes messages to callbacks on the loop, in the order of their arrival.
-
-    There is one mailbox for all topics, since their order matters: events of a tick come before its state. The loop
-    is woken once for all waiting messages, not once per message.
-    """
+    """Passes messages to callbacks on the loop in one queue, because events of a tick must precede its state."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.dropped = 0
@@ -28,15 +24,14 @@ class Inbox:
         self._woken = False
 
     def put(self, callback: Callback, data: bytes, *, droppable: bool) -> None:
-        """Add a message, which may be dropped if there is no room (states, not events). Any thread may call this."""
+        """Add a message, from any thread; without room, drop it if it is droppable (states, not events)."""
         if droppable and len(self._waiting) >= MAX_WAITING:
             if not self.dropped:
                 log.warning("the event loop has been busy for too long: messages are being dropped")
             self.dropped += 1
             return
         self._waiting.append((callback, data))
-        # It does no harm if two threads both wake the loop. At least one always does, since the flag is cleared
-        # before the queue is emptied.
+        # Two threads may both wake the loop. At least one does: the flag is cleared before the queue is emptied.
         if not self._woken:
             self._woken = True
             wake(self._loop, self._deliver)

@@ -18,19 +18,14 @@ class InProcessRobot(Protocol):
         """Take an encoded set-point."""
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[], None]:
-        """Call a function for each message of a topic, first the present `state` or `io`; return how to end this."""
+        """Call a function for each message of a topic, first the present one; calling the result ends this."""
 
     def info(self) -> bytes:
         """Return the encoded `info`."""
 
 
 class LoopbackTransport(Transport):
-    """A connection to a robot in this process.
-
-    Args:
-        host: The robot.
-        client: Name under which the host knows this client.
-    """
+    """A connection to the robot `host` in this process, which knows this client as `client`."""
 
     def __init__(self, host: InProcessRobot, client: str = "client") -> None:
         self._host = host
@@ -41,7 +36,7 @@ class LoopbackTransport(Transport):
     async def request(self, data: bytes, timeout_s: float) -> bytes:  # noqa: ARG002  it computes, it never waits
         self._check_open()
         reply = self._host.request(self._client, data)
-        # lets tasks that iterate over the states run between two commands
+        # Let tasks that iterate over the states run between two commands.
         await asyncio.sleep(0)
         return reply
 
@@ -65,7 +60,7 @@ class LoopbackTransport(Transport):
         """Do nothing: a client in this process does not disconnect either."""
 
     async def withdraw(self, client: str) -> None:
-        """Do nothing, as `announce` does nothing."""
+        """Do nothing, as `announce` does."""
 
     async def close(self) -> None:
         self._closed = True

@@ -16,7 +16,7 @@ from tvist_protocol.keys import check_namespace
 
 _PORT = "[1-9]\\d{0,3}|[1-5]\\d{4}|6[0-4]\\d{3}|65[0-4]\\d{2}|655[0-2]\\d|6553[0-5]"
 _ENDPOINT = re.compile(rf"(?!(tcp|tls|udp|quic|ws)/)[a-z]+[/-].*|[a-z]+/\S+:({_PORT})([?#].*)?")
-"""Matches endpoints with a valid port, and those whose protocol has none, which Zenoh checks itself."""
+"""Matches endpoints with a valid port, and those of protocols without ports, which Zenoh checks itself."""
 CONFIG: Mapping[str, Any] = {
     "mode": "client",
     # The endpoint is given, so there is nothing to search for.
@@ -27,7 +27,7 @@ CONFIG: Mapping[str, Any] = {
 
 
 def open_session(endpoint: str, security: Folder | None = None, namespace: str = "") -> zenoh.Session:
-    """Open a session; its keys are those without the namespace. Blocks while it connects."""
+    """Open a session, whose keys omit the namespace. Blocks while it connects."""
     if not isinstance(endpoint, str) or not _ENDPOINT.fullmatch(endpoint):
         raise NotConnectedError(_no_endpoint(endpoint))
     config = zenoh.Config()
@@ -69,6 +69,6 @@ def _close_all() -> None:
         close_session(session)
 
 
-# A session that is left open can hang the process at its end. `atexit` runs too late: after threads were joined.
+# An open session can hang the process at its end. `atexit` runs too late: after threads were joined.
 _register: Callable[[Callable[[], None]], None] = threading._register_atexit  # type: ignore[attr-defined]  # noqa: SLF001
 _register(_close_all)

@@ -1,7 +1,7 @@
 """A robot on the network, over Zenoh.
 
-Callbacks run directly in Zenoh's own threads (`indirect=False`), so messages keep their order across topics, and no
-Python thread has to be joined at the end. The callbacks only convert payloads to bytes; the event loop does the rest.
+Callbacks run in Zenoh's own threads (`indirect=False`), so that messages keep their order across topics and no Python
+thread has to be joined. They only convert payloads to bytes.
 """
 
 import asyncio
@@ -29,9 +29,9 @@ from tvist_protocol import keys
 
 ENCODING = zenoh.Encoding("application/msgpack")
 FIND_S = 1.0
-"""Time after which the available robots are queried, once there is a link [s]; a robot appears within milliseconds."""
+"""Time after which the present robots are queried, once there is a link [s]; a robot appears within milliseconds."""
 LATE_S = 3.0
-"""Time after which they are queried again if none answered, since the machine may be busy [s]."""
+"""Time after which they are queried again if none answered, because the machine may be busy [s]."""
 INFO_S = 10.0
 """Longest wait for `info` [s]."""
 
@@ -73,7 +73,7 @@ class ZenohTransport(Transport):
 
         Raises:
             NotConnectedError: No server listens there, or there is no visible robot of that name.
-            ProtocolError: `robot` is not a valid robot name, or `namespace` no namespace.
+            ProtocolError: `robot` is not a valid robot name, or `namespace` not a valid namespace.
         """
         keys.check_robot_name(robot)
         session = await _opened(endpoint, security, namespace)
@@ -87,7 +87,7 @@ class ZenohTransport(Transport):
 
     @property
     def dropped(self) -> int:
-        """Messages dropped because the event loop was busy for too long."""
+        """Number of messages dropped because the event loop was busy for too long."""
         return self._mailbox.dropped
 
     async def request(self, data: bytes, timeout_s: float) -> bytes:
@@ -96,8 +96,7 @@ class ZenohTransport(Transport):
         try:
             return await self._get(keys.key(self._robot, "command"), data, timeout_s)
         except NotConnectedError:
-            # Access control drops what is not allowed, so that it reaches no one. A robot that has been there all the
-            # time, and still answers, denies it.
+            # If the robot was present all the time and still answers, access control has dropped the command.
             if self._endpoint.startswith("tls/") and self._alive.is_set():
                 await self.info()
                 if self._losses == losses:
@@ -163,8 +162,8 @@ class ZenohTransport(Transport):
     async def _get(self, key: str, data: bytes | None, timeout_s: float) -> bytes:
         """Query one key and return the first answer.
 
-        If a query reaches no one, or its link breaks, Zenoh ends it at once and silently. If it is received but not
-        answered, Zenoh ends it at its timeout with an error.
+        Zenoh ends a query that reaches no queryable silently at once, and an unanswered one with an error at its
+        timeout.
         """
         if self._closed:
             raise self._gone()
@@ -181,8 +180,7 @@ class ZenohTransport(Transport):
             wake(self._loop, partial(_settle, answer, nobody))
 
         try:
-            # With the default quality of service, answers have a queue other than the states', which cannot delay
-            # them.
+            # With the default quality of service, states have another queue and cannot delay answers.
             self._session.get(
                 key,
                 Callback(on_reply, on_end, indirect=False),
@@ -233,7 +231,6 @@ class ZenohTransport(Transport):
             _settle(answer, error)
 
     async def _find(self) -> None:
-        """Wait until the robot's liveliness token appears."""
         robots: list[str] = []
         for seconds in (FIND_S, LATE_S - FIND_S):
             with suppress(TimeoutError):
@@ -241,7 +238,7 @@ class ZenohTransport(Transport):
                     await self._alive.wait()
                 return
             robots = await _robots(self._session)
-            if self._robot in robots:  # it has appeared late: the machine is slow
+            if self._robot in robots:  # it appeared late because the machine is slow
                 return
             with suppress(NotConnectedError):  # it has no token while it starts, but answers
                 await self.info()
@@ -281,7 +278,7 @@ async def only_robot(endpoint: str, wanted: str, security: Folder | None = None,
 
 
 async def _opened(endpoint: str, security: Folder | None, namespace: str) -> zenoh.Session:
-    """Open a session; if this is cancelled meanwhile, close it again, as a server has room for few."""
+    """Open a session; if this is cancelled, close it again, because a server has few places."""
     opening = asyncio.create_task(asyncio.to_thread(open_session, endpoint, security, namespace))
     try:
         return await asyncio.shield(opening)
@@ -292,7 +289,7 @@ async def _opened(endpoint: str, security: Folder | None, namespace: str) -> zen
 
 
 async def _robots(session: zenoh.Session) -> list[str]:
-    """Names of the robots that can be reached, in natural order: ur5e-2 before ur5e-10."""
+    """Return the names of the reachable robots, in natural order: ur5e-2 before ur5e-10."""
     loop = asyncio.get_running_loop()
     names: list[str] = []
     ended = asyncio.Event()
@@ -309,7 +306,7 @@ async def _robots(session: zenoh.Session) -> list[str]:
 
 
 def natural(name: str) -> list[int | str]:
-    """Return what names are sorted by: their numbers count as such."""
+    """Return a sort key for names, in which digits count as numbers."""
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 

@@ -1,1 +1,1 @@
-"""The controller's public interface for studies, experiments and evaluations; each part loads only what it needs."""
+"""The controller's public interface for studies and experiments, in modules that load only what they need."""

@@ -1,7 +1,4 @@
-"""The control line for studies: the boxes of Figure 6, their parameters, and motions of the joints.
-
-The modules behind it may change; a study of moves imports nothing else of this package.
-"""
+"""The control line for studies: the blocks of Figure 6, their parameters, and joint motions."""
 
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.foresight.line_copy import resting_after

@@ -1,7 +1,4 @@
-"""Geometry for studies: where the tool is.
-
-The modules behind it may change.
-"""
+"""Geometry for studies: the pose of the tool."""
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import turned

@@ -1,7 +1,4 @@
-"""A whole controller for studies, with its programs, instruments and clients.
-
-The modules behind it may change.
-"""
+"""A complete controller for studies, with programs, instruments and clients."""
 
 from tvist_controller.about import info_of
 from tvist_controller.controller import Controller

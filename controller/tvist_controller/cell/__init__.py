@@ -1,5 +1,1 @@
-"""What stands around a robot: wires between its terminals, its tools, a gripper, and parts that it grips.
-
-It is a part of the simulation, like the plant: it sees outputs and the arm's place in every tick, and gives inputs and
-what the arm carries.
-"""
+"""The cell around a robot: wires, tools, gripper and parts, simulated in every tick like the plant."""

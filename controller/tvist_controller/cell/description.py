@@ -1,4 +1,4 @@
-"""The content of a cell file: wires, tools, a gripper and parts."""
+"""Content of a cell file: wires, tools, a gripper and parts."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, get_args
@@ -16,11 +16,11 @@ Terminal = Literal[
     "configurable 4", "configurable 5", "configurable 6", "configurable 7",
     "tool 0", "tool 1",
 ]  # fmt: skip
-"""Name of a digital terminal, in the order of the bits of inputs and outputs."""
+"""Name of a digital terminal, in bit order of inputs and outputs."""
 MAX_THINGS = 100
-"""Largest number of wires, tools and parts, each."""
+"""Largest number each of wires, tools and parts."""
 STROKES = {"2F-85": 0.085, "2F-140": 0.14}
-"""Opening of each gripper [m]."""
+"""Opening of each gripper model [m]."""
 
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 HeavyMass = Annotated[float, Meta(gt=0, le=100)]
@@ -32,28 +32,28 @@ class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
 
 
 class Wire(_Table, frozen=True, kw_only=True):
-    """A wire from a digital output to a digital input, or something that acts like one: a valve, a relay, a sensor."""
+    """A wire from a digital output to a digital input, or a valve, relay or sensor that acts like one."""
 
     output: Terminal
-    """Output: `standard 0` to `7`, `configurable 0` to `7`, or `tool 0` or `1`."""
+    """Output: `standard 0` to `7`, `configurable 0` to `7`, `tool 0` or `1`."""
     input: Terminal
-    """Input, named in the same way. It has one wire."""
+    """Input, named likewise; an input has only one wire."""
     after: Annotated[float, Meta(ge=0, le=3600)] = 0.0
-    """Time after which the input follows, rounded to ticks of 2 ms, but at least one [s]."""
+    """Delay of the input, rounded to ticks of 2 ms, at least one tick [s]."""
     inverted: bool = False
     """Whether the input is on while the output is off."""
 
     @property
     def ticks(self) -> int:
-        """Ticks after which the input follows."""
+        """Delay of the input in ticks."""
         return max(1, round(self.after / PERIOD))
 
 
 class Tool(_Table, frozen=True, kw_only=True):
-    """A tool. The first one is on the flange, and is declared at the start: its TCP, its mass and centre of gravity."""
+    """A tool. The first is mounted on the flange, and its TCP and payload are declared at the start."""
 
     name: Name
-    """Its name, in messages."""
+    """Name for messages."""
     mass: Mass
     """Mass [kg]."""
     cog: Vec3
@@ -63,27 +63,27 @@ class Tool(_Table, frozen=True, kw_only=True):
     inertia: Inertia6 = (0.0,) * 6
     """Moments of inertia xx xy xz yy yz zz about the centre of gravity, flange axes [kg m²]."""
     while_on: Terminal | None = None
-    """Digital output of a tool changer, as in `output` of a wire: while it is on, this tool replaces the first one."""
+    """Digital output of a tool changer (see `Wire.output`): while on, this tool replaces the first one."""
 
 
 def as_declared(tool: Tool) -> Payload:
-    """Return a tool as a client would declare it."""
+    """Return a tool as the payload that a client would declare."""
     return Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
 
 
 class GripperModel(_Table, frozen=True, kw_only=True):
-    """A gripper with two fingers, on one of the tools. It answers as a Robotiq 2F does."""
+    """A two-finger gripper on one of the tools; it answers like a Robotiq 2F."""
 
     model: Literal["2F-85", "2F-140"]
-    """Model, which opens by 85 mm or 140 mm."""
+    """Model; it opens by 85 mm or 140 mm."""
     tool: str | None = None
-    """Name of the tool that it is part of [the first]."""
+    """Name of its tool [the first]."""
     activated: bool = False
-    """Whether it is activated at the start. After power-on it is not: a program activates it."""
+    """Whether it is activated at the start; otherwise a program activates it, as after power-on."""
     tolerance: Annotated[float, Meta(gt=0, le=0.1)] = 0.005
-    """Largest distance between a part and the tool centre point at which closing fingers meet it [m]."""
+    """Largest distance between part and tool centre point at which the fingers grip [m]."""
     angle_tolerance: Annotated[float, Meta(gt=0, le=3.15)] = 0.2
-    """Largest angle between the two; a half turn about z changes nothing, as it only swaps the fingers [rad]."""
+    """Largest angle between the two; a half turn about z only swaps the fingers [rad]."""
 
     @property
     def stroke(self) -> float:
@@ -95,45 +95,45 @@ class Part(_Table, frozen=True, kw_only=True):
     """A box that can be gripped."""
 
     name: Name
-    """Its name, in messages."""
+    """Name for messages."""
     mass: HeavyMass
     """Mass [kg]."""
     size: tuple[Edge, Edge, Edge]
-    """Lengths of its edges along x y z of its own frame [m]. Fingers close along y."""
+    """Edge lengths along x y z of its own frame; fingers close along y [m]."""
     pose: Pose
-    """Pose of its own frame in that of the base: the pose of the tool centre point that grips it in the middle."""
+    """Pose in the base frame: that of a tool centre point that grips it in the middle."""
     cog: Vec3 = (0.0, 0.0, 0.0)
     """Centre of gravity in its own frame [m]."""
 
     @property
     def inertia(self) -> Inertia6:
-        """Moments of inertia of a box of even density about its centre, own axes [kg m²]."""
+        """Moments of inertia of a homogeneous box about its centre, own axes [kg m²]."""
         x, y, z = (edge * edge * self.mass / 12.0 for edge in self.size)
         return y + z, 0.0, 0.0, x + z, 0.0, x + y
 
 
 class Cell(_Table, frozen=True, kw_only=True):
-    """A cell: what stands around one robot."""
+    """The cell around one robot."""
 
     wires: Annotated[tuple[Wire, ...], Meta(max_length=MAX_THINGS)] = ()
     """Wires between terminals."""
     tools: Annotated[tuple[Tool, ...], Meta(max_length=MAX_THINGS)] = ()
-    """Tools; the first one is on the flange."""
+    """Tools; the first is mounted on the flange."""
     gripper: GripperModel | None = None
-    """Gripper; None if there is none."""
+    """Gripper; None for none."""
     parts: Annotated[tuple[Part, ...], Meta(max_length=MAX_THINGS)] = ()
-    """Parts that it can grip."""
+    """Parts that the gripper can grip."""
     world: Annotated[str, Meta(min_length=1, max_length=4096)] | None = None
-    """Scene in which the arm stands, as of `tvist serve --world`: its bodies are gripped, and there are no parts."""
+    """Scene around the arm, as `tvist serve --world`; its bodies are gripped, and `parts` stays empty."""
 
     @property
     def changes_load(self) -> bool:
-        """Whether what the arm carries can change."""
+        """Whether the carried payload can change."""
         return bool(self.parts) or len(self.tools) > 1
 
     @property
     def gripping_tool(self) -> Tool | None:
-        """Tool that the gripper is part of; None without a gripper."""
+        """Tool of the gripper; None without a gripper."""
         if self.gripper is None or self.gripper.tool is None:
             return self.tools[0] if self.gripper is not None else None
         return next(tool for tool in self.tools if tool.name == self.gripper.tool)
@@ -188,7 +188,7 @@ class Cell(_Table, frozen=True, kw_only=True):
 
 
 def bit_of(terminal: Terminal) -> int:
-    """Return a digital terminal as a bit among inputs or outputs."""
+    """Return the bit of a digital terminal among inputs or outputs."""
     return 1 << get_args(Terminal).index(terminal)
 
 

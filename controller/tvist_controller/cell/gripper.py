@@ -1,11 +1,10 @@
-r"""A gripper whose fingers move at a finite speed: a Robotiq 2F's registers, and its text protocol.
+r"""A gripper with moving fingers: a Robotiq 2F's registers and text protocol.
 
-Positions are counts, as in its registers: the fingers are open at `OPEN` and meet at `CLOSED`, both of which are inside
-the range 0 to 255 of what can be requested. A request beyond the end of the way ends there.
+Positions are counts as in the registers: open at `OPEN`, closed at `CLOSED`, requests of 0 to 255 are clamped.
 
-The protocol, port 63352: `SET POS 255 GTO 1\n` is answered by `ack`, `GET POS\n` by a line. A `GET POS` without
-a line feed is answered by the value alone, with leading zeros: so the URCap's own functions ask, which read a
-fixed number of bytes. There is no `\n` after `ack` for the same reason.
+Protocol on port 63352: `SET POS 255 GTO 1\n` is answered by `ack`, `GET POS\n` by a line. The URCap's functions send
+`GET POS` without a line feed and read a fixed number of bytes: the answer is the value alone with leading zeros. For
+the same reason `ack` has no `\n`.
 """
 
 import re
@@ -15,83 +14,83 @@ from types import MappingProxyType
 from typing import Final
 
 OPEN, CLOSED = 3, 230
-"""Positions of open fingers and of fingers that meet [counts]; real ones differ by a few counts."""
+"""Positions of open and closed fingers [counts]; real ones differ by a few counts."""
 ACTIVATION: Final = 500
-"""Ticks that an activation takes at least."""
+"""Shortest duration of an activation [ticks]."""
 SPEEDS = {0.085: (0.020, 0.150), 0.14: (0.030, 0.250)}
-"""Speed of the fingers at the registers' 0 and 255 for each opening [m/s]."""
+"""Finger speed at register values 0 and 255 for each opening [m/s]."""
 FORCES = {0.085: (20.0, 235.0), 0.14: (10.0, 125.0)}
-"""Force of the fingers at the registers' 0 and 255 for each opening [N]."""
+"""Finger force at register values 0 and 255 for each opening [N]."""
 MOVING, STOPPED_CLOSING, ARRIVED = 0, 2, 3
 """Values of OBJ."""
 WRITABLE: Mapping[str, int] = MappingProxyType(
     {"ACT": 1, "GTO": 1, "ATR": 1, "ARD": 1, "POS": 255, "SPE": 255, "FOR": 255, "MOD": 1, "MSC": 255}
 )
-"""Registers that can be written, and their largest values."""
+"""Writable registers and their largest values."""
 
 PORT: Final = 63352
 """TCP port on which the URCap listens."""
 SLAVES = ("9", "1")
-"""Numbers by which clients select the only gripper, SID."""
+"""SID values by which clients select the only gripper."""
 UNKNOWN: Final = b"?"
-"""Answer to what is not understood."""
+"""Answer to an unknown request."""
 LONGEST: Final = 1024
 """Longest line [bytes]."""
 _DIGITS = {"PRE": 3, "POS": 3, "SPE": 3, "FOR": 3, "MSC": 3, "FLT": 2}
-"""Digits of a value that is answered alone; 1 for others."""
+"""Digits of a bare answer; 1 for other registers."""
 _BARE_GET = re.compile(rb"GET [A-Z]{3}")
 _LIST = b"[9]"
-"""Numbers of the grippers that are there."""
+"""Numbers of the connected grippers."""
 _LIST_BYTES = 17
-"""Length of the list of grippers, for up to four of them."""
+"""Length of the list of up to four grippers."""
 
 Meet = Callable[[float, float], float | None]
-"""Returns the opening at which closing fingers meet a part on their way between two openings, or None [m]."""
+"""Function that returns the opening at which fingers closing between two openings meet a part, else None [m]."""
 
 
 @dataclass(frozen=True)
 class Moved:
-    """What the fingers did in a tick that others have to know."""
+    """Results of a tick of the fingers."""
 
     gripped: bool = False
-    """They have met a part, which stopped them."""
+    """The fingers have gripped a part."""
     released: bool = False
-    """They have let go of the part that they held."""
+    """The fingers have released the part."""
     met_nothing: bool = False
-    """They have closed without meeting a part."""
+    """The fingers have closed without a part."""
 
 
 _NOTHING = Moved()
 
 
 class Gripper:
-    """The fingers, with their opening [m], and their registers."""
+    """The fingers with their opening [m], and their registers."""
 
     def __init__(self, stroke: float, *, activated: bool) -> None:
         self.stroke = stroke
-        """Opening [m]."""
+        """Largest opening [m]."""
         self._activated = activated
         self.begin()
 
     @property
     def grip_force(self) -> float:
-        """Force that is set for the fingers [N]."""
+        """Set force of the fingers [N]."""
         least, most = FORCES[self.stroke]
         return least + self._written["FOR"] / 255.0 * (most - least)
 
     def lose(self) -> None:
-        """Let go of the part that has slipped out, so that the fingers go on."""
+        """Continue closing after a part has slipped out."""
         self.holds = False
 
     def begin(self) -> None:
-        """Begin as at the start: the fingers are open."""
+        """Reset to the start: open fingers."""
         self._position = float(OPEN)
         self._written = dict.fromkeys(WRITABLE, 0) | {"ACT": int(self._activated), "SPE": 255, "FOR": 255}
         self._activating = 0
-        """Ticks that the activation has left; 0 if it is over."""
+        """Remaining ticks of the activation; 0 if complete."""
         self._active = self._activated
         self._released = False
-        """Whether an automatic release is over, after which it has to be activated anew."""
+        """Whether an automatic release has ended, which requires another activation."""
         self._object = ARRIVED
         self.holds = False
         """Whether a part is between the fingers."""
@@ -99,7 +98,7 @@ class Gripper:
     # ------------------------------------------------------------------ registers
 
     def write(self, values: Mapping[str, int]) -> None:
-        """Write registers of `WRITABLE` at once; what they ask for begins with the next tick."""
+        """Write registers of `WRITABLE` together, with effect from the next tick."""
         written, before = self._written, self._written["ACT"]
         written.update(values)
         if not written["ACT"]:
@@ -112,7 +111,7 @@ class Gripper:
             self._object = MOVING
 
     def read(self, name: str) -> int | None:
-        """Return a register; None if there is none of this name."""
+        """Return a register; None for an unknown name."""
         match name:
             case "POS":
                 return round(self._position)
@@ -128,7 +127,7 @@ class Gripper:
 
     @property
     def _fault(self) -> int:
-        """Fault: automatic release in progress 11 or over 15; a request before the activation 7, or during it 5."""
+        """Fault: automatic release running (11) or over (15); request before (7), during (5) activation."""
         if self._written["ATR"]:
             return 15 if self._released else 11
         if self._written["GTO"] and not self._active:
@@ -144,7 +143,6 @@ class Gripper:
 
     @property
     def _target(self) -> float | None:
-        """Position to go to [counts]; None to stay."""
         written = self._written
         if written["ATR"]:
             return CLOSED if written["ARD"] else OPEN
@@ -156,12 +154,12 @@ class Gripper:
 
     @property
     def _stopped(self) -> bool:
-        """Whether the part between the fingers keeps them from going on."""
+        """Whether the part between the fingers blocks them."""
         return self.holds and self._target is not None and self._target >= self._position
 
     @property
     def _step(self) -> float:
-        """Way of the fingers in a tick [counts]."""
+        """Travel of the fingers in a tick [counts]."""
         from tvist_plant.plant import PERIOD  # the port's number is read by the options, without the plant
 
         slow, fast = SPEEDS[self.stroke]
@@ -169,7 +167,7 @@ class Gripper:
         return (slow + share * (fast - slow)) * PERIOD / self.stroke * (CLOSED - OPEN)
 
     def tick(self, meet: Meet) -> Moved:
-        """Move the fingers for a tick; `meet` looks for a part while they close and hold nothing."""
+        """Move the fingers for a tick; `meet` finds a part while they close and hold nothing."""
         target, position = self._target, self._position
         if target is None:
             return _NOTHING
@@ -210,16 +208,13 @@ class Gripper:
 
 
 class Requests:
-    """What has arrived on one connection, cut into requests."""
+    """Splits the bytes of one connection into requests."""
 
     def __init__(self) -> None:
         self._received = b""
 
     def cut(self, data: bytes) -> list[bytes]:
-        """Return the requests that are complete with what has arrived now.
-
-        A request without a line feed is one that has arrived by itself: else its line feed may be under way.
-        """
+        """Return the requests completed by new data; one without a line feed counts only if it arrived alone."""
         if not self._received and _BARE_GET.fullmatch(data):
             return [data]
         *lines, rest = (self._received + data).split(b"\n")
@@ -232,12 +227,12 @@ class Requests:
 
 
 def changes(request: bytes) -> bool:
-    """Return whether a request may change something, so that a journal needs it."""
+    """Return whether a request may change something and so belongs in the journal."""
     return not request.startswith(b"GET ")
 
 
 def answer(gripper: Gripper, request: bytes) -> bytes:
-    """Carry out a request that `Requests` has cut; return the answer."""
+    """Carry out a request cut by `Requests` and return the answer."""
     alone = not request.endswith(b"\n")
     match request.decode("ascii", "replace").split():
         case ["GET", "SID"]:
@@ -245,10 +240,10 @@ def answer(gripper: Gripper, request: bytes) -> bytes:
         case ["GET", name] if (value := gripper.read(name)) is not None:
             digits = _DIGITS.get(name, 1)
             return (f"{value:0{digits}d}" if alone else f"{name} {value}\n").encode()
-        case ["SET", "SCN_BLOCK", _]:  # looks for grippers no more
+        case ["SET", "SCN_BLOCK", _]:  # stop scanning for grippers
             return b"ack"
         case ["SET", "SID", slave]:
-            return b"ack" if slave in SLAVES else b""  # nobody answers for a gripper that is not there
+            return b"ack" if slave in SLAVES else b""  # no answer for a gripper that does not exist
         case ["SET", *pairs] if pairs and len(pairs) % 2 == 0:
             return _set(gripper, pairs)
     return UNKNOWN

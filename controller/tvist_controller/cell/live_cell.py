@@ -1,4 +1,4 @@
-"""A cell in time: what it does in every tick."""
+"""Simulation of a cell, tick by tick."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -18,47 +18,44 @@ from tvist_plant.plant import Plant
 from tvist_protocol.values import Pose
 
 TRANSFER = 100
-"""Ticks (0.2 s) in which the weight of a part goes over to the arm and back, as when it is lifted off its support."""
+"""Ticks (0.2 s) in which a part's weight moves to the arm and back, as when lifted off its support."""
 NEAR = 0.1
-"""Distance up to which a part that closing fingers have missed is worth a warning [m]."""
+"""Distance up to which a missed part causes a warning [m]."""
 THIS_MACHINE = ("127.0.0.1", "localhost", "::1")
-"""Names by which programs call the machine on which the URCap runs."""
+"""Names by which programs address the machine of the URCap."""
 STALLED = 0.004
-"""Way by which fingers that really hold are behind when something has stopped them [m]."""
+"""Lag by which simulated fingers count as stopped by an object [m]."""
 _SWAPPED = np.diag([-1.0, -1.0, 1.0])
 """Half a turn about z."""
 
 
 class Terminals(Protocol):
-    """Terminals of the robot, and the place where its tool centre point is declared."""
+    """Terminals of the robot and its tool centre point."""
 
     @property
     def digital_outputs(self) -> int:
-        """Digital outputs, a bit each."""
+        """Digital outputs, one bit each."""
 
     def set_digital_inputs(self, mask: int, values: int) -> None:
-        """Apply signals to the digital inputs that the mask selects."""
+        """Set the digital inputs selected by the mask."""
 
     def set_tcp(self, pose: Pose) -> None:
         """Declare the tool centre point in the flange frame."""
 
 
 class Wires:
-    """The wires of a cell, which follow after a number of ticks."""
+    """The delayed wires of a cell."""
 
     def __init__(self, wires: Sequence[Wire]) -> None:
         self._wires = [(bit_of(one.output), bit_of(one.input), one.ticks, one.inverted) for one in wires]
         self._outputs: int | None = None
         """Outputs of the last tick; None before the first."""
-        # Those of one wire are in order of time, as its delay is always the same.
+        # Entries of one wire are in order of time, since its delay is constant.
         self._under_way: list[deque[tuple[int, bool]]] = [deque() for _ in wires]
         self._left = 0
 
     def tick(self, tick: int, outputs: int) -> tuple[int, int]:
-        """Return which inputs change for the tick after this one, and to what, as bits: a mask and values.
-
-        Inputs change only when their wire does, so that other signals stay until then.
-        """
+        """Return the inputs that change for the next tick as a mask and values; others keep their signal."""
         if outputs == self._outputs and not self._left:
             return 0, 0
         before, self._outputs = self._outputs, outputs
@@ -78,9 +75,9 @@ class Wires:
 
 
 class LiveCell:
-    """A cell, which has been checked, around a robot.
+    """A checked cell around a robot.
 
-    What the plant carries at the start is the first tool unless a test wants something else.
+    The plant carries the first tool at the start, unless a test sets another payload.
     """
 
     def __init__(
@@ -101,7 +98,7 @@ class LiveCell:
         self.gripper = (
             None if cell.gripper is None else Gripper(cell.gripper.stroke, activated=cell.gripper.activated)
         )
-        """The gripper; None if there is none."""
+        """The gripper; None for none."""
         tool = cell.gripping_tool
         self._tcp = placement(None if tool is None else tool.tcp)
         self._changers = [(bit_of(tool.while_on), tool) for tool in cell.tools[1:] if tool.while_on]
@@ -109,11 +106,11 @@ class LiveCell:
 
     @property
     def empty(self) -> Payload:
-        """What the arm carries at the start, without a part."""
+        """Payload at the start, without a part."""
         return self._first_load
 
     def begin(self, load: Payload) -> None:
-        """Begin as at the start, with what the arm carries without a part."""
+        """Reset to the start, with this payload without a part."""
         self._wires = Wires(self._cell.wires)
         if self.gripper is not None:
             self.gripper.begin()
@@ -121,28 +118,28 @@ class LiveCell:
         self._tool = self._cell.tools[0] if self._cell.tools else None
         self._load = self._first_load = load
         self._met: int | None = None
-        """Number of the part that the closing fingers have met in this tick."""
+        """Number of the part met by the closing fingers in this tick."""
         self._held: int | None = None
         """Number of the part between the fingers."""
         self._grip = placement(None)
-        """Pose of that part in the frame of the flange."""
+        """Pose of that part in the flange frame."""
         self._part = Payload()
-        """Body of the part that is held, or was last."""
+        """Body of the held or last held part."""
         self._share = 0
-        """Ticks of `TRANSFER` by which its weight has gone over to the arm."""
+        """Ticks of `TRANSFER` completed."""
 
     def answer(self, request: bytes) -> bytes:
-        """Carry out a request of the gripper's protocol; see `gripper`."""
+        """Carry out a request of the gripper's protocol."""
         if self.gripper is None:
             raise ValueError("the cell has no gripper")
         return answer(self.gripper, request)
 
     def reaches(self, address: str, port: int) -> bool:
-        """Return whether a program that connects to a machine reaches the gripper."""
+        """Return whether a program connecting to this address reaches the gripper."""
         return self.gripper is not None and port == PORT and address.strip().lower() in THIS_MACHINE
 
     def tick(self, tick: int, q: Floats) -> None:
-        """Follow the outputs and the measured posture of a tick; what it does counts from the next on."""
+        """Update the cell from outputs and measured posture; effects start with the next tick."""
         before, outputs = (self._tool, self._share), self._terminals.digital_outputs
         if self._changers:
             first = self._cell.tools[0]
@@ -168,13 +165,13 @@ class LiveCell:
             return
         if self._held is not None:
             self._put_down(q)
-            self._share = 0  # it stays behind with the tool
+            self._share = 0  # it stays with the tool
         self._tool = tool
         self._load = self._first_load if tool is self._cell.tools[0] else _tool_body(tool)
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")
 
     def _move_real_fingers(self, gripper: Gripper, hand: Plant) -> None:
-        """Move fingers that touch things: what stops them is between them, and what they hold does not fall."""
+        """Move fingers that touch simulated objects: whatever stops them counts as gripped."""
         opening = hand.opening()
         if gripper.holds and opening < gripper.opening - STALLED:
             self._emit("warning", why="cell: the gripper has lost what it held")
@@ -198,7 +195,7 @@ class LiveCell:
             self._tell_missed(q)
 
     def _between(self, wide: float, narrow: float, q: Floats) -> float | None:
-        """Return the width of the part that fingers meet on their way between two openings [m]; see `Meet`."""
+        """Return the width of the part met between two openings, see `Meet` [m]."""
         self._met, limits, nearest = None, self._cell.gripper, np.inf
         if limits is None or self._tool is not self._cell.gripping_tool:  # the fingers are not on the arm
             return None
@@ -213,7 +210,7 @@ class LiveCell:
         return Placement(*self._kinematics.pose(q))
 
     def _away(self, number: int, q: Floats) -> tuple[float, float]:
-        """Distance [m] and angle [rad] between a part and the tool centre point."""
+        """Return distance [m] and angle [rad] between a part and the tool centre point."""
         away = (self._flange(q) @ self._tcp).inverse @ self._places[number]
         cosine = max(np.trace(away.rotation), np.trace(away.rotation @ _SWAPPED)) / 2.0 - 0.5
         return float(np.linalg.norm(away.position)), float(np.arccos(np.clip(cosine, -1.0, 1.0)))
@@ -232,7 +229,6 @@ class LiveCell:
         self._held = None
 
     def _tell_missed(self, q: Floats) -> None:
-        """Warn of a part that was nearly gripped."""
         limits = self._cell.gripper
         away = [(*self._away(number, q), part.name) for number, part in enumerate(self._cell.parts)]
         if limits is None or self._tool is not self._cell.gripping_tool or not away or min(away)[0] > NEAR:
@@ -246,18 +242,16 @@ class LiveCell:
 
 
 def _tool_body(tool: Tool) -> Payload:
-    """Return a tool as a payload."""
     return Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
 
 
 def _part_body(part: Part, place: Placement) -> Payload:
-    """Return a part as a payload, from the pose of its frame in that of the flange."""
     own = Payload(mass=part.mass, com=part.cog, inertia=part.inertia)
     return _payload(pin.SE3(place.rotation, place.position).act(payload_inertia(own)))
 
 
 def _joined(tool: Payload, part: Payload, share: float) -> Payload:
-    """Return a tool and a part as one body; the part counts with a share of its mass and inertia, 0 to 1."""
+    """Return tool and part as one body; the part counts with a share of its mass, 0 to 1."""
     if share == 0.0 or part.mass == 0.0:
         return tool
     own = payload_inertia(part)

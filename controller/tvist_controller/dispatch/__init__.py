@@ -1,1 +1,1 @@
-"""Commands on their way: who may send them, their plans, and the parts of a robot that they act on."""
+"""Command handling: senders' rights, plans, and the parts of a robot that commands act on."""

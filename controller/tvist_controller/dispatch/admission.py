@@ -1,8 +1,4 @@
-"""Checks that a message must pass before the controller gets it: it is valid, and its sender may send it.
-
-Nothing here changes any state, so messages can be admitted in any thread. A message that is admitted long before it
-is carried out has to be checked again, since the lease may have changed.
-"""
+"""Checks of messages in any thread: valid content, and a sender with the right to send it at this moment."""
 
 import contextlib
 from typing import Any, NamedTuple
@@ -31,28 +27,25 @@ from tvist_protocol.simulation import SimulationStep
 
 STEP = tag(SimulationStep)
 LONG = frozenset(tag(row.message) for row in COMMANDS.values() if row.long)
-"""Types of commands that may be longer than `EXPLAINED_BYTES`."""
+"""Types of commands that may exceed `EXPLAINED_BYTES`."""
 
 
 class Admitted(NamedTuple):
-    """A command that has passed the checks."""
+    """A command that passed the checks."""
 
     command: Command
     content: dict[str, Any]
-    """Content as Python's built-in types, for the journal."""
+    """Content as built-in types, for the journal."""
     session: str | None = None
-    """Session of the client that the command gives control or the clock to, if `client_gone` will report its end."""
+    """Session of a client that gets control or the clock, if `client_gone` will report its end."""
     client: str | None = None
-    """Client that sent it, from its token or the name in the command; None if it has neither."""
+    """Sending client, from its token or the command; None if unknown."""
     origin: str | None = None
-    """IP address of the machine that sent it; None if the network does not tell."""
+    """IP address of the sender; None if unknown."""
 
 
 def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:
-    """Decode a command, and check that its sender may send it.
-
-    Of a long command only the type and token are decoded until its sender is known to have control or the clock.
-    """
+    """Decode a command and check its sender's rights; of a long command, check the token before decoding."""
     try:
         if len(data) > EXPLAINED_BYTES:
             _check_envelope(decode_envelope(data), len(data), lease, clock)
@@ -64,7 +57,7 @@ def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admit
 
 
 def admit_command(command: Command, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:
-    """Check that the sender of a command may send it."""
+    """Check the rights of a command's sender."""
     try:
         client = _authorize(command, lease, clock)
     except NoControlError as error:
@@ -73,10 +66,7 @@ def admit_command(command: Command, lease: Lease | None, clock: Lease | None = N
 
 
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
-    """Decode a set-point; return None if its sender is not known to have control, to spare the controller's thread.
-
-    Whose it is decides the lease at the moment at which it is carried out.
-    """
+    """Decode a set-point; return None unless its sender may have control, which the lease decides later."""
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None
     setpoint: Setpoint | Unreadable
@@ -91,7 +81,7 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
 
 
 def _authorize(command: Command, lease: Lease | None, clock: Lease | None) -> str | None:
-    """Check that a command's sender may send it; return the sender's name, if the command contains it."""
+    """Check the rights of a command's sender; return its name, if known."""
     match command:
         case TakeControl():
             check_free(lease, command.client)

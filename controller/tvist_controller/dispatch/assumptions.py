@@ -1,4 +1,4 @@
-"""What the control line assumes: the payload that is declared or learnt, and the filter with the modes for it."""
+"""Payload (declared or learnt) and filter that the control line uses."""
 
 from collections.abc import Callable
 from typing import Any
@@ -23,7 +23,7 @@ from tvist_shaping.base import Filter
 
 
 class Assumptions:
-    """The control line's payload and filter, whose changes must not spoil the robot's motion."""
+    """The control line's payload and filter, changed without disturbing the motion."""
 
     def __init__(
         self,
@@ -37,37 +37,35 @@ class Assumptions:
         follows: bool,  # whether the robot follows its payload
     ) -> None:
         self.declared = payload
-        """Declared payload."""
         self.assumed = payload
-        """Payload that dynamics and modes are computed with: the declared one, or what the robot has learnt."""
+        """Payload for dynamics and modes: the declared or the learnt one."""
         self.source = source
-        """Source of the filter's modes."""
         self._motion, self._cycle, self._peripherals = motion, motion.cycle, peripherals
         self._plan, self._emit = plan, emit
         self.monitor = PayloadMonitor(motion.cycle.description, body(payload), follows=follows)
-        """Compares the payload with what the drives feel."""
+        """Compares the payload with the drives' torques."""
         self._warn_of_payload()
         self._warn_of_arm()
 
     def present(self) -> FilterState:
-        """Return the present state that a new filter depends on: what the robot takes its arm for."""
+        """Return the present state that a new filter depends on."""
         tvist = self._cycle.tvist
         return FilterState(tvist.name, tvist.estimator.modes, self.source, self.assumed, self.declared)
 
     # ------------------------------------------------------------------ filter
 
     def choose(self, chosen: PlannedFilter) -> None:
-        """Shape with a filter from now on, unless the rest of the motion would not be clear with it."""
+        """Use a filter from now on, or refuse it if the rest of the motion would collide."""
         self._motion.ahead.check_filter(chosen.tvist)
         self.use(chosen)
 
     def estimate(self, chosen: PlannedFilter) -> None:
-        """Shape with other modes from now on; else as `choose`."""
+        """Use other modes from now on, as `choose`."""
         self.choose(chosen)
         self._warn_of_payload()
 
     def use(self, chosen: PlannedFilter) -> None:
-        """Shape with a filter from now on."""
+        """Use a filter from now on."""
         before, idle = self.source, self._idle
         self.source = chosen.source
         self._cycle.drives.compensate(chosen.law)
@@ -82,7 +80,7 @@ class Assumptions:
     # ------------------------------------------------------------------ payload
 
     def learn(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
-        """Take a lesson at rest; a plan that was made for it beforehand is used if it still holds."""
+        """Take a lesson at rest, with a plan made in advance if it is still valid."""
         present = self.present()
         if plan is None or plan.state != {"filter": present}:
             plan = self._plan(lesson, present)
@@ -97,14 +95,14 @@ class Assumptions:
         self._peripherals.changed = True
 
     def declare(self, command: SetPayload, tvist: Filter | None) -> None:
-        """Take another payload, with the filter that is planned for it."""
+        """Take another declared payload, with the filter planned for it."""
         payload = payload_of(command)
         self._clear_with(payload, tvist)
         self.declared = payload
         self._assume(payload, tvist, max(round(command.transition_time / PERIOD), SLEW))
 
     def forget(self, planned: Callable[[], Any]) -> None:
-        """Assume what was declared again, with the filter that is planned for it."""
+        """Return to the declared payload, with the filter planned for it."""
         if self.assumed == self.declared:
             return
         tvist = planned()
@@ -113,16 +111,12 @@ class Assumptions:
         self._emit("learnt", why=f"the declared {self.declared.mass:g} kg are assumed again")
 
     def _clear_with(self, payload: Payload, tvist: Filter | None) -> None:
-        """Put a payload into the collision model, unless the rest of the motion would not be clear with it."""
+        """Put a payload into the collision model, or refuse it if the rest of the motion would collide."""
         move = self._motion.motions.move
         self._motion.ahead.check_payload(body(payload), tvist, () if move is None else move.coming)
 
     def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, told: bool = False) -> None:
-        """Compute dynamics and modes with a payload, which is phased in.
-
-        The filter is None if its modes are not known to differ. `told` says whether a warning tells that the arm
-        carries more, which is above its rating.
-        """
+        """Phase in a payload with its filter, if modes differ; `told`: an overload warning was sent."""
         self.assumed, carried = payload, body(payload)
         self._cycle.dynamics.declare(carried, ticks)
         if tvist is not None:
@@ -133,11 +127,10 @@ class Assumptions:
 
     @property
     def _idle(self) -> bool:
-        """True if there is no shaper, so that the modes do not matter."""
+        """Whether there is no shaper, so that modes do not matter."""
         return self._cycle.tvist.name == "none"
 
     def _warn_of_payload(self) -> None:
-        """Warn if a shaper uses modes that belong to another payload."""
         assumed, word = self.assumed, "declared" if self.assumed == self.declared else "carried"
         calibration = self.source.calibration
         if not self._idle and calibration is not None and not fits(calibration, assumed, self.source.name):
@@ -151,7 +144,6 @@ class Assumptions:
             )
 
     def _warn_of_arm(self) -> None:
-        """Warn if the modes belong to another arm of the same model."""
         calibration = self.source.calibration
         if calibration is not None and self.source.fits_arm is False:
             why = (

@@ -1,4 +1,4 @@
-"""Commands that move, guide, stop and power the arm, or let it give way to forces."""
+"""Commands that move, guide, stop and power the arm, and force control."""
 
 from functools import partial
 from typing import Any
@@ -117,7 +117,6 @@ def _speed_l(robot: Robot, call: Call[m.SpeedL]) -> Reply:
 
 
 def _accelerations(command: m.SpeedL | m.StopL) -> tuple[float, float]:
-    """Acceleration [m/s^2] and angular acceleration [rad/s^2] of the tool."""
     angular = command.angular_acceleration
     return command.acceleration, command.acceleration if angular is None else angular
 
@@ -191,4 +190,3 @@ ROWS: tuple[Row, ...] = (
         lambda robot, call: robot.force_control.external.sense(np.array(call.command.wrench, dtype=float)),
     ),
 )
-"""The commands."""

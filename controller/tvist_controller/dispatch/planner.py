@@ -1,4 +1,4 @@
-"""Planner of all commands that take longer than a tick can wait."""
+"""Planner of all commands that take too long for a tick."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ from tvist_protocol.lessons import PayloadLesson
 
 
 class Planner:
-    """Plans for one robot. It keeps no state: equal commands on equal states get equal plans."""
+    """Stateless plans for one robot: equal commands in equal states get equal plans."""
 
     def __init__(self, setup: Setup) -> None:
         self._description = setup.description
@@ -29,11 +29,11 @@ class Planner:
         self._planners: dict[type, Any] = {type(one): one for one in planners}
 
     def rehearse_scripts(self) -> None:
-        """Make what compiling a program needs; that is Python alone, and may be done while a robot ticks."""
+        """Prepare the compiler of programs, in pure Python, while a robot ticks."""
         self._scripts.rehearse()
 
     def for_lesson(self, lesson: PayloadLesson, present: FilterState) -> Plan:
-        """Plan what the robot has learnt: the present filter for what it carries."""
+        """Plan the present filter for a payload that the robot has learnt."""
         found: Found | RefusalError
         try:
             found = self.filters.with_payload(lesson.payload, present)
@@ -44,10 +44,7 @@ class Planner:
     def plan(
         self, command: Command, now: Snapshot, *, within_tick: bool = False, checked: bool = False
     ) -> Plan:
-        """Plan a command, as its row says, on the present state; a refusal is a plan, too.
-
-        `within_tick`: see `Planning.within_tick`; `checked`: whether it has passed its row's check.
-        """
+        """Plan a command, or its refusal, on the present state; `checked`: its row's check has passed."""
         row = COMMANDS[type(command)]
         planning = row.plan
         assert planning is not None, "the command is carried out without a plan"

@@ -1,4 +1,4 @@
-"""Commands that load, play, pause and stop programs, and that add statements to one."""
+"""Commands that load, play, pause, stop and extend programs."""
 
 from tvist_controller.dispatch.robot import Robot
 from tvist_controller.planning.command_row import Call, Row
@@ -67,7 +67,7 @@ def _stop(robot: Robot, _: Call[p.ProgramStop]) -> None:
 
 
 def _check_power(robot: Robot, command: str) -> None:
-    """Refuse to start a program where the arm has no power or is in a protective stop."""
+    """Refuse to start a program without power or in a protective stop."""
     activity = robot.motion.activity
     if activity.robot_mode is not RobotMode.RUNNING or activity.protective:
         raise out_of_turn(command, activity)
@@ -92,4 +92,3 @@ ROWS: tuple[Row, ...] = (
         p.ProgramSkip, lambda robot, call: robot.programs.statements.skip(call.command.what), changes_io=True
     ),
 )
-"""The commands."""

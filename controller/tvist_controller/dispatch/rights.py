@@ -1,4 +1,4 @@
-"""Control of the arm by lease, the right to advance time, and who is there; the time is an argument."""
+"""Control of the arm by lease, the right to advance time, and presence of clients; time is an argument."""
 
 import math
 from collections.abc import Callable
@@ -11,18 +11,18 @@ from tvist_protocol.simulation import SimulationStep
 
 
 class Lease(NamedTuple):
-    """Control, or the clock, that one client holds."""
+    """A client's hold of control or of the clock."""
 
     client: str
     token: str
     session: str | None
-    """Session whose end ends it; empty if the client's token does not name it, None if it had no token."""
+    """Session whose end ends it; empty if the client's token does not name it, None without a token."""
     seconds: float = math.inf
-    """Duration without renewal [s]; infinite for the clock, since nothing times out when a client advances time."""
+    """Duration without renewal [s]; infinite for the clock, since nothing times out in simulated time."""
 
 
 class _Words(NamedTuple):
-    """What refusals say of one of the two rights."""
+    """Texts of refusals for one of the two rights."""
 
     nobody: str
     whose: str
@@ -45,7 +45,7 @@ CLOCK = _Words(
 
 
 class NoControlError(Exception):
-    """A command that needs control came from a client without it."""
+    """A command came from a client without the right that it needs."""
 
     def __init__(self, code: Code, why: str, where: str = "token") -> None:
         super().__init__(why)
@@ -53,11 +53,7 @@ class NoControlError(Exception):
 
 
 def check_token(held: Lease | None, token: str, where: str = "token", words: _Words = CONTROL) -> Lease:
-    """Return the lease, or with `CLOCK` the hold of the clock, that a token names.
-
-    Raises:
-        NoControlError: No client has it, or the token is another client's or an old one.
-    """
+    """Return the lease, or with `CLOCK` the hold of the clock, of a token, or raise NoControlError."""
     if held is None:
         raise NoControlError("no_control", words.nobody, where)
     if token != held.token:
@@ -72,26 +68,18 @@ def is_holders(lease: Lease | None, token: str | None) -> bool:
 
 
 def check_free(held: Lease | None, client: str, words: _Words = CONTROL) -> None:
-    """Check that a client may take control, or the clock.
-
-    Raises:
-        NoControlError: Another client has it.
-    """
+    """Raise NoControlError if another client has control, or the clock."""
     if held is not None and held.client != client:
         raise NoControlError("no_control", words.taken.format(held.client), words.where)
 
 
 def may_step(clock: Lease | None, lease: Lease | None, token: str) -> bool:
-    """Return whether a token may advance time: the clock's token if a client holds the clock, else the lease's."""
+    """Return whether a token may advance time: the clock's, or the lease's if no client holds the clock."""
     return is_holders(lease if clock is None else clock, token)
 
 
 def check_step_token(clock: Lease | None, lease: Lease | None, token: str) -> str:
-    """Return the name of the client whose token it is, if it may advance time.
-
-    Raises:
-        NoControlError: It may not.
-    """
+    """Return the client of a token; raise NoControlError if it may not advance time."""
     if clock is None:
         return check_token(lease, token).client
     if is_holders(lease, token):
@@ -101,11 +89,7 @@ def check_step_token(clock: Lease | None, lease: Lease | None, token: str) -> st
 
 
 def check_step(clock: Lease | None, lease: Lease | None, step: SimulationStep) -> str:
-    """Return the name of the client that steps; advancing time and sending set-points are separate rights.
-
-    Raises:
-        NoControlError: A token is missing or does not give the required right.
-    """
+    """Return the client that steps; raise NoControlError if it may not step or send its set-points."""
     client = check_step_token(clock, lease, step.token)
     if step.motion_token is not None:
         check_token(lease, step.motion_token, "motion_token")
@@ -116,24 +100,20 @@ def check_step(clock: Lease | None, lease: Lease | None, step: SimulationStep) -
 
 
 class Standing(NamedTuple):
-    """Who holds control and the clock, as read at one moment."""
+    """Holders of control and the clock at one moment."""
 
     lease: Lease | None
-    """Lease of the client that has control."""
+    """Lease of the client in control."""
     clock: Lease | None
-    """Hold of the client that has the clock."""
+    """Hold of the client with the clock."""
 
     def sessions_of(self, client: str) -> set[str | None]:
-        """Sessions whose end takes control or the clock from a client; empty if it has neither."""
+        """Return the sessions whose end takes control or the clock from a client."""
         return {right.session for right in self if right is not None and right.client == client}
 
 
 class Authority:
-    """The lease of a robot, with which motion ends, and the hold of its clock: one client each at a time.
-
-    The instance is part of every token, different after each restart, so that no token of before is valid
-    again; empty where equal runs have to give equal tokens.
-    """
+    """The lease of a robot, whose end stops motion, and the hold of its clock; `instance` makes tokens unique."""
 
     def __init__(
         self,
@@ -148,33 +128,21 @@ class Authority:
         self._granted = self._granted_clocks = 0
         self._ends = math.inf
         self.lease: Lease | None = None
-        """Lease of the client that has control."""
         self.clock: Lease | None = None
-        """Hold of the client that has the clock."""
 
     def take(self, client: str, seconds: float, now: float, session: str | None = None) -> Lease:
-        """Give control to a client for so many seconds; one that already has it gets a new lease.
-
-        The end of the session ends the lease; None if its end will not be reported.
-
-        Raises:
-            NoControlError: Another client has control.
-        """
+        """Give control to a client for its session (None: unknown), or raise NoControlError if another has it."""
         check_free(self.lease, client)
         return self._grant(client, seconds, now, session)
 
     def renew(self, token: str, now: float) -> Lease:
-        """Check a token and renew its lease.
-
-        Raises:
-            NoControlError: See `check_token`.
-        """
+        """Renew a token's lease; raise NoControlError as `check_token`."""
         lease = check_token(self.lease, token)
         self._ends = now + lease.seconds
         return lease
 
     def hand_over(self, client: str, now: float, session: str | None = None) -> None:
-        """Reserve the lease for another client, which only has to take it; the session is as in `take`."""
+        """Reserve the lease for another client, which can then take it; session as in `take`."""
         if self.lease is not None:
             self._grant(client, self.lease.seconds, now, session)
 
@@ -186,7 +154,7 @@ class Authority:
 
     @property
     def ends(self) -> float:
-        """Time at which the lease runs out if it is not renewed [s]; infinite if it does not."""
+        """Time at which the lease expires unless renewed, infinite if never [s]."""
         return self._ends if self._realtime and self.lease is not None else math.inf
 
     def watch(self, now: float) -> None:
@@ -195,14 +163,14 @@ class Authority:
             self._lose("the lease expired: no command renewed it")
 
     def end_rights(self, client: str, session: str) -> None:
-        """End the rights of a client whose session has ended: motion ends with control, and the clock becomes free."""
+        """End the rights of a client whose session has ended: control and its motion, and the clock."""
         if self.clock is not None and (self.clock.client, self.clock.session) == (client, session):
             self.clock = None
         if self.lease is not None and (self.lease.client, self.lease.session) == (client, session):
             self._lose(f"client {client!r} is gone")
 
     def release(self) -> None:
-        """End the lease, and with it motion, since its holder asks for that."""
+        """End the lease and its motion at the holder's request."""
         self.lease = None
         self._interrupt("control was released")
 
@@ -212,12 +180,7 @@ class Authority:
         self._interrupt(why)
 
     def take_clock(self, client: str, session: str | None = None) -> str:
-        """Give the clock to a client, and return its token; one that already holds it gets a new one.
-
-        Raises:
-            NoControlError: Another client holds it.
-            RefusalError: See `check_step`.
-        """
+        """Give the clock to a client and return a new token; raise NoControlError if another holds it."""
         self._check_steppable()
         check_free(self.clock, client, CLOCK)
         self._granted_clocks += 1
@@ -226,21 +189,12 @@ class Authority:
         return self.clock.token
 
     def release_clock(self, token: str) -> None:
-        """Release the clock.
-
-        Raises:
-            NoControlError: See `check_token`.
-        """
+        """Release the clock; raise NoControlError as `check_token`."""
         check_token(self.clock, token, words=CLOCK)
         self.clock = None
 
     def check_step(self, step: SimulationStep, now: float) -> None:
-        """Check that a step's sender may advance time, and may send the set-points in it.
-
-        Raises:
-            NoControlError: The sender has no such right.
-            RefusalError: Time passes by itself with this clock.
-        """
+        """Check a step's rights; raise NoControlError without them, RefusalError in real time."""
         check_step(self.clock, self.lease, step)
         if self.clock is None:
             self.renew(step.token, now)
@@ -259,18 +213,18 @@ class Presence:
         self._sessions: dict[str, set[str]] = {}
 
     def seen(self, client: str, session: str) -> None:
-        """Note that a client's liveliness token has appeared; the session is empty if it names none."""
+        """Add a client's liveliness token; the session is empty if the token names none."""
         self._sessions.setdefault(client, set()).add(session)
 
     def gone(self, client: str, session: str) -> None:
-        """Note that a client's liveliness token has disappeared."""
+        """Remove a client's liveliness token."""
         there = self._sessions.get(client, set())
         there.discard(session)
         if not there:
             self._sessions.pop(client, None)
 
     def clients_of(self, session: str) -> list[str]:
-        """Names of the clients that a session declares."""
+        """Return the clients that a session declares."""
         return [client for client, there in self._sessions.items() if session in there]
 
     def has(self, client: str, session: str) -> bool:
@@ -278,11 +232,7 @@ class Presence:
         return session in self._sessions.get(client, ())
 
     def session_of(self, client: str) -> str | None:
-        """Return the session of a client that requests control; None if it has no token.
-
-        Raises:
-            NoControlError: Several sessions use this name, and a command does not say which one sent it.
-        """
+        """Return the session of a client, None without one; raise NoControlError if several sessions use the name."""
         there = self._sessions.get(client, set())
         if len(there) > 1:
             why = (

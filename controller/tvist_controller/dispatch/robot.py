@@ -1,4 +1,4 @@
-"""The parts of one robot, and what they need of one another."""
+"""The parts of one robot and their connections."""
 
 from abc import ABC, abstractmethod
 from functools import cached_property
@@ -42,28 +42,27 @@ from tvist_protocol.values import Payload
 
 
 class Robot(ABC):
-    """The parts of one robot, on which commands act; a `Controller` makes them."""
+    """The parts of one robot, on which commands act; a `Controller` creates them."""
 
     def __init__(self, setup: Setup, plant: Plant | None, planner: MakesPlans, order: Order | None) -> None:
         self.setup = setup
-        """Initial setup; of an arm that cannot be placed, with the posture in which it stood."""
+        """Initial setup; for an arm that cannot be placed, with its initial posture."""
         self.tick_number = 0
         self.counters = Counters()
         self.events: list[Event] = []
-        """Events of the tick that is being computed, or of the next one between two ticks."""
+        """Events of the present tick, or of the next one between ticks."""
         self.plans = Plans(planner.plan, self.snapshot, order)
-        """The way to plans."""
+        """Access to plans."""
         first, timeouts, description = planner.filters.first(), setup.clock == "realtime", setup.description
         self.cycle = _cycle(setup, first, plant)
         plant = self.cycle.plant
         self.seed = setup.seed
-        """Seed with which a simulated arm is placed next."""
-        # What only watches has no power to move anything, whatever is asked of it.
+        """Seed for the next reset of a simulated arm."""
+        # A robot that is only watched cannot be moved.
         mode = "POWER_OFF" if plant.watched else setup.mode
         collisions = CollisionModel(description, body(setup.payload))
         self.motion = motion = MotionControl(self.cycle, collisions, self.emit, mode)
         self.modes = RobotModes(motion)
-        """Robot mode, safety mode and runtime state."""
         self.session = Authority(self._interrupt, self.emit, realtime=timeouts, instance=setup.instance)
         """Rights to control the robot and to advance time."""
         self.safety = safety = SafetyControl(motion, self.emit)
@@ -71,43 +70,39 @@ class Robot(ABC):
         self.peripherals = Peripherals(motion.set_tcp)
         self.watching: Watching | None = None
         self.supervision: Supervision | None = None
-        """The robot's own controller, which is only watched, or through which the robot is moved; None for neither."""
+        """Interface to the robot's own controller, if it is only watched, or moved through it; else None."""
         if isinstance(plant, RealArm) and plant.watched:
             self.watching = Watching(plant, self.peripherals, self.emit, self.cycle, self.modes)
         elif isinstance(plant, RealArm) and plant.supervised:
             self.supervision = Supervision(plant, self.peripherals, self.emit, motion, safety)
         self.forces = ToolForces(description, self.peripherals, lambda: self.report, lambda: self.declared)
-        """Forces and torques on the arm."""
         self.cell = None
-        """What stands around the robot; None for nothing."""
+        """The cell around the robot; None for none."""
         if setup.cell is not None:
             self.cell = LiveCell(setup.cell, description, plant, self.peripherals, self.emit)
         self.guidance = Guidance(motion)
-        """Guided motions."""
         self.force_control = ForceControl(self.guidance, self.forces, timeouts=timeouts)
         self.programs = ProgramPlayer(self._access(), safety)
         self.assumed = Assumptions(
             setup.payload, first.source, motion, self.peripherals, planner.for_lesson, self.emit,
             follows=setup.adapt == "payload",
         )  # fmt: skip
-        """What it carries, and how it shapes."""
+        """Payload and filter in use."""
         safety.monitors = self._monitors()
         self.true_modes: dict[str, list[float]] = {}
-        """The arm's true modes, which are computed now and then; empty if the next truth needs them anew."""
+        """The arm's true modes, computed at intervals; empty to recompute them for the next truth."""
         self._layouts: dict[Key, Layout] = {}
         self.report = self.reported(self.cycle.sample)
-        """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
+        """Report of the last tick, or of the arm at rest if it has not ticked yet or was reset since."""
 
     def _monitors(self) -> tuple[Monitor, ...]:
-        """Return all that judges the signals of a tick, in this order."""
         description = self.setup.description
         overload = Overload(description.robot.joints, description.limits.torque)
-        # An arm with a controller of its own is watched by that; here its torques may be guessed from currents.
+        # A driven arm's own controller monitors its torques; those reported here may be estimates from currents.
         drives = () if self.cycle.plant.supervised else (overload,)
         return *drives, ShaperMonitor(self.cycle), self.force_control, self.assumed.monitor
 
     def _access(self) -> Access:
-        """What programs may use of the robot."""
         return Access(
             description=self.setup.description, motion=self.motion, guidance=self.guidance,
             peripherals=self.peripherals, emit=self.emit, send=self.carry_out, plans=self.plans,
@@ -126,13 +121,13 @@ class Robot(ABC):
 
     @property
     def declared(self) -> Payload:
-        """Declared payload; for a watched robot, the one that it reports, if it reports one."""
+        """Declared payload; for a watched robot the one it reports, if any."""
         declared = self.assumed.declared
         return declared if self.watching is None else self.watching.declared(declared)
 
     @property
     def now(self) -> float:
-        """Time of the present tick [s], which only ticks advance."""
+        """Time of the present tick; only ticks advance it [s]."""
         return self.tick_number * PERIOD
 
     @cached_property
@@ -141,14 +136,11 @@ class Robot(ABC):
         return fingerprint(self.setup.description)
 
     def snapshot(self, time: float | None = None) -> Snapshot:
-        """The present state that plans depend on; for a time, that of a path that goes on from the running motion."""
+        """Return the state that plans depend on; with a time, of a path that continues the motion."""
         return self.motion.snapshot(self.assumed.present(), self.programs.statements.last, time)
 
     def io(self, *, wrench: bool = True) -> Io:
-        """Return inputs, outputs and registers as they are for the next tick.
-
-        To compute the wrench at the tool takes a third of a tick.
-        """
+        """Return inputs, outputs and registers for the next tick; the tool wrench costs a third of a tick."""
         said, payload = self.watching or self.supervision, self.assumed
         io = self.peripherals.io(
             self.tick_number + 1, payload.declared, self.motion.motions.asked_speed, self.programs.published,
@@ -170,24 +162,19 @@ class Robot(ABC):
         )  # fmt: skip
 
     def emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
-        """Store an event of the tick that is being computed, or of the next one between two ticks."""
+        """Store an event of the present tick, or of the next one between ticks."""
         event = Event(tick=self.tick_number + 1, kind=kind, **fields)
         self.events.append(event)
         self.modes.hear(event)
         self.programs.hear(event)
 
     def _interrupt(self, why: str) -> None:
-        """End the activities that need control, when no client has control any more."""
         self.programs.end(why)
         self.motion.interrupt(why)
 
 
 def _cycle(setup: Setup, first: PlannedFilter, plant: Plant | None) -> ControlCycle:
-    """The control line with its arm.
-
-    Raises:
-        ValueError: The arm cannot be where it is to begin, or has no truth to report.
-    """
+    """Create the control line with its arm; raise ValueError for an invalid start or a missing truth."""
     try:
         cycle = ControlCycle(
             setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),

@@ -1,7 +1,4 @@
-"""The table of commands.
-
-The rows are known without a robot, since admission and planning need them in other threads.
-"""
+"""The table of commands, known without a robot because admission and planning use it in other threads."""
 
 from typing import Any
 
@@ -43,7 +40,7 @@ def _take_control(robot: Robot, call: Call[c.TakeControl]) -> Reply:
 _RIGHTS = (
     Row(c.TakeControl, _take_control, lease="none", check=_check_version),
     Row(c.KeepAlive, lambda _, __: None),  # every command renews the lease
-    # Who takes control from the new holder gets a token of its own.
+    # The new holder takes control with its own token.
     Row(c.HandOver, lambda robot, call: robot.session.hand_over(call.command.client, call.now, call.session)),
     Row(c.ReleaseControl, lambda robot, _: robot.session.release()),
     Row(
@@ -63,7 +60,7 @@ def _check_payload(command: c.SetPayload, description: RobotDescription) -> None
 
 
 def _filter(make: Any) -> Planning:
-    """A plan by the planner of filters, from the command and the state of the present filter."""
+    """Return a plan of the filter planner, from the command and the present filter's state."""
     return Planning(FILTER, FilterPlanner, lambda planner, command, now: make(planner, command, now.filter))
 
 
@@ -124,7 +121,6 @@ def _check_reset(command: SimulationReset, description: RobotDescription) -> Non
 
 
 def _place(robot: Robot, call: Call[SimulationReset]) -> Reply:
-    """Place the simulated arm somewhere at rest."""
     command, chosen, cycle = call.command, call.planned(), robot.cycle
     plant, motion, cell = cycle.plant, robot.motion, robot.cell
     if not isinstance(plant, SimulatedArm):
@@ -209,6 +205,5 @@ COMMANDS: dict[type[c.Command], Row] = {
         *_SIMULATION, *_QUESTIONS,
     )
 }  # fmt: skip
-"""The row of each command."""
 HARMLESS: frozenset[type[c.Command]] = frozenset(row.message for row in (*_RIGHTS, *_FILTERS, *_QUESTIONS))
-"""Commands that do not concern the arm, so that a robot that is only watched takes them."""
+"""Commands that do not affect the arm, accepted also by a watched robot."""

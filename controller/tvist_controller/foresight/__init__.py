@@ -1,1 +1,1 @@
-"""What will happen: copies of the line run ahead, stops, and collisions on the way."""
+"""Prediction: simulated copies of the line, stops, and collisions."""

@@ -1,10 +1,9 @@
-"""Distances between the bodies of an arm and the floor, and bounds of them while joints turn, compiled.
+"""Distances between capsules of an arm and the floor, and lower bounds while joints turn, compiled.
 
-Each body is a capsule: all that is nearer to its axis than its radius.
-
-The distance between two bodies on one chain of joints changes only with the joints between them. If joint j turns at
-the rate q̇_j, it changes at most as fast as |q̇_j| times the smaller of the two bodies' largest distances from the joint:
-both surfaces' nearest points lie on a common normal, to which a turn about an axis gives them the same velocity.
+A capsule is everything within its radius of its axis. The distance between two bodies changes only with the
+joints between them. Joint j turning at q̇_j changes it by at most |q̇_j| times the smaller of the bodies'
+largest distances from the joint: the nearest points of both surfaces lie on a common normal, and a turn gives
+them equal velocity along it.
 """
 
 import math
@@ -16,14 +15,13 @@ from tvist_controller.line.differentiator import Floats
 from tvist_plant.chain import bend, start, step_along
 
 LINK, FIRST, SECOND, RADIUS, BODY = 0, 1, 4, 7, 8
-"""Columns of a body: number of joints before it, the ends of its axis in its link's frame and its radius [m]; their
-number. The floor's row has the link `FLOOR` and its height.
-"""
+"""Columns of a body: number of joints before it, ends of its axis in its link's frame and radius [m]; number
+of columns. The floor's row has the link `FLOOR` and its height."""
 FLOOR = -1.0
 ONE, OTHER, ARMS = 0, 1, 2
-"""Columns of a pair: the numbers of its bodies, and for each joint how far a turn of it may bring them [m/rad]."""
+"""Columns of a pair: numbers of its bodies, then for each joint the bound of their approach [m/rad]."""
 LOOKS = 16
-"""Largest number of postures of a stop that are looked at."""
+"""Largest number of postures checked per stop."""
 
 
 @compiled_for_ticks
@@ -33,7 +31,7 @@ def place(
     bodies: Floats,  # see `BODY`, shape (b, 8)
     ends: Floats,  # result: both ends of each axis in the base frame, shape (b, 6) [m]
 ) -> None:
-    """Compute where the axes of bodies end."""
+    """Compute the ends of the bodies' axes."""
     R, o = np.empty((3, 3)), np.empty(3)
     start(R, o)
     for link in range(q.shape[0] + 1):
@@ -50,7 +48,7 @@ def place(
 
 @compiled_for_ticks
 def gap(bodies: Floats, ends: Floats, one: int, other: int) -> float:
-    """Return the distance between two bodies, of which the second may be the floor [m]; see `place`."""
+    """Return the distance between two bodies, the second of which may be the floor [m]."""
     p, q = ends[one], ends[other]
     if bodies[other, LINK] == FLOOR:
         return float(min(p[2], p[5]) - bodies[one, RADIUS] - bodies[other, RADIUS])
@@ -80,7 +78,7 @@ def rooms(
     turned: Floats,  # largest angle of each joint; with zeros, the distances at q are computed [rad]
     found: Floats,  # result of each pair, shape (k,) [m]
 ) -> float:
-    """Compute how far the bodies of each pair certainly stay apart while joints turn, and return the least [m]."""
+    """Compute lower bounds of all pairs' distances while joints turn; return the smallest [m]."""
     place(chain, q, bodies, ends)
     least = math.inf
     for p in range(pairs.shape[0]):
@@ -88,7 +86,7 @@ def rooms(
         for j in range(q.shape[0]):
             way += pairs[p, ARMS + j] * turned[j]
         found[p] = gap(bodies, ends, int(pairs[p, ONE]), int(pairs[p, OTHER])) - way
-        # Nothing is clear in a posture that is not finite.
+        # A non-finite posture is never clear.
         least = min(least, found[p]) if math.isfinite(found[p]) else -math.inf
     return least
 
@@ -106,9 +104,9 @@ def stop_has_room(
     jerk: float,  # likewise [rad/s^3]
     least: float,
 ) -> bool:
-    """Return whether all bodies certainly stay farther apart than `least` [m] on the way of a stop.
+    """Return whether all bodies certainly stay more than `least` [m] apart during a stop.
 
-    From each posture that is looked at, time goes on by as much as the bodies then certainly need to meet.
+    From each posture checked, time advances by as much as the bodies need at least to meet.
     """
     n, time = q.shape[0], 0.0
     now, fastest, left = np.empty(n), np.empty(n), np.empty(n)
@@ -132,7 +130,7 @@ def stop_has_room(
                 way += pairs[p, ARMS + j] * left[j]
                 speed += pairs[p, ARMS + j] * fastest[j]
             room = gap(bodies, ends, int(pairs[p, ONE]), int(pairs[p, OTHER])) - least
-            if not room > 0.0:  # negated, so that nothing is clear in a posture that is not finite
+            if not room > 0.0:  # negated, so that NaN is never clear
                 return False
             if not room > way:
                 waiting[count] = p
@@ -151,9 +149,9 @@ def stop_has_room(
 
 @compiled_for_ticks
 def stop_phases(v: float, a: float, limit: float, jerk: float) -> tuple[float, float, float, float, float]:
-    """Return duration [s] and jerk [rad/s^3] of the first phase, the other durations, and the last phase's jerk.
+    """Return a stop's durations [s] and jerks [rad/s^3]: first phase and its jerk, middle, last and its jerk.
 
-    Velocity and acceleration are those at the start [rad/s, rad/s^2]; the acceleration may exceed its limit.
+    The initial acceleration may exceed its limit.
     """
     # Without braking, the velocity would become this while the acceleration is reduced to zero.
     left = v + 0.5 * a * abs(a) / jerk
@@ -175,7 +173,7 @@ def stop_phases(v: float, a: float, limit: float, jerk: float) -> tuple[float, f
 def after(
     v: float, a: float, phases: tuple[float, float, float, float, float], time: float
 ) -> tuple[float, float, float]:
-    """Return the turned angle [rad], velocity and acceleration at a time after the start of a stop [s]."""
+    """Return turned angle [rad], velocity and acceleration at a time after the start of a stop [s]."""
     ramp, first, held, last, jerk = phases
     turned = 0.0
     for phase in range(3):

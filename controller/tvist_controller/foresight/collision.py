@@ -1,4 +1,4 @@
-"""Collisions of the arm with itself and the floor: capsules of the robot file."""
+"""Collisions of the arm with itself and the floor, using the robot file's capsules."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,19 +29,19 @@ from tvist_plant.model import FLANGE, link_frame, rigid_model
 CLEARANCE = 0.005
 """Smallest permitted distance between two bodies [m]."""
 FAR = 0.05
-"""Distance above which checks may be far apart [m]."""
+"""Distance above which long steps between checks are allowed [m]."""
 SHORT = 0.004
-"""Travel of the arm's points between two checks where bodies are as close as permitted [m]."""
+"""Travel of the arm between two checks at the smallest permitted distance [m]."""
 ROUNDING = 1e-9
-"""Changes of a distance below this are rounding errors [m]."""
+"""Distance changes below this are rounding errors [m]."""
 SURE = 1e-5
-"""What a bound must leave beyond the clearance, more than the accuracy of distances [m]."""
+"""Margin of bounds beyond the clearance, above the accuracy of distances [m]."""
 PAYLOAD = "payload"
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """Two bodies that are too close to each other."""
+    """A pair of bodies that are too close."""
 
     first: str
     second: str
@@ -56,7 +56,7 @@ class Meeting:
 
 
 class CollisionModel:
-    """The arm's bodies with its declared payload and the floor; without bodies there are no collisions."""
+    """The arm's bodies, its declared payload and the floor; without bodies there are no collisions."""
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
         model, collision = rigid_model(description, Payload()), description.collision
@@ -72,7 +72,7 @@ class CollisionModel:
         self._names += ["floor"] if self._names and collision.has_floor else []
         self._bodies = np.zeros((len(self._names), BODY))
         self._far = np.full((len(self._names), description.joints), np.inf)
-        """How far each joint may carry each body [m/rad]."""
+        """Bound of each body's travel per joint [m/rad]."""
         for number, body in enumerate(collision.bodies):
             place = pin.SE3.Identity() if body.link < 0 else link_frame(description, body.link)
             ends = np.array([place.act(np.array(end)) for end in (body.start, body.end)])
@@ -82,17 +82,17 @@ class CollisionModel:
         self._all_pairs = self._pairs_of(description)
         self._still = np.zeros(description.joints)
         self._upright = bool(np.allclose(self._chain[0, [2, 5]], 0.0))
-        """Whether the first axis is vertical, so that turning it leaves all heights as they are."""
+        """Whether the first axis is vertical, so that turning it changes no heights."""
         self.declare(payload)
 
     def meeting(self, q: Floats) -> Meeting | None:
-        """Return the nearest pair of bodies at a posture, if it is closer than the clearance."""
+        """Return the closest pair of bodies at a posture if it is below the clearance."""
         gaps = self._gaps(q)
         number = int(np.argmin(gaps)) if len(gaps) else None
         return None if number is None or gaps[number] >= CLEARANCE else self._meeting_of(gaps, number)
 
     def misplaced(self, q: Floats, *payloads: Payload) -> str | None:
-        """Say which bodies would meet at a posture with one of these payloads; None if none would."""
+        """Return a message about bodies too close at a posture with any of these payloads, else None."""
         before = self.declared
         for payload in payloads:
             self.declare(payload)
@@ -104,21 +104,17 @@ class CollisionModel:
         return None
 
     def check_place(self, q: Floats, payloads: Sequence[Payload], field: str) -> None:
-        """Refuse to put the arm, or another payload on it, where two bodies would be nearer than permitted.
-
-        Raises:
-            RefusalError: They would be; the field of the command is to blame.
-        """
+        """Refuse a posture or payload with bodies too close; the RefusalError names the field."""
         met = self.misplaced(q, *payloads)
         if met is not None:
             why = f"{met}: choose a posture in which the arm and its payload are clear"
             raise RefusalError("collision", field, why, CLEARANCE)
 
     def on_way(self, way: Way, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
-        """Find the first meeting on a way, in long steps where everything is far apart and short ones elsewhere.
+        """Return the first meeting on a path with its position (share of the path), or None.
 
-        Bodies that are too close where the way begins, or at a posture before it, may move apart, but none of
-        these pairs may come closer again. What is found is the share of the way, and the pair.
+        Steps are long where all bodies are far apart. Pairs that are too close at the start, or at a posture
+        before it, may separate but not come closer.
         """
         travel, share = self.travel(way.turned), 0.0
         least = np.minimum(self._gaps(way.at(0.0) if before is None else before), CLEARANCE)
@@ -133,19 +129,19 @@ class CollisionModel:
             share = 1.0 if travel <= 0.0 else min(share + max(nearest - CLEARANCE, SHORT) / travel, 1.0)
 
     def nearest(self, postures: Floats, far: float = FAR) -> float:
-        """Smallest distance between two bodies at k postures, shape (k, n) [rad]; `far` if none is smaller [m]."""
+        """Return the smallest distance at k postures, shape (k, n) [rad], at most `far` [m]."""
         return min((far, *(float(self._gaps(q).min(initial=far)) for q in postures)))
 
     def travel(self, turned: Floats) -> float:
-        """Upper bound of any point's travel [m] while the joints turn by these angles, shape (n,) [rad]."""
+        """Return an upper bound of any point's travel for joint angles turned, shape (n,) [rad], in [m]."""
         return float(np.abs(turned) @ self._reach)
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
-        """Return whether the joints can certainly turn by these angles around a posture without a meeting."""
+        """Return whether turning the joints by these angles around a posture certainly avoids meetings."""
         return rooms(*self._parts, q, turned, self._found) > CLEARANCE + SURE
 
     def stop_is_spacious(self, state: Target, acceleration: float, jerk: float) -> bool:
-        """Return whether the joints can certainly stop without a meeting, within these limits."""
+        """Return whether a joint stop within these limits certainly avoids meetings."""
         least = CLEARANCE + SURE
         return stop_has_room(*self._parts, state.q, state.qd, state.qdd, acceleration, jerk, least)
 
@@ -163,13 +159,12 @@ class CollisionModel:
             pairs = pairs if payload.mass > 0.0 else pairs[(pairs[:, [ONE, OTHER]] != number).all(axis=1)]
         pairs = np.array([self._bounded(pair) for pair in pairs]).reshape(-1, ARMS + len(self._still))
         self._parts = self._chain, self._bodies, pairs, np.zeros((len(self._names), 6))
-        """Chain, bodies, pairs that can meet, and scratch, as the kernels of `clearance` take them."""
+        """Chain, bodies, pairs that can meet, and scratch: arguments of the kernels in `clearance`."""
         self._found = np.zeros(len(pairs))
         self._reach = np.where(carried, self._far, 0.0).max(axis=0, initial=0.0)
-        """Largest distance of any point of the arm from each joint's axis, in any posture, shape (n,) [m]."""
+        """Largest distance of the arm from each joint's axis in any posture, shape (n,) [m]."""
 
     def _gaps(self, q: Floats) -> Floats:
-        """Distance of each pair of bodies at a posture [m]."""
         found = np.empty(len(self._found))
         rooms(*self._parts, q, self._still, found)
         return found
@@ -179,7 +174,7 @@ class CollisionModel:
         return Meeting(self._names[int(pair[ONE])], self._names[int(pair[OTHER])], float(gaps[number]))
 
     def _put(self, number: int, link: int, ends: Floats, radius: float) -> None:
-        """Place a body by the ends of its axis in pinocchio's frame of its link, shape (2, 3) [m]."""
+        """Place a body by the ends of its axis in its link's pinocchio frame, shape (2, 3) [m]."""
         row = self._bodies[number]
         row[LINK], row[FIRST:RADIUS], row[RADIUS] = link, (ends @ self._axes[link]).ravel(), radius
         own = radius + float(np.linalg.norm(ends, axis=1).max())
@@ -187,7 +182,6 @@ class CollisionModel:
         self._far[number] = own + np.abs(along[link] - along[1:])
 
     def _bounded(self, pair: Floats) -> Floats:
-        """Return a pair with how far each joint between its bodies may bring them [m/rad]."""
         row, (one, other) = pair.copy(), (int(pair[ONE]), int(pair[OTHER]))
         links = [max(int(self._bodies[number, LINK]), 0) for number in (one, other)]
         between = slice(min(links), max(links))
@@ -197,7 +191,7 @@ class CollisionModel:
         return row
 
     def _pairs_of(self, description: RobotDescription) -> Floats:
-        """Return the pairs of bodies that may meet, without bounds; see `ARMS`."""
+        """Return the pairs that may meet, without bounds; see `ARMS`."""
         bodies = len(description.collision.bodies) + 1 if self._names else 0
         apart = {frozenset(pair) for pair in description.collision.apart}
         found = [

@@ -1,4 +1,4 @@
-"""Future references, simulated as far ahead as the caller needs them."""
+"""Simulation of future references, as far as the caller needs."""
 
 from functools import cached_property
 
@@ -11,30 +11,25 @@ from tvist_controller.trajectory import Trajectory
 from tvist_plant.plant import PERIOD
 
 MAX_AHEAD = 4000
-"""Largest number of ticks that a motion is simulated ahead to find its end."""
+"""Largest number of ticks simulated to find the end of a motion."""
 
 
 class LineSimulation:
-    """A control line without its arm, simulated ahead of time; what it is made of is consumed.
-
-    A stop has no filter, since it bypasses that.
-    """
+    """A control line without its arm, simulated ahead; it consumes its arguments. A stop has no filter."""
 
     def __init__(
         self, trajectory: Trajectory, line_filter: LineFilter | None, shaped: ShapedReference
     ) -> None:
         self._trajectory, self._line_filter, self._shaped = trajectory, line_filter, shaped
         self.samples: list[Floats] = [shaped.along.published.q, shaped.along.position]
-        """Samples of the shaped reference, one for each entry of `references`: path parameters, or else joint
-        positions.
-        """
+        """Samples of the shaped reference, one per entry of `references`: path parameters or joint positions."""
         self.references: list[Floats] = [shaped.joints.published.q, shaped.position]
-        """The last two shaped references played and the future ones, one for each tick, each of shape (n,) [rad]."""
+        """The last two shaped references played, then the future ones per tick, each of shape (n,) [rad]."""
         self.rests = False
-        """True once the last reference is at rest, so that no more will follow."""
+        """Whether the last reference is at rest, so that no more follow."""
 
     def until(self, ticks: int) -> None:
-        """Simulate until this many future references are known, or they come to rest."""
+        """Simulate until this many future references are known or they come to rest."""
         trajectory, line_filter = self._trajectory, self._line_filter
         while not self.rests and len(self.references) < ticks + 2:
             x = trajectory.next()
@@ -53,6 +48,6 @@ class LineSimulation:
 
 
 def resting_after(references: Floats) -> int:
-    """Return the index of the last one of references of shape (k, n), one for each tick, that moved; 0 if none did."""
+    """Return the index of the last of references (k, n), one per tick, that moved; 0 if none."""
     moves = np.flatnonzero(np.abs(np.diff(references, axis=0)).max(axis=1) > STILL)
     return int(moves[-1]) + 1 if len(moves) else 0

@@ -1,4 +1,4 @@
-"""Check of the remaining motion: whether it stays clear, and how long it lasts."""
+"""Check of the remaining motion: its clearance and duration."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ from tvist_shaping.base import Filter
 
 
 class RemainingMotion:
-    """Examines the future motion of the control line."""
+    """Checks the future motion of the control line."""
 
     def __init__(self, cycle: ControlCycle, stopper: Stopper, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
@@ -31,16 +31,12 @@ class RemainingMotion:
         self._guide_guard = StreamGuard(collisions, stopper.stops, room, reach=reach)
 
     def guard_of_stream(self) -> StreamGuard:
-        """Return the guard of a stream that begins from rest."""
+        """Return the guard of a stream that starts from rest."""
         self._guard.begin(self._cycle.newest)
         return self._guard
 
     def guard_of_guided(self) -> StreamGuard:
-        """Return the guard of a guided motion from the present state of motion, whatever that is.
-
-        Raises:
-            RefusalError: There is no clear stop from here, as on a narrow path; nothing has changed.
-        """
+        """Return the guard of a guided motion from the present state; raise RefusalError without a clear stop."""
         cycle, guard, stops = self._cycle, self._guide_guard, self._stopper.stops
         state = cycle.newest
         guard.begin(state)
@@ -53,11 +49,7 @@ class RemainingMotion:
         return guard
 
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
-        """Time until the shaped reference rests [s], and the angle that the joint that turns most still turns [rad].
-
-        They are those of the plan of a stop that has begun, or else of the present motion; None and None if
-        rest is too far ahead to tell.
-        """
+        """Return time [s] and largest joint angle [rad] until rest, by `plan` if given; None if too far ahead."""
         if plan is not None:
             return plan.duration, plan.way
         ahead = self._stopper.foresee()
@@ -67,16 +59,13 @@ class RemainingMotion:
         return max(last - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 
     def after_stream(self, end: JointStop) -> Meeting | None:
-        """Return the meeting that would occur while the end of a stream runs through the filter, if any."""
+        """Return the first meeting while the end of a stream runs through the filter, else None."""
         if self._tail_is_spacious(end):
             return None
         return self._on(self._stopper.foresee(trajectory=end))
 
     def rest_of_way(self, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> Meeting | None:
-        """Return the meeting that would occur on the rest of the motion, if any; if that is unknown, in a stop.
-
-        The rest has a new filter, if there is one, and the parts of the motion that have not begun.
-        """
+        """Return the first meeting on the rest of a motion with a new filter; if unknown, in a stop."""
         cycle = self._cycle
         coming = [part.path.whole for part in parts]
         if cycle.mode.at_rest:
@@ -94,15 +83,10 @@ class RemainingMotion:
         return None
 
     def _first(self, ways: Sequence[Way]) -> Meeting | None:
-        """Return the first meeting on several ways, one after the other."""
         return next((found[1] for way in ways if (found := self._collisions.on_way(way))), None)
 
     def check_payload(self, payload: Payload, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> None:
-        """Check the rest of the motion with another payload, and put that into the collision model; see `rest_of_way`.
-
-        Raises:
-            RefusalError: There would be a collision; nothing has changed.
-        """
+        """Put another payload into the collision model, or raise RefusalError if the rest would collide."""
         collisions, q = self._collisions, self._cycle.position
         before = collisions.declared
         escaping = self._cycle.mode.at_rest or collisions.meeting(q) is not None
@@ -115,11 +99,7 @@ class RemainingMotion:
             raise RefusalError("collision", "com", why, CLEARANCE)
 
     def check_filter(self, tvist: Filter) -> None:
-        """Check with another filter the rest of a motion that comes to rest through the filter and is not on a path.
-
-        Raises:
-            RefusalError: There would be a collision.
-        """
+        """Raise RefusalError if the rest of a stream or guided motion would collide with another filter."""
         cycle = self._cycle
         if not (cycle.mode.guarded and cycle.trajectory.foreseeable):
             return
@@ -128,7 +108,7 @@ class RemainingMotion:
             raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
 
     def _tail_is_spacious(self, end: JointStop) -> bool:
-        """Return whether there is room for any output of a filter from the references that it may still use."""
+        """Return whether any filter output from the references still in use is clear."""
         cycle = self._cycle
         if cycle.tvist.peak > 1.0:
             return False
@@ -140,7 +120,7 @@ class RemainingMotion:
         )
 
     def _on(self, ahead: Floats | None) -> Meeting | None:
-        """Return the first pair of bodies that meets along known references, one for each tick, shape (k, n)."""
+        """Return the first meeting along known references, one per tick, shape (k, n), else None."""
         if ahead is None:
             return None
         steps = np.abs(np.diff(ahead, axis=0)).max(axis=0)

@@ -1,4 +1,4 @@
-"""Check of streams of set-points and of guided motions: a reference is played only if a clear stop exists from it."""
+"""Guard of streams and guided motions: a reference is played only if a clear stop exists from it."""
 
 import numpy as np
 
@@ -10,20 +10,15 @@ from tvist_controller.line.limits import GENTLEST_STOP, TorqueRoom
 from tvist_controller.trajectory import JointStop, Way
 
 MARGIN = 0.8
-"""Share of the acceleration that the torque permits at the start of a stop, which the stop uses, since the permitted
-acceleration changes on the way [-].
-"""
+"""Fraction of the acceleration that torque permits at the start of a stop; the margin is for changes on the way [-]."""
 
 
 class StreamGuard(Guard):
-    """Checks the stop from the state of motion that a reference would lead to.
+    """Checks the stop from the state that a reference would lead to.
 
-    As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the
-    previous state is made. It was checked a tick earlier, so there is always a clear stop.
-
-    If bounds prove the stop to be clear, which takes microseconds, it is made only when it is needed. Stops
-    keep the joints within their reach, unless the references keep clear of it by themselves, as those of
-    streams do.
+    A reference may be played if that whole stop is clear. Otherwise the stop from the previous state is used, which was
+    checked a tick earlier, so a clear stop always exists. If bounds, which take microseconds, prove a stop clear, it is
+    computed only when needed. `reach` keeps stops within the joints' range; references of streams keep it themselves.
     """
 
     def __init__(
@@ -38,16 +33,16 @@ class StreamGuard(Guard):
         self._collisions, self._stops, self._torque = collisions, stops, room
         self._before: tuple[Target, float | JointStop] | None = None
         self.met: Meeting | None = None
-        """Meeting on the way of the latest stop that is not clear; None if it leaves the joints' range."""
+        """Meeting during the latest stop that is not clear; None if it leaves the joints' range."""
         self.obstacle = Obstacle("", "collision")
-        """Why the latest reference was refused."""
+        """Reason for refusing the latest reference."""
 
     def begin(self, state: Target) -> None:
         """Start from rest."""
         self._before, self.met = (state, GENTLEST_STOP), None
 
     def __call__(self, state: Target) -> JointStop | None:
-        """Decide whether a reference that leads to this state may be played; see `Guard`."""
+        """Return the stop to use if a reference that leads to this state must not be played, else None."""
         found = self._permitted(state)
         if found is None:
             return self.fallback()
@@ -55,22 +50,22 @@ class StreamGuard(Guard):
         return None
 
     def take(self, state: Target, stop: JointStop) -> None:
-        """Set the stop from the state of the newest reference, which is known to be clear."""
+        """Set the clear stop from the state of the newest reference."""
         self._before = state, stop
 
     def fallback(self) -> JointStop:
-        """Return the stop from the state of the last reference played, which is known to be clear."""
+        """Return the clear stop from the state of the last reference played."""
         assert self._before is not None, "begin comes first"
         state, stop = self._before
         return stop if isinstance(stop, JointStop) else self._stops.stop(state, stop)
 
     def give_up(self, why: str) -> JointStop:
-        """Return the stop as in `fallback`, since no reference follows for this reason."""
+        """Return the stop of `fallback`, because no reference follows for this reason."""
         self.obstacle = Obstacle(why, "singular")
         return self.fallback()
 
     def clear(self, stop: JointStop) -> bool:
-        """Return whether the whole way of a stop is clear."""
+        """Return whether a whole stop is clear."""
         q, qd, qdd = stop.at(0.0)
         turned = self.turned(qd, qdd, stop.acceleration)
         if not self._is_inside(q, turned) and (beyond := self._beyond(stop)) is not None:
@@ -90,7 +85,7 @@ class StreamGuard(Guard):
         return False
 
     def _permitted(self, state: Target) -> float | JointStop | None:
-        """Return a clear stop, or the acceleration of one that is made when it is needed; None if there is none."""
+        """Return a clear stop, or the acceleration of one to be computed later; None if none is clear."""
         stops = self._stops
         allowed = MARGIN * self._torque.acceleration(state.q, state.qd)
         acceleration = min(max(allowed, GENTLEST_STOP), stops.highest)
@@ -103,11 +98,11 @@ class StreamGuard(Guard):
         return stop if self.clear(stop) else stops.by_joints(state, None, self.clear)
 
     def _is_inside(self, q: Floats, turned: Floats) -> bool:
-        """Return whether the joints can certainly turn by these angles around q inside their range."""
+        """Return whether turning the joints by these angles around q certainly stays in range."""
         return self._reach is None or bool((np.abs(q) + turned <= self._reach).all())
 
     def _beyond(self, stop: JointStop) -> str | None:
-        """Return which joint leaves its range on the way of a stop, if one does, in words."""
+        """Return a message about a joint that leaves its range during a stop, else None."""
         assert self._reach is not None, "only a range can be left"
         beyond = stop.farthest - self._reach
         joint = int(np.argmax(beyond))
@@ -116,7 +111,7 @@ class StreamGuard(Guard):
         return f"joint {joint} would pass the end of its range, ±{self._reach[joint]:g} rad"
 
     def turned(self, qd: Floats, qdd: Floats, acceleration: float, jerk: float | None = None) -> Floats:
-        """Upper bound of each joint's turn in a stop, by default with the joints' jerk, shape (n,) [rad]."""
+        """Return upper bounds of the joints' turns in a stop, default jerk as in stops, shape (n,) [rad]."""
         jerk = self._stops.jerk if jerk is None else jerk
         fastest = _fastest(qd, qdd, jerk)
         ramps = (acceleration + np.abs(qdd)) / jerk
@@ -125,6 +120,6 @@ class StreamGuard(Guard):
 
 
 def _fastest(qd: Floats, qdd: Floats, jerk: float) -> Floats:
-    """Upper bound of each joint's velocity by the time its acceleration has been reduced to zero [rad/s]."""
+    """Return upper bounds of joint velocity while the acceleration decays to zero [rad/s]."""
     fastest: Floats = np.abs(qd) + qdd * qdd / (2.0 * jerk)
     return fastest

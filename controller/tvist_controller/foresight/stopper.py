@@ -1,4 +1,4 @@
-"""Forecast of the control line's motion, and the quickest way to end it."""
+"""Prediction of the control line's motion, and the quickest way to end it."""
 
 import math
 from contextlib import suppress
@@ -16,7 +16,7 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
 LONG = 0.2
-"""Time for which a motion along a curve may run out before a stop is sought that plays it more slowly [s]."""
+"""Duration above which slower playback along a curve is tried as a stop [s]."""
 EVEN = 1e-12
 """Differences between steps below this are rounding errors [rad]."""
 
@@ -26,20 +26,18 @@ def _anywhere(_: JointStop) -> bool:
 
 
 class Stopper:
-    """Forecasts the motion of a control line, and stops it."""
+    """Predicts and stops the motion of a control line."""
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
         self.stops = StopPlanner(cycle.description, cycle.dynamics, PERIOD)
-        """Planner of stops."""
         self._wanted = math.inf
 
     def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
-        """Simulate what follows without a command, or after a change to a filter or a trajectory.
+        """Simulate what follows without a command, optionally with another filter or trajectory.
 
-        The shaped references, shape (k, n) [rad], begin with the last two that were played, and end at rest.
-        The result is None if that takes more than `MAX_AHEAD` ticks, or the trajectory cannot go on. Stops
-        bypass every filter.
+        Returns the last two shaped references played and those until rest, shape (k, n) [rad]; None after
+        more than `MAX_AHEAD` ticks or if the trajectory is stuck. Stops bypass filters.
         """
         ahead = LineSimulation(*self._cycle.fork(tvist, trajectory))
         with suppress(StuckError):
@@ -47,11 +45,11 @@ class Stopper:
         return np.array(ahead.references) if ahead.rests else None
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
-        """Come to rest as quickly as permitted, by default with the deceleration that torque permits.
+        """Come to rest as quickly as permitted, by default at the deceleration that torque permits.
 
-        A motion stays on its path, is at no time ahead of the uninterrupted motion, and comes to rest no later than
-        it. If no stop within the torque limits does that, the motion runs out through the filter. A stream, whose
-        path is its client's, stops clear of all bodies. A stop in progress that is as quick continues: None.
+        A motion stays on its path, is never ahead of the uninterrupted motion, and rests no later. If no stop
+        within the torque limits does that, it runs out through the filter. A stream, whose path the client
+        defines, stops clear of all bodies. Returns None if a stop in progress is as quick and continues.
         """
         cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
         if cycle.mode in {LineMode.STOPPING, LineMode.RUNNING_OUT} and wanted <= self._wanted:
@@ -67,19 +65,19 @@ class Stopper:
         return plan
 
     def brake(self, trajectory: Trajectory) -> None:
-        """Follow the arm while its brakes bring it to rest; no stop replaces this."""
+        """Follow the arm while its brakes stop it; no other stop replaces this."""
         self._cycle.begin(trajectory, LineMode.STOPPING)
-        self._wanted = math.inf  # as if the hardest stop had been asked for
+        self._wanted = math.inf  # like a request for the hardest stop
 
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
-        """Return the quickest permitted stop from the present state, without starting it; see `stop`."""
+        """Return the quickest permitted stop from the present state without starting it; see `stop`."""
         forecast = self._cycle.trajectory.forecast
         return self._by_joints(deceleration) if forecast is None else self._on_path(forecast, deceleration)
 
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
         stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
-        # A stop that goes on is replaced by a harder one only: each new one begins with a ramp of its own.
+        # Replace a running stop only by a harder one, since each new stop begins with a ramp.
         braking = cycle.mode is LineMode.STOPPING or present.acceleration > 0.0
         if braking and (stop is None or stop.acceleration <= present.acceleration):
             return None
@@ -90,21 +88,20 @@ class Stopper:
 
     def _on_path(self, forecast: Forecast, deceleration: float | None) -> StopPlan | None:
         cycle, forecast = self._cycle, self._shaped(forecast)
-        # Stops on a path are sought in the order of their cost: by bounds alone, then beside the motion simulated for
-        # as long as a stop lasts, then beside the whole of it.
+        # Try the cheapest search first: bounds only, then simulation of a stop's duration, then of the whole motion.
         state, newest = cycle.along.published, cycle.along.position
         stop = self.stops.on_path(state, newest, forecast, deceleration)
         lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
         ahead = None
         if stop is None:
             ahead = LineSimulation(*cycle.fork())
-            # A motion that cannot turn back has to be simulated only for as long as a stop lasts.
+            # Unless the motion may turn back, simulating a stop's duration is enough.
             ahead.until(MAX_AHEAD if forecast.turns else 0)
             stop = self.stops.under(ahead, state, forecast, deceleration)
         if stop is None and ahead is not None:
             ahead.until(MAX_AHEAD)
             asked = None
-            if not ahead.rests:  # it lasts so long that any stop is sooner
+            if not ahead.rests:  # too long: any stop ends sooner
                 stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
             else:
                 last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
@@ -132,7 +129,7 @@ class Stopper:
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
 
     def _shaped(self, forecast: Forecast) -> Forecast:
-        """Return the forecast of a motion after the filter."""
+        """Return the forecast of a motion behind the filter."""
         cycle = self._cycle
         if cycle.mode is LineMode.STOPPING:
             return forecast

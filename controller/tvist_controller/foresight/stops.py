@@ -1,4 +1,4 @@
-"""Planning of stops: which are permitted (docs/explanations/design-notes.md says why), and the quickest of them."""
+"""Planning of stops: which are permitted (see docs/explanations/design-notes.md), and the quickest."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -18,19 +18,18 @@ from tvist_plant.description import RobotDescription
 S = TypeVar("S", JointStop, PathStop, SlowedStop)
 
 STEP = 0.8
-"""Ratio of one tried deceleration to the previous one [-]."""
+"""Ratio of consecutive trial decelerations [-]."""
 HARDER = 1.05
-"""A stop that brakes harder than the motion by this factor is never ahead of it, although a filter that varies may
-brake a little harder than its reference [-].
-"""
+"""Factor by which a stop must brake harder than the motion to be never ahead of it, since a varying filter
+may brake slightly harder than its reference [-]."""
 SLOW = 3e-3
-"""Speed below which a shaped motion may turn back slightly because of interpolation [rad/s]."""
+"""Speed below which interpolation may turn a shaped motion back slightly [rad/s]."""
 SOON = 0.02
-"""A motion that starts braking later than this is ahead of a stop by then [s]."""
+"""A motion that brakes later than this is by then ahead of a stop [s]."""
 COUNTED = 0.9
-"""Share of its present velocity that a motion is assumed to keep until it brakes [-]."""
+"""Fraction of its velocity that a motion is assumed to keep until it brakes [-]."""
 ROUNDING = 1e-12
-"""Differences between positions below this are rounding errors [rad]."""
+"""Position differences below this are rounding errors [rad]."""
 
 
 @dataclass(frozen=True)
@@ -38,15 +37,15 @@ class StopPlan:
     """A stop and its limits."""
 
     trajectory: AnyStop | None
-    """Trajectory of the stop; None if the present motion runs out by itself."""
+    """Trajectory of the stop; None if the present motion runs out."""
     acceleration: float | None
-    """Acceleration limit of the stop [rad/s^2]; None for the motion's own."""
+    """Acceleration limit of the stop, None for the motion's own [rad/s^2]."""
     limited: bool
     """Whether the limit differs from the requested one."""
     duration: float | None
-    """Time until rest [s]; None if it is too far ahead to tell."""
+    """Time until rest, None if too far ahead [s]."""
     way: float | None
-    """Angle until rest of the joint that turns most [rad]; None if it is too far ahead to tell."""
+    """Largest joint angle until rest, None if too far ahead [rad]."""
 
 
 class StopPlanner:
@@ -70,20 +69,20 @@ class StopPlanner:
         *,
         certain: bool = True,
     ) -> PathStop | None:
-        """Return the quickest stop along a motion's path that is certain to be permitted, if there is one.
+        """Return the quickest stop along a motion's path that is certain to be permitted, else None.
 
-        Two kinds of stops are never ahead of the motion and never come to rest later: those that brake harder
-        than the motion ever will, with more jerk; and gentler ones that end before the motion could, even if
-        it braked as hard as possible. There is none for a motion that is about to come to rest by itself. For
-        one that will not rest for long, a stop within the torque limits is enough, and need not be `certain`.
+        A stop is never ahead of the motion and rests no later if it brakes harder, with more jerk, than the
+        motion ever will, or if it ends before the motion could even at its hardest braking. No stop qualifies
+        if the motion is about to rest. For a motion that lasts long, any stop within the torque limits will
+        do, and need not be `certain`.
         """
         speed, rise = forecast.path.forwards(state.qd), forecast.path.forwards(state.qdd)
         hardest = self._keeping(state, forecast, self.highest)
         if hardest is None:
             return None
         in_time = forecast.steady + COUNTED * max(speed, 0.0) / forecast.braking
-        # A motion that is very slow may turn back a little, one that brakes with as much jerk as a stop may be as
-        # quick, and one that is about to rest is quicker than anything within the limits.
+        # A very slow motion may turn back a little; braking with a stop's jerk may end as soon as the stop; and a
+        # motion about to rest ends sooner than any stop within the limits.
         creeps = speed < SLOW
         jerks = HARDER * forecast.jerk > hardest.jerk and forecast.steady < SOON
         rests = rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * hardest.jerk)
@@ -103,11 +102,7 @@ class StopPlanner:
         wanted: float | None,
         asked: Floats | None = None,  # largest torques of the uninterrupted motion, shape (n,) [N m]
     ) -> PathStop | None:
-        """Return the quickest stop along the path of a motion that is simulated ahead, if there is one.
-
-        If the torques of the uninterrupted motion are not known, a stop may only use its share.
-        Without a stop, the motion has to run out.
-        """
+        """Return the quickest stop along the path of a motion simulated ahead, or None: it must then run out."""
         newest = ahead.samples[1]
         along: list[float] = []  # distance of the motion at each known tick
 
@@ -128,10 +123,7 @@ class StopPlanner:
         wanted: float | None,
         asked: Floats | None,
     ) -> SlowedStop | None:
-        """Return the quickest stop that plays a motion more and more slowly, see `SlowedStop`; arguments as of `under`.
-
-        It is None if none keeps the torques and the acceleration of stops.
-        """
+        """Return the quickest `SlowedStop` within the limits of torque and acceleration, else None."""
         samples, path = np.array(ahead.samples), forecast.path
         joints = Target(*path.states(state.q, state.qd, state.qdd))
         fastest = float(np.abs(joints.qd).max())
@@ -159,21 +151,18 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _behind(self, stop: PathStop | SlowedStop, along: Sequence[float]) -> bool:
-        """Return whether a stop is never ahead of a motion, of which the distance at each tick is known."""
+        """Return whether a stop is never ahead of a motion whose distance at each tick is known."""
         shares = (stop.share(number * self.period) for number in range(1, len(along) + 1))
         return all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
 
     def asked(self, ahead: Floats) -> Floats:
-        """Largest torques that a motion needs for its future references, shape (k, n): shape (n,) [N m]."""
+        """Return the largest torques of future references of shape (k, n), shape (n,) [N m]."""
         return torque_along(self._dynamics, ahead, self.period)
 
     def by_joints(
         self, state: Target, wanted: float | None, clear: Callable[[JointStop], bool]
     ) -> JointStop | None:
-        """Return the quickest stop with independent joints that is clear and within the torque limits.
-
-        `wanted` is the requested deceleration [rad/s^2], None for the largest possible.
-        """
+        """Return the quickest clear stop of independent joints within torque limits, at `wanted` [rad/s^2]."""
         torque = StopTorque(self._dynamics, state, self._torque)
         stops = (self.stop(state, acceleration) for acceleration in self._ladder(wanted))
         within = (stop for stop in stops if (np.abs(stop.end) <= self._position).all())
@@ -181,7 +170,7 @@ class StopPlanner:
         return _first(within, lambda stop, rebound: torque.holds(stop, rebound=rebound) and fits(stop))
 
     def stop(self, state: Target, acceleration: float) -> JointStop:
-        """Return a stop with independent joints within an acceleration [rad/s^2], whatever torque it needs."""
+        """Return a stop with independent joints at an acceleration [rad/s^2], without checking torque."""
         return JointStop(
             state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self.jerk, period=self.period
         )
@@ -210,16 +199,13 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _keeping(self, state: Target, forecast: Forecast, acceleration: float) -> MotionLimits | None:
-        """Limits for a stop's parameter that keep all joints within an acceleration [rad/s^2] and the jerk of stops.
-
-        The velocity is the highest that can occur in the stop while the present acceleration is reduced.
-        """
+        """Return limits of a stop's parameter that keep all joints within an acceleration and the stops' jerk."""
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
         fastest = speed + self.period * rise + rise * rise / self.jerk
         return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest, state.q)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
-        """Decelerations in the order in which they are tried: down from the requested one, then up from it."""
+        """Yield trial decelerations: down from the requested one, then up from it."""
         first = self.highest if wanted is None else min(max(wanted, GENTLEST_STOP), self.highest)
         down = first
         while down > GENTLEST_STOP:
@@ -235,7 +221,7 @@ class StopPlanner:
 
 
 def _first(stops: Iterable[S], holds: Callable[[S, bool], bool]) -> S | None:
-    """The first stop that holds with the rebound, else the first that holds without it; each is created once."""
+    """Return the first stop that holds with rebound, else the first without; create each once."""
     made = []
     for stop in stops:
         if holds(stop, True):

@@ -1,1 +1,1 @@
-"""What is measured and reported: states, terminals, and the values of UR's interfaces, without clock or I/O."""
+"""Measured and reported values: states, terminals, and variables of UR's interfaces, without clock or I/O."""

@@ -1,13 +1,12 @@
-"""The joints' motors: currents, heat and energy, by ratings that are plausible guesses, not measurements.
+"""Currents, heat and energy of the joints' motors; the ratings are plausible guesses, not measurements.
 
-A robot file does not describe motors. There are two sizes of joint, distinguished by their largest torque, as in a
-UR5e, whose base, shoulder and elbow are of one size and whose wrist joints are of the other.
+A robot file does not describe motors. Joints have two sizes, distinguished by their largest torque as in a UR5e: base,
+shoulder and elbow, and the wrists.
 
-Torque constants: the currents that UR's own simulator shows in its start posture (2.14, 1.49 and 0.23 A at shoulder,
-elbow and first wrist), divided into this model's gravity torques of a UR5e in that posture (21.1, 15.0 and 1.8 N m),
-give 9.9, 10.0 and 7.9 N m/A. They grow with the largest torque, so that a joint of another arm draws the UR5e's
-current at its own largest torque. All other values are chosen so that a joint under its rated load stays below 80 °C,
-and settles within some twenty minutes.
+Torque constants: the currents that UR's simulator shows in its start posture (2.14, 1.49 and 0.23 A at shoulder, elbow
+and first wrist) and this model's gravity torques there (21.1, 15.0 and 1.8 N m) give 9.9, 10.0 and 7.9 N m/A. They
+scale with the largest torque, so that any joint draws the UR5e's current at its largest torque. The other values keep a
+joint at rated load below 80 °C, and let it settle within some twenty minutes.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +20,7 @@ AMBIENT = 25.0
 BUS_VOLTAGE = 48.0
 """Voltage of the supply [V]."""
 STANDBY = 5.0
-"""Power of a joint's electronics while it is on [W]."""
+"""Power of a joint's electronics when on [W]."""
 
 
 @dataclass(frozen=True)
@@ -29,13 +28,13 @@ class JointRating:
     """One size of joint."""
 
     torque_constant: float
-    """Torque on the joint's side over motor current [N m/A]."""
+    """Joint torque per motor current [N m/A]."""
     resistance: float
-    """Heat of the motor divided by the square of its current [Ω]."""
+    """Motor heat per squared current [Ω]."""
     thermal_resistance: float
-    """Steady rise of temperature divided by heat [K/W]."""
+    """Steady temperature rise per heat [K/W]."""
     thermal_time: float
-    """Time after which the temperature has covered 63 % of its way [s]."""
+    """Time constant of the temperature [s]."""
     torque: float
     """Largest torque [N m]."""
 
@@ -48,9 +47,9 @@ class JointRating:
 BIG = JointRating(10.0, resistance=0.4, thermal_resistance=1.0, thermal_time=1200.0, torque=150.0)
 """Base, shoulder and elbow of a UR5e."""
 SMALL = JointRating(7.9, resistance=1.2, thermal_resistance=2.0, thermal_time=900.0, torque=28.0)
-"""Its wrists."""
+"""Wrists of a UR5e."""
 LARGEST_SMALL = 60.0
-"""A joint with a larger torque limit is a big one [N m]."""
+"""Joints with a larger torque limit are big [N m]."""
 
 
 def joint_ratings(description: RobotDescription) -> list[JointRating]:
@@ -65,8 +64,8 @@ def _rating(size: JointRating, torque: float) -> JointRating:
 class Meters:
     """Temperature of each joint, and energy of all joints.
 
-    A joint is one body: τ dT/dt = T_ambient + R_th (P_standby + R i²) - T, solved exactly over each step with
-    constant current. Ticks that were skipped count as one step with the current at its end.
+    Each joint is one body: τ dT/dt = T_ambient + R_th (P_standby + R i²) - T, solved exactly for constant
+    current. Skipped ticks count as one step with the current at its end.
     """
 
     def __init__(self, ratings: list[JointRating]) -> None:
@@ -76,21 +75,18 @@ class Meters:
         self.temperatures = [AMBIENT] * len(ratings)
         """Temperatures of the joints [°C]."""
         self.power = 0.0
-        """Power taken from the supply now [W]."""
+        """Present power from the supply [W]."""
         self.consumed = 0.0
-        """Energy taken from the supply since the first tick [J]."""
+        """Energy from the supply since the first tick [J]."""
         self.dissipated = 0.0
-        """Energy returned by braking and dissipated in a resistor [J]."""
+        """Braking energy dissipated in a resistor [J]."""
 
     def _over(self, seconds: float) -> list[float]:
-        """Share of the way to its steady value that each temperature covers in this time."""
+        """Return the fraction of the way to its steady value that each temperature covers in this time."""
         return [1.0 - exp(-seconds / rating.thermal_time) for rating in self._ratings]
 
     def update(self, tick: int, current: list[float], mechanical: float, *, powered: bool) -> None:
-        """Advance to a tick, with the currents of the motors [A] and the power that they deliver [W].
-
-        Braking drives have negative power. A tick that is not later than the last adds nothing.
-        """
+        """Advance to a later tick with motor currents [A] and mechanical power, negative in braking [W]."""
         standby = STANDBY if powered else 0.0
         heats = [rating.resistance * i * i for rating, i in zip(self._ratings, current, strict=True)]
         net = sum(heats) + mechanical

@@ -1,4 +1,4 @@
-"""Terminals, registers and tool centre point of a robot: set by commands, and published as `Io`."""
+"""Terminals, registers and tool centre point of a robot, set by commands and published as `Io`."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, get_args
@@ -18,29 +18,29 @@ from tvist_protocol.io import (
 from tvist_protocol.values import Payload
 
 CURRENT = (0.004, 0.020)
-"""Range of an analogue terminal as a current [A]."""
+"""Range of an analogue terminal set to current [A]."""
 VOLTAGE = (0.0, 10.0)
-"""Range of an analogue terminal as a voltage [V]."""
+"""Range of an analogue terminal set to voltage [V]."""
 MIN_INTEGER, MAX_INTEGER = -(2**31), 2**31 - 1
 """Range of an integer register."""
 _EMPTY: dict[str, list[Any]] = {"bit": [0] * (BITS // 32), "int": [0] * NUMBERS, "double": [0.0] * NUMBERS}
-"""Registers of each kind at the start."""
+"""Initial registers of each kind."""
 
 
 def analog_value(share: float, *, voltage: bool) -> float:
-    """Value of an analogue terminal at a share of its range [A or V]."""
+    """Return an analogue terminal's value at a fraction of its range [A or V]."""
     low, high = VOLTAGE if voltage else CURRENT
     return low + share * (high - low)
 
 
 def analog_share(value: float, *, voltage: bool) -> float:
-    """Share of its range that corresponds to a value of an analogue terminal [-]."""
+    """Return the fraction of its range for an analogue terminal's value [-]."""
     low, high = VOLTAGE if voltage else CURRENT
     return (value - low) / (high - low)
 
 
 class Peripherals:
-    """Everything connected to the control box except the arm. Initially everything is off or zero."""
+    """Everything connected to the control box except the arm; initially off or zero."""
 
     def __init__(self, on_tcp: Callable[[tuple[float, ...]], None]) -> None:
         self._on_tcp = on_tcp
@@ -49,7 +49,7 @@ class Peripherals:
         self.analog_inputs, self.tool_analog_inputs = [CURRENT[0], CURRENT[0]], [0.0, 0.0]
         """Analogue inputs of the control box and of the tool [A or V]."""
         self.analog_shares = [0.0, 0.0]
-        """Analogue outputs as shares of their ranges [-]."""
+        """Analogue outputs as fractions of their ranges [-]."""
         self._analog_types = 0
         self._registers: dict[Bank, list[Any]] = {
             bank: list(_EMPTY[bank.partition("_")[2]]) for bank in get_args(Bank)
@@ -61,16 +61,16 @@ class Peripherals:
         }  # fmt: skip
         """Settings of the tool, as fields of `Io`."""
         self.changed = True
-        """True if `io` has to be published, since something in it has changed; whoever publishes it resets this."""
+        """Whether `io` has changed since it was last published; the publisher resets it."""
         self.wrench_zero: list[float] | None = None
-        """Force and torque that count as zero [N, N m]: at the tool in the base frame, or by a sensor at the flange."""
+        """Force and torque subtracted as zero [N, N m]: at the tool in the base frame, or of the flange sensor."""
         self.payload_change: tuple[Payload, int, int] | None = None
-        """Payload from which a program goes over to the declared one, the ticks that takes, and the tick at its end."""
+        """Payload from which a program changes to the declared one, duration in ticks, and last tick."""
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 
     def set_outputs(self, command: SetIo) -> None:
-        """Set the outputs that the masks select."""
+        """Set the outputs selected by the masks."""
         self.set_digital_outputs(command.digital_output_mask, command.digital_outputs)
         for number, ratio in enumerate((command.standard_analog_output_0, command.standard_analog_output_1)):
             if command.standard_analog_output_mask >> number & 1:
@@ -78,19 +78,19 @@ class Peripherals:
                 self.choose(2 + number, voltage=bool(command.standard_analog_output_type >> number & 1))
 
     def set_digital_outputs(self, mask: int, values: int) -> None:
-        """Set the digital outputs that the mask selects."""
+        """Set the digital outputs selected by the mask."""
         self.digital_outputs, self.changed = self.digital_outputs & ~mask | values & mask, True
 
     def set_analog_output(self, number: int, share: float) -> None:
-        """Set an analogue output to a share of its range; it stays a voltage or a current."""
+        """Set an analogue output to a fraction of its voltage or current range."""
         self.analog_shares[number], self.changed = share, True
 
     def set_digital_inputs(self, mask: int, values: int) -> None:
-        """Apply signals to the digital inputs that the mask selects."""
+        """Set the digital inputs selected by the mask."""
         self.digital_inputs, self.changed = self.digital_inputs & ~mask | values & mask, True
 
     def set_inputs(self, command: SimulationSetInputs) -> None:
-        """Apply signals to inputs."""
+        """Set signals at inputs."""
         self.set_digital_inputs(command.digital_input_mask, command.digital_inputs)
         if command.standard_analog_input is not None:
             self.analog_inputs = list(command.standard_analog_input)
@@ -107,25 +107,22 @@ class Peripherals:
     # ------------------------------------------------------------------ for programs
 
     def choose(self, terminal: int, *, voltage: bool) -> None:
-        """Make an analogue input, 0 or 1, or output, 2 or 3, a voltage or a current.
-
-        The signal at an input keeps its number, an output its share of the range.
-        """
+        """Make an analogue input (0, 1) or output (2, 3) a voltage or a current; its number or share stays."""
         self._analog_types = self._analog_types & ~(1 << terminal) | voltage << terminal
         self.changed = True
 
     def choose_tool_input(self, number: int, *, voltage: bool) -> None:
-        """Make an analogue input of the tool a voltage or a current; the signal at it keeps its number."""
+        """Make an analogue input of the tool a voltage or a current; its signal keeps its number."""
         types = self._tool["tool_analog_input_types"]
         self.set_tool(tool_analog_input_types=types & ~(1 << number) | voltage << number)
 
     def set_tool(self, **settings: int) -> None:
-        """Change settings of the tool: its supply and the modes of its terminals, as fields of `Io`."""
+        """Change settings of the tool, as fields of `Io`."""
         self._tool.update(settings)
         self.changed = True
 
     def zero_wrench(self, wrench: list[float] | None) -> None:
-        """Take a force and torque as zero, see `wrench_zero`; None for nothing [N, N m]."""
+        """Set the force and torque counted as zero, see `wrench_zero` [N, N m]."""
         self.wrench_zero, self.changed = wrench, True
 
     def bit(self, bank: Bank, place: int) -> bool:
@@ -141,7 +138,7 @@ class Peripherals:
         return self._registers[bank]
 
     def write(self, bank: Bank, place: int, value: Register) -> None:
-        """Write a register whose place and value are known to be valid."""
+        """Write a register; place and value must be valid."""
         values = self._registers[bank]
         if bank.endswith("bit"):
             place, mask = place // 32, 1 << place % 32
@@ -152,13 +149,13 @@ class Peripherals:
         values[place] = value
 
     def written(self, bank: Bank, place: int) -> int:
-        """Return the first control period after a client last wrote a register; 0 if none ever did."""
+        """Return the first control period after a client's last write to a register; 0 if never written."""
         return self._written.get((bank, place), 0)
 
     # ------------------------------------------------------------------ for clients
 
     def write_registers(self, command: SetRegisters, tick: int) -> None:
-        """Write registers for a client; input registers may be written without control."""
+        """Write registers for a client; only input registers can be written without control."""
         runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
         for bank in (run.bank for run in runs if command.token is None and run.bank.startswith("output")):
             why = f"token is missing: {bank} registers belong to the robot, and writing them needs control"
@@ -169,7 +166,7 @@ class Peripherals:
                 self._written[run.bank, place] = tick
 
     def set_registers(self, command: SetRegisters) -> None:
-        """Write registers: all of them, or none."""
+        """Write all registers of a command, or refuse them all."""
         runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
         for number, run in enumerate(runs):
             where = f"also[{number - 1}].values" if number else "values"
@@ -192,7 +189,7 @@ class Peripherals:
         wrench: list[float] | None,
         assumed: Payload | None = None,
     ) -> Io:
-        """Return the message that publishes all this, with the fields of the loaded program and the rest."""
+        """Return the message that publishes all this."""
         registers: dict[str, Any] = {
             f"{bank}_register": list(values) for bank, values in self._registers.items()
         }
@@ -216,7 +213,7 @@ class Peripherals:
         )
 
     def _payload_at(self, tick: int, after: Payload) -> Payload:
-        """Return the payload of a tick, each of whose properties changes evenly, as on a robot of UR's."""
+        """Return the payload at a tick; all its properties change linearly, as on UR robots."""
         if self.payload_change is None:
             return after
         before, ticks, last = self.payload_change
@@ -235,7 +232,7 @@ class Peripherals:
 
 
 def _check(where: str, value: Register, bank: Bank) -> None:
-    """Refuse a value that is invalid for its bank."""
+    """Refuse a value that its bank cannot hold."""
     if bank.endswith("bit"):
         fits, wanted = isinstance(value, bool), "true or false"
     elif bank.endswith("int"):

@@ -1,4 +1,4 @@
-"""What clients get of a tick: its state, made or encoded when somebody wants it, the truth, and who receives them."""
+"""Reports of a tick: state, built or encoded on demand, and truth; and their receivers."""
 
 from typing import Literal
 
@@ -17,17 +17,17 @@ from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth
 
 Topic = Literal["state", "event", "truth", "telemetry", "io"]
-"""Topic of messages that are published without a request."""
+"""Topics published without a request."""
 Key = tuple[object, ...]
 MODES = ("f_d", "zeta", "participation")
 TRUE_MODES_EVERY = 50
-"""Ticks between two computations of the arm's true modes, whose eigenvalue problem takes a good part of a tick."""
+"""Ticks between computations of the arm's true modes, which take a good part of a tick."""
 NOTHING: Floats = np.empty((0, 0))
 NOWHERE: Floats = np.empty(0)
 
 
 class Report(Struct, gc=False):
-    """A tick, of which clients get a state. Threads may share it."""
+    """A tick, from which clients get a state; threads may share it."""
 
     tick: int
     """Number of the tick."""
@@ -36,36 +36,36 @@ class Report(Struct, gc=False):
     modes: tuple[int, int, int]
     """Robot mode, safety mode and runtime state."""
     speed: float
-    """Share of the programmed speed [-]."""
+    """Fraction of the programmed speed [-]."""
     f_d: Floats
-    """Damped frequencies that the shaper uses, shape (modes,) [Hz]."""
+    """Damped frequencies used by the shaper, shape (modes,) [Hz]."""
     zeta: Floats
-    """Damping ratios that it uses, shape (modes,) [-]."""
+    """Damping ratios used by the shaper, shape (modes,) [-]."""
     delay: float
-    """Time of the shaper's last impulse, and by which commands for the drives are late [s]."""
+    """Time of the shaper's last impulse plus delay of the drive commands [s]."""
     clipped: bool
     """Whether the shaper cannot meet its specification."""
     sequence: int | None
     """Sequence number of the newest accepted set-point."""
     missed: int
-    """Number of ticks that began too late."""
+    """Number of ticks that started late."""
     arm: Arm
-    """The arm with its tool, which must not change."""
+    """The arm with its tool; it must not change."""
     layouts: dict[Key, Layout]
-    """The layout of the last state, by all that it depends on; it is usually that of the next."""
+    """Layout of the last state, by everything it depends on; usually also that of the next."""
     made: State | None = None
     written: bytes | None = None
 
     @property
     def state(self) -> State:
-        """The state; from its encoding, if there is one, which takes half the time of making it."""
+        """The state, decoded from its encoding if present, which halves the time."""
         if self.made is None:
             self.made = self._make() if self.written is None else decode(State, self.written)
         return self.made
 
     @property
     def encoded(self) -> bytes:
-        """The encoded state, equal to what the codec makes of it."""
+        """The encoded state, equal to the codec's result."""
         if self.written is None:
             self.written = self._write() if self.made is None else encode(self.made)
         return self.written
@@ -136,45 +136,45 @@ class Report(Struct, gc=False):
 
 
 class Sink:
-    """Takes messages in the controller's thread. No method may raise, and none may block except in lockstep.
+    """Receives messages in the controller's thread; by default ignores them.
 
-    By default each method ignores its message.
+    Must not raise, nor block except in lockstep.
     """
 
     wants_truth = False
-    """Whether it asks for what a real robot cannot measure just now, although the robot does not publish it."""
+    """Whether this sink wants the truth now, even if the robot does not publish it."""
 
     def report(self, report: Report) -> None:
-        """Take a tick's report, by default as its state, which takes a while to make."""
+        """Take a tick's report; by default as its state, which takes a while to build."""
         self.state(report.state)
 
     def state(self, state: State) -> None:
         """Take a tick's state."""
 
     def event(self, event: Event) -> None:
-        """Take an event; it comes before the state of its tick."""
+        """Take an event; it precedes the state of its tick."""
 
     def truth(self, truth: Truth) -> None:
-        """Take what a real robot cannot measure, if it is published or this sink wants it."""
+        """Take what a real robot cannot measure, if published or wanted by this sink."""
 
     def io(self, io: Io) -> None:
         """Take changed inputs, outputs and registers; they precede the state of their tick."""
 
     def raised(self, error: Exception) -> None:
-        """Take what a plant, a function of a program or a tick has raised, for a log; the robot has dealt with it."""
+        """Take an exception of a plant, program function or tick for a log; the robot has handled it."""
 
     def journal(self, entry: Entry) -> None:
         """Take an input of the controller, which precedes the tick of its number."""
 
 
 def true_modes(plant: Plant, joints: int) -> dict[str, list[float]]:
-    """Return the arm's true modes, as many as joints, which takes half a tick; empty lists if the plant has none."""
+    """Return at most `joints` true modes of the arm (half a tick); empty lists if the plant has none."""
     modes = plant.modes()
     return {name: [] if modes is None else getattr(modes, name)[:joints].tolist() for name in MODES}
 
 
 def truth_message(plant: Plant, tick: int, modes: dict[str, list[float]]) -> Truth:
-    """Return what a real robot cannot measure, with its true modes; a `ValueError` says that the plant has no truth."""
+    """Return the message of the truth with true modes; raise ValueError if the plant has none."""
     truth = truth_of(plant)
     return Truth(
         tick=tick,
@@ -194,7 +194,7 @@ def truth_message(plant: Plant, tick: int, modes: dict[str, list[float]]) -> Tru
 
 
 def truth_of(plant: Plant) -> PlantTruth:
-    """Return what a real robot cannot measure, from a plant that provides it."""
+    """Return what a real robot cannot measure; raise ValueError if the plant does not provide it."""
     truth = plant.truth()
     if truth is None:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Mechanics of the rigid arm with the declared payload, as the instruments need them."""
+"""Mechanics of the rigid arm with the declared payload, for the instruments."""
 
 from collections.abc import Sequence
 from math import hypot
@@ -19,23 +19,23 @@ ELBOW = 2
 
 
 def add(a: list[float], b: list[float]) -> list[float]:
-    """Sum of two vectors as lists; for three numbers, numpy takes ten times as long."""
+    """Return the sum of two vectors as lists; numpy takes ten times as long for three numbers."""
     return [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 
 
 def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
-    """Cross product a × b, also as lists."""
+    """Return the cross product a × b as a list."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def carried(omega: list[float], alpha: list[float], arm: list[float]) -> list[float]:
-    """Acceleration of one point of a body relative to another at r, the arm, α × r + ω × (ω × r) [m/s²]."""
+    """Return the acceleration of a point at r relative to another, α × r + ω × (ω × r) [m/s²]."""
     return add(cross(alpha, arm), cross(omega, cross(omega, arm)))
 
 
 @compiled_for_ticks
 def momentum_of(chain: Floats, q: Floats, qd: Floats, bodies: Floats) -> tuple[float, float, float]:
-    """Linear momentum of all links, Σ m v [kg m/s]; arguments as in `tvist_plant.chain.sweep`."""
+    """Return the linear momentum of all links, Σ m v [kg m/s]; arguments as `tvist_plant.chain.sweep`."""
     sweep(chain, q, qd, np.zeros(q.shape[0]), 0.0, bodies)
     x = y = z = 0.0
     for j in range(q.shape[0]):
@@ -47,8 +47,8 @@ def momentum_of(chain: Floats, q: Floats, qd: Floats, bodies: Floats) -> tuple[f
 class RigidBody:
     """The arm as the controller models it.
 
-    Motions are joint positions [rad], velocities [rad/s] and accelerations [rad/s²], shape (3, n); offsets are the tool
-    centre point in the flange frame: x y z [m] and rotation vector [rad].
+    Motions are joint positions [rad], velocities [rad/s] and accelerations [rad/s²], shape (3, n). Offsets
+    are the tool centre point in the flange frame: x y z [m] and rotation vector [rad].
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -66,11 +66,7 @@ class RigidBody:
         momentum_of(self._arm.chain, still[0], still[1], self._arm.scratch)
 
     def tool(self, motion: Floats, offset: Sequence[float]) -> Floats:
-        """Return the motion of the tool centre point in the base frame, shape (18,).
-
-        Its pose, x y z [m] and rotation vector [rad]; its velocity, linear [m/s] and angular [rad/s]; its
-        acceleration, linear [m/s²] and angular [rad/s²].
-        """
+        """Return pose [m, rad], velocity [m/s, rad/s] and acceleration of the TCP, base frame, (18,)."""
         tool = self._at(offset)
         return np.concatenate((tool.motion(motion[0], motion[1]), tool.acceleration(*motion)))
 
@@ -80,14 +76,13 @@ class RigidBody:
         return self._tool
 
     def external(self, rows: Floats, offset: Sequence[float]) -> Floats:
-        """Return force and torque at the tool centre point, base frame [N, N m], and torques on the joints [N m].
+        """Return external force and torque at the TCP, base frame, then joint torques [N, N m], (6 + n,).
 
-        External torques on the joints are the torques of drives that follow their target (rigid arm with the declared
-        payload, rotors and friction), minus the measured torques.
+        External joint torques are those of drives that follow their target (rigid arm with the declared payload, rotors
+        and friction) minus the measured ones; the rows are those of `joint_lists`.
 
-        F with Jᵀ F = τ by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) if the manipulability
-        w is below w₀ (Nakamura and Hanafusa, 1986). Components that affect no joint are zero. The rows are those of
-        `joint_lists`; the result has shape (6 + n,).
+        F with Jᵀ F = τ follows by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) if the
+        manipulability w is below w₀ (Nakamura and Hanafusa, 1986). Components that affect no joint are zero.
         """
         share = rows[SHAPED_QD] / self._width
         out = np.empty(6 + len(share))
@@ -95,34 +90,33 @@ class RigidBody:
         return out
 
     def flange_rotation(self, q: Floats) -> Floats:
-        """Rotation from the flange to the base frame, shape (3, 3)."""
+        """Return the rotation from the flange to the base frame, shape (3, 3)."""
         return self._arm.pose(q)[0]
 
     def elbow(self, q: Floats, qd: Floats) -> tuple[list[float], list[float]]:
-        """Position [m] and velocity [m/s] of the elbow's axis, or of the flange if the arm has no elbow."""
+        """Return position [m] and velocity [m/s] of the elbow's axis, or of the flange without an elbow."""
         joints, out = self._joints_to_elbow, np.empty(12)
         end_motion(self._arm.chain[: joints + 1], q[:joints], qd[:joints], out)
         return out[:3].tolist(), out[6:9].tolist()
 
     def momentum(self, q: Floats, qd: Floats, payload: Payload) -> float:
-        """Magnitude of the momentum of the links and the payload, |Σ m v| [kg m/s]."""
+        """Return the magnitude of the momentum of links and payload, |Σ m v| [kg m/s]."""
         self._load(payload)
         return hypot(*momentum_of(self._arm.chain, q, qd, self._arm.scratch))
 
     def moment(self, motion: Floats, payload: Payload) -> list[float]:
-        """Torques that a motion needs, one for each joint [N m]."""
+        """Return the joint torques of a motion [N m]."""
         self._load(payload)
         torque: list[float] = self._arm.torque(*motion).tolist()
         return torque
 
     def base_wrench(self, motion: Floats, payload: Payload) -> list[float]:
-        """Force [N] and torque [N m] of the arm on its base, base frame; without the base's own weight."""
+        """Return force [N] and torque [N m] on the base, base frame, without the base's own weight."""
         self.moment(motion, payload)
         torque, force = -self._arm.scratch[0, 22:25], -self._arm.scratch[0, 25:28]
         return [*force.tolist(), *torque.tolist()]
 
     def _load(self, payload: Payload) -> None:
-        """Attach a payload to the last link."""
         if payload is self._payload or payload == self._payload:
             return
         self._payload = payload

@@ -1,4 +1,4 @@
-"""One tick of a robot as UR's interfaces report it, under RTDE's names."""
+"""One tick of a robot as UR's interfaces report it, with RTDE's names."""
 
 from tvist_controller.instruments.motors import Meters, joint_ratings
 from tvist_controller.instruments.reading import POWERED, Reading, computed_once
@@ -11,7 +11,7 @@ from tvist_protocol.stream import State
 
 
 class Snapshot(Reading):
-    """Variables and registers are attributes by RTDE's names, such as `actual_q` or `input_int_register_7`."""
+    """Variables and registers as attributes named as in RTDE: `actual_q`, `input_int_register_7`."""
 
 
 for _name, _read in READERS.items():
@@ -21,7 +21,7 @@ for _name, _read in READERS.items():
 
 
 class Instruments:
-    """Reads a robot's values tick by tick; if ticks are skipped, temperatures and energies are less accurate."""
+    """Reads a robot's values tick by tick; skipped ticks make temperatures and energies less accurate."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._rigid = RigidBody(description)
@@ -31,15 +31,12 @@ class Instruments:
         self._meters = Meters(self._ratings)
 
     def snapshot(self, state: State, io: Io) -> Snapshot:
-        """Return the values of a tick, from its state and the terminals and registers at that tick."""
+        """Return the values of a tick from its state, terminals and registers."""
         current = self.follow(state.tick, state.robot_mode, state.actual_moment, state.actual_qd)
         return Snapshot(state, io, self._rigid, self._ratings, current, self._meters)
 
     def follow(self, tick: int, mode: int, moment: list[float], velocity: list[float]) -> list[float]:
-        """Let temperatures and energies go on to a tick whose other values nobody reads; return the currents [A].
-
-        Once for each control period is enough. Torques [N m] and velocities [rad/s] are measured.
-        """
+        """Advance temperatures and energies to a tick by measured values; return the currents [A]."""
         current, mechanical = self._idle, 0.0
         if mode == RUNNING:
             current = [m / constant for m, constant in zip(moment, self._constants, strict=True)]

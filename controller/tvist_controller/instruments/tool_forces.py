@@ -1,4 +1,4 @@
-"""Forces and torques on the arm in the last tick, computed when somebody asks."""
+"""External forces and torques on the arm in the last tick, computed on request."""
 
 from collections.abc import Callable
 
@@ -24,7 +24,7 @@ from tvist_protocol.values import Payload
 
 
 class ToolForces:
-    """What acts on the arm from outside: by the sensor in its flange if it has one, else by the drives' torques."""
+    """External forces, measured by the flange sensor if there is one, else estimated from drive torques."""
 
     def __init__(
         self,
@@ -37,12 +37,12 @@ class ToolForces:
         self._rigid, self._declared = RigidBody(description), declared
 
     def torques(self) -> list[float]:
-        """External torques on the joints, shape (n,) [N m]."""
+        """Return the external joint torques, shape (n,) [N m]."""
         torques: list[float] = self._estimate()[6:].tolist()
         return torques
 
     def wrench(self) -> list[float]:
-        """External force and torque at the tool centre point, base frame [N, N m]."""
+        """Return external force and torque at the tool centre point, base frame [N, N m]."""
         sample = self._latest().sample
         if sample.wrench is None:
             found = self._since_zeroed(self._estimate()[:6])
@@ -52,7 +52,7 @@ class ToolForces:
         return wrench
 
     def zero(self) -> None:
-        """Take the present force and torque at the tool as zero; of a sensor, in its own frame."""
+        """Take the present force and torque at the tool as zero; with a sensor, in its frame."""
         sample = self._latest().sample
         if sample.wrench is None:
             found = self._estimate()[:6]
@@ -62,23 +62,23 @@ class ToolForces:
         self._peripherals.zero_wrench(found.tolist())
 
     def felt(self, sample: Sample) -> Floats:
-        """Return the same as `wrench` for a tick whose signals are known, shape (6,), with the arm driven."""
+        """Return `wrench` for a tick with known signals and a driven arm, shape (6,)."""
         if sample.wrench is not None:
             return self._sensed(sample.wrench, sample.measured.q)
         return self._since_zeroed(self._estimated(sample, sample.signals[TORQUE])[:6])
 
     def estimated(self, sample: Sample, qd_before: Floats) -> Floats:
-        """Return the force that the drives' torques and the measured motion tell, shape (3,) [N].
+        """Return the force estimated from drive torques and measured motion, shape (3,) [N].
 
-        Unlike `felt`, it does not contain what accelerates links that lag behind their reference, as they do when they
-        ring or a set-point comes late; the rotors are taken to follow it.
+        Unlike `felt`, it excludes forces that accelerate links lagging behind their reference, as in
+        vibration or after late set-points. The rotors are assumed to follow the reference.
         """
         measured = sample.measured
         motion = np.array([measured.q, measured.qd, (measured.qd - qd_before) / PERIOD])
         return self._estimated(sample, self._rigid.moment(motion, self._declared()))[:3]
 
     def _estimate(self) -> Floats:
-        """What the drives' torques tell of the last tick; zeros with the brakes on."""
+        """Estimate the forces of the last tick from drive torques; zeros with closed brakes."""
         latest = self._latest()
         sample = latest.sample
         if latest.modes[0] != RUNNING:
@@ -98,21 +98,20 @@ class ToolForces:
 
     @property
     def basis(self) -> tuple[object, ...]:
-        """What forces are reckoned from: what counts as zero, and the declared payload."""
+        """Quantities that forces are relative to: the zero and the declared payload."""
         zero = self._peripherals.wrench_zero
         return None if zero is None else tuple(zero), self._declared()
 
     def forget_zero(self) -> None:
-        """Take nothing as zero any longer."""
+        """Remove the zero."""
         if self._peripherals.wrench_zero is not None:
             self._peripherals.zero_wrench(None)
 
     def unexplained(self, sample: Sample, wrench: Floats, *, zeroed: bool) -> Floats:
-        """Return the force in a sensor's wrench that is neither weight nor inertia of the payload, shape (3,) [N].
+        """Return the force in a sensor's wrench besides weight and inertia of the payload, shape (3,) [N].
 
-        The payload is taken to be accelerated as the flange is, whose accelerometer also feels that the arm bends; of a
-        plant without one, which measures zeros, only the weight is taken away. `zeroed` tells whether what was taken as
-        zero is of this sensor.
+        The payload accelerates as the flange does, whose accelerometer includes bending. If a plant has none
+        (zeros), only the weight is subtracted. `zeroed`: whether the zero was taken with this sensor.
         """
         measured, zero = sample.measured, self._peripherals.wrench_zero
         rotation, specific = self._rigid.flange_rotation(measured.q), measured.accelerometer

@@ -1,4 +1,4 @@
-"""RTDE's output variables, as rows: name, type, source, meaning, and what reads it from a tick."""
+"""RTDE's output variables as rows: name, type, source, meaning, and the function that reads a tick."""
 
 from collections.abc import Callable, Iterator
 from math import sqrt
@@ -23,14 +23,14 @@ from tvist_protocol.io import BITS, NUMBERS
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 
 START: Final = 40.0
-"""Time of tick 0 on UR's interfaces [s]; a smaller time makes clients believe that the robot is still booting."""
+"""Time of tick 0 on UR's interfaces; with a smaller one, clients believe that the robot is booting [s]."""
 JOINT_MODES: dict[int, int] = {RobotMode.RUNNING: 253, RobotMode.POWER_OFF: 239, RobotMode.BACKDRIVE: 238}
-"""RTDE's joint mode for each robot mode; in all others the joints idle."""
+"""RTDE's joint mode for each robot mode; the joints idle in all others."""
 JOINT_IDLE: Final = 255
 CONFIGURABLE: Final = 0xFF00
 """Bits 8–15, the configurable terminals."""
 DEVIATION: Final = 0.05
-"""Difference between measured and shaped angle that counts as 1 [rad]."""
+"""Difference between measured and shaped angle that counts as a ratio of 1 [rad]."""
 _STOPPED, _EMERGENCY = 1 << 10, 1 << 7
 SAFETY_BITS: dict[int, int] = {
     SafetyMode.NORMAL: 1 << 0,
@@ -52,16 +52,16 @@ Read = Callable[[Reading], Any]
 
 
 class Variable(NamedTuple):
-    """An output variable of RTDE that is no register."""
+    """An RTDE output variable other than registers."""
 
     name: str
     type: str
-    """RTDE's word."""
+    """RTDE's name of the type."""
     source: Literal["state", "io", "computed", "constant"]
-    """State and io: the message contains it; RTDE reads one with `io` only when `Io` changes. Computed: from both.
-    Constant: it stands for something that is not simulated."""
+    """State, io: contained in that message; RTDE reads io variables only when `Io` changes. Computed: from
+    both. Constant: not simulated."""
     what: str
-    """What it is, for the page of reference."""
+    """Description for the reference page."""
     read: Read
 
 
@@ -81,7 +81,7 @@ def _constant(name: str, type_: str, what: str, value: object = 0) -> Variable:
     return Variable(name, type_, "constant", what, lambda _: value)
 
 
-# ---------------------------------------------------------------------- what takes more than an expression
+# ---------------------------------------------------------------------- reading functions
 
 
 def _runtime_state(r: Reading) -> int:
@@ -376,7 +376,7 @@ _ROWS = (
 # fmt: on
 
 VARIABLES = {row.name: row for row in _ROWS}
-"""Every output variable of RTDE that is no register, by name and in the order of the page of reference."""
+"""Output variables of RTDE other than registers, in the order of the reference page."""
 
 
 def _registers() -> Iterator[tuple[str, Read]]:
@@ -396,4 +396,4 @@ def _registers() -> Iterator[tuple[str, Read]]:
 
 
 READERS: dict[str, Read] = {row.name: row.read for row in _ROWS} | dict(_registers())
-"""What reads each variable and register, by RTDE's name."""
+"""Function that reads each variable and register, by RTDE's name."""

@@ -1,4 +1,4 @@
-"""The wrench at the tool, by a force sensor in the flange or estimated from the drives' torques, see `RigidBody`."""
+"""Wrench at the tool: from a flange sensor, or estimated from drive torques (see `RigidBody`)."""
 
 from collections.abc import Sequence
 from struct import pack
@@ -19,17 +19,16 @@ JOINT_LISTS = (
     "target_q", "target_qd", "target_qdd", "shaped_q", "shaped_qd", "shaped_qdd", "shaped_moment", "actual_q",
     "actual_qd", "actual_moment",
 )  # fmt: skip
-"""Rows by the names of RTDE's variables: the reference before shaping, the one after it with the torques that it needs,
-and what is measured."""
+"""Rows, named as RTDE variables: unshaped reference, shaped reference with its torques, measured values."""
 ROWS = len(JOINT_LISTS)
 UNSHAPED, SHAPED = slice(0, 3), slice(3, 6)
-"""Rows of the two references: positions, velocities and accelerations."""
+"""Rows of positions, velocities and accelerations of the two references."""
 SHAPED_QD, SHAPED_QDD, SHAPED_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)
 """Single rows."""
 
 
 def joint_lists(state: State) -> bytearray:
-    """Return the rows one behind the other, as doubles in the machine's order."""
+    """Return the rows one after the other as doubles in native byte order."""
     q, qd, qdd = state.target_q, state.target_qd, state.target_qdd
     unshaped = (
         *(q if state.unshaped_q is None else state.unshaped_q),
@@ -42,26 +41,26 @@ def joint_lists(state: State) -> bytearray:
 
 
 def as_rows(lists: bytearray) -> Floats:
-    """Return what `joint_lists` has made as an array, shape (10, n)."""
+    """Return the result of `joint_lists` as an array, shape (10, n)."""
     return np.ndarray((ROWS, len(lists) // (8 * ROWS)), buffer=lists)
 
 
 NEAR_SINGULAR = 0.01
-"""Manipulability √det(J Jᵀ) below which forces are damped; a UR5e reaches 0.11 [m³ with six joints]."""
+"""Manipulability √det(J Jᵀ) below which estimates are damped; at most 0.11 on a UR5e [m³ with six joints]."""
 DAMPING = 0.08
-"""λ₀, the damping factor at a singular posture [m, or -]."""
+"""λ₀, the damping factor at a singularity [m, or -]."""
 RUNNING = int(RobotMode.RUNNING)
-"""Robot mode in which the drives hold the arm, as a plain integer, since it is compared often."""
+"""Robot mode in which the drives hold the arm, as an int for quick comparison."""
 
 
 def since_zeroed(wrench: list[float], zero: list[float] | None) -> list[float]:
-    """Return a wrench relative to the one that a program has taken as zero, if there is one [N, N m]."""
+    """Subtract the wrench that a program has set as zero, if any [N, N m]."""
     return wrench if zero is None else [felt - none for felt, none in zip(wrench, zero, strict=True)]
 
 
 @compiled_for_ticks
 def product(A: Floats, B: Floats) -> Floats:
-    """Product of two small matrices."""
+    """Return the product of two small matrices."""
     found = np.zeros((A.shape[0], B.shape[1]))
     for i in range(A.shape[0]):
         for j in range(B.shape[1]):
@@ -72,10 +71,7 @@ def product(A: Floats, B: Floats) -> Floats:
 
 @inlined
 def force_at(chain: Floats, q: Floats, torque: Floats, force: Floats) -> None:
-    """Compute force and torque [N, N m], shape (6,), at a chain's end that cause torques on the joints, shape (n,).
-
-    See `RigidBody.external`.
-    """
+    """Compute the wrench [N, N m] at a chain's end that causes joint torques; see `RigidBody.external`."""
     n = q.shape[0]
     J = np.empty((6, n))
     locate(chain, q, np.empty((3, 3)), np.empty(3), J)
@@ -105,7 +101,7 @@ def estimate(
     slip: Floats,  # share of the friction that acts, shape (n,) [-]
     out: Floats,  # force and torque at the point [N, N m], then torques on the joints [N m], shape (6 + n,)
 ) -> None:
-    """Estimate what acts on the arm from outside; see `RigidBody.external`."""
+    """Estimate external wrench and torques; see `RigidBody.external`."""
     for j in range(slip.shape[0]):
         expected = motion[SHAPED_MOMENT, j] + drives[0, j] * motion[SHAPED_QDD, j] + drives[1, j] * slip[j]
         out[6 + j] = expected - motion[ACTUAL_MOMENT, j]
@@ -113,10 +109,9 @@ def estimate(
 
 
 def without_weight(raw: Floats, rotation: Floats, payload: Payload) -> Floats:
-    """Return what a sensor feels beside the weight of the payload, in its own frame, shape (6,) [N, N m].
+    """Subtract the payload's weight from a flange sensor's wrench, in its own frame, shape (6,) [N, N m].
 
-    As on UR's e-Series, only the weight is taken away, not what it takes to accelerate the payload. What it measures
-    is about the flange's origin in its frame, and the rotation that from there to the base frame.
+    As on UR's e-Series, the payload's inertia is not subtracted. `rotation` leads from the flange to the base frame.
     """
     weight = -payload.mass * GRAVITY * rotation[2]
     felt: Floats = raw - np.concatenate((weight, np.cross(payload.com, weight)))
@@ -126,11 +121,7 @@ def without_weight(raw: Floats, rotation: Floats, payload: Payload) -> Floats:
 def sensed_at_tool(
     raw: Floats, rotation: Floats, payload: Payload, zero: list[float] | None, offset: Sequence[float]
 ) -> Floats:
-    """Return what a sensor tells of the wrench at the tool centre point, in the base frame, shape (6,) [N, N m].
-
-    That is without the payload's weight, see `without_weight`, and what a program has taken as zero; the offset is the
-    tool centre point in the flange frame [m, rad].
-    """
+    """Return a flange sensor's wrench at the TCP (`offset`), base frame, without weight and zero, (6,)."""
     felt = without_weight(raw, rotation, payload)
     force, torque = np.split(felt if zero is None else felt - zero, 2)
     return np.concatenate((rotation @ force, rotation @ (torque - np.cross(offset[:3], force))))

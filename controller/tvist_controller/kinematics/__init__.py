@@ -1,1 +1,1 @@
-"""The rigid arm: kinematics forward and inverse, and the torques that a motion needs."""
+"""The rigid arm: forward and inverse kinematics, and torques of a motion."""

@@ -1,8 +1,7 @@
-"""The rigid arm as one chain of links: where its tool is, how that moves, and the torques that a motion needs.
+"""The rigid arm as a chain of links: pose and motion of its tool, and torques of a motion.
 
-The end of the chain is the tool centre point. Everything is in the base frame: vectors at the tool centre point have
-the base's axes, as pinocchio's LOCAL_WORLD_ALIGNED. Kernels take the links as `tvist_plant.chain` describes them, shape
-(n+1, 22).
+The end of the chain is the tool centre point. All results are in the base frame, as pinocchio's
+LOCAL_WORLD_ALIGNED. Kernels take the links as `tvist_plant.chain` describes them, shape (n+1, 22).
 """
 
 import copy
@@ -20,15 +19,15 @@ from tvist_plant.model import FLANGE, Floats, payload_inertia, rigid_model
 from tvist_plant.plant import GRAVITY
 
 AT_FLANGE = (0.0,) * 6
-"""Tool centre point of an arm without a tool."""
+"""Tool centre point of an arm without tool."""
 
 
 @compiled_for_ticks
 def bias_of(jacobian: Floats, qd: Floats, found: Floats) -> None:
-    """Compute the end's acceleration at constant velocities of the joints, J̇ q̇, shape (6,).
+    """Compute the end's acceleration at constant joint velocities, J̇ q̇, shape (6,).
 
-    With ω and v the parts of the Jacobian's columns, joint k moves column j by ω_min(j,k) x v_max(j,k), and its ω_j by
-    ω_k x ω_j if it comes before joint j.
+    With the parts ω and v of the Jacobian's columns, joint k moves column j by ω_min(j,k) x v_max(j,k), and
+    its ω_j by ω_k x ω_j if k < j.
     """
     a = b = c = 0.0  # angular velocity of the links before
     for k in range(6):
@@ -48,7 +47,7 @@ def bias_of(jacobian: Floats, qd: Floats, found: Floats) -> None:
 
 @compiled_for_ticks
 def end_motion(chain: Floats, q: Floats, qd: Floats, out: Floats) -> None:
-    """Compute position [m], rotation vector [rad], velocity [m/s] and angular velocity [rad/s] of the end, (12,)."""
+    """Compute position [m], rotation vector [rad] and their velocities at the end, shape (12,)."""
     R, J = np.empty((3, 3)), np.empty((6, q.shape[0]))
     locate(chain, q, R, out[:3], J)
     turned_by(R, out[3:6])
@@ -60,7 +59,7 @@ def end_motion(chain: Floats, q: Floats, qd: Floats, out: Floats) -> None:
 
 @compiled_for_ticks
 def end_acceleration(chain: Floats, q: Floats, qd: Floats, qdd: Floats, out: Floats) -> None:
-    """Compute the end's acceleration and angular acceleration, J q̈ + J̇ q̇, shape (6,) [m/s^2, rad/s^2]."""
+    """Compute the end's linear and angular acceleration, J q̈ + J̇ q̇, shape (6,) [m/s^2, rad/s^2]."""
     R, o, J = np.empty((3, 3)), np.empty(3), np.empty((6, q.shape[0]))
     locate(chain, q, R, o, J)
     bias_of(J, qd, out)
@@ -71,23 +70,20 @@ def end_acceleration(chain: Floats, q: Floats, qd: Floats, qdd: Floats, out: Flo
 
 @compiled
 def torques_of(chain: Floats, q: Floats, qd: Floats, qdd: Floats, bodies: Floats, found: Floats) -> None:
-    """Torques for k states of motion, each of shape (k, n); see `tvist_plant.chain.torques`."""
+    """Compute torques for k states of motion, each of shape (k, n); see `tvist_plant.chain.torques`."""
     for k in range(q.shape[0]):
         torques(chain, q[k], qd[k], qdd[k], GRAVITY, bodies, found[k])
 
 
 class Arm:
-    """Kinematics and dynamics of the rigid arm.
-
-    The tool centre point is in the flange frame: x y z [m] and rotation vector [rad].
-    """
+    """Kinematics and dynamics of the rigid arm, with a TCP in the flange frame: x y z [m], turn [rad]."""
 
     def __init__(self, description: RobotDescription, tcp: Sequence[float] = AT_FLANGE) -> None:
         model = rigid_model(description, Payload())
         flange = model.getFrameId(FLANGE)
         self._flange = model.frames[flange].placement
         self.chain = chain_of(model, flange)
-        """The links, with what the last one carries, shape (n+1, 22)."""
+        """The links, including the load of the last one, shape (n+1, 22)."""
         self.scratch = np.zeros((description.joints + 1, SCRATCH))
         """Scratch of `tvist_plant.chain`, shape (n+1, 28)."""
         self.bare = self.chain[-2, BODY:].copy()
@@ -100,7 +96,7 @@ class Arm:
         self.chain[-1, TURN:SHIFT], self.chain[-1, SHIFT:BODY] = end.rotation.ravel(), end.translation
 
     def with_tool(self, tcp: Sequence[float]) -> Self:
-        """Return the same arm with another tool centre point."""
+        """Return a copy of the arm with another tool centre point."""
         other = copy.copy(self)
         other.chain, other.scratch = self.chain.copy(), self.scratch.copy()
         other._attach(tcp)  # noqa: SLF001  one of its own kind
@@ -120,7 +116,7 @@ class Arm:
         return self.located(q)[:2]
 
     def jacobian(self, q: Floats) -> Floats:
-        """Return the Jacobian of velocity [m/s] and angular velocity [rad/s], shape (6, n)."""
+        """Return the Jacobian: velocity [m/s], then angular velocity [rad/s], shape (6, n)."""
         return self.located(q)[2]
 
     def located(self, q: Floats) -> tuple[Floats, Floats, Floats]:
@@ -130,7 +126,7 @@ class Arm:
         return rotation, position, jacobian
 
     def motion(self, q: Floats, qd: Floats) -> Floats:
-        """Return pose and speed of the tool in one array, see `end_motion`, shape (12,)."""
+        """Return pose and velocity of the tool, see `end_motion`, shape (12,)."""
         out = np.empty(12)
         end_motion(self.chain, q, qd, out)
         return out
@@ -142,7 +138,7 @@ class Arm:
         return out
 
     def inverse(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return the Jacobian, and its pseudo-inverse without the directions that are lost, shape (n, 6)."""
+        """Return the Jacobian and its pseudo-inverse without lost directions, shape (n, 6)."""
         jacobian, inverse = self.jacobian(q), np.empty((len(q), 6))
         pseudo_inverse(jacobian, inverse)
         return jacobian, inverse
@@ -150,42 +146,39 @@ class Arm:
     def near(
         self, goal: tuple[Floats, Floats], q: Floats, inverse: Floats | None = None, steps: int = 12
     ) -> tuple[Floats, Floats]:
-        """Return joint positions near others at which the tool has a pose, and what lacks to it, see `newton`.
-
-        The pseudo-inverse is that of the Jacobian nearby; None for that at q.
-        """
+        """Return joint positions near q at a tool pose, and the remaining error; `inverse` as in `newton`."""
         rotation, position = map(
             np.ascontiguousarray, goal
-        )  # of one layout, so that the kernel is compiled once
+        )  # same memory layout, so that the kernel is compiled only once
         found, error = q.copy(), np.empty(6)
         nearby = self.inverse(q)[1] if inverse is None else inverse
         newton(self.chain, rotation, position, nearby, steps, found, error)
         return found, error
 
     def torque(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """τ = M(q) q̈ + C(q, q̇) q̇ + g(q), shape (n,) [N m]."""
+        """Return τ = M(q) q̈ + C(q, q̇) q̇ + g(q), shape (n,) [N m]."""
         found = np.empty(len(q))
         torques(self.chain, q, qd, qdd, GRAVITY, self.scratch, found)
         return found
 
     def torques(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """Torques for k states of motion, each argument of shape (k, n): shape (k, n) [N m]."""
+        """Return torques for k states of motion, arguments and result of shape (k, n) [N m]."""
         found = np.empty_like(q)
         torques_of(self.chain, q, qd, qdd, self.scratch, found)
         return found
 
     def gravities(self, q: Floats) -> Floats:
-        """g(q) at k postures, shape (k, n) [N m]."""
+        """Return g(q) at k postures, shape (k, n) [N m]."""
         still = np.zeros_like(q)
         return self.torques(q, still, still)
 
     def gravity(self, q: Floats) -> Floats:
-        """g(q), shape (n,) [N m]."""
+        """Return g(q), shape (n,) [N m]."""
         still = np.zeros(len(q))
         return self.torque(q, still, still)
 
     def inertia(self, q: Floats) -> Floats:
-        """M(q), shape (n, n) [kg m^2]."""
+        """Return M(q), shape (n, n) [kg m^2]."""
         still, M = np.zeros(len(q)), np.zeros((len(q), len(q)))
         sweep(self.chain, q, still, still, 0.0, self.scratch)
         collect_inertia(self.scratch, M)

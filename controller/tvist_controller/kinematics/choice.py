@@ -1,4 +1,4 @@
-"""The nearest of all postures that have a pose, for arms with a closed form and for all others."""
+"""The posture nearest to a given one among all with the same pose, in closed form or by search."""
 
 import math
 
@@ -13,21 +13,18 @@ from tvist_plant.model import Floats
 
 FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
 ON_CURVE = 4
-"""Added to these where a joint is free, by which the search takes many times as long."""
+"""Added to these if a joint is free and a curve of postures was searched, which takes many times longer."""
 
 SAMPLES = 96
-"""Values of a free angle at which postures are computed, before the nearest ones are improved."""
+"""Values of a free angle at which postures are computed before the nearest are refined."""
 
 OUTSIDE = 1e6
-"""Added to the squared distance [rad^2] of a posture outside a joint's range: any inside is preferred."""
+"""Penalty on the squared distance of a posture outside a joint's range [rad^2]."""
 
 
 @compiled
 def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
-    """Choose the nearest representation of each joint's position within its range, in place.
-
-    Return the squared distance from `near` [rad^2], and whether all joints are within their ranges.
-    """
+    """Bring q nearest to `near` by whole turns; return squared distance [rad^2], and whether in range."""
     square, inside = 0.0, True
     for i in range(len(q)):
         q[i] = representation(q[i], near[i], arm[i, 4])
@@ -45,7 +42,7 @@ def all_postures(
     near: Floats,  # joint positions, shape (6,) [rad]
     table: Floats,  # result, shape (8, 6) at least [rad]; rows without posture begin with NaN
 ) -> int:
-    """Do what `postures` does; of a curve of postures, compute the ones nearest to `near`."""
+    """Compute all postures as `postures` does; if they form a curve, those nearest to `near`."""
     freedom = postures(arm, rotation, position, 0.0, table)
     if freedom == FREE:
         _sample_curves(arm, chain, rotation, position, near, table)
@@ -56,7 +53,7 @@ def all_postures(
 def _sample_curves(
     arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats
 ) -> None:
-    """Compute the postures at many values of the free angle, and move the nearest of each kind along its curve."""
+    """Sample the free angle, then move the nearest posture of each kind along its curve."""
     sample, least = np.empty((8, 6)), np.empty(8)
     for row in range(8):
         table[row, 0], least[row] = math.nan, math.inf
@@ -76,7 +73,7 @@ def _sample_curves(
         posture = table[row].copy()
         if approach(chain, rotation, position, near, posture) <= ACCURACY:
             _, inside = represent(arm, near, posture)
-            # The way from a posture within the ranges to the nearest one may lead out of them.
+            # Refinement may leave the joint ranges.
             if inside or least[row] >= OUTSIDE:
                 put(posture, table[row])
 
@@ -85,7 +82,7 @@ def _sample_curves(
 def _start_from_near(
     chain: Floats, rotation: Floats, position: Floats, near: Floats, on_curve: bool, row: Floats
 ) -> None:
-    """Find the posture next to `near`: close to a singularity, rounding of the pose moves those of `postures` far."""
+    """Find the posture next to `near`; rounding near singularities moves those of `postures` away."""
     posture = near.copy()
     if descend(chain, rotation, position, near, 0.0, 30, posture) <= ACCURACY:
         if on_curve:
@@ -95,11 +92,7 @@ def _start_from_near(
 
 @compiled
 def closest(arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, q: Floats) -> int:
-    """Find the nearest posture in closed form; return FOUND, NO_SOLUTION or OUT_OF_RANGE, plus ON_CURVE if it applies.
-
-    For the arguments see `all_postures`. If every posture is outside the range of a joint, q is the nearest
-    of them.
-    """
+    """Find the nearest posture in closed form; return FOUND, NO_SOLUTION or OUT_OF_RANGE, plus ON_CURVE."""
     table = np.empty((9, 6))
     table[8, 0] = math.nan
     freedom = all_postures(arm, chain, rotation, position, near, table)
@@ -126,7 +119,7 @@ def closest(arm: Floats, chain: Floats, rotation: Floats, position: Floats, near
             put(table[best], q)
             locate(chain, q, now, place, J)
             far, angle = pose_error(rotation, position, now, place, error)
-            # Written so that a number that is none does not pass.
+            # Negated so that NaN fails.
             if max(far, angle) <= AIM or descend(chain, rotation, position, near, 0.0, 5, q) <= ACCURACY:
                 return (OUT_OF_RANGE if wrong else FOUND) + curve
             squares[best] = math.inf
@@ -143,11 +136,10 @@ def search(
     near: Floats,
     found: Floats,  # result, shape (2 k + 2, n) [rad]
 ) -> int:
-    """Find postures of any arm by least squares, from `near` and from given starts.
+    """Find postures of any arm by least squares from `near` and other starts; return the nearest's index.
 
-    `found` has what was found from each start, and the nearest to `near` that can be reached from there
-    without leaving the pose, in the representation nearest to `near`; rows without result begin with NaN.
-    Return the index of the nearest posture within the joints' ranges; -1 if there is none.
+    `found` has two rows per start: the solution, and the nearest to `near` reachable from it at this pose;
+    rows without result begin with NaN. Return -1 if no posture is within the joints' ranges.
     """
     best, least = -1, math.inf
     for start in range(len(starts) + 1):

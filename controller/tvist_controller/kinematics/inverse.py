@@ -1,4 +1,4 @@
-"""Inverse kinematics: joint positions from a pose of the flange."""
+"""Inverse kinematics: joint positions for a pose of the flange."""
 
 from typing import Literal
 
@@ -17,16 +17,15 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 
 STARTS = 63
-"""Postures, besides the given one, from which an arm without closed form is searched."""
+"""Number of further start postures for an arm without closed form."""
 
 
 class InverseKinematicsError(ValueError):
     """No joint positions reach the pose.
 
     Attributes:
-        code: "no_solution" if no posture has this pose; "limit_position" if every posture that has it is outside a
-            joint's range.
-        limit: Largest distance of that joint from zero [rad]; None without solution.
+        code: "no_solution", or "limit_position" if every solution is outside a joint's range.
+        limit: Position limit of that joint [rad]; None for "no_solution".
     """
 
     def __init__(self, message: str, limit: float | None = None) -> None:
@@ -36,10 +35,10 @@ class InverseKinematicsError(ValueError):
 
 
 class InverseKinematics:
-    """The nearest of all postures of an arm that have a pose of the flange.
+    """Nearest posture with a given pose of the flange.
 
-    UR arms, and arms with a spherical wrist, are solved in closed form (`postures`), others by damped least squares
-    from 64 starts, which are the same for every call. There, a posture that no start leads to is missed.
+    UR arms and arms with a spherical wrist have a closed form (`postures`). Others are solved by damped least
+    squares from 64 fixed starts, which may miss a posture.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -49,21 +48,17 @@ class InverseKinematics:
         self._closed = bool(self._arm[-1, 0] != ANY)
         span = np.minimum(self._limits, np.pi)
         self.searched = not self._closed
-        """Whether the last call of `solve` had to search a curve of postures, or without a closed form."""
+        """Whether the last `solve` searched a curve of postures, or had no closed form."""
         self._starts = np.random.default_rng(1).uniform(-span, span, (STARTS, description.joints))
 
     def solve(self, rotation: Floats, position: Floats, near: Floats) -> Floats:
-        """Return the posture nearest to another one, of all that have a pose of the flange.
+        """Return the posture nearest to `near` (Euclidean, in joint space) with this pose of the flange.
 
-        Nearest means the smallest Euclidean distance in joint space. Each joint has the representation, of
-        those that differ by whole turns and are in its range, that is nearest. If sin q₅ = 0, or if another
-        joint is free at the pose, the nearest posture of the curve of them is returned. Its pose differs by
-        at most 1e-9 m and 1e-9 rad.
-
-        Raises:
-            InverseKinematicsError: No posture within the joints' ranges has this pose.
+        Each joint's turn count is the nearest in its range. If sin q₅ = 0 or another joint is free, the
+        nearest posture of that curve is returned. The pose is accurate to 1e-9 m and 1e-9 rad. Raise
+        InverseKinematicsError if no posture is in range.
         """
-        # Of one layout, so that the kernels are compiled once.
+        # Same memory layout, so that kernels are compiled only once.
         rotation, position, near = (np.array(given, float, order="C") for given in (rotation, position, near))
         if not self._closed:
             return self._search(rotation, position, near)
@@ -84,7 +79,7 @@ class InverseKinematics:
         raise self._error(found[np.argmin(np.linalg.norm(found - near, axis=1))] if len(found) else None)
 
     def _error(self, q: Floats | None) -> InverseKinematicsError:
-        """Say that there is no posture, or which joint of the nearest one is outside its range most."""
+        """Return the error for no posture, or for the joint farthest outside its range."""
         if q is None:
             return InverseKinematicsError("no joint positions reach this pose")
         joint = int(np.argmax(np.abs(q) - self._limits))

@@ -1,4 +1,4 @@
-"""Joint positions at a pose by damped least squares, from a start nearby or anywhere."""
+"""Joint positions at a pose by damped least squares."""
 
 import math
 
@@ -10,20 +10,20 @@ from tvist_kernels.compiling import inlined
 from tvist_plant.model import Floats
 
 ACCURACY = 1e-9
-"""Error [m] and [rad] that a solution may have."""
+"""Permitted error of a solution [m and rad]."""
 
 AIM = 1e-12
-"""Error [m] and [rad] above which a solution is improved."""
+"""Error above which a solution is refined [m and rad]."""
 
 NO_PIVOT = 1e-30
-"""Pivot that stands for none, so that a singular matrix lets no number overflow."""
+"""Smallest pivot, to avoid overflow with a singular matrix."""
 
 
 @compiled
 def solve_in_place(A: Floats, b: Floats) -> float:
-    """Solve A x = b, A symmetric positive definite, by Cholesky's method; return √(det A).
+    """Solve A x = b in place for symmetric positive definite A (Cholesky); return √(det A).
 
-    b becomes x, and A is used up. numba's own linear algebra needs scipy, which a served robot does without.
+    A is overwritten. Not numba's own solver, because that needs scipy, which a served robot does without.
     """
     n, root = len(b), 1.0
     for j in range(n):
@@ -57,14 +57,13 @@ def _linearize(
 
 @inlined
 def put(values: Floats, place: Floats) -> None:
-    """Copy a vector in a loop, since numba takes seconds to compile an assignment of arrays."""
+    """Copy a vector in a loop; numba takes seconds to compile an assignment of arrays."""
     for i in range(len(values)):
         place[i] = values[i]
 
 
 @inlined
 def _normal_matrix(J: Floats, added: float, A: Floats) -> None:
-    """Compute the lower half of JᵀJ + added 1."""
     n = J.shape[1]
     for i in range(n):
         for j in range(i + 1):
@@ -92,11 +91,11 @@ def descend(
     iterations: int,
     q: Floats,  # start, which becomes the result
 ) -> float:
-    """Minimize |error of the pose|² + pull |q - near|² from a start, by the method of Levenberg and Marquardt.
+    """Minimize |pose error|² + pull |q - near|² from a start (Levenberg-Marquardt); return the pose error.
 
-    The damping is proportional to the squared error, with which convergence is quadratic also to a solution at which
-    the Jacobian is singular because the solution is one of many (Yamashita and Fukushima, 2001).
-    Return the root of the summed squares of the errors of position [m] and rotation [rad].
+    The damping is proportional to the squared error, so convergence is quadratic even if the Jacobian is
+    singular because the solution is one of many (Yamashita and Fukushima, 2001). The result combines position
+    [m] and rotation [rad].
     """
     n = q.shape[0]
     J, error = np.empty((6, n)), np.empty(6)
@@ -138,7 +137,7 @@ def descend(
 
 @compiled
 def approach(chain: Floats, rotation: Floats, position: Floats, near: Floats, q: Floats) -> float:
-    """Move along the postures that have a pose, from one of them, to the nearest to `near`; return the error."""
+    """Move along postures with equal pose to the one nearest to `near`; return the error."""
     pull = 1e-2
     for _ in range(4):
         descend(chain, rotation, position, near, pull, 60, q)

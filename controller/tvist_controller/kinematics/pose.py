@@ -1,7 +1,7 @@
-"""Rotations, where the end of a chain of links is, and joint positions nearby that bring it to a pose.
+"""Rotations, forward kinematics of a chain, and joint positions nearby for a pose.
 
-Rotations are matrices, shape (3, 3), or vectors, shape (3,) [rad]. All kernels can be called from other
-compiled functions; their arrays are C-contiguous and of 64-bit floats.
+Rotations are matrices (3, 3) or vectors (3,) [rad]. Kernels can be called from other compiled functions;
+their arrays are C-contiguous 64-bit floats.
 """
 
 import math
@@ -13,19 +13,18 @@ from tvist_plant.chain import bend, start, step_along
 from tvist_plant.model import Floats
 
 LOST = 1e-4
-"""Singular value of the Jacobian below which the joints cannot move the tool in its direction [m or rad per rad]."""
+"""Singular value of the Jacobian below which its direction counts as lost [m or rad per rad]."""
 SWEEPS = 15
-"""Largest number of sweeps over all pairs of the Jacobian's rows; seven are enough for any that was tried."""
+"""Largest number of sweeps over all pairs of rows; seven have always been enough."""
 ACCURATE = 1e-12
-"""Error of a pose at which Newton's method ends [m or rad]."""
+"""Pose error at which Newton's method stops [m or rad]."""
 
 
 @compiled_for_ticks
 def turned_by(R: Floats, vector: Floats) -> None:
     """Convert a rotation matrix to a rotation vector of at most half a turn.
 
-    The way leads over the unit quaternion (w, v), computed from the largest of its entries (Shepperd, 1978), so it is
-    exact for small turns and for half turns.
+    Uses the unit quaternion computed from its largest entry (Shepperd, 1978), so small turns and half turns are exact.
     """
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]  # 4 w v
@@ -47,7 +46,7 @@ def turned_by(R: Floats, vector: Floats) -> None:
 
 @compiled_for_ticks
 def turn_into(angle: Floats, rotation: Floats, result: Floats) -> None:
-    """Turn a rotation matrix about the base frame's axes by a rotation vector (Rodrigues)."""
+    """Rotate a rotation matrix about the base frame's axes by a rotation vector (Rodrigues)."""
     x, y, z = angle[0], angle[1], angle[2]
     size = math.sqrt(x * x + y * y + z * z)
     s = math.sin(size) / size if size > 1e-8 else 1.0
@@ -69,7 +68,7 @@ def rotation_vector(rotation: Floats) -> list[float]:
 
 
 def turn(start: Floats, end: Floats) -> Floats:
-    """Return the rotation vector in the base frame that turns one orientation into another, by the shortest way."""
+    """Return the shortest rotation vector in the base frame from one orientation to another."""
     vector = np.empty(3)
     turned_by(np.ascontiguousarray(end @ start.T), vector)
     return vector
@@ -84,16 +83,13 @@ def turned(rotation: Floats, angle: Floats) -> Floats:
 
 @compiled
 def locate(chain: Floats, q: Floats, R: Floats, o: Floats, J: Floats) -> None:
-    """Compute rotation, shape (3, 3), position, shape (3,) [m], and Jacobian, shape (6, n), of a chain's end.
-
-    The Jacobian times q̇ is the end's velocity [m/s], then its angular velocity [rad/s].
-    """
+    """Compute rotation (3, 3), position (3,) [m] and Jacobian (6, n) of a chain's end; linear rows come first."""
     n = q.shape[0]
     start(R, o)
     for j in range(n):
         step_along(chain[j], R, o)
         bend(R, q[j])
-        # Each column holds the joint's axis, and a point on it in place of the lever, until the end is known.
+        # Until the end is known, each column holds the joint's axis and a point on it instead of the lever arm.
         for k in range(3):
             J[k, j], J[3 + k, j] = o[k], R[k, 2]
     step_along(chain[n], R, o)
@@ -109,10 +105,7 @@ def locate(chain: Floats, q: Floats, R: Floats, o: Floats, J: Floats) -> None:
 def pose_error(
     rotation: Floats, position: Floats, now: Floats, place: Floats, error: Floats
 ) -> tuple[float, float]:
-    """Compute the way from one pose (`now`, `place`) to another: translation [m] and rotation vector [rad], (6,).
-
-    Return the length of the translation and the angle of the rotation.
-    """
+    """Compute translation [m] and rotation vector [rad] between two poses, (6,); return their lengths."""
     D = np.empty((3, 3))
     for i in range(3):
         error[i] = position[i] - place[i]
@@ -125,9 +118,9 @@ def pose_error(
 
 @compiled
 def pseudo_inverse(jacobian: Floats, inverse: Floats) -> None:  # noqa: C901, PLR0912  a kernel: its branches are loops
-    """Compute the pseudo-inverse, shape (n, 6), of a Jacobian without its lost directions, by one-sided rotations.
+    """Compute the pseudo-inverse (n, 6) of a Jacobian without lost directions (Hestenes, 1958).
 
-    numba's own decomposition needs scipy, which a served robot does without (Hestenes, 1958).
+    Not numba's own decomposition, because that needs scipy, which a served robot does without.
     """
     n = jacobian.shape[1]
     W, V = jacobian.copy(), np.eye(6)
@@ -170,12 +163,12 @@ def newton(
     inverse: Floats,
     steps: int,
     q: Floats,  # start, which becomes the result
-    error: Floats,  # result: what lacks to the pose, shape (6,) [m, rad]
+    error: Floats,  # result: remaining error, shape (6,) [m, rad]
 ) -> float:
-    """Bring a chain's end to a pose by Newton's method with the inverse of the Jacobian nearby, shape (n, 6).
+    """Bring a chain's end to a pose by Newton's method with a nearby inverse Jacobian (n, 6).
 
-    Directions that this inverse lacks are left as they are, so that a singular posture lets no joint turn far.
-    Return the largest entry of the error.
+    Directions that the inverse lacks stay unchanged, so no joint turns far at a singularity. Return the
+    largest error entry.
     """
     n, off = q.shape[0], 0.0
     R, o, J = np.empty((3, 3)), np.empty(3), np.empty((6, n))

@@ -1,18 +1,17 @@
-"""The postures of an arm with six joints at a pose of its flange, in closed form.
+"""All postures of a six-joint arm at a flange pose, in closed form.
 
-Two forms of arm are solved, whose parameters a and d may have any value and sign where none is named:
+Two forms are solved; a and d may have any value and sign unless named:
 
-- Axes 2, 3 and 4 are parallel (UR): α = ±90°, 0 or 180°, 0 or 180°, ±90°, ±90°, any; a₅ = 0.
-- Axes 4, 5 and 6 meet (spherical wrist): α = ±90°, 0 or 180°, ±90°, ±90°, ±90°, any; a₄ = a₅ = d₅ = 0.
+- Axes 2, 3 and 4 parallel (UR): α = ±90°, 0 or 180°, 0 or 180°, ±90°, ±90°, any; a₅ = 0.
+- Axes 4, 5 and 6 intersect (spherical wrist): α = ±90°, 0 or 180°, ±90°, ±90°, ±90°, any; a₄ = a₅ = d₅ = 0.
 
-Both have a shoulder that turns a plane, in which upper arm and forearm move, about axis 1: two postures have the wrist
-on that plane's fixed distance from axis 1. In the plane, the triangle of upper arm and forearm has two forms, and the
-wrist has two postures, q₅ and -q₅, so that there are up to eight. Angles come from atan2 alone, so that rounding of
-the pose, near a singularity too, is rounding of the result's forward kinematics, not more.
+Axis 1 turns a plane in which upper arm and forearm move; its fixed distance from axis 1 allows two shoulder positions.
+In the plane the triangle of upper arm and forearm has two forms, and the wrist two postures, q₅ and -q₅: up to eight in
+all. All angles come from atan2, so rounding errors of the pose are not amplified, even near singularities.
 
-Where a joint is free because axes coincide, there is a curve of postures. It is followed with a free angle as
-parameter: q₁ if the wrist's centre is on axis 1; the direction of frame 4 in the plane (axes 4 and 6 parallel, UR) or
-q₄ (axes 4 and 6 coincide, spherical wrist) if sin q₅ = 0; q₂ if the wrist is on axis 2.
+If axes coincide, a joint is free and the postures form a curve. Its parameter is q₁ if the wrist centre is on axis 1;
+the direction of frame 4 in the plane (UR, axes 4 and 6 parallel) or q₄ (spherical wrist) if sin q₅ = 0; q₂ if the wrist
+is on axis 2.
 """
 
 import math
@@ -25,19 +24,19 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 
 ANY, PARALLEL, SPHERICAL = 0.0, 1.0, 2.0
-"""No closed form; axes 2, 3 and 4 are parallel (UR); axes 4, 5 and 6 meet in one point (spherical wrist)."""
+"""No closed form; axes 2, 3 and 4 parallel (UR); axes 4, 5 and 6 intersect (spherical wrist)."""
 
 EXACT = 1e-9
-"""Deviation of a sine, a cosine or a length [m] from the form that still counts as the form."""
+"""Tolerance of a sine, cosine or length [m] for recognising a form."""
 
 AT_BORDER = 1e-10
-"""Distance [m] beyond the reach that counts as rounding, and sine or length [m] below which a joint is free."""
+"""Distance [m] beyond the reach that counts as rounding; sine or length [m] below which a joint is free."""
 
 AMPLIFIED = 1e-6
-"""Sine or length [m] below which an angle has the rounding of the pose more than a million times."""
+"""Sine or length [m] below which an angle amplifies the pose's rounding a million times."""
 
 DEFINITE, LOOSE, FREE = 0, 1, 2
-"""No angle is free; one is nearly so and has the rounding of the pose many times; one is free."""
+"""No angle is free; one nearly is and amplifies rounding of the pose; one is free."""
 
 Point = tuple[float, float]
 Vector = tuple[float, float, float]
@@ -45,12 +44,11 @@ Triangles = tuple[float, float, float, float]
 
 
 def arm_table(description: RobotDescription) -> Floats:
-    """Return what the closed form of inverse kinematics needs to know of an arm, shape (n + 1, 5).
+    """Return an arm's constants for the closed form of inverse kinematics, shape (n + 1, 5).
 
-    The first n rows have a, d [m], cos α and sin α of each joint, whose turn about z is followed by Tz(d) Tx(a) Rx(α);
-    they are zero for an arm with placements. The fifth column has the joint's largest distance from zero [rad]. The
-    last row has the form (`ANY`, `PARALLEL` or `SPHERICAL`), the length l₃ [m] of the forearm between the axes of elbow
-    and wrist in the arm's plane, and its angle ψ [rad] to the x axis of its Denavit-Hartenberg frame.
+    The first n rows have a, d [m], cos α, sin α (zero for an arm with placements) and the position limit [rad] of each
+    joint, which turns about z before Tz(d) Tx(a) Rx(α). The last row has the form, the forearm's length l₃ [m] between
+    the axes of elbow and wrist in the arm's plane, and its angle ψ to the x axis of its DH frame [rad].
     """
     table = np.zeros((description.joints + 1, 5))
     table[:-1, 4] = description.limits.position
@@ -70,12 +68,11 @@ def arm_table(description: RobotDescription) -> Floats:
 
 
 def is_of_ur_form(description: RobotDescription) -> bool:
-    """Return whether an arm has six joints, of which the axes 2, 3 and 4 are parallel, as UR's arms have."""
+    """Return whether an arm has six joints with parallel axes 2, 3 and 4, as UR's arms."""
     return bool(arm_table(description)[-1, 0] == PARALLEL)
 
 
 def _form(dh: Floats) -> float:
-    """Recognise a form that `postures` solves."""
     if len(dh) != 6:
         return ANY
     a, d, cosine, sine = dh.T
@@ -92,15 +89,12 @@ def _form(dh: Floats) -> float:
 
 @inlined
 def representation(angle: float, near: float, limit: float) -> float:
-    """Add the whole turns to an angle that bring it nearest to `near` within ± limit.
-
-    If none of its representations is in the range, the one nearest to zero is returned.
-    """
+    """Add whole turns to an angle to bring it nearest to `near` within ± limit, or if impossible to zero."""
     turn = 2.0 * math.pi
     value = angle + turn * math.floor((near - angle) / turn + 0.5)
     if abs(value) <= limit:
         return value
-    # A limit is a number in a file, and an angle that should be on it is beyond it by rounding half of the time.
+    # Tolerate rounding errors of angles exactly at the limit.
     fewest, most = math.ceil((-limit - 1e-10 - angle) / turn), math.floor((limit + 1e-10 - angle) / turn)
     if fewest > most:
         return angle - turn * math.floor(angle / turn + 0.5)
@@ -110,7 +104,7 @@ def representation(angle: float, near: float, limit: float) -> float:
 
 @compiled
 def freedom_at(length: float) -> int:
-    """Return DEFINITE, LOOSE or FREE for the sine or length that an angle is computed from."""
+    """Return DEFINITE, LOOSE or FREE for the sine or length that determines an angle."""
     if length < AT_BORDER:
         return FREE
     return LOOSE if length < AMPLIFIED else DEFINITE
@@ -120,11 +114,10 @@ def freedom_at(length: float) -> int:
 def elbow(
     upper: float, forearm: float, x: float, y: float, slack: float, free: float
 ) -> tuple[Triangles, int]:
-    """Solve the triangle of upper arm and forearm for its far end at (x, y).
+    """Solve the triangle of upper arm and forearm with its far end at (x, y).
 
-    Return (θ₂, δ, θ₂', δ'), the angle of the upper arm and the angle from it to the forearm, for the two
-    forms [rad], all of them NaN where there is none; and DEFINITE, LOOSE, or FREE if θ₂ is free and therefore
-    has the value `free`.
+    Return (θ₂, δ, θ₂', δ'), the angles of the upper arm and from it to the forearm for both forms [rad], NaN
+    without solution; and DEFINITE, LOOSE, or FREE if θ₂ is free and set to `free`.
     """
     square = x * x + y * y
     radius = math.sqrt(square)
@@ -154,7 +147,7 @@ def postures(
 ) -> int:
     """Compute all postures at a pose; return the largest of DEFINITE, LOOSE and FREE that applies.
 
-    The row 4 shoulder + 2 wrist + elbow has a posture, or begins with NaN if there is none.
+    Row 4 shoulder + 2 wrist + elbow has a posture, or begins with NaN if there is none.
     """
     for row in range(8):
         table[row, 0] = math.nan
@@ -205,7 +198,7 @@ def postures(
 
 @inlined
 def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
-    """Compute the four postures of an arm whose axes 2, 3 and 4 are parallel, at one position of its shoulder."""
+    """Compute the four postures of a UR arm at one shoulder position."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose
     e2 = arm[1, 2]
     along = e2 * arm[2, 2]  # axis 4 along axis 2, or against it
@@ -245,7 +238,7 @@ def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: 
 
 @inlined
 def _spherical(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
-    """Compute the four postures of an arm with a spherical wrist, at one position of its shoulder."""
+    """Compute the four postures of an arm with a spherical wrist at one shoulder position."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose
     e2, s3, s4, s5 = arm[1, 2], arm[2, 3], arm[3, 3], arm[4, 3]
     ways, freedom = elbow(arm[1, 0], arm[6, 1], px, py, AT_BORDER, free)

@@ -1,1 +1,1 @@
-"""The control line: the paper's Figure 6, box by box."""
+"""The control line: Figure 6 of the paper, block by block."""

@@ -1,4 +1,4 @@
-"""One control period: the paper's Figure 6, left to right."""
+"""One control period: Figure 6 of the paper, left to right."""
 
 from typing import TypeVar
 
@@ -31,18 +31,18 @@ class ControlCycle:
 
     Args:
         description: The robot.
-        tvist: The filter, with its shaper and estimator.
-        q: Joint angles at which the arm is at rest initially, shape (n,) [rad].
-        declared: Payload that inverse dynamics uses.
-        carried: Payload that the arm carries.
+        tvist: The filter with its shaper and estimator.
+        q: Initial joint angles, at rest, shape (n,) [rad].
+        declared: Payload for inverse dynamics.
+        carried: Payload of the arm.
         seed: Seed of the arm's noise and gear errors.
         plant: Plant to control; None for the flexible arm of the description.
-        elastic: Elastic feed-forward to use with the filter; None for that of the paper's controller.
-        compensate_sag: Whether the drives lead by the twist of the gears under gravity.
-        law: Known friction to feed forward, see `LAWS`; None for a share of the description's.
+        elastic: Elastic feed-forward for the filter; None for the paper's.
+        compensate_sag: Whether set-points compensate the gears' twist under gravity.
+        law: Known friction to feed forward, see `LAWS`; None for a fraction of the description's.
 
     Raises:
-        ValueError: The plant cannot start there, or its measurement has the wrong shape.
+        ValueError: The plant cannot start at q, or its measurement has the wrong shape.
     """
 
     def __init__(
@@ -62,29 +62,26 @@ class ControlCycle:
         self.description = description
         self._plant = arm_of(FlexibleArm(description, carried) if plant is None else plant)
         self.trajectory: Trajectory = Rest(q)
-        """Trajectory generator."""
         self.filter = LineFilter(tvist, arm_limits(description))
-        """TVIST: shaper, estimator and fractional-delay filter, from the reference to the shaped one."""
+        """TVIST: shaper, estimator and fractional-delay filter."""
         self.shaped = ShapedReference(q, PERIOD)
-        """Shaped reference and its derivatives."""
         self.dynamics = dynamics = InverseDynamics(description, declared)
         """Torques of the rigid arm with its declared payload."""
         self.drives = drives = DriveFeedForward(
             description, PERIOD, compensate_sag=compensate_sag, positions=self._plant.supervised
         )
-        """Joint controllers: what the drives are sent for a target."""
+        """Joint controllers: from the target to the drive commands."""
         self.drives.use(elastic)
         self.drives.compensate(law)
         self.kernel_parts = dynamics.chain, dynamics.scratch, drives.rows
-        """Links, scratch and joint controllers, as `line_tick` takes them."""
+        """Links, scratch and joint controllers: arguments of `line_tick`."""
         self.mode = LineMode.REST
-        """What the line does."""
         self.placements = 0
-        """Number of times that the arm was put at rest somewhere, which breaks off what it did."""
+        """Number of times the arm was placed at rest, which interrupts its motion."""
         self.guard: Guard | None = None
-        """What checks the references and the stops of a guarded motion; None without one."""
+        """Checks references and stops of a guarded motion; None without one."""
         self.sample = self.reset(q, carried=carried, seed=seed)
-        """Signals of the last tick, or of the arm where it was put at rest since."""
+        """Signals of the last tick, or of the arm at rest after a reset."""
         check_measurement(self.sample.measured, description.joints, self._plant)
 
     @property
@@ -93,7 +90,7 @@ class ControlCycle:
         return self._plant
 
     def step(self, external: Floats | None = None) -> Sample:
-        """Compute one tick; takes what an external force sensor feels, see `Sample.external`."""
+        """Compute one tick; `external` is the reading of an external force sensor, see `Sample.external`."""
         # Trajectory generator: the reference x is q, or the parameter of a path. Filter: the shaped reference x*.
         x, x_star, refused = self._references()
         reference, mode = self.shaped.take(x, x_star), self.mode
@@ -109,21 +106,18 @@ class ControlCycle:
             mode, reference, self.shaped.references, self.shaped.joints.window, signals, command, measured,
             self.drives.reference, refused, external,
         )  # fmt: skip
-        self._settle()  # last, so that the tick that comes to rest is still reported as one of the motion
+        self._settle()  # last, so that the final tick still counts as motion
         return self.sample
 
     def _to_drives(self, reference: Floats) -> Floats:
-        """Signals from the shaped reference to the drives and the reference before, shape (9, n), see `line_tick`."""
+        """Return signals from the shaped reference to the drives, and the last reference, shape (9, n)."""
         signals = np.empty((SIGNALS, len(reference)))
         before, middle, last = self.shaped.joints.window
         to_drives(before, middle, last, reference, PERIOD, *self.kernel_parts, signals)
         return signals
 
     def follow(self, target: Floats, measured: Measurement) -> Sample:
-        """Take what another controller asked of the arm in a tick, and what that measured; the arm gets no command.
-
-        The target has position, velocity, acceleration and torque, shape (4, n).
-        """
+        """Take target (q, q̇, q̈, τ, shape (4, n)) and measurement of an arm driven by its own controller."""
         q, qd, qdd, torque = target
         signals = np.array([q, q, qd, qdd, torque, np.zeros_like(q), q, qd, torque])
         still = (q, q, q)
@@ -133,7 +127,7 @@ class ControlCycle:
         return self.sample
 
     def _references(self) -> tuple[Floats, Floats, Obstacle | None]:
-        """Return the reference of this tick, the shaped one, and why a stop had to begin; None if it had not."""
+        """Return reference, shaped reference, and the reason for a stop that had to begin, else None."""
         guard = self.guard
         try:
             x = self.trajectory.next()
@@ -141,7 +135,7 @@ class ControlCycle:
             assert guard is not None, "what may be stuck is guarded"
             return self._stopped(guard, guard.give_up(str(error)))
         x_star = self.filter.filter(x) if self.mode.shaped else x
-        # Judged after the filter, since it is the shaped reference from which the arm must be able to stop.
+        # Check after the filter, since the arm must be able to stop from the shaped reference.
         if self.mode.guarded and guard is not None:
             stop = guard(self.shaped.joints.after(x_star))
             if stop is not None:
@@ -153,18 +147,18 @@ class ControlCycle:
         return x, x, guard.obstacle
 
     def begin(self, trajectory: T, mode: LineMode = LineMode.SHAPED, guard: Guard | None = None) -> T:
-        """Follow a trajectory from now on, and keep the present guard unless another one is given.
+        """Follow a trajectory from now on, with another guard if given.
 
-        In a shaped mode, the trajectory continues the reference x; in another one it continues the shaped
-        reference x*, and the delay line is discarded. A new path may begin only at rest.
+        In a shaped mode the trajectory continues the reference x, otherwise the shaped reference x*, and the
+        delay line is discarded. A new path can begin only at rest.
 
         Raises:
-            ValueError: The mode cannot follow the present one, or it is guarded, and there is no guard.
+            ValueError: The mode cannot follow the present one, or needs a guard and has none.
         """
         guard, path = guard or self.guard, trajectory.path
         check_change(self.mode, mode, guarded=guard is not None)
         if not mode.shaped:
-            # What the delay line still holds would carry the arm on after the stop: it is never played.
+            # Drop the delay line's content, which would move the arm after the stop.
             if path is None:
                 self.shaped.enter(None, self.position)
             self.filter.cut()
@@ -176,18 +170,18 @@ class ControlCycle:
         return trajectory
 
     def _enter(self, sample: Floats, posture_of: Posture | None = None) -> None:
-        """Change between samples of the joints and of a path's parameter, at rest; see `ShapedReference.enter`."""
+        """Change between joint samples and a path's parameter, at rest; see `ShapedReference.enter`."""
         self.shaped.enter(posture_of, sample)
         self.filter.begin(self.tvist, sample, posture_of)
 
     def use(self, tvist: Filter, elastic: ElasticFeedForward | None = None) -> None:
-        """Change the filter: at once if the arm is at rest, else within the limits of the motion.
+        """Change the filter: at once if at rest, otherwise within the limits of the motion.
 
-        If a change is under way, the new filter waits until that is complete; only the latest waiting filter is kept.
-        Without elastic feed-forward, that of the paper's controller is used.
+        During a change the new filter waits; only the latest waiting filter is kept. Without elastic
+        feed-forward, the paper's is used.
         """
         self.drives.use(elastic)
-        if self.mode.at_rest:  # both kinds of feed-forward are equal there, so that none has to fade
+        if self.mode.at_rest:  # both kinds of feed-forward are equal at rest: no fading
             self.drives.rest()
         if self.mode.at_rest or not self.mode.shaped:
             self.filter.begin(tvist, self.sample.reference)
@@ -196,7 +190,7 @@ class ControlCycle:
             self.trajectory.adapt(self.filter.spared)
 
     def go_on(self, longer: PlannedMotion) -> None:
-        """Let the present planned motion go on to the end of a longer one, which is the same until now."""
+        """Extend the present planned motion to the end of a longer one that is equal until now."""
         assert isinstance(self.trajectory, PlannedMotion)
         self.trajectory.go_on(longer)
         self.filter.limits = self.trajectory.limits
@@ -204,10 +198,7 @@ class ControlCycle:
     def fork(
         self, tvist: Filter | None = None, trajectory: Trajectory | None = None
     ) -> tuple[Trajectory, LineFilter | None, ShapedReference]:
-        """Return independent copies of all that shapes the reference: generator, filter if it is in use, and output.
-
-        They change to a filter, and follow a trajectory, if these are given.
-        """
+        """Return copies of generator, filter (if in use) and output, with another filter or trajectory."""
         line_filter = self.filter.fork() if self.mode.shaped else None
         if tvist is not None and line_filter is not None:
             line_filter.use(tvist.fork())
@@ -220,7 +211,7 @@ class ControlCycle:
 
     @property
     def newest(self) -> Target:
-        """State of motion of the newest shaped reference."""
+        """State of the newest shaped reference."""
         return self.shaped.newest
 
     @property
@@ -230,12 +221,12 @@ class ControlCycle:
 
     @property
     def along(self) -> Differentiator:
-        """State of motion of the filter's samples, which are a path's parameters or else joint positions."""
+        """State of the filter's samples: path parameters or joint positions."""
         return self.shaped.along
 
     @property
     def stands_still(self) -> bool:
-        """Whether the shaped reference rests on a reference that stands: the motion is over, or it is paused."""
+        """Whether the shaped reference rests on a standing reference: the motion is over or paused."""
         sample = self.sample
         return (
             self.trajectory.standing
@@ -244,7 +235,7 @@ class ControlCycle:
         )
 
     def _settle(self) -> None:
-        """Rest if the motion is over: its trajectory has finished, and the shaped reference rests on its end."""
+        """Enter rest if the trajectory has finished and the shaped reference rests at its end."""
         trajectory, mode = self.trajectory, self.mode
         if mode.at_rest or not ((trajectory.finished or mode is LineMode.RUNNING_OUT) and self.stands_still):
             return
@@ -252,7 +243,7 @@ class ControlCycle:
         on_path = self.shaped.posture_of is not None
         if on_path or not mode.shaped:  # the delay line restarts from where the motion ended
             self._enter(reference)
-        if on_path or not trajectory.finished:  # a motion that ran out while paused ends here
+        if on_path or not trajectory.finished:  # a motion that finished while paused ends here
             self.trajectory = Rest(reference)
         self.mode, self.guard = LineMode.REST, None
         self.drives.rest()
@@ -260,16 +251,16 @@ class ControlCycle:
     def reset(
         self, q: Floats, *, carried: Payload | None = None, seed: int = 0, measured: Measurement | None = None
     ) -> Sample:
-        """Place the arm somewhere at rest, in static equilibrium; the whole line restarts.
+        """Place the arm at rest in static equilibrium and restart the whole line.
 
         Args:
-            q: Joint angles, shape (n,) [rad]; of an arm that cannot be placed, the line begins where that stands.
+            q: Joint angles, shape (n,) [rad]; ignored for an arm that cannot be placed.
             carried: New carried payload; None for the present one.
             seed: Seed of the arm's noise and gear errors.
-            measured: Last measurements of an arm that does not answer: the line then begins at q, and nobody asks it.
+            measured: Last measurements of an arm that does not answer; the line then starts at its position.
 
         Raises:
-            ValueError: An arm that cannot be placed does not tell where it stands. Nothing has changed.
+            ValueError: The position of an arm that cannot be placed is unknown; nothing has changed.
         """
         plant = self._plant
         if measured is None and not isinstance(plant, SimulatedArm):

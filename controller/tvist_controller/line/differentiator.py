@@ -12,11 +12,11 @@ from tvist_controller._compiled import compiled_for_ticks
 Floats = npt.NDArray[np.float64]
 
 STILL = 1e-7
-"""A reference that changes by less than this between two ticks is at rest [rad]."""
+"""Change per tick below which a reference is at rest [rad]."""
 
 
 class Target(Struct, frozen=True, eq=False, gc=False):
-    """Shaped reference with its derivatives, all at the same tick."""
+    """Shaped reference and its derivatives at the same tick."""
 
     q: Floats
     """q*, shape (n,) [rad]."""
@@ -27,21 +27,21 @@ class Target(Struct, frozen=True, eq=False, gc=False):
 
 
 def rests_at(reference: Floats, target: Target, period: float) -> bool:
-    """Return whether the shaped reference of the next tick has come to rest at an unshaped reference."""
+    """Return whether the shaped reference has come to rest at an unshaped reference."""
     # The central differences' equivalent of q*ᵢ - q*ᵢ₋₁.
     step = period * (target.qd - 0.5 * period * target.qdd)
     return bool(max(np.abs(step).max(), np.abs(reference - target.q).max()) <= STILL)
 
 
 def central_differences(references: Floats, period: float) -> tuple[Floats, Floats, Floats]:
-    """Positions, velocities and accelerations of known references, equal to the results of `Differentiator`.
+    """Return positions, velocities and accelerations of known references, equal to `Differentiator`.
 
     Args:
-        references: References, one for each tick, shape (k + 2, n) [rad].
+        references: References, one per tick, shape (k + 2, n) [rad].
         period: Tick [s].
 
     Returns:
-        References except the first and the last, and their derivatives, each of shape (k, n).
+        References without the first and last, and their derivatives, each of shape (k, n).
     """
     qd: Floats = (references[2:] - references[:-2]) / (2.0 * period)
     qdd: Floats = np.diff(references, 2, axis=0) / period**2
@@ -50,7 +50,7 @@ def central_differences(references: Floats, period: float) -> tuple[Floats, Floa
 
 @compiled_for_ticks
 def extrapolate(before: Floats, middle: Floats, last: Floats, period: float, rates: Floats) -> None:
-    """Velocity and acceleration at the last one of three references, as of a parabola through them, (2, n)."""
+    """Compute velocity and acceleration at the last of three references on a parabola, (2, n)."""
     for j in range(middle.shape[0]):
         rise, fall = last[j] - middle[j], middle[j] - before[j]
         rates[1, j] = (rise - fall) / (period * period)
@@ -59,7 +59,7 @@ def extrapolate(before: Floats, middle: Floats, last: Floats, period: float, rat
 
 @compiled_for_ticks
 def differentiate(before: Floats, middle: Floats, last: Floats, period: float, rates: Floats) -> None:
-    """Velocity and acceleration at the middle one of three references, by central differences, (2, n)."""
+    """Compute velocity and acceleration at the middle of three references by central differences, (2, n)."""
     for j in range(middle.shape[0]):
         # Take differences of neighbours first, so that rounding does not grow with the position.
         rise, fall = last[j] - middle[j], middle[j] - before[j]
@@ -68,7 +68,7 @@ def differentiate(before: Floats, middle: Floats, last: Floats, period: float, r
 
 
 def middle_of(window: tuple[Floats, Floats, Floats], period: float) -> Target:
-    """Return the state of motion at the middle one of three references; arguments as in `differentiate`."""
+    """Return the state at the middle of three references, as `differentiate`."""
     rates = np.empty((2, len(window[1])))
     differentiate(*window, period, rates)
     return Target(window[1], rates[0], rates[1])
@@ -77,8 +77,7 @@ def middle_of(window: tuple[Floats, Floats, Floats], period: float) -> Target:
 class Differentiator:
     """Central differences: q̇ᵢ = (qᵢ₊₁ - qᵢ₋₁)/2h and q̈ᵢ = (qᵢ₊₁ - 2qᵢ + qᵢ₋₁)/h².
 
-    All three refer to the same tick, without a phase shift between them; this costs one tick of delay. They
-    start at rest.
+    All refer to the same tick without phase shift, at the cost of one tick of delay. The start is at rest.
     """
 
     def __init__(self, q: Floats, period: float) -> None:
@@ -89,10 +88,10 @@ class Differentiator:
         """Restart at rest."""
         at = np.array(q, dtype=float)
         self.window: tuple[Floats, Floats, Floats] = (at, at, at)
-        """The last three references, the oldest first, each of shape (n,) [rad]; arrays that never change."""
+        """The last three references, oldest first, each of shape (n,) [rad]; the arrays never change."""
 
     def fork(self) -> Self:
-        """Return an independent copy of the present state."""
+        """Return an independent copy."""
         return copy.copy(self)
 
     def push(self, q: Floats) -> None:
@@ -102,7 +101,7 @@ class Differentiator:
 
     @property
     def published(self) -> Target:
-        """State of motion one tick before the newest reference, where central differences are accurate to order h²."""
+        """State one tick before the newest reference, where central differences are accurate to order h²."""
         return middle_of(self.window, self._period)
 
     @property
@@ -112,14 +111,11 @@ class Differentiator:
 
     @property
     def newest(self) -> Target:
-        """State of motion at the newest reference, computed from the last three references.
-
-        A motion continued from these derivatives has the second difference q̈ at its first tick.
-        """
+        """State at the newest reference; a motion continued from it starts with this second difference."""
         return self._state(*self.window)
 
     def after(self, q: Floats) -> Target:
-        """Return what `newest` will be after this next reference."""
+        """Return the value of `newest` after this next reference."""
         return self._state(self.window[1], self.window[2], q)
 
     def _state(self, before: Floats, middle: Floats, last: Floats) -> Target:

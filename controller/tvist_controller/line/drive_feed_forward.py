@@ -1,4 +1,4 @@
-"""Choice between the two kinds of feed-forward for the drives, and the transition from one to the other."""
+"""Choice between paper's and elastic feed-forward for the drives, with a smooth transition."""
 
 import numpy as np
 from msgspec import Struct
@@ -11,23 +11,23 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 
 FADE = 150
-"""Ticks over which one kind of feed-forward fades into the other in motion."""
+"""Duration of the transition in motion [ticks]."""
 
 
 class MotorReference(Struct, frozen=True, eq=False, gc=False):
-    """Motion of the motors that elastic feed-forward asks for."""
+    """Motion of the motors that elastic feed-forward commands."""
 
     rows: Floats
     """Velocity q̇* + ẇ [rad/s], acceleration q̈* + ẅ [rad/s^2] and torque [N m], shape (3, n)."""
     limited: bool
-    """Whether ẅ was limited to the torque that the drives have left."""
+    """Whether ẅ was limited to the drives' remaining torque."""
 
 
 class DriveFeedForward:
-    """Feed-forward of the paper's controller, or of an elastic arm's while a shaper wants that.
+    """The paper's feed-forward, or that of an elastic arm while a shaper uses it.
 
-    Commands of the two kinds belong to different ticks, and they lead by different shares of the wind-up, so in motion
-    one fades into the other; at rest they are equal. For `compensate_sag` and `positions` see `joint_rows`.
+    Their commands belong to different ticks and contain different shares of wind-up, so one fades into the
+    other in motion; at rest they are equal. For `compensate_sag` and `positions` see `joint_rows`.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class DriveFeedForward:
         """Parameters and state of the paper's joint controllers, see `joint_controllers`."""
         self._sags = compensate_sag and not positions
         self.wanted: ElasticFeedForward | None = None
-        """The elastic feed-forward in use, or about to be; None for that of the paper's controller."""
+        """Elastic feed-forward in use or next; None for the paper's."""
         self._elastic: ElasticFeedForward | None = None
         self._share, self._rising = 0, False
         self._rate = 1.0 / (FADE * period)
@@ -52,18 +52,15 @@ class DriveFeedForward:
 
     @property
     def delay(self) -> float:
-        """Time by which commands are later than their targets at rest [s]."""
+        """Delay of commands behind the paper's targets [s]."""
         return 0.0 if self.wanted is None else self.wanted.delay
 
     def use(self, elastic: ElasticFeedForward | None) -> None:
-        """Use elastic feed-forward or, for None, that of the paper's controller, after a transition."""
+        """Change to elastic feed-forward, or to the paper's for None, with a transition."""
         self.wanted = elastic
 
     def compensate(self, law: Floats | None) -> None:
-        """Feed known friction forward from the next rest on, since its torque may be another one.
-
-        Without a law, see `LAWS`, it is a share of the friction in the description.
-        """
+        """Feed known friction (`LAWS`), or a fraction of the description's, forward from the next rest on."""
         self._law = law
 
     def _rely_on_law(self) -> None:
@@ -72,7 +69,7 @@ class DriveFeedForward:
             self.rows[LAW : LAW + len(self._law)] = self._law
 
     def rest(self) -> None:
-        """Complete a transition at once if the motors do not lead either, since the reference rests: both are equal."""
+        """Complete a transition at once if the motors do not lead either, since both kinds are then equal."""
         self._rely_on_law()
         if self._elastic is self.wanted and self._share == self._full:
             return
@@ -81,7 +78,7 @@ class DriveFeedForward:
             self._share = self._full
 
     def reset(self, gravity: Floats) -> None:
-        """Restart at rest, where a torque balances gravity, shape (n,) [N m]."""
+        """Restart at rest with the torque that balances gravity, shape (n,) [N m]."""
         self._rely_on_law()
         self.rows[WINDUP], self.rows[STICTION] = self.rows[YIELDING] * gravity, 0.0
         self._begin()
@@ -95,11 +92,10 @@ class DriveFeedForward:
         may_begin: bool = True,
         may_go_on: bool = True,
     ) -> DriveCommand:
-        """Drive command for a target.
+        """Return the drive command for a target.
 
-        `may_begin` and `may_go_on` say whether the reference is smooth enough for elastic feed-forward. A stop is
-        smooth enough to go on; a guided motion that is not shaped may jump in acceleration, which motors cannot
-        lead.
+        Elastic feed-forward needs a smooth reference to begin (`may_begin`) or continue (`may_go_on`). A stop is smooth
+        enough to continue; an unshaped guided motion may jump in acceleration, which motors cannot lead.
         """
         if self._elastic is not None or self.wanted is not None:
             self._fade(may_begin if self._share == 0 else may_go_on)
@@ -118,32 +114,30 @@ class DriveFeedForward:
 
     @property
     def _full(self) -> int:
-        """Share of a completed transition."""
         return 0 if self.wanted is None else FADE
 
     def _begin(self) -> None:
-        """Begin with what is wanted, with a share of zero."""
         self._elastic, self._share, self._rising = self.wanted, 0, False
         if self._elastic is not None:
             self._elastic.reset(self.rows[STICTION])
 
     def _fade(self, smooth: bool) -> None:
-        """Advance the transition by a tick; one that is under way is completed before it turns back."""
+        """Advance the transition by a tick; complete one before reversing it."""
         if self._share == 0 and self._elastic is not self.wanted:
             self._begin()
         rises = smooth and self._elastic is not None and self._elastic is self.wanted
         if self._share == 0 and rises and self._elastic is not None:
-            # Its lead is a history, which must be that of this motion.
+            # Its lead depends on past ticks; forget those of earlier motions.
             self._elastic.reset(self.rows[STICTION])
         if self._share in {0, FADE}:
             self._rising = rises
-        # It never turns back half-way: only a whole rise or fall has the smooth rate that `_blend` adds.
+        # Complete each transition, since `_blend` adds the rate of a complete one.
         self._share = min(max(self._share + (1 if self._rising else -1), 0), FADE)
 
     def _blend(self, plain: DriveCommand, elastic: DriveCommand) -> DriveCommand:
-        """Mixture of both commands, whose velocity is the derivative of its position."""
+        """Blend both commands; the velocity is the derivative of the position."""
         x = self._share / FADE
-        # A quintic, whose velocity and acceleration are zero at both ends.
+        # Quintic with zero velocity and acceleration at both ends.
         share = x * x * x * (10.0 - x * (15.0 - 6.0 * x))
         rate = 30.0 * (x * (1.0 - x)) ** 2 * (self._rate if self._rising else -self._rate)
         away = elastic.q - plain.q

@@ -1,4 +1,4 @@
-"""Feed-forward of the arm's elasticity: drives lead, so that the flange of an elastic arm stays on its target."""
+"""Feed-forward of the arm's elasticity: motors lead so that an elastic arm's flange stays on target."""
 
 import numpy as np
 import pinocchio as pin
@@ -26,31 +26,29 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.model import FLANGE, flexible_model, rigid_model
 
 TORQUE_SHARE = 0.95
-"""Share of a drive's torque limit that target and lead may need together [-]."""
+"""Fraction of a drive's torque limit that target and lead may use together [-]."""
 LEAST_ROOM = 0.05
-"""Share of a drive's torque limit that the lead may always need, however much the target needs [-]."""
+"""Fraction of a drive's torque limit that the lead may always use [-]."""
 SETTLED = 1e-8
-"""A lead below this counts as none [rad]."""
+"""Lead below which the motors count as settled [rad]."""
 
 
 class ElasticFeedForward:
-    """Commands for drives that move an elastic arm.
+    """Drive commands for an elastic arm.
 
-    With the lead w of `elastic_lead` the drives get q* + w, q̇* + ẇ, and τ* + B (q̈* + ẅ) + friction(q̇* + ẇ),
-    where τ* contains what the bending links' own acceleration adds. Central differences give ẇ and ẅ, so commands
-    are a tick later than their target, as `delay` says. ẅ is a fourth derivative of the reference, so that must be
-    smooth; where it is not, as at the beginning of a stop, ẅ is limited to the torque that the target leaves, and w
-    and ẇ stay continuous.
+    With the lead w of `elastic_lead` the drives get q* + w, q̇* + ẇ, and τ* + B (q̈* + ẅ) + friction(q̇* + ẇ), where τ*
+    includes the acceleration of the bending links. Central differences give ẇ and ẅ, so commands are one tick late
+    (`delay`). ẅ contains the reference's fourth derivative. Where the reference is not smooth, as at the start of a
+    stop, ẅ is limited to the torque left by the target, and w and ẇ stay continuous.
 
     Args:
-        description: The robot, of which masses, geometry, the places where links bend, rotors, friction and
-            torque limits are used.
-        stiffness: Stiffness of each gear and bending, as the model's coordinates, shape (N,) [N m/rad].
+        description: The robot: masses, geometry, bending links, rotors, friction and torque limits.
+        stiffness: Stiffness of each gear and bending joint, in the model's order, shape (N,) [N m/rad].
         damping_time: Damping divided by stiffness, shape (N,) [s].
         period: Tick [s].
-        torques: Whether torques count with the lead; otherwise only positions and velocities do.
-        law: Known friction, see `LAWS`, shape (9, n), or (5, n) without stiction. None for a share of the Coulomb
-            friction in the description.
+        torques: Whether the lead affects torques, not only positions and velocities.
+        law: Known friction, see `LAWS`, shape (9, n), or (5, n) without stiction; None for a fraction of the described
+            Coulomb friction.
     """
 
     def __init__(
@@ -65,10 +63,10 @@ class ElasticFeedForward:
     ) -> None:
         flexible, rigid = flexible_model(description, Payload()), rigid_model(description, Payload())
         self.delay = period
-        """Time by which commands are later than their targets [s]."""
+        """Delay of commands behind their targets [s]."""
         self._memory = memory = memory_for(flexible.model.nv, description.joints, len(flexible.flexes))
         self.lead = lead = parts(memory)
-        """The arm as its kernels see it."""
+        """The arm's memory as the kernels use it."""
         drives = description.drives
         memory[PERIOD], memory[FRICTION_WIDTH], memory[LINEAR] = (
             period,
@@ -95,20 +93,19 @@ class ElasticFeedForward:
         self._bare, self._carried = lead.chain[-2, BODY:].copy(), np.zeros(0)
         self._ticks = 0
         self._sag: Floats | None = None
-        """Sag of the target before."""
         self.motors: Floats = np.zeros((3, description.joints))
         """Velocity [rad/s], acceleration [rad/s^2] and torque [N m] of the last command, shape (3, n)."""
         self.limited = False
         """Whether the lead's acceleration was limited at the last tick."""
 
     def reset(self, stiction: Floats | float = 0.0) -> None:
-        """Restart with the lead of the next targets, and with the stiction of the motors [N m]."""
+        """Restart with the lead of the next targets and the motors' stiction [N m]."""
         self._ticks, self.limited = 0, False
         self.lead.drives[STICTION] = stiction
 
     @property
     def settled(self) -> bool:
-        """Whether the motors do not lead, and have not led for some ticks."""
+        """Whether the motors have not led for some ticks."""
         return self._ticks == 0 or float(np.abs(self.lead.leads[1]).max()) < SETTLED
 
     def carry(self, added: Floats) -> None:
@@ -125,7 +122,7 @@ class ElasticFeedForward:
         *,
         smooth: bool = True,  # so that the reference's sixth derivative says how bending links accelerate
     ) -> DriveCommand:
-        """Take a target, and return the command for the target of the tick before."""
+        """Take a target and return the command for the previous tick's target."""
         self.carry(carried)
         motors = np.empty_like(target)
         self.limited = command_motors(self._memory, target, self._ticks, smooth, motors)
@@ -138,10 +135,7 @@ class ElasticFeedForward:
 
 
 def _moved(parameters: Floats, placement: pin.SE3) -> Floats:
-    """Express inertial parameters, shape (10,), in the frame in which `placement` is the pose of their own.
-
-    Unlike with `pin.Inertia`, the mass may be zero.
-    """
+    """Transform inertial parameters (10,) by a placement; unlike `pin.Inertia`, with any mass."""
     mass, p = parameters[0], placement.translation
     h = placement.rotation @ parameters[1:4]
     xx, xy, yy, xz, yz, zz = parameters[4:]

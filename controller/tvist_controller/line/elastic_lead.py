@@ -1,16 +1,15 @@
-"""By how much motors have to lead so that an elastic arm follows its target, and what its drives get, compiled.
+"""Lead of the motors that keeps an elastic arm on its target, and the resulting commands, compiled.
 
-A gear that transmits a load τ without gravity twists by τ/K_g, and a link that carries one bends by φ = -τ_f/k_b. Both
-lag by the damping time D/K, a fraction of a tick. The joints have to turn by the twist, and by what moves the flange
-back by as much as the bending has moved it:
+A gear with load τ (without gravity) twists by τ/K_g, and a bending link by φ = -τ_f/k_b. Both lag by the damping time
+D/K, a fraction of a tick. The joints must turn by the twist, and by what returns the flange to its place:
 
     w = τ/K_g + J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ (-J_f φ)
 
-J_j and J_f are the flange's translation Jacobians with respect to joints and bending. λ keeps w small near singular
-postures, where joints would have to turn far to move the flange a little (Nakamura and Hanafusa, 1986).
+J_j and J_f are the flange's translation Jacobians of joints and bending. λ keeps w small near singular postures, where
+small flange motions need large joint turns (Nakamura and Hanafusa, 1986).
 
-While links bend and joints move the flange back, both accelerate masses of the arm, by φ̈ and J_j⁺ (-J_f φ̈). The load τ
-contains these, too: without them the modes in which links bend, at 20 to 50 Hz, would be left to ring.
+The bending links accelerate by φ̈, and the joints that compensate them by J_j⁺ (-J_f φ̈). The load τ includes both;
+otherwise the bending modes, at 20 to 50 Hz, would stay excited.
 """
 
 from typing import NamedTuple
@@ -25,52 +24,51 @@ from tvist_plant.chain import SCRATCH, WIDTH, torques
 from tvist_plant.model import Floats
 
 DAMPED = 0.1
-"""λ, in the order of the lever arms that may be taken for none [m]."""
+"""λ, of the order of lever arms that may be neglected [m]."""
 RECOVERY = 120.0
-"""Rate at which the lead returns to the formula after its acceleration was limited, critically damped [1/s]."""
+"""Rate of the lead's return after its acceleration was limited, critically damped [1/s]."""
 ROTOR, FRICTION, MOST, LEAST, STICTION, LAW = range(6)
-"""Rows of a drive's parameters: rotor inertia [kg m^2]; Coulomb friction to feed forward [N m], or its slope if it is
-linear [N m s/rad]; torque that motion and lead may need together, and that the lead may always need [N m]; stiction of
-the last command [N m]; and the first row of the known friction, see `LAWS`.
-"""
+"""Rows of a drive's parameters: rotor inertia [kg m^2]; fed-forward Coulomb friction [N m], or its slope if
+linear [N m s/rad]; torque that motion and lead may use together, and that the lead may always use [N m];
+stiction of the last command [N m]; first row of the known friction, see `LAWS`."""
 COORDINATES, JOINTS, FLEXES, PERIOD, FRICTION_WIDTH, LINEAR, WITH_TORQUES, WITH_LAW, HEAD = range(9)
-"""Places of the single numbers at the front of the memory; their number. The last three are 1 or 0: whether friction is
-linear, whether torques count with the lead, and whether friction is known, which then counts instead."""
+"""Indices of the scalars at the front of the memory, and their number. The last three are 1 or 0: linear
+friction; torques include the lead; friction is known and replaces the description's."""
 
 
 class Lead(NamedTuple):
-    """Parts of the memory of an arm with N coordinates, n joints and m ways in which links bend, all of them views."""
+    """Views of the memory of an arm with N coordinates, n joints and m bending joints."""
 
     joints: Floats
     """Indices of the joints among the coordinates, shape (n,)."""
     flexes: Floats
-    """Indices of the bending, shape (m,)."""
+    """Indices of the bending joints, shape (m,)."""
     chain: Floats
-    """Links of the arm with those that bend, see `tvist_plant.chain`, shape (N+1, 22)."""
+    """Links of the arm, including bending ones, see `tvist_plant.chain`, shape (N+1, 22)."""
     bodies: Floats
     """Scratch of the chain, shape (N+1, 28)."""
     springs: Floats
-    """Stiffness of each spring [N m/rad], and its damping time divided by the tick [-], shape (2, N)."""
+    """Stiffness of each spring [N m/rad], and damping time in ticks [-], shape (2, N)."""
     drives: Floats
-    """Rows of `ROTOR` and so on, shape (14, n)."""
+    """Rows of `ROTOR` etc., shape (14, n)."""
     late: Floats
-    """Target of the tick before and the torque that it needs, shape (4, n)."""
+    """Previous target and its torque, shape (4, n)."""
     leads: Floats
-    """Wanted and actual leads of the last three ticks, the newest first, shape (2, 3, n) [rad]."""
+    """Wanted and actual leads of the last three ticks, newest first, shape (2, 3, n) [rad]."""
     before: Floats
-    """Deflections without damping of the tick before, shape (N,) [rad]."""
+    """Undamped deflections at the previous tick, shape (N,) [rad]."""
     motion: Floats
-    """Angles, velocities and accelerations of the coordinates, the first two zero for the bending, shape (3, N)."""
+    """Angles, velocities and accelerations of the coordinates; the first two are zero for bending, shape (3, N)."""
     jacobian: Floats
-    """Translation of the flange, shape (3, N) [m/rad]."""
+    """Translation Jacobian of the flange, shape (3, N) [m/rad]."""
     loads: Floats
-    """Torques on the springs without gravity, if the bending did not accelerate and as it does, shape (2, N) [N m]."""
+    """Spring torques without gravity, without and with bending acceleration, shape (2, N) [N m]."""
     bent: Floats
-    """Bending at the last three ticks, the newest first, shape (3, m) [rad]."""
+    """Bending at the last three ticks, newest first, shape (3, m) [rad]."""
 
 
 def memory_for(N: int, n: int, m: int) -> Floats:
-    """Return memory for an arm with N coordinates, n joints and m ways in which links bend, full of zeros."""
+    """Return zeroed memory for an arm with N coordinates, n joints and m bending joints."""
     memory = np.zeros(HEAD + (N + 1) * (WIDTH + SCRATCH) + 11 * N + (LAW + LAWS + 11) * n + 4 * m)
     memory[COORDINATES], memory[JOINTS], memory[FLEXES] = N, n, m
     return memory
@@ -109,7 +107,7 @@ def parts(memory: Floats) -> Lead:
 
 @compiled_for_ticks
 def move_back(lead: Lead, moved: Floats, back: Floats) -> None:
-    """Compute by what the joints turn to move the flange by a way that is used up, J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ moved."""
+    """Compute the joint turns that move the flange, J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ moved; overwrite `moved`."""
     n = lead.joints.shape[0]
     square = np.zeros((3, 3))
     for row in range(3):
@@ -127,10 +125,7 @@ def move_back(lead: Lead, moved: Floats, back: Floats) -> None:
 
 @inlined
 def bending_accelerations(lead: Lead, period: float, found: Floats) -> None:
-    """Compute the accelerations of bending links, and of the joints that move the flange back meanwhile, shape (N,).
-
-    They are second differences, and therefore those of the tick before; at 30 Hz this is a sixteenth of a period late.
-    """
+    """Compute accelerations of bending and compensating joints, one tick late as second differences, (N,)."""
     bent, moved, back = lead.bent, np.zeros(3), np.empty(lead.joints.shape[0])
     for k in range(lead.flexes.shape[0]):
         c = int(lead.flexes[k])
@@ -145,7 +140,7 @@ def bending_accelerations(lead: Lead, period: float, found: Floats) -> None:
 
 @inlined
 def loads_of(lead: Lead) -> None:
-    """Compute the first torques on all springs, without gravity, which is static, and the Jacobian."""
+    """Compute the spring torques without gravity and bending acceleration, and the Jacobian."""
     motion, bodies, jacobian, load = lead.motion, lead.bodies, lead.jacobian, lead.loads[0]
     torques(lead.chain, motion[0], motion[1], motion[2], 0.0, bodies, load)
     N = load.shape[0]
@@ -159,7 +154,7 @@ def loads_of(lead: Lead) -> None:
 
 @inlined
 def wanted_lead(lead: Lead, load: Floats, found: Floats) -> None:
-    """Compute w, shape (n,) [rad], from torques on the springs, shape (N,) [N m]."""
+    """Compute w (n,) [rad] from spring torques (N,) [N m]."""
     n, m = lead.joints.shape[0], lead.flexes.shape[0]
     stiffness, late, before = lead.springs[0], lead.springs[1], lead.before
     moved, back = np.zeros(3), np.zeros(n)
@@ -188,7 +183,7 @@ def lead_of(  # noqa: C901  a kernel: its branches are loops
     memory: Floats,
     needed: Floats,  # result, shape (n,) [N m]
 ) -> None:
-    """Compute w for a target, and the torque that arm and rotors need for it."""
+    """Compute w for a target and the torque that arm and rotors need."""
     n, m, motion, loads, wanted = (
         target.shape[1],
         lead.flexes.shape[0],
@@ -233,10 +228,7 @@ def follow(
     room: Floats,  # largest acceleration of each joint's lead, shape (n,) [rad/s^2]
     period: float,
 ) -> bool:
-    """Advance the lead by one tick to what is wanted, and return whether its acceleration was limited.
-
-    After a limit was hit, the lead returns to the wanted one like a critically damped oscillator.
-    """
+    """Advance the actual lead, critically damped after a limit; return whether acceleration was limited."""
     limited = False
     for j in range(led.shape[1]):
         now, before = led[0, j], led[1, j]
@@ -260,7 +252,7 @@ def command_motors(  # noqa: C901, PLR0912  a kernel: its branches are loops
     smooth: bool,
     motors: Floats,  # result: positions, velocities, accelerations and torques of the motors, shape (4, n)
 ) -> bool:
-    """Compute the lead for a target, then what the motors get for the target before; return whether it was limited."""
+    """Compute a target's lead and the previous target's commands; return whether it was limited."""
     lead, period, with_torques = parts(memory), memory[PERIOD], memory[WITH_TORQUES] > 0.0
     n, late, drives, wanted, led = target.shape[1], lead.late, lead.drives, lead.leads[0], lead.leads[1]
     needed, limited = np.empty(n), False

@@ -1,4 +1,4 @@
-"""What the control line asks before it plays a reference of a guarded motion."""
+"""Interface by which the control line checks references of a guarded motion."""
 
 from typing import NamedTuple, Protocol
 
@@ -8,28 +8,28 @@ from tvist_protocol.replies import Code
 
 
 class Obstacle(NamedTuple):
-    """Why a reference was refused."""
+    """Reason for refusing a reference."""
 
     why: str
-    """The reason, for people."""
+    """Reason for users."""
     code: Code
-    """The reason, for programs."""
+    """Reason for programs."""
 
 
 class Guard(Protocol):
-    """Decides whether a shaped reference may be played, and knows a stop that may be made instead."""
+    """Decides whether a shaped reference may be played, and supplies the stop otherwise."""
 
     obstacle: Obstacle
-    """Why the latest reference was refused."""
+    """Reason for refusing the latest reference."""
 
     def __call__(self, state: Target) -> JointStop | None:
-        """Return the stop from the previous state to make instead of a reference that must not be played."""
+        """Return the stop to use if a reference that leads to this state must not be played, else None."""
 
     def give_up(self, why: str) -> JointStop:
-        """Return the stop from the previous state, since no reference follows for this reason."""
+        """Return the stop from the previous state, because no reference follows for this reason."""
 
     def fallback(self) -> JointStop:
-        """Return the stop from the state of the last reference played, which is known to be clear."""
+        """Return the clear stop from the state of the last reference played."""
 
     def clear(self, stop: JointStop) -> bool:
-        """Return whether the whole way of a stop is clear."""
+        """Return whether a whole stop is clear."""

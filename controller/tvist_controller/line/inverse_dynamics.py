@@ -1,4 +1,4 @@
-"""Torques that a motion of the rigid arm needs, with the declared payload."""
+"""Torques of a motion of the rigid arm with the declared payload."""
 
 import numpy as np
 
@@ -8,15 +8,15 @@ from tvist_plant.chain import BODY
 from tvist_plant.description import Payload, RobotDescription
 
 SLEW = 250
-"""Ticks over which a new payload is phased in."""
+"""Default duration of a payload change [ticks]."""
 
 
 class InverseDynamics(Arm):
     """The arm with its declared payload.
 
-    Torque is linear in the ten inertial parameters of a body (mass, mass times centre of mass, inertia about the
-    joint), so a new payload is phased in by a ramp between two sets of them. The torque then has no step, and every
-    set in between is a physically possible body (Wensing, Kim and Slotine, 2018: such bodies are a convex set).
+    Torque is linear in a body's ten inertial parameters (mass, first moment, inertia about the joint), so a
+    new payload is phased in by a ramp between two sets of them. The torque then has no step, and all sets in
+    between are physically possible, since such bodies form a convex set (Wensing, Kim and Slotine, 2018).
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -24,21 +24,19 @@ class InverseDynamics(Arm):
         self._before = self._present = self._after = self.bare
         self._ticks_left, self._slew = 0, SLEW
         self.payload_parameters = np.zeros_like(self.bare)
-        """Inertial parameters of the payload in use in the frame of the last joint, in pinocchio's order, shape (10,).
-
-        It is a new array whenever they change.
-        """
+        """Present inertial parameters of the payload in the last joint's frame, in pinocchio's order, shape
+        (10,); a new array after each change."""
         self.declare(payload)
         self.settle()
 
     def declare(self, payload: Payload, ticks: int = SLEW) -> None:
-        """Declare another payload, which `advance` phases in over a number of ticks."""
+        """Declare another payload; `advance` phases it in over a number of ticks."""
         self.payload = payload
         self._before, self._after = self._present, self.loaded(payload)
         self._ticks_left = self._slew = ticks
 
     def advance(self) -> None:
-        """Advance the change to the latest declared payload by one tick."""
+        """Advance a payload change by one tick."""
         if self._ticks_left == 0:
             return
         self._ticks_left -= 1
@@ -53,14 +51,11 @@ class InverseDynamics(Arm):
 
     @property
     def bodies(self) -> tuple[Floats, ...]:
-        """Possible inertial parameters of the last link: two sets while a new payload is being phased in, else one.
-
-        Each has shape (10,), in pinocchio's order [kg, kg m, kg m^2].
-        """
+        """Possible inertial parameters (10,) of the last link: two sets during a payload change, else one."""
         return (self._before, self._after) if self.changing else (self._after,)
 
     def believe(self, bodies: tuple[Floats, ...]) -> None:
-        """Use other inertial parameters at once, as `bodies` returns them."""
+        """Use other inertial parameters at once, in the form of `bodies`."""
         self._before, self._after = bodies[0], bodies[-1]
         self._ticks_left, self._slew = len(bodies) - 1, SLEW
         self._load(self._after)
@@ -71,7 +66,7 @@ class InverseDynamics(Arm):
         self._load(self._after)
 
     def effort(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """Largest |τ| over all of `bodies`, shape (n,) [N m]: while a payload is phased in, either one may be right."""
+        """Return the largest |τ| over all `bodies`, any of which may be right, shape (n,) [N m]."""
         if self._ticks_left == 0:
             return np.abs(self.torque(q, qd, qdd))
         present, largest = self._present, np.zeros_like(q)
@@ -82,7 +77,7 @@ class InverseDynamics(Arm):
         return largest
 
     def _load(self, parameters: Floats) -> None:
-        """Set the inertial parameters of the last link with its payload in place, since building a model takes long."""
+        """Set the last link's inertial parameters in place, since building a model takes long."""
         self._present = parameters
         self.payload_parameters = parameters - self.bare
         self.chain[-2, BODY:] = parameters

@@ -1,4 +1,4 @@
-"""Commands to the drives: set-points with their feed-forward; feedback control runs in the drives themselves."""
+"""Commands to the drives: set-points with feed-forward. The feedback control is in the drives."""
 
 import math
 
@@ -12,25 +12,18 @@ from tvist_plant.imperfections import GearLaw, Imperfections
 from tvist_plant.stiction import stiction_after
 
 LAWS = 9
-"""Number of parameters of known friction: F_c [N m], F_s/F_c [-], v_s [rad/s], w [rad/s], F_v [N m s/rad]; and of the
-stiction of `Imperfections`, all zero if the motors do not stick: F_s [N m], μ_s [-], v_s [rad/s], σ K_g [N m/rad].
-"""
+"""Number of parameters of known friction: F_c [N m], F_s/F_c [-], v_s [rad/s], w [rad/s], F_v [N m s/rad];
+and stiction as in `Imperfections`, zero for none: F_s [N m], μ_s [-], v_s [rad/s], σ K_g [N m/rad]."""
 ROTOR, COMPLIANCE, YIELDING, COULOMB, VISCOUS, WIDTH, PER_SECOND, WINDUP, STICTION, LAW = range(10)
-"""Rows of the parameters of each joint: rotor inertia B [kg m^2], c_w/K_g [rad/(N m)], 1/K_g if the sag is compensated
-[rad/(N m)], Coulomb [N m] and viscous friction [N m s/rad], speed over which the former changes its sign [rad/s], 1/h
-[1/s]; the wind-up [rad] and the stiction [N m] of the last tick; and the first row of the known friction, see `LAWS`,
-which counts instead of the friction before it. Its w is zero if none is known.
-"""
+"""Rows of each joint's parameters: B [kg m^2], c_w/K_g [rad/(N m)], 1/K_g for sag compensation [rad/(N m)], Coulomb [N
+m] and viscous friction [N m s/rad], Coulomb width [rad/s], 1/h [1/s]; wind-up [rad] and stiction [N m] of the last
+tick; first row of the known friction, see `LAWS`, which replaces the other friction unless its w is zero."""
 ROWS = LAW + LAWS
-"""Number of rows."""
 
 
 @compiled_for_ticks
 def friction_at(law: Floats, j: int, speed: float) -> float:
-    """Return sliding friction at a motor's speed: [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v [N m].
-
-    Source: Stribeck. A law has the parameters of each joint in the order of `LAWS`, shape (9, n).
-    """
+    """Return sliding friction, [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v [N m] (Stribeck)."""
     slow = speed / law[2, j]
     coulomb = law[0, j] * (1.0 + (law[1, j] - 1.0) * math.exp(-slow * slow))
     friction: float = coulomb * math.tanh(speed / law[3, j]) + law[4, j] * speed
@@ -39,16 +32,13 @@ def friction_at(law: Floats, j: int, speed: float) -> float:
 
 @compiled_for_ticks
 def stiction_at(law: Floats, j: int, d: float, period: float, speed: float, load: float) -> float:
-    """Return the stiction of a motor that had d and turns at a speed for a period, under a load in its gear [N m].
-
-    This is the plant's equation along the commanded motion.
-    """
+    """Return a motor's stiction after turning for a period from d, by the plant's equation [N m]."""
     return stiction_after(d, period * speed, speed, load, law[5, j], law[6, j], law[7, j], law[8, j])
 
 
 @compiled_for_ticks
 def sticks(law: Floats, j: int) -> bool:
-    """Whether a law has stiction; otherwise that of the last tick stays, since a torque that ends shakes the arm."""
+    """Return whether a law has stiction; otherwise the last value stays, as a torque step shakes the arm."""
     return bool(law[5, j] > 0.0 or law[6, j] > 0.0)
 
 
@@ -63,12 +53,11 @@ def command_drives(
 ) -> None:
     """Compute the drive command for a target.
 
-    - Torque: τ_ff = τ* + B q̈* + friction; the rotors' inertia and a share of Coulomb friction are added to the
-      torque of the rigid arm. Friction that is known counts in full, at the speed of the motors, and so does stiction.
-    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor leads by a share c_w of that, so that the
-      link is closer to its reference.
-    - Sag: the twist by gravity itself, g/K_g, is left, as on the paper's robot, or the motor leads by all of it, so
-      that the link rests on its reference. g(q*) has neither feedback nor a delay, and is as smooth as q*.
+    - Torque: τ_ff = τ* + B q̈* + friction: rigid arm, rotor inertia and a fraction of Coulomb friction. Known friction
+    counts in full, at motor speed, as does stiction.
+    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g; the motor leads by a fraction c_w of it.
+    - Sag: the twist g/K_g under gravity is left, as on the paper's robot, or compensated in full. g(q*) has neither
+    feedback nor delay, and is as smooth as q*.
     """
     law = joints[LAW:]
     for j in range(q.shape[0]):
@@ -92,11 +81,7 @@ def command_drives(
 def joint_rows(
     description: RobotDescription, period: float, *, compensate_sag: bool = False, positions: bool = False
 ) -> Floats:
-    """Return the parameters of each joint, in the order of `ROTOR` and so on, shape (19, n).
-
-    The motors lead by the twist of the gears under gravity to compensate sag. With `positions`, the command
-    is the reference, without wind-up and sag, since the arm's own controller adds these.
-    """
+    """Return each joint's parameters, rows as `ROTOR` etc., shape (19, n); `positions` omits wind-up and sag."""
     drives = description.drives
     friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)
     rows = np.zeros((ROWS, description.joints))
@@ -113,7 +98,7 @@ def joint_rows(
 
 
 def described_friction(description: RobotDescription) -> Floats | None:
-    """Return the friction in a robot file whose motors stick, rows as in `LAWS`, shape (9, n); None if they do not."""
+    """Return the described friction of an arm with stiction, rows as `LAWS`, shape (9, n); else None."""
     sticks, drives = GearLaw.of(Imperfections.of(description), description), description.drives
     if sticks.stiction_load == 0.0 and not sticks.stiction.any():
         return None

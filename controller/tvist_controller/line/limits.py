@@ -1,4 +1,4 @@
-"""Limits of the arm's motion: velocities and torques."""
+"""Limits of velocity and torque."""
 
 import math
 
@@ -14,39 +14,38 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.plant import GRAVITY
 
 TORQUE_SHARE = 0.9
-"""Share of the joints' torque that a stop or a stream may use [-]."""
+"""Fraction of the joint torque limits available to a stop or stream [-]."""
 REBOUND = 1.0
-"""Overshoot of a flexible arm's torque after a sudden change of the rigid arm's torque, relative to that change [-]:
-1 without damping. A stop bypasses the filter, so its change is sudden.
-"""
+"""Overshoot of a flexible arm's torque relative to a sudden change of the rigid arm's torque: 1 without
+damping [-]. Stops bypass the filter, so their change is sudden."""
 GENTLEST_STOP = 1.0
-"""Lowest deceleration of a stop, whatever the torque permits or a client requests [rad/s^2]."""
+"""Lowest deceleration of a stop [rad/s^2]."""
 
 MOMENTS = 32
-"""Number of moments of a stop at which its torque is checked."""
+"""Number of moments at which a stop's torque is checked."""
 _SHARES = np.arange(1, MOMENTS + 1) / MOMENTS
 _POINTS = np.linspace(0.0, 1.0, 17)[:, np.newaxis]
-"""Shares of a path at which its torque is checked."""
+"""Fractions of a path at which its torque is checked."""
 LOOK_EVERY = 4
-"""Ticks between two checks of the torque along known references."""
+"""Ticks between torque checks along known references."""
 REDUCED_SHARE = 0.25
-"""Share of the joints' velocity that remains while the safety system reduces the speed [-]."""
+"""Fraction of joint velocity that remains in reduced mode [-]."""
 
 
 def arm_limits(description: RobotDescription) -> MotionLimits:
-    """Return the limits that suit every joint: the smallest of all."""
+    """Return limits that hold for every joint: the smallest of each."""
     limits = description.limits
     return MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
 
 
 def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
-    """Rate of a motion's time [-]; `slowest` is the velocity limit of reduced speed, if that applies."""
+    """Return a motion's time rate [-]; `slowest` is the velocity limit of reduced mode, if active."""
     return speed if slowest is None else min(speed, slowest / velocity)
 
 
 @compiled_for_ticks
 def keeps_torque(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, most: Floats) -> bool:
-    """Return whether a state of motion keeps within torques, shape (n,) [N m]; see `tvist_plant.chain.torques`."""
+    """Return whether a state keeps torques within `most`, (n,) [N m]; see `tvist_plant.chain.torques`."""
     found = np.empty(q.shape[0])
     torques(chain, q, qd, qdd, GRAVITY, scratch, found)
     keeps = True
@@ -57,10 +56,9 @@ def keeps_torque(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Flo
 
 @compiled_for_ticks
 def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Floats, share: float) -> float:
-    """Return the largest acceleration of all joints at once, in any direction, that keeps torques, shape (n,) [N m].
+    """Return the largest acceleration of all joints at once, any directions, within torques `most` [N m].
 
-    The torque of the acceleration counts by the factor `share`. For the other arguments see
-    `tvist_plant.chain.torques`.
+    Torque of the acceleration counts by the factor `share`; other arguments as `tvist_plant.chain.torques`.
     """
     n, least = q.shape[0], math.inf
     found, M = np.zeros(n), np.empty((n, n))
@@ -75,11 +73,10 @@ def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Flo
 
 
 class TorqueRoom:
-    """The acceleration of a stream or a guided motion that the joints' torques permit, after gravity and velocities.
+    """Acceleration of a stream or guided motion within the joint torques left by gravity and velocity.
 
-    A guided motion may change suddenly, since neither its client nor a filter smooths it. The flexible arm's torque
-    overshoots after each change, by its share `rebound`: then the torque of the acceleration, and what the arm adds to
-    it, have to stay within the limits as well.
+    A guided motion may change suddenly, as no filter smooths it. The flexible arm's torque then overshoots by
+    the fraction `rebound`, and must also stay within the limits.
     """
 
     def __init__(
@@ -90,7 +87,7 @@ class TorqueRoom:
         self._dynamics = dynamics
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
-        """Return whether a state of motion keeps all torques, or is as gentle as any stop."""
+        """Return whether a state keeps all torques, or is as gentle as any stop."""
         swung = (1.0 + self._rebound) * qdd
         keeps = self._keeps(q, qd, qdd, self._most) and (
             self._rebound == 0.0 or self._keeps(q, qd, swung, self._limits)
@@ -98,10 +95,9 @@ class TorqueRoom:
         return keeps or bool(np.abs(qdd).max() <= GENTLEST_STOP)
 
     def acceleration(self, q: Floats, qd: Floats) -> float:
-        """Largest a such that every q̈ with |q̈ᵢ| ≤ a is allowed [rad/s^2].
+        """Return the largest a such that every |q̈ᵢ| ≤ a is allowed, at least `GENTLEST_STOP` [rad/s^2].
 
-        With τ = M q̈ + h, such a q̈ needs at most |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i. The result is at least that of the
-        gentlest stop.
+        With τ = M q̈ + h, such a q̈ needs at most |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i.
         """
         room = self._room(q, qd, self._most, 1.0)
         if self._rebound > 0.0:
@@ -123,10 +119,10 @@ class TorqueRoom:
 
 
 class StopTorque:
-    """The joint torques that a stop may use, which begins at a state.
+    """Joint torques available to a stop from a state.
 
-    All torques of the rigid arm along the stop stay within their share of the limits. If the uninterrupted motion
-    would need more (`asked`, else the torque at the start), the stop may use as much.
+    The rigid arm's torques stay within their share of the limits, or, if larger, within those of the
+    uninterrupted motion (`asked`, by default the torque at the start).
     """
 
     def __init__(
@@ -138,16 +134,14 @@ class StopTorque:
         self._share, self._most = np.maximum(TORQUE_SHARE * limits, asked), np.maximum(limits, asked)
         self._before = dynamics.torque(state.q, state.qd, state.qdd) - dynamics.gravity(state.q)
         self._failed: int | None = None
-        """Number of the moment at which the last stop that does not hold needed too much."""
+        """Moment at which the last failing stop exceeded the torques."""
 
     def holds(self, stop: AnyStop, *, rebound: bool = True) -> bool:
-        """Return whether a stop keeps within these torques; with `rebound`, also the overshoot at its ends.
+        """Return whether a stop keeps these torques and, with `rebound`, its overshoot keeps the limits.
 
-        The torque of the flexible arm may reach the limits themselves.
-
-        Thirty-two moments are checked, since torque peaks where a joint's acceleration ramp ends. Nine in ten of
-        the stops that need too much do so where the whole stop's ramp ends, so that moment is checked first,
-        after the one at which the stop before failed: the next one on the ladder mostly fails there, too.
+        Torque peaks where a joint's acceleration ramp ends, hence 32 moments. Nine in ten failing stops fail
+        at the end of the whole stop's ramp; the next stop mostly fails where the last one did. These two
+        moments are checked first.
         """
         ramp = stop.acceleration / stop.jerk
         ends = min(math.ceil(ramp / stop.duration * MOMENTS), MOMENTS) if stop.duration > 0.0 else MOMENTS
@@ -161,7 +155,7 @@ class StopTorque:
         return bool(within.all())
 
     def _within(self, stop: AnyStop, times: Floats, *, rebound: bool) -> npt.NDArray[np.bool_]:
-        """Return at which of k times a stop keeps within the torques, shape (k,)."""
+        """Return at which of k times a stop keeps the torques, shape (k,)."""
         dynamics = self._dynamics
         q, qd, qdd = stop.states(times)
         torque = dynamics.torques(q, qd, qdd)
@@ -182,11 +176,10 @@ class StopTorque:
 def acceleration_on_way(
     dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, limits: Floats
 ) -> float:
-    """Largest acceleration of a path's parameter that keeps the torques within their share [rad/s^2].
+    """Return the largest acceleration of a path's parameter that keeps torques within their share [rad/s^2].
 
-    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), so it is largest at a corner of the range of ẋ² and ẍ. Seventeen
-    points are checked of the way that begins at a parameter, both of shape (m,); `limits` are those of the joints'
-    torques.
+    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), largest at a corner of the range of ẋ² and ẍ. It is
+    checked at 17 points of a way from `start`, both of shape (m,); `limits` are the joints' torque limits.
     """
     farthest, x = float(np.abs(way).max()), start + _POINTS * way
     still = np.zeros_like(x)
@@ -199,10 +192,7 @@ def acceleration_on_way(
 
 
 def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:
-    """Largest torques along known references, shape (k >= 3, n) [rad], by central differences, shape (n,) [N m].
-
-    Every `LOOK_EVERY`th reference is checked, and the last one.
-    """
+    """Return the largest torques along references (k >= 3, n) [rad] by central differences, (n,) [N m]."""
     q, qd, qdd = central_differences(references, period)
     looked = np.append(np.arange(0, len(q) - 1, LOOK_EVERY), len(q) - 1)
     states = zip(q[looked], qd[looked], qdd[looked], strict=True)

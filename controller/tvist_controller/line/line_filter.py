@@ -1,4 +1,4 @@
-"""The filter on the control line, and the transition from one filter to the next."""
+"""The filter on the control line, and transitions between filters."""
 
 import copy
 from typing import Self
@@ -12,11 +12,11 @@ from tvist_shaping.fade import Fade
 
 
 class LineFilter:
-    """Shapes with the latest chosen filter; during motion, the previous one fades into it."""
+    """Shapes with the latest chosen filter; in motion, the previous one fades into it."""
 
     def __init__(self, tvist: Filter, arm: MotionLimits) -> None:
         self.tvist = tvist
-        """The latest chosen filter: in use, or about to be."""
+        """The latest chosen filter, in use or next."""
         self._arm = arm
         self.limits = arm
         """Limits of the current motion."""
@@ -24,34 +24,31 @@ class LineFilter:
 
     @property
     def fading(self) -> bool:
-        """Whether one filter is fading into another."""
+        """Whether a transition is in progress."""
         return self._fade is not None
 
     @property
     def settled(self) -> bool:
-        """Whether the filters' future output is constant once the output equals the reference.
-
-        If weights are negative, echoes may cancel each other for a moment.
-        """
+        """Whether the output stays at the reference; with negative weights echoes may cancel momentarily."""
         return self._fade is None and (self.tvist.peak == 1.0 or self.tvist.settled)
 
     @property
     def fault(self) -> str | None:
-        """Name of a shaper that could compute no weights at the last tick, with the reason; None if there is none."""
+        """Name and fault of a shaper that could not compute weights at the last tick; None without fault."""
         fade, tvist = self._fade, self.tvist
-        if fade is None and tvist.fault is None:  # as at nearly every tick
+        if fade is None and tvist.fault is None:  # the usual case
             return None
         filters = (tvist,) if fade is None else (tvist, fade.old, fade.new)
         return next((f"shaper {one.name} {one.fault}" for one in filters if one.fault is not None), None)
 
     @property
     def peak(self) -> float:
-        """Factor by which the shaped acceleration may exceed the reference's, see `Filter.peak`."""
+        """Ratio of shaped to reference acceleration at most, see `Filter.peak`."""
         fade = self._fade
         return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
 
     def spared(self, limits: MotionLimits | None = None) -> MotionLimits:
-        """Return limits of a reference whose shaped one keeps the arm's limits, and these if given."""
+        """Return limits of a reference such that the shaped one keeps the arm's limits and the given ones."""
         arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
         limits = arm if limits is None else limits
         return MotionLimits(
@@ -61,7 +58,7 @@ class LineFilter:
         )
 
     def filter(self, reference: Floats) -> Floats:
-        """Return the shaped sample, in a transition between two filters if there is one."""
+        """Return the shaped sample, also within a transition."""
         fade = self._fade
         if fade is None:
             return self.tvist.filter(reference)
@@ -75,11 +72,7 @@ class LineFilter:
         return shaped
 
     def use(self, tvist: Filter) -> None:
-        """Change the filter within the limits of the motion; the new one continues on the present path.
-
-        If a transition is under way, the new filter waits until that is complete; only the latest waiting filter is
-        kept.
-        """
+        """Change the filter within the limits of the motion; during a transition, the latest one waits."""
         fade = self._fade
         if fade is None or fade.share == 0.0:
             self._fade = self._fade_to(self.tvist if fade is None else fade.old, tvist)
@@ -88,16 +81,16 @@ class LineFilter:
         self.tvist = tvist
 
     def cut(self) -> None:
-        """Prepare for a bypass: drop the transition; the next use of the filter begins from rest."""
+        """Drop the transition for a bypass; the filter restarts from rest."""
         self._fade = None
 
     def begin(self, tvist: Filter, sample: Floats, posture_of: Posture | None = None) -> None:
-        """Use a filter from rest; samples are joint positions, or a path's parameter with `posture_of`."""
+        """Start a filter at rest, for joint positions or, with `posture_of`, a path's parameter."""
         self.tvist, self._fade = tvist, None
         tvist.reset(sample, posture_of)
 
     def fork(self) -> Self:
-        """Return an independent copy of the present state."""
+        """Return an independent copy."""
         other, fade = copy.copy(self), self._fade
         if fade is None:
             other.tvist = self.tvist.fork()
@@ -108,7 +101,7 @@ class LineFilter:
         return other
 
     def window(self) -> Floats:
-        """Samples that the filters may still use, the oldest first, shape (k, m) [rad]."""
+        """Return the samples that the filters may still use, oldest first, shape (k, m) [rad]."""
         filters = [self.tvist] if self._fade is None else [self._fade.old, self._fade.new, self.tvist]
         return np.concatenate([tvist.window() for tvist in filters])
 

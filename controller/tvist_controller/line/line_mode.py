@@ -1,44 +1,35 @@
-"""What the control line does, as a table: which of its parts are at work in each mode, and which mode may follow."""
+"""Modes of the control line as a table: active parts, and permitted next modes."""
 
 from enum import Enum
 
 
 class LineMode(Enum):
-    """Mode of the control line.
-
-    A row has `shaped`, `guarded`, and the names of the modes that may follow.
-    """
+    """Mode of the control line; a row has `shaped`, `guarded`, and the permitted next modes."""
 
     REST = (True, False, "REST", "SHAPED", "GUARDED", "BYPASSED")
     """The shaped reference rests."""
     SHAPED = (True, False, "REST", "SHAPED", "BYPASSED", "RUNNING_OUT", "STOPPING")
-    """A planned motion, shaped."""
+    """A shaped planned motion."""
     GUARDED = (True, True, "REST", "GUARDED", "BYPASSED", "STOPPING")
-    """A stream or a guided motion, shaped."""
+    """A shaped stream or guided motion."""
     BYPASSED = (False, True, "REST", "BYPASSED", "STOPPING")
-    """A guided motion, not shaped."""
+    """An unshaped guided motion."""
     RUNNING_OUT = (True, False, "REST", "STOPPING")
-    """A planned motion that goes on, since it ends sooner than any stop."""
+    """A planned motion that continues to its end, which is sooner than any stop."""
     STOPPING = (False, False, "REST", "STOPPING")
-    """A stop, not shaped."""
+    """An unshaped stop."""
 
     def __init__(self, shaped: bool, guarded: bool, *followed_by: str) -> None:
         self.at_rest = self.name == "REST"
-        """Whether the shaped reference rests."""
         self.shaped = shaped
-        """Whether references go through the filter; else they are the shaped ones, and its delay line is dropped."""
+        """Whether references pass the filter; otherwise they are played as they are, and the delay line is dropped."""
         self.guarded = guarded
-        """Whether each shaped reference is played only if the arm could still stop from it without a collision."""
+        """Whether a shaped reference is played only if a collision-free stop exists from it."""
         self.followed_by = followed_by
-        """Names of the modes that may begin while it lasts."""
 
 
 def check_change(before: LineMode, after: LineMode, *, guarded: bool) -> None:
-    """Check that a mode may follow another one.
-
-    Raises:
-        ValueError: The table does not have this change, or the mode needs a guard.
-    """
+    """Raise ValueError if the table lacks this change, or the mode needs a guard and has none."""
     if after.name not in before.followed_by:
         raise ValueError(f"the line cannot change from {before.name} to {after.name}")
     if after.guarded and not guarded:

@@ -1,7 +1,4 @@
-"""Figure 6 of the paper from the shaped reference to the drives' commands, in one compiled function.
-
-The boxes are in their own modules; called one by one from Python, they would take three times as long.
-"""
+"""Figure 6 of the paper from shaped reference to drive commands, as one kernel for speed."""
 
 import numpy as np
 
@@ -12,9 +9,8 @@ from tvist_plant.chain import collect_gravity, torques
 from tvist_plant.plant import GRAVITY
 
 REFERENCE, Q, QD, QDD, TORQUE, STATIC, Q_R, QD_R, TORQUE_FF, SIGNALS = range(10)
-"""Rows of the signals of a tick: the newest reference q, the target q*, q̇* and q̈* with its torque τ*, the part of τ*
-that balances gravity, and the command q_r, q̇_r and τ_ff; their number.
-"""
+"""Rows of a tick's signals, and their number: newest reference q; target q*, q̇*, q̈* with torque τ*; the
+part of τ* that balances gravity; command q_r, q̇_r, τ_ff."""
 
 
 @compiled_for_ticks
@@ -29,7 +25,7 @@ def to_drives(
     joints: Floats,  # parameters of the joint controllers, shape (19, n); wind-up and stiction are changed
     signals: Floats,  # result, shape (9, n), see `SIGNALS`
 ) -> None:
-    """Compute the drives' commands for the middle one of three shaped references."""
+    """Compute the drive commands for the middle of three shaped references."""
     rates, torque, static = signals[QD:TORQUE], signals[TORQUE], signals[STATIC]
     for j in range(middle.shape[0]):
         signals[REFERENCE, j], signals[Q, j] = reference[j], middle[j]
@@ -50,7 +46,7 @@ def all_to_drives(
     targets: Floats,  # result: q*, q̇* and q̈*, shape (T, 3, n)
     commands: Floats,  # result: q_r, q̇_r and τ_ff, shape (T, 3, n)
 ) -> None:
-    """Compute the drives' commands for many ticks, one by one as `to_drives` does, from rest."""
+    """Compute the drive commands of many ticks from rest, as `to_drives` does."""
     n = start.shape[0]
     signals = np.empty((SIGNALS, n))
     before, middle = start, start

@@ -1,4 +1,4 @@
-"""What the control line computes in a tick."""
+"""Signals of the control line in a tick."""
 
 from msgspec import Struct
 
@@ -15,40 +15,40 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     """Signals along the control line in one tick."""
 
     mode: LineMode
-    """What the line did."""
+    """Mode of the line."""
     reference: Floats
     """q before shaping, shape (n,) [rad]."""
     references: tuple[Floats, Floats, Floats]
     """The last three references before shaping, see `ShapedReference`."""
     window: tuple[Floats, Floats, Floats]
-    """The last three shaped references, the newest last, each of shape (n,) [rad]."""
+    """The last three shaped references, newest last, each of shape (n,) [rad]."""
     signals: Floats
     """All signals before the arm, shape (9, n), see `line_tick`."""
     command: DriveCommand
-    """What the drives receive."""
+    """Command to the drives."""
     measured: Measurement
     """Measurement of the arm."""
     motors: MotorReference | None = None
-    """Motion of the motors that elastic feed-forward asks for; None without it."""
+    """Motor motion of elastic feed-forward; None without it."""
     refused: Obstacle | None = None
-    """Why a reference was not played, so that a stop was made instead; None if it was played."""
+    """Reason for a stop instead of the reference; None if the reference was played."""
 
     external: Floats | None = None
-    """Force and torque that a sensor of the user's feels in place of the arm's own, see `wrench`; None without one."""
+    """Reading of a user's force sensor that replaces the arm's own, see `wrench`; None without one."""
 
     @property
     def wrench(self) -> Floats | None:
-        """Force and torque at the flange by the sensor that counts, shape (6,) [N, N m]; None without a sensor."""
+        """Force and torque at the flange from the sensor in use, shape (6,) [N, N m]; None without one."""
         return self.measured.wrench if self.external is None else self.external
 
     @property
     def target(self) -> Target:
-        """q* and its derivatives at the previous tick, since central differences cost one tick of delay."""
+        """q* and its derivatives at the previous tick, due to central differences."""
         return Target(self.signals[Q], self.signals[QD], self.signals[QDD])
 
     @property
     def unshaped(self) -> tuple[Floats, Floats, Floats] | None:
-        """The references before shaping around the tick of the target; None if they are the shaped ones to the bit."""
+        """Unshaped references around the target's tick; None if equal to the shaped ones to the bit."""
         references, shaped = self.references, self.window
         if references is shaped:
             return None

@@ -1,4 +1,4 @@
-"""The shaped reference: the filter's samples, the joint positions that they stand for, and their derivatives."""
+"""The shaped reference: filter samples, corresponding joint positions, and derivatives."""
 
 import copy
 from typing import Self
@@ -8,30 +8,27 @@ from tvist_shaping.base import Posture
 
 
 class ShapedReference:
-    """Converts samples of the filter into targets, from rest at joint positions.
-
-    Samples are joint positions, or the parameter of a path on which the joints have to stay.
-    """
+    """Converts filter samples (joint positions or a path's parameter) to targets, from rest."""
 
     def __init__(self, q: Floats, period: float) -> None:
         self._period = period
         self.joints = Differentiator(q, period)
-        """State of motion of the joints."""
+        """State of the joints."""
         self.reset(q)
 
     def reset(self, q: Floats) -> None:
-        """Restart at rest; from now on samples are joint positions."""
+        """Restart at rest with joint positions as samples."""
         self.joints.reset(q)
         self.references = self.joints.window
-        """The last three references before shaping, as `Differentiator.window`; since a bypass, the shaped ones."""
+        """The last three unshaped references, as `Differentiator.window`; during a bypass, the shaped ones."""
         self.enter(None, q)
 
     def enter(self, posture_of: Posture | None, sample: Floats) -> None:
-        """Accept samples of another kind, at rest now; the joints continue from their present position."""
+        """Accept samples of another kind, at rest; the joints keep their position."""
         self.posture_of = posture_of
-        """Converts samples to joint positions; None if they are joint positions."""
+        """Function from samples to joint positions; None if samples are joint positions."""
         self.along = self.joints if posture_of is None else Differentiator(sample, self._period)
-        """State of motion of the samples; without a path it is that of the joints."""
+        """State of the samples; without a path, of the joints."""
 
     @property
     def position(self) -> Floats:
@@ -40,14 +37,11 @@ class ShapedReference:
 
     @property
     def newest(self) -> Target:
-        """State of motion of the joints there, see `Differentiator.newest`."""
+        """State of the joints, see `Differentiator.newest`."""
         return self.joints.newest
 
     def take(self, x: Floats, x_star: Floats) -> Floats:
-        """Take the samples of this tick, and return the joint positions before shaping, shape (n,) [rad].
-
-        Without a filter, both samples are the same object.
-        """
+        """Take this tick's samples, equal objects without a filter; return the unshaped joint positions."""
         q, q_star, posture_of = x, x_star, self.posture_of
         if posture_of is not None:
             q = posture_of(x)
@@ -62,11 +56,11 @@ class ShapedReference:
         return q
 
     def posture(self, sample: Floats) -> Floats:
-        """Return the joint positions that a sample stands for, shape (n,) [rad]."""
+        """Return the joint positions of a sample, shape (n,) [rad]."""
         return sample if self.posture_of is None else self.posture_of(sample)
 
     def fork(self) -> Self:
-        """Return an independent copy of the present state."""
+        """Return an independent copy."""
         other = copy.copy(self)
         other.joints = self.joints.fork()
         other.along = other.joints if self.posture_of is None else self.along.fork()

@@ -1,7 +1,4 @@
-"""Whole motions in one go: since nothing on the line depends on the arm, each box computes all its ticks at once.
-
-The boxes are those of `ControlCycle`, and the results are equal to those of its ticks to the last bit.
-"""
+"""Whole motions at once, block by block, equal to `ControlCycle` to the last bit, since no block depends on the arm."""
 
 from dataclasses import dataclass
 
@@ -20,16 +17,16 @@ from tvist_shaping.base import Filter
 
 @dataclass(frozen=True)
 class Driven:
-    """What the drives get in T ticks."""
+    """Drive commands of T ticks."""
 
     rest: DriveCommand
-    """Command under which the arm rests before them."""
+    """Command for the arm at rest before them."""
     targets: Floats
     """q*, q̇* and q̈* of each tick, shape (T, 3, n) [rad, rad/s, rad/s^2]."""
     commands: Floats
     """Positions, velocities and torques of each command, shape (T, 3, n)."""
     delay: float
-    """Time by which commands are later than their targets [s]."""
+    """Delay of commands behind their targets [s]."""
 
 
 class Still(SimulatedArm):
@@ -58,7 +55,7 @@ class DrivenLine:
         passes: Filter that returns its input.
         start: Joint angles, shape (n,) [rad].
         declared: Declared payload.
-        law: Identified friction to feed forward, see `ControlCycle`.
+        law: Known friction to feed forward, see `ControlCycle`.
     """
 
     def __init__(
@@ -84,14 +81,14 @@ class DrivenLine:
         elastic: ElasticFeedForward | None = None,
         law: Floats | None = None,
     ) -> Driven:
-        """Compute what the drives get while a shaped reference runs, from rest.
+        """Compute the drive commands for a shaped reference, from rest.
 
         Args:
             start: Joint angles at rest, shape (n,) [rad].
             shaped: Shaped reference, shape (k, n) [rad].
             ticks: Number of ticks T.
             resting: Number of ticks before the first sample.
-            elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
+            elastic: Elastic feed-forward; None for the paper's.
             law: Friction to feed forward in this motion; None for that of the line.
         """
         cycle = self._cycle
@@ -121,7 +118,7 @@ class DrivenLine:
 
 
 def respond(plant: SimulatedArm, driven: Driven, seed: int) -> Response:
-    """Let a plant follow what its drives get, from rest.
+    """Move a plant with drive commands, from rest.
 
     Raises:
         PlantError: The state is no longer finite.

@@ -1,1 +1,1 @@
-"""What moves: activities, motions by number, streams, guided motions, and the state that they depend on."""
+"""Motion of the robot: activities, numbered motions, streams, guided motions, and their state."""

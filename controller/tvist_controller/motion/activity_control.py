@@ -1,7 +1,4 @@
-"""The robot's activities: motions by number, streams of set-points and stops.
-
-`tvist_protocol.transitions` defines which trigger leads to which activity; this module carries the transitions out.
-"""
+"""The robot's activities: carries out the transitions of `tvist_protocol.transitions`."""
 
 from collections import deque
 from typing import Unpack
@@ -37,13 +34,13 @@ from tvist_protocol.values import ResetMode
 from tvist_urscript import Script
 
 HISTORY = 1000
-"""Number of past postures that are kept: two seconds."""
+"""Number of past postures kept (2 s)."""
 STEADY = 250
-"""Ticks for which the target must be at rest before the arm counts as steady: 500 ms, as on UR's robots."""
+"""Ticks of rest after which the arm counts as steady (500 ms, as on UR robots)."""
 
 
 class MotionControl:
-    """Starts, monitors and ends motion on the control line. Each motion's number ends in either done or stopped."""
+    """Starts, monitors and ends motion on the control line; each numbered motion ends as done or stopped."""
 
     def __init__(
         self, cycle: ControlCycle, collisions: CollisionModel, emit: Emit, mode: ResetMode = "RUNNING"
@@ -51,27 +48,25 @@ class MotionControl:
         self.cycle = cycle
         self.collisions = collisions
         self.changed = True
-        """True if activity or modes may have changed since `RobotModes.update` looked them up."""
+        """Whether activity or modes may have changed since `RobotModes.update`."""
         self.activity = PUT[mode]
         self.safety = SafetySystem()
-        """The safety system."""
         self._emit = emit
         self.stopper = Stopper(cycle)
-        """Forecast and stops of the control line's motion."""
+        """Prediction and stops of the control line's motion."""
         self.ahead = RemainingMotion(cycle, self.stopper, collisions)
         """Collision check of that motion."""
         self.power = ArmPower.of(cycle.plant)
-        """Power of an arm that has one."""
+        """Power of a real arm; None for simulated arms."""
         self.motions = Motions(cycle, self.safety, emit)
-        """Motions by number, and their speed."""
         self.streams = Setpoints(cycle.description)
-        """The present stream of set-points, if there is one."""
+        """The present stream of set-points, if any."""
         self.tcp: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self.tool = Arm(cycle.description)
-        """Kinematics of that point, which threads share, so that another one replaces it."""
+        """Kinematics with that TCP; shared by threads, so replaced instead of changed."""
         self.past = deque[Floats](maxlen=HISTORY)
-        """Measured postures of the past ticks since the arm was placed, the newest last [rad]."""
+        """Measured postures since the arm was placed, newest last [rad]."""
         self._still = 0
 
     @property
@@ -81,12 +76,12 @@ class MotionControl:
 
     @activity.setter
     def activity(self, activity: Activity) -> None:
-        # What every tick asks is looked up once.
+        # Cache what every tick reads.
         self._activity, self._moving, self.robot_mode = activity, activity.moving, activity.robot_mode
         self.changed = True
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
-        """Set the tool centre point for the motions that begin from now on; see `tcp`."""
+        """Set the tool centre point for motions that start from now on; see `tcp`."""
         self.tcp, self.tool = offset, self.tool.with_tool(offset)
 
     @property
@@ -95,10 +90,7 @@ class MotionControl:
         return self.streams.stream is not None
 
     def snapshot(self, filter_now: FilterState, script: Script | None, time: float | None) -> Snapshot:
-        """The state that plans depend on: of a motion from rest, or of one that goes on from the running one.
-
-        The running motion stays as it is for a `time` [s]; None: the new one begins at rest.
-        """
+        """Return the state that plans depend on, from rest, or of a motion to be extended in `time` [s]."""
         cycle = self.cycle
         tvist = cycle.tvist
         now = Snapshot(
@@ -119,7 +111,7 @@ class MotionControl:
         move = self.motions.move
         if move is None or move.course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
             return replace(now, movable=False)
-        # Its time runs at full rate, whatever the rate of the running motion is.
+        # Its time rate is 1, independent of the running motion.
         return replace(
             now,
             movable=True,
@@ -131,31 +123,23 @@ class MotionControl:
         )
 
     def move(self, planned: PlannedMove) -> int:
-        """Start a motion that `check` permits, with a plan that holds for the present state; return its number."""
+        """Start a motion permitted by `check`, with a plan for the present state; return its number."""
         self.activity = Activity.MOVING
         return self.motions.begin(planned)
 
     def pause(self) -> None:
-        """Bring the motion to a standstill on its path; one that is about to end continues to its end.
-
-        Raises:
-            RefusalError: No motion is running.
-        """
+        """Pause the motion on its path, or let it end if it is about to; raise RefusalError if none runs."""
         self.go("pause")
         self.motions.hold()
 
     def resume(self) -> None:
-        """Resume a paused motion.
-
-        Raises:
-            RefusalError: No motion is paused.
-        """
+        """Resume a paused motion; raise RefusalError if none is paused."""
         self.go("resume")
         self.motions.release()
 
     @property
     def runtime(self) -> RuntimeState:
-        """Runtime state; a paused motion counts as pausing while it slows down."""
+        """Runtime state; a paused motion that still slows down is pausing."""
         if self.activity is Activity.PAUSED and self.motions.speed > 0.0 and not self.cycle.mode.at_rest:
             return RuntimeState.PAUSING
         return RUNTIME.get(self.activity, RuntimeState.STOPPED)
@@ -167,20 +151,16 @@ class MotionControl:
 
     @property
     def ready(self) -> bool:
-        """Whether the drives hold the arm; simulated arms are always ready."""
+        """Whether the drives hold the arm, as they always do with simulated arms."""
         return self.power is None or self.power.condition.ready
 
     def protect(self, why: str, code: Code | None = None) -> None:
-        """Make a protective stop; do nothing if the brakes hold the arm or its power is being switched off."""
+        """Make a protective stop, unless the brakes hold the arm or it is being powered off."""
         if after(self.activity, "protective_stop") is not None:
             self.end("protective_stop", why, code, kind="protective_stop")
 
     def check(self, trigger: str) -> Activity:
-        """Return the activity that a trigger leads to.
-
-        Raises:
-            RefusalError: The trigger is not allowed in the present activity.
-        """
+        """Return the activity that a trigger leads to, or raise RefusalError if it is not allowed now."""
         target = after(self.activity, trigger)
         if target is None:
             raise out_of_turn(trigger, self.activity)
@@ -192,15 +172,11 @@ class MotionControl:
         return target
 
     def go(self, trigger: str) -> None:
-        """Carry out the transition of a trigger that `check` accepts."""
+        """Carry out the transition of a trigger, if `check` permits."""
         self.activity = self.check(trigger)
 
     def follow(self, period: float, limits: MotionLimits, now: float) -> None:
-        """Start to follow set-points.
-
-        Raises:
-            RefusalError: The arm is busy, or the velocity limit is above that of reduced speed.
-        """
+        """Start to follow set-points; raise RefusalError if busy or above the reduced velocity limit."""
         target = self.check("servo_start")
         if (most := self.motions.slowest) is not None and limits.velocity > most:
             why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which allows {most:.3g}"
@@ -209,7 +185,7 @@ class MotionControl:
         self.streams.begin(self._stream(period, limits), now)
 
     def _stream(self, period: float, limits: MotionLimits) -> SetpointStream:
-        """Let the line follow set-points, which come every `period` seconds, from rest."""
+        """Make the line follow set-points with an interval of `period` seconds, from rest."""
         cycle = self.cycle
         cycle.tvist.aim(None)
         stream = SetpointStream(
@@ -223,11 +199,7 @@ class MotionControl:
         return cycle.begin(stream, LineMode.GUARDED, self.ahead.guard_of_stream())
 
     def end_stream(self) -> None:
-        """Bring the stream to rest through the filter.
-
-        Raises:
-            RefusalError: No stream is running.
-        """
+        """Bring the stream to rest through the filter; raise RefusalError if none runs."""
         stream = self.streams.stream
         if stream is None:
             raise out_of_turn("servo_stop", self.activity)
@@ -241,15 +213,11 @@ class MotionControl:
         self._end_stream("servo_stop")
 
     def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
-        """Stop without the filter, and report how the present motion ended.
-
-        The reason is given for people and as a code for programs. The deceleration is a limit [rad/s^2]; None
-        for what the torque permits.
-        """
+        """Stop without the filter at up to a deceleration [rad/s^2], and report how the motion ended."""
         self.end("stop", why, code, deceleration)
 
     def interrupt(self, why: str, code: Code | None = None) -> None:
-        """End motion that may not continue, in the same way as `stop`."""
+        """End motion that must not continue, as `stop`."""
         self.end("interruption", why, code)
 
     def end(
@@ -262,10 +230,7 @@ class MotionControl:
         kind: EventKind | None = None,
         category: int = 2,
     ) -> None:
-        """Carry out a trigger's transition, and stop any motion. Nothing happens if the trigger leads nowhere.
-
-        An event of the kind reports the stop; None for no event. The other arguments are those of `stop`.
-        """
+        """Carry out a trigger's transition, if any, and stop motion; an event of `kind` reports the stop."""
         target = after(self.activity, trigger)
         if target is None:
             return
@@ -287,7 +252,7 @@ class MotionControl:
         kind: EventKind | None = None,
         category: int = 2,
     ) -> None:
-        """Report a stop and what it has ended; `plan` is None if the line makes one already."""
+        """Report a stop and the motion it ended; `plan` is None if the line already stops."""
         if kind is None and not self.motions.running and not self.streaming:
             return
         duration, way = (0.0, 0.0) if self.cycle.mode.at_rest else self.ahead.until_rest(plan)
@@ -303,21 +268,17 @@ class MotionControl:
         self.motions.stopped(why, code)
 
     def watch(self, now: float) -> None:
-        """End a stream that is no longer fed."""
+        """End a stream without new set-points."""
         silence = self.streams.silence(now)
         if silence is not None:
             self.interrupt(silence)
 
     def step(self, wrench: Floats | None = None) -> Sample:
-        """Compute one tick of the line; takes what an external force sensor feels, see `Sample.external`.
-
-        Raises:
-            PlantError: The arm's state is no longer finite; call `recover`.
-        """
+        """Compute one tick of the line; see `ControlCycle.step`. After a PlantError, call `recover`."""
         if self.power is not None:
             self.power.follow(self.robot_mode)
         sample = self.cycle.step(wrench)
-        # The line has begun a stop by itself, in the tick in which its guard refused a reference.
+        # The guard refused a reference, so the line has begun a stop.
         interrupted = None if sample.refused is None else after(self.activity, "interruption")
         if sample.refused is not None and interrupted is not None:
             self.activity = interrupted
@@ -330,13 +291,13 @@ class MotionControl:
         return sample
 
     def note(self, sample: Sample) -> None:
-        """Remember a tick."""
+        """Record a tick."""
         self.past.append(sample.measured.q)
         self._still = self._still + 1 if self.cycle.mode.at_rest else 0
 
     @property
     def steady(self) -> bool:
-        """True if the target has rested for half a second since the arm was placed."""
+        """Whether the target has rested for half a second since the arm was placed."""
         return min(self._still, len(self.past)) >= STEADY
 
     def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:

@@ -1,4 +1,4 @@
-"""The power, brakes and condition of a plant that has them; simulated arms have none, and are always ready."""
+"""Power, brakes and condition of a real plant; simulated arms have none and are always ready."""
 
 from contextlib import suppress
 from typing import Self
@@ -9,26 +9,26 @@ from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, Plant, Plant
 from tvist_protocol.modes import RobotMode
 
 STALE = 10
-"""Number of ticks after which measurements whose time does not pass are stale."""
+"""Ticks without a new timestamp after which measurements are stale."""
 
 
 class ArmPower:
-    """Tells a plant what power and brakes it is to have, and the robot what the plant says of them."""
+    """Passes power and brake states to a plant, and its condition to the robot."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
         self.halted: Halt | None = None
-        """Why the arm's own controller has taken it, until it is to be held again."""
+        """Stop by the arm's own controller, until the drives are to hold the arm again."""
         self._told: RobotMode | None = None
         self._was_ready = False
         self.begun = False
-        """Whether the drives have begun to hold the arm with the last tick."""
+        """Whether the drives have started to hold the arm in the last tick."""
         self._measured: float | None = None
         self._same = 0
 
     @classmethod
     def of(cls, plant: Plant) -> Self | None:
-        """Return the power of a plant; None if it has none, and no clock, as simulated arms."""
+        """Return the power of a plant; None for a simulated arm without `switch` and `stop`."""
         needs_nothing = isinstance(plant, SimulatedArm) and not (
             plant.can(Plant.switch) or plant.can(Plant.stop)
         )
@@ -36,14 +36,14 @@ class ArmPower:
 
     @property
     def condition(self) -> Condition:
-        """Present condition of the plant; one that does not answer has a fault."""
+        """Present condition of the plant; a fault if it does not answer."""
         try:
             return self._plant.condition
         except PlantError as error:
             return Condition(ready=False, fault=str(error))
 
     def follow(self, mode: RobotMode) -> None:
-        """Switch power and brakes as the robot mode asks, if that has changed; none while others have the arm."""
+        """Switch power and brakes after a mode change; off while the arm's own controller has stopped it."""
         if self.halted is not None:
             mode = RobotMode.POWER_OFF
         if mode is self._told:
@@ -52,19 +52,19 @@ class ArmPower:
         self._plant.switch(power=mode >= RobotMode.POWER_ON, brakes=mode is not RobotMode.RUNNING)
 
     def stop(self) -> None:
-        """Let the plant make its own stop, if it has one."""
-        self._told = None  # by its own stop it has switched itself
+        """Make the plant stop itself, if it can."""
+        self._told = None  # the arm has switched itself by its own stop
         with suppress(PlantError):  # the robot stops in any case, and says why
             self._plant.stop()
 
     def end(self) -> None:
-        """Leave the arm without power, since nobody controls it any more."""
+        """Power the arm off because nobody controls it any more."""
         self.stop()
         with suppress(PlantError):
             self._plant.switch(power=False, brakes=True)
 
     def trouble(self, mode: RobotMode, measured: Measurement) -> str | None:
-        """Return why the robot cannot go on, in words; None if it can. To be called after every tick."""
+        """Return why the robot cannot continue, else None; call after every tick."""
         self.begun = False
         if not (np.isfinite(measured.q).all() and np.isfinite(measured.moment).all()):
             return "the arm has measured what is no number"

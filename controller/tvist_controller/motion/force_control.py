@@ -1,4 +1,4 @@
-"""Force mode and freedrive: guided motions that give way to the force at the tool, and what ends them."""
+"""Force mode and freedrive: guided motions that comply with the force at the tool, and their limits."""
 
 from collections.abc import Callable, Sequence
 from typing import Literal
@@ -19,37 +19,37 @@ from tvist_controller.trajectory.compliant import CRAWL, FREE_DAMPING
 from tvist_plant.plant import PERIOD
 
 Feature = tuple[float, ...] | Literal["base", "tool"]
-"""Pose of a frame in the base frame, x y z [m] and rotation vector [rad], or the frame of the base or of the tool."""
+"""Pose of a frame in the base frame, x y z [m] and rotation vector [rad], or the frame of base or tool."""
 NEAR = 1e-3
-"""Distance of the tool from the frame's origin, and speed, below which the axes stay as they are [m, m/s]."""
+"""Distance of the tool from the frame's origin, and speed, below which axes stay unchanged [m, m/s]."""
 SMOOTHED = 0.04
-"""Time constant of a wrench that is estimated from the drives' torques, which the arm's elasticity shakes [s]."""
+"""Time constant for a wrench estimated from drive torques, which the arm's elasticity disturbs [s]."""
 HAND_SPEED = np.repeat([0.5, 1.5], 3)
-"""Largest speed by hand [m/s, rad/s]."""
+"""Largest speed in freedrive [m/s, rad/s]."""
 LIGHT, HEAVY = (30.0, 150.0), (70.0, 700.0)
-"""Virtual mass [kg] and damping [N s/m] of freedrive, by a sensor and by an estimate, which the arm's elasticity shakes
-more: with the light ones a hand that presses it against something hard would begin an oscillation."""
+"""Virtual mass [kg] and damping [N s/m] of freedrive, with a sensor and with an estimate. Light values with
+the disturbed estimate would oscillate when a hand presses the arm against something hard."""
 MOST = 250.0
-"""Force at the tool above which a protective stop begins, as the widest limit of UR's robots [N]."""
+"""Force at the tool that causes a protective stop, the widest limit of UR robots [N]."""
 DRIVES = "the drives' torques"
-"""Source of the force if there is no sensor."""
+"""Source of the force without a sensor."""
 TICKS = 5
-"""Ticks for which a force or a deviation must last before it does."""
+"""Ticks for which a force or deviation must last to cause a stop."""
 TOUCH = 10.0, 4
-"""Force of a contact [N] and ticks whose mean must exceed it, if the flange has a sensor."""
+"""Force of a contact [N] and number of ticks averaged, with a flange sensor."""
 ESTIMATED_TOUCH = 20.0, 16
-"""The same if the force is estimated from the drives' torques, which a late set-point shakes for a few ticks."""
+"""The same for an estimated force, which a late set-point disturbs for a few ticks."""
 GENTLE = 1.0
-"""Deceleration of the fastest joint where force mode ends, the lowest of any stop [rad/s^2]."""
+"""Deceleration of the fastest joint at the end of force mode, the lowest of any stop [rad/s^2]."""
 
 
 class ForceControl(Monitor):
-    """Begins and ends force mode, and watches its limits; `timeouts` as in `ExternalSensor`."""
+    """Starts and ends force mode, and monitors its limits; `timeouts` as in `ExternalSensor`."""
 
     def __init__(self, guidance: Guidance, forces: ToolForces, *, timeouts: bool) -> None:
         self._guidance, self._forces = guidance, forces
         self.external = ExternalSensor(timeouts=timeouts)
-        """A force sensor of the user's own."""
+        """A user's own force sensor."""
         self._motion, self._cycle = guidance.motion, guidance.motion.cycle
         self._smooth = np.zeros(6)
         self._by_hand, self._beyond = False, 0
@@ -60,23 +60,20 @@ class ForceControl(Monitor):
 
     @property
     def by_hand(self) -> bool:
-        """Whether the arm can be moved by hand."""
+        """Whether the arm is in freedrive."""
         return self._by_hand and self._guidance.compliant is not None
 
     @property
     def hindrance(self) -> int:
-        """0 if the arm can be moved by hand freely, 1 near a singular posture, 2 if that hardly lets it move."""
+        """Freedrive: 0 if free, 1 near a singular posture, 2 if that nearly blocks the arm."""
         share = 1.0 if not self.by_hand or (lead := self._guidance.compliant) is None else lead.hindered
         return 0 if share == 1.0 else 1 if share > CRAWL else 2
 
     def begin(self, task: ForceTask, feature: Feature, kind: int, trigger: str = "force_mode") -> int:
-        """Control the force at the tool from now on, and return the motion's number; what moves goes on in other axes.
+        """Start or change force control with trigger `force_mode` or `freedrive`; return the motion's number.
 
-        The feature is the frame of the task; the kind is 1 to 3, see `frame_of`. The trigger is `force_mode`,
-        or `freedrive`, in which the arm is moved by hand.
-
-        Raises:
-            RefusalError: The present activity does not allow it, or its motion cannot be taken over.
+        A running guided motion continues in the other axes. `feature` is the task's frame, `kind` 1 to 3 as
+        in `frame_of`. Raise RefusalError if the activity or its motion does not allow it.
         """
         if self._cycle.plant.supervised:
             why = "this arm follows positions with a lag, and its force is a guess: forces cannot move it"
@@ -90,42 +87,35 @@ class ForceControl(Monitor):
         return self._guidance.follow(trigger, lead)
 
     def free(self, axes: Floats, feature: Feature) -> int:
-        """Let the arm be moved by hand along and about some axes, shape (6,), each 0 or 1; else as `begin`."""
+        """Start freedrive along and about the axes that are 1, shape (6,); else as `begin`."""
         mass, damping = HEAVY if self._cycle.sample.wrench is None else LIGHT
         speeds = np.where(axes > 0.0, HAND_SPEED, np.inf)
         task = ForceTask(axes, np.zeros(6), speeds, (damping / FREE_DAMPING) ** 4, 1.0, mass, damping)
         return self.begin(task, feature, 2, "freedrive")
 
     def end(self) -> None:
-        """Come to rest where the arm is, if force mode is on; a motion in the other axes ends, too."""
+        """End force mode, if on, and any motion in the other axes; come to rest."""
         if self._guidance.compliant is not None:
             self._guidance.stop_joints(GENTLE, "end_force_mode")
 
     def check_sensor(self) -> None:
-        """Refuse what needs the force at the tool while a sensor of the user's own has not told it.
-
-        Raises:
-            RefusalError: It has told nothing yet, or nothing for too long.
-        """
+        """Raise RefusalError if an external force sensor in use has sent nothing (yet, or for too long)."""
         if self.external.awaited:
             why = "the external force sensor has told nothing yet: send its values, every 100 ms at least"
             raise RefusalError("wrong_mode", "", why)
 
     def sensed(self) -> Floats | None:
-        """Return what the user's own sensor feels in the next tick; needed in each while it has a latest value."""
+        """Return the external sensor's reading for the next tick; call each tick while it has values."""
         self.awake = True
         return self.external.next()
 
     def begin_anew(self) -> None:
-        """Use the arm's own sensor, and take nothing as zero, since the arm was placed somewhere."""
+        """Use the arm's own sensor without zero, because the arm was placed elsewhere."""
         self.external.use(None)
         self._forces.forget_zero()
 
     def touched(self, direction: Sequence[float]) -> int:
-        """Return the number of ticks since just before the tool touched something; 0 if it does not.
-
-        The direction is that in which it meets that, in the base frame, shape (3,); zeros for any.
-        """
+        """Return the ticks since just before a contact in a direction (base frame, zeros: any), 0 if none."""
         estimated = self._cycle.sample.wrench is None
         if self._contact is None:
             self._contact, self.awake = ContactWatch(), True
@@ -146,7 +136,6 @@ class ForceControl(Monitor):
         )  # fmt: skip
 
     def _felt(self) -> Floats:
-        """Force and torque of the last tick."""
         sample = self._cycle.sample
         found = self._forces.felt(sample)
         if sample.wrench is None:
@@ -155,8 +144,8 @@ class ForceControl(Monitor):
         return found
 
     def look(self, sample: Sample) -> Finding | None:
-        """Find an arm that presses too hard, or leaves its way in an axis that does not give way."""
-        # Most arms have no sensor, and give way seldom: it then sleeps until something else is asked of it.
+        """Detect excessive force, and deviation in an axis that is not compliant."""
+        # Without sensor and compliance there is nothing to monitor: sleep.
         leads = isinstance(self._cycle.trajectory, Compliant)
         if sample.wrench is None and self._contact is None and self._source == DRIVES and not leads:
             self._beyond, self.awake = 0, False
@@ -172,7 +161,7 @@ class ForceControl(Monitor):
         ]
         if self._contact is not None:
             self._note_contact(self._contact, sample, pressed)
-        # NumPy's maximum, unlike Python's, is NaN if one of them is.
+        # NumPy's maximum propagates NaN, unlike Python's.
         force = float(np.max([np.linalg.norm(one) for one in pressed])) if pressed else 0.0
         why = self._excess(sample, force)
         self._beyond = 0 if why is None else self._beyond + 1
@@ -182,7 +171,7 @@ class ForceControl(Monitor):
         return Finding(why, "limit_force", "protective_stop")
 
     def _note_contact(self, contact: ContactWatch, sample: Sample, pressed: Sequence[Floats]) -> None:
-        """Tell the present watch of contacts the force; it begins anew where forces jump."""
+        """Pass the force to the contact watch, which restarts if the force's reference changes."""
         basis = self._forces.basis
         if basis != self._basis:
             self._basis, self._contact = basis, None
@@ -198,7 +187,7 @@ class ForceControl(Monitor):
         return DRIVES if sample.wrench is None else "the arm's force sensor"
 
     def _follow_source(self, source: str) -> Finding | None:
-        """End what relies on the force if it comes from elsewhere; what was taken as zero then means nothing."""
+        """End force control if the source of the force changes, which makes the zero meaningless."""
         if source == self._source:
             return None
         self._source, self._contact = source, None
@@ -229,13 +218,10 @@ class ForceControl(Monitor):
 
 
 def frame_of(feature: Feature, kind: int) -> Callable[[tuple[Floats, Floats], Floats], Floats]:
-    """Return the function that gives the axes of a task, as columns in the base frame, shape (3, 3).
+    """Return a function from tool pose (R, p) and velocity (3,) [m/s] to a task's axes, columns (3, 3).
 
-    Its arguments are the tool's pose, as rotation matrix and position, and its velocity, shape (3,) [m/s].
-
-    With kind 2 the axes stay as the frame's. With 1, the frame is turned so that its y axis points from the
-    tool to the frame's origin; with 3, so that its x axis is the tool's velocity projected into its x-y
-    plane.
+    With kind 2 the axes are the frame's. With 1, its y axis is turned to point from the tool to the frame's
+    origin; with 3, its x axis is the tool's velocity projected into its x-y plane.
     """
     if feature == "tool":
         return lambda pose, _: pose[0]
@@ -259,7 +245,7 @@ def frame_of(feature: Feature, kind: int) -> Callable[[tuple[Floats, Floats], Fl
 
 
 def _turned_to(axes: Floats, axis: int, direction: Floats) -> Floats:
-    """Axes, of which one is turned into a direction by the shortest way."""
+    """Turn one axis of a frame into a direction by the shortest rotation."""
     length = np.linalg.norm(direction)
     if length < NEAR:
         return axes

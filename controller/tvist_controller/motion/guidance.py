@@ -1,4 +1,4 @@
-"""Motions that a client guides by commands, each of which replaces the one before: `servo_j`, `speed_j`, `speed_l`."""
+"""Guided motions, each command of which replaces the one before: `servo_j`, `speed_j`, `speed_l`."""
 
 from typing import TypeVar
 
@@ -19,26 +19,24 @@ G = TypeVar("G", bound=Guided)
 
 
 class Guidance:
-    """Starts guided motions, from rest or from a motion that is taken over, and brings them to rest.
+    """Starts guided motions, from rest or by taking over a motion, and stops them.
 
-    They are not shaped, unless the first command asks for it at rest. One that is not shaped starts from the state of
-    the newest shaped reference, whatever moves. A successor continues from the reference of the command before it.
+    They are unshaped unless the first command requests shaping at rest. An unshaped one starts from the
+    newest shaped reference of any motion. Further commands continue from the reference of the previous one.
     """
 
     def __init__(self, motion: MotionControl) -> None:
         self.motion = motion
-        """The robot's motion."""
         self._cycle = motion.cycle
         self.limits = arm_limits(motion.cycle.description)
-        """Limits of every joint."""
         self.reach = np.array(motion.cycle.description.limits.position)
-        """Largest position of each joint in either direction, shape (n,) [rad]."""
+        """Position limit of each joint, shape (n,) [rad]."""
         self.torque = TorqueRoom(motion.cycle.description, motion.cycle.dynamics, REBOUND)
-        """Motion that the torque permits."""
+        """Accelerations that torque permits."""
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Compile what a motion of the tool uses, or load it from disk, before a tick needs it."""
+        """Compile or load the kernels of a tool motion before a tick needs them."""
         q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self.motion.tool
         speed = Speed((q, still, still), self.limits, self.torque, PERIOD, arm=arm)
         speed.aim(arm.jacobian(q)[:, 0] * 1e-3, 1.0, 1.0)
@@ -47,11 +45,7 @@ class Guidance:
         arm.near((turned(rotation, turn(rotation, rotation)), position), q)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:
-        """Follow a posture, see `Servo`; return the motion's number.
-
-        Raises:
-            RefusalError: The present activity does not allow it, or its motion cannot be taken over.
-        """
+        """Follow a posture, see `Servo`, and return the motion's number; RefusalError as in `check`."""
         self.check("servo_j", shaped=shaped)
         servo = self._present(Servo, shaped) or Servo(
             self._start(shaped), self._most(shaped), self.reach, self.torque, PERIOD
@@ -60,11 +54,7 @@ class Guidance:
         return self.follow("servo_j", servo, shaped=shaped)
 
     def move_joints(self, qd: Floats, acceleration: float, *, shaped: bool) -> int:
-        """Approach velocities of the joints, see `Speed`; return the motion's number.
-
-        Raises:
-            RefusalError: See `servo`.
-        """
+        """Approach joint velocities, see `Speed`; return the motion's number. RefusalError as in `check`."""
         self.check("speed_j", shaped=shaped)
         if shaped:
             most = self._most(shaped).velocity
@@ -74,11 +64,7 @@ class Guidance:
     def move_tool(
         self, twist: Floats, acceleration: float, angular_acceleration: float, *, shaped: bool
     ) -> int:
-        """Approach a velocity of the tool, see `Speed`; return the motion's number.
-
-        Raises:
-            RefusalError: See `servo`.
-        """
+        """Approach a tool velocity, see `Speed`; return the motion's number. RefusalError as in `check`."""
         self.check("speed_l", shaped=shaped)
         accelerations = (acceleration, angular_acceleration)
         return self._approach("speed_l", self.motion.tool, twist, accelerations, shaped=shaped)
@@ -94,10 +80,7 @@ class Guidance:
         return self.follow(trigger, speed, shaped=shaped)
 
     def stop_joints(self, acceleration: float | None, trigger: str = "stop_j") -> None:
-        """Come to rest with a deceleration of the fastest joint [rad/s^2]; None for what the torque permits.
-
-        A guided motion brakes with all joints in phase.
-        """
+        """Come to rest, all joints in phase, at a deceleration [rad/s^2]; None for what torque permits."""
         motion = self.motion
         if motion.activity is not Activity.GUIDED or acceleration is None:
             motion.end(trigger, f"{trigger} was commanded", deceleration=acceleration)
@@ -108,11 +91,7 @@ class Guidance:
         self._halt(trigger, stop, stop.duration)
 
     def stop_tool(self, acceleration: float, angular_acceleration: float) -> None:
-        """Come to rest with a deceleration of the tool [m/s^2, rad/s^2].
-
-        It goes on straight if `speed_l` moves it. Other motions brake with the deceleration of the joints that
-        corresponds to it at their present velocities.
-        """
+        """Come to rest with a deceleration of the tool, straight if `speed_l` moves it [m/s^2, rad/s^2]."""
         cycle = self._cycle
         state, present, tool = cycle.newest, cycle.trajectory, self.motion.tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
@@ -133,79 +112,76 @@ class Guidance:
         self._halt("stop_l", stop, stop.duration)
 
     def _most(self, shaped: bool) -> MotionLimits:
-        """Limits of a reference."""
         return self._cycle.filter.spared(self.limits) if shaped else self.limits
 
     def check(self, trigger: str, *, shaped: bool = False) -> None:
-        """Refuse a command that the present activity does not allow."""
+        """Raise RefusalError if the present activity does not allow a command."""
         self.motion.check(trigger)
         if shaped and self.motion.activity is not Activity.REST and not self._continues(shaped):
             why = "shaped is true; it must be false, since this motion does not begin at rest"
             raise RefusalError("busy", "shaped", why)
 
     def _continues(self, shaped: bool) -> bool:
-        """Return whether a command continues the reference of the one before."""
+        """Return whether a command continues the previous one's reference."""
         return self.motion.activity is Activity.GUIDED and shaped == self._cycle.mode.shaped
 
     def _present(self, kind: type[G], shaped: bool) -> G | None:
-        """Return the present trajectory, if it is of this kind and continues."""
         present = self.guided
         return present if self._continues(shaped) and isinstance(present, kind) else None
 
     @property
     def compliant(self) -> Compliant | None:
-        """The present motion that gives way to forces; None without one."""
+        """The present force-compliant motion; None without one."""
         present = self._cycle.trajectory
         guided = self.motion.activity is Activity.GUIDED
         return present if guided and isinstance(present, Compliant) else None
 
     @property
     def guided(self) -> Guided | None:
-        """The present guided motion, which is the inner one of a motion that gives way; None if none can go on."""
+        """The present guided motion, inside a compliant one if any; None if none can continue."""
         lead = self.compliant
         found = self._cycle.trajectory if lead is None else lead.inner
         return found if self.motion.activity is Activity.GUIDED and isinstance(found, Guided) else None
 
     @property
     def reference(self) -> Floats:
-        """Position from which the next motion leads on, shape (n,) [rad]: that without what gave way to forces."""
+        """Position from which the next motion starts, without compliance, shape (n,) [rad]."""
         return self._cycle.sample.reference if self.compliant is None else self.compliant.nominal
 
     @property
     def resting(self) -> bool:
-        """Whether nothing moves, but for what gives way to forces."""
+        """Whether nothing moves except by compliance."""
         lead = self.compliant
         return not self.motion.activity.moving if lead is None else lead.inner.finished
 
     @property
     def state(self) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the present reference, from which one that is not shaped begins."""
+        """Position, velocity and acceleration of the present reference, where an unshaped one starts."""
         return self._start(shaped=False) if self.compliant is None else self.compliant.state
 
     def stand(self, deceleration: float) -> None:
-        """Come to rest in the axes that do not give way to forces [rad/s^2]."""
+        """Come to rest in the non-compliant axes, at a deceleration [rad/s^2]."""
         lead = self.compliant
         if lead is None or lead.inner.finished:
             return
         lead.take(self.halting(self._start(shaped=False), deceleration))
 
     def halting(self, state: tuple[Floats, Floats, Floats], deceleration: float) -> Speed:
-        """Return a trajectory that comes to rest from a state of motion with a deceleration [rad/s^2]."""
+        """Return a trajectory from a state to rest with a deceleration [rad/s^2]."""
         stop = Speed(state, self.limits, self.torque, PERIOD)
         stop.aim(np.zeros_like(state[0]), deceleration)
         return stop
 
     def slow_down(self) -> None:
-        """Let a commanded velocity end until the next command; a commanded posture is one where the arm may stay."""
+        """End a commanded velocity until the next command; a commanded posture may stay."""
         if isinstance(present := self.guided, Speed):
             present.come_to_rest()
 
     def _start(self, shaped: bool) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration from which a trajectory begins."""
         cycle, lead = self._cycle, self.compliant
         if self._continues(shaped) and (present := self.guided) is not None:
             return present.state
-        if lead is not None:  # its inner reference stands
+        if lead is not None:  # its inner reference is at rest
             return lead.nominal, np.zeros_like(lead.nominal), np.zeros_like(lead.nominal)
         if cycle.mode.at_rest:
             q = cycle.sample.reference if shaped else cycle.position
@@ -214,7 +190,7 @@ class Guidance:
         return newest.q, newest.qd, newest.qdd
 
     def follow(self, trigger: str, trajectory: Guided, *, shaped: bool = False) -> int:
-        """Carry out the transition, or let a motion that gives way take it in its other axes; return its number."""
+        """Start a trajectory, in the other axes of a compliant motion if any; return the motion's number."""
         motion, cycle, guard, lead = self.motion, self._cycle, None, self.compliant
         if lead is not None and trajectory is not lead:
             lead.take(trajectory)
@@ -233,7 +209,7 @@ class Guidance:
         return motion.motions.guide(trajectory)
 
     def _halt(self, trigger: str, stop: Guided, duration: float) -> None:
-        """End the guided motion by a trajectory that comes to rest in some time [s]."""
+        """End the guided motion by a trajectory that comes to rest after `duration` [s]."""
         motion, fastest = self.motion, float(np.abs(stop.state[1]).max())
         self._cycle.begin(stop, LineMode.BYPASSED)
         motion.go(trigger)

@@ -1,4 +1,4 @@
-"""The one interface of all that judges the signals of a tick, and what it finds."""
+"""Interface of all monitors of a tick's signals."""
 
 from abc import ABC, abstractmethod
 from typing import ClassVar, Literal, NamedTuple
@@ -8,28 +8,28 @@ from tvist_protocol.replies import Code
 
 
 class Finding(NamedTuple):
-    """What a monitor has found, and what it leads to."""
+    """A monitor's finding and its consequence."""
 
     why: str
-    """The reason, for people."""
+    """Reason for users."""
     code: Code | None = None
-    """The reason, for programs."""
+    """Reason for programs."""
     then: Literal["warning", "interruption", "protective_stop"] = "warning"
-    """A warning, the end of the present motion or stream, or a protective stop."""
+    """Warn, end the present motion or stream, or make a protective stop."""
 
 
 class Monitor(ABC):
-    """Judges the signals of a tick after the tick; `SafetyControl` has the list of all monitors of a robot."""
+    """Checks the signals of each tick afterwards; `SafetyControl` has a robot's list of monitors."""
 
     needs: ClassVar[Literal["nothing", "drives", "drives alone"]] = "nothing"
-    """When it looks: in every tick, while the drives hold the arm, or while no motion gives way to forces either."""
+    """Run every tick, only while the drives hold the arm, or only if also no motion is compliant."""
 
     awake = True
-    """False to skip ticks in which the arm measures no force."""
+    """False to skip ticks without a measured force."""
 
     @abstractmethod
     def look(self, sample: Sample) -> Finding | None:
-        """Return what the latest tick has shown; None if all is well."""
+        """Return a finding about the latest tick, else None."""
 
     def restart(self) -> None:  # noqa: B027  most have no memory
-        """Forget what was before: the arm was placed elsewhere, or the drives have begun to hold it."""
+        """Forget earlier ticks: the arm was placed elsewhere, or the drives have started to hold it."""

@@ -1,4 +1,4 @@
-"""Motions by number; the parts, rate and pause of a planned one in progress."""
+"""Numbered motions; parts, rate and pause of a planned motion in progress."""
 
 import math
 from typing import Protocol, Unpack
@@ -15,20 +15,20 @@ from tvist_controller.trajectory import Guided, PlannedMotion
 from tvist_protocol.replies import Code
 
 PAUSE_SHARE = 0.95
-"""Share of the acceleration permitted by the torque that a pause uses, since the filter may add a little [-]."""
+"""Fraction of the acceleration allowed by torque that a pause uses; the filter may add a little [-]."""
 LEAST_PAUSE = 0.2
-"""Smallest share of a motion's acceleration that the torque must permit for a pause; else the motion runs on [-]."""
+"""Smallest fraction of a motion's acceleration that torque must allow for a pause; otherwise it runs on [-]."""
 
 
 class RunningMotion(Protocol):
-    """A motion in progress, whose speed can be changed."""
+    """A motion in progress with adjustable speed."""
 
     @property
     def rate(self) -> float:
-        """Rate of its time [-]."""
+        """Time rate [-]."""
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Change its speed [-]; `slowest` is the velocity limit of reduced speed [rad/s], None without."""
+        """Change the speed [-]; `slowest` is the velocity limit of reduced mode [rad/s], None if inactive."""
 
 
 class RunningMove:
@@ -40,15 +40,15 @@ class RunningMove:
         self._room, self._surplus = planned.room, planned.surplus
         self._held = False
         self.course = planned.course
-        """What its last part may go on from; None if it cannot."""
+        """State from which its last part can be extended; None if it cannot."""
         self._parts = len(planned.parts)
         self._trajectory, *coming = planned.parts
         self.coming: tuple[PlannedMotion, ...] = tuple(coming)
-        """Parts that have not begun."""
+        """Parts that have not started."""
         self._begin()
 
     def go_on(self, speed: float, slowest: float | None) -> None:
-        """Begin the next part; see `RunningMotion` for the arguments."""
+        """Start the next part; arguments as in `RunningMotion`."""
         self._trajectory, *coming = self.coming
         self.coming, self._held = tuple(coming), False
         self._trajectory.speed = self._rate(speed, slowest)
@@ -56,14 +56,11 @@ class RunningMove:
 
     @property
     def passed(self) -> float:
-        """Time of its last part, 0 before that begins [s]."""
+        """Time spent in the last part; 0 before it [s]."""
         return 0.0 if self.coming else self._trajectory.time
 
     def extend(self, planned: PlannedMove, speed: float, slowest: float | None) -> None:
-        """Go on to further parts of the path; speeds as in `RunningMotion`.
-
-        The first part of their plan is the last one so far, which is the same until now and some ticks more.
-        """
+        """Continue to further parts of the path; the plan's first part equals the last one for some ticks."""
         longer, *coming = planned.parts
         if self.coming:
             self.coming = (*self.coming[:-1], longer, *coming)
@@ -81,7 +78,7 @@ class RunningMove:
         self._cycle.tvist.aim(self._trajectory.path.end)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
-        """Rate of its time [-]: lower if it was planned for a shaper that is less slow, peaked or uneven."""
+        """Return the time rate [-], lower if planned for a shaper with less delay, peak or surplus."""
         tvist = self._cycle.tvist
         room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
         if tvist.surplus != self._surplus:
@@ -93,33 +90,33 @@ class RunningMove:
 
     @property
     def progress(self) -> tuple[int, float] | None:
-        """Number of its present part, from 0, and the length covered on it [m]; None on a part without length."""
+        """Number of the present part, from 0, and length covered on it [m]; None on a part without length."""
         if self._trajectory.path.posture_of is None:
             return None
         return self._parts - 1 - len(self.coming), float(self._cycle.along.newest.q[0])
 
     @property
     def stops_at(self) -> tuple[int, float] | None:
-        """Progress at which a stop that has begun ends; None if no stop on the path has begun."""
+        """Progress at the end of a stop in progress on the path; None without one."""
         forecast, present = self._cycle.trajectory.forecast, self.progress
         if present is None or forecast is None or forecast.path is not self._trajectory.path:
             return None
         if self._held and self._cycle.trajectory is self._trajectory:
-            return present  # it is paused, and does not go on to its end
+            return present  # paused: it does not continue to its end
         return present[0], float(forecast.end[0])
 
     @property
     def rate(self) -> float:
-        """Rate of its time [-]."""
+        """Time rate [-]."""
         return self._trajectory.rate
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Change the rate, unless the motion is paused; see `RunningMotion`."""
+        """Change the rate unless paused; see `RunningMotion`."""
         if not self._held:
             self._trajectory.speed = self._rate(speed, slowest)
 
     def hold(self) -> None:
-        """Slow down to a standstill within the torque limits, if that takes less time; see `PlannedMotion.hold`."""
+        """Pause within torque limits unless the motion ends sooner; see `PlannedMotion.hold`."""
         if self._held or self._cycle.mode.at_rest:  # at rest, it is between two parts
             return
         trajectory, cycle = self._trajectory, self._cycle
@@ -133,7 +130,7 @@ class RunningMove:
         room = PAUSE_SHARE * acceleration_on_way(
             cycle.dynamics, trajectory.path, newest.q, way, speed, limits
         )
-        if not trajectory.steady:  # the slider is changing its speed already, and may use all
+        if not trajectory.steady:  # the slider is already changing its speed, possibly at full acceleration
             room = most
         self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
 
@@ -145,7 +142,7 @@ class RunningMove:
 
 
 class Motions:
-    """Starts motions, one at a time; each number ends in either done or stopped."""
+    """Starts one motion at a time; each number ends as done or stopped."""
 
     def __init__(self, cycle: ControlCycle, safety: SafetySystem, emit: Emit) -> None:
         self._cycle, self._safety, self._emit = cycle, safety, emit
@@ -153,7 +150,7 @@ class Motions:
         self._started = 0
         self._running: RunningMotion | None = None
         self.asked_speed = 1.0
-        """Speed that was set [-]."""
+        """Set speed [-]."""
         self._scale = 1.0
 
     @property
@@ -163,17 +160,17 @@ class Motions:
 
     @property
     def wanted_speed(self) -> float:
-        """Speed that was set, as far as the robot's own slider lets it [-]."""
+        """Set speed times the robot's own slider [-]."""
         return self.asked_speed * self._scale
 
     @property
     def speed(self) -> float:
-        """Rate of the running motion's time; without one, that of the next motion [-]."""
+        """Time rate of the running motion, or of the next one [-]."""
         return self.wanted_speed if self._running is None else self._running.rate
 
     @property
     def slowest(self) -> float | None:
-        """Largest velocity of a joint while the safety system reduces the speed [rad/s]; None while it does not."""
+        """Joint velocity limit in reduced mode, else None [rad/s]."""
         return self._reduced_velocity if self._safety.reduced else None
 
     def begin(self, planned: PlannedMove) -> int:
@@ -183,7 +180,7 @@ class Motions:
         return number
 
     def extend(self, planned: PlannedMove) -> None:
-        """Let the running motion go on to further parts of its path; the plan holds for the present state."""
+        """Extend the running motion to further parts of its path, with a plan for the present state."""
         assert self.move is not None
         self.move.extend(planned, self.wanted_speed, self.slowest)
         self._warn(planned)
@@ -196,7 +193,7 @@ class Motions:
             self._emit("warning", id=self._started, code=code, why=why)
 
     def guide(self, trajectory: Guided) -> int:
-        """Return the number of a guided motion, which is that of its predecessor if there is one."""
+        """Return the number of a guided motion, which is its predecessor's, if any."""
         trajectory.pace(self.wanted_speed, self.slowest)
         if self._running is None:
             return self._begin(trajectory)
@@ -210,7 +207,7 @@ class Motions:
         return self._started
 
     def go_on(self) -> bool:
-        """Start the next part of the running motion, since one has come to rest; return whether there was one."""
+        """Start the next part of the running motion when one has come to rest; return False without one."""
         move = self.move
         if move is None or not move.coming:
             return False
@@ -219,26 +216,26 @@ class Motions:
 
     @property
     def move(self) -> RunningMove | None:
-        """The running motion, if it is a planned one."""
+        """The running planned motion, if any."""
         return self._running if isinstance(self._running, RunningMove) else None
 
     def set_speed(self, fraction: float) -> None:
-        """Scale the time of the running motion and of later ones."""
+        """Set the time scale of running and later motions."""
         self.asked_speed = fraction
         self.keep_rate()
 
     def scale(self, share: float) -> None:
-        """Scale that speed, too, by the slider of a robot that is moved through its own controller [-]."""
+        """Scale the speed by the slider of a robot moved through its own controller [-]."""
         self._scale = share
         self.keep_rate()
 
     def keep_rate(self) -> None:
-        """Let the running motion continue at the rate that is set and allowed."""
+        """Update the running motion to the set and allowed rate."""
         if self._running is not None:
             self._running.pace(self.wanted_speed, self.slowest)
 
     def hold(self) -> None:
-        """Bring a planned motion to a standstill on its path."""
+        """Pause a planned motion on its path."""
         if self.move is not None:
             self.move.hold()
 
@@ -248,7 +245,7 @@ class Motions:
             self.move.release(self.wanted_speed, self.slowest)
 
     def done(self) -> None:
-        """Report that the shaped reference has come to rest at the motion's target."""
+        """Report that the shaped reference rests at the target."""
         if self._running is not None:
             self._emit("motion_done", id=self._started)
             self._running = None
@@ -261,5 +258,5 @@ class Motions:
 
 
 def _fitting(planned: float, present: float) -> float:
-    """Rate at which a property of the shaper is no larger than planned [-]."""
+    """Return the rate at which a shaper property is no larger than planned [-]."""
     return 1.0 if present <= planned else planned / present

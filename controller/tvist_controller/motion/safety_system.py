@@ -1,4 +1,4 @@
-"""State of the safety system, and the activities of an arm at rest."""
+"""State of the safety system, and activities of an arm at rest."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -19,30 +19,30 @@ _LATCHED = {"violation": SafetyMode.VIOLATION, "fault": SafetyMode.FAULT}
 _MOTION = frozenset(
     row.trigger for row in TRANSITIONS if row.target in {Activity.MOVING, Activity.STREAMING, Activity.GUIDED}
 )
-"""Triggers that let the arm move: the table of transitions says where each leads."""
+"""Triggers that start motion, from the table of transitions."""
 _LIVE = _MOTION | frozenset(
     row.trigger
     for row in TRANSITIONS
     if row.target in {Activity.IDLE, Activity.REST} and row.trigger != "at_rest"
 )
-"""Triggers after which the arm has power, or moves."""
+"""Triggers that power the arm or start motion."""
 
 
 @dataclass
 class SafetySystem:
-    """Inputs and latched faults. Each is independent of the robot's activity."""
+    """Safety inputs and latched faults, independent of the robot's activity."""
 
     reduced: bool = False
     """Whether the speed is reduced."""
     safeguard: bool = False
     """Whether a safeguard requests a stop."""
     emergencies: set[Emergency] = field(default_factory=set)
-    """Emergency stops that are pressed."""
+    """Pressed emergency stops."""
     latched: Latched | None = None
-    """Fault or violation that is latched until a restart."""
+    """Fault or violation latched until a restart."""
 
     def mode(self, activity: Activity) -> SafetyMode:
-        """Return the most severe of the present conditions, as RTDE's safety mode."""
+        """Return the most severe present condition as RTDE's safety mode."""
         if self.latched is not None:
             return _LATCHED[self.latched]
         if self.emergencies:
@@ -52,11 +52,7 @@ class SafetySystem:
         return activity.safety_mode(reduced=self.reduced)
 
     def check(self, trigger: str, activity: Activity) -> None:
-        """Refuse a command that the safety system does not allow.
-
-        Raises:
-            RefusalError: The command is not allowed.
-        """
+        """Raise RefusalError for a command that the safety system does not allow."""
         if trigger in _LIVE and self.latched is not None:
             way_out = "send restart_safety first"
         elif trigger in _LIVE and self.emergencies:
@@ -68,16 +64,12 @@ class SafetySystem:
         raise RefusalError("wrong_mode", "", f"safety_mode is {self.mode(activity).name}: {way_out}")
 
     def clear(self) -> None:
-        """Release safeguard and emergency stops, and clear the latched fault; reduced speed stays as it is."""
+        """Release safeguard and emergency stops and clear the latched fault, but keep reduced mode."""
         self.safeguard, self.latched = False, None
         self.emergencies.clear()
 
     def restart(self) -> None:
-        """Clear the latched fault.
-
-        Raises:
-            RefusalError: There is none.
-        """
+        """Clear the latched fault; raise RefusalError without one."""
         if self.latched is None:
             why = "the safety system has found no violation or fault: there is no need to restart it"
             raise RefusalError("wrong_mode", "", why)
@@ -101,11 +93,11 @@ RUNTIME = {
     Activity.BRAKING: RuntimeState.STOPPING,
     Activity.PROTECTIVE_STOPPING: RuntimeState.STOPPING,
 }
-"""Runtime state of each activity; it is STOPPED for all others."""
+"""Runtime state of each activity; STOPPED for all others."""
 
 
 def at_rest(activity: Activity, *, emergency: bool) -> Activity:
-    """Return the activity of a robot whose arm was placed at rest, in an emergency stop or not."""
+    """Return the activity after placing the arm at rest, in an emergency stop or not."""
     if activity.protective:
         return Activity.PROTECTIVE_STOP
     if activity is Activity.BRAKING or (emergency and activity.moving):

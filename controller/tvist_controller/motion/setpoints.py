@@ -1,4 +1,4 @@
-"""Set-points of the client in control, which are not answered, and the stream that they feed."""
+"""Set-points of the client in control, which get no reply, and the stream they feed."""
 
 import math
 from typing import NamedTuple
@@ -11,36 +11,35 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Setpoint
 
 TIMEOUT = 0.25
-"""Time without set-points after which a stream is stopped [s]."""
+"""Time without set-points that stops a stream [s]."""
 
 
 class Unreadable(NamedTuple):
     """A set-point that cannot be decoded."""
 
     token: str | None
-    """Token in it, if one is found."""
+    """Its token, if found."""
     why: str
-    """A sentence with field, value and limit."""
+    """Message with field, value and limit."""
 
 
 class Setpoints:
-    """Feeds one stream at a time, and counts for all."""
+    """Feeds one stream at a time and counts for all streams."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._description = description
         self.stream: SetpointStream | None = None
-        """The present stream."""
         self._heard = 0.0
         self._refused: str | None = None
-        """Why the latest set-point was rejected, to be reported if no valid one follows."""
+        """Reason for the latest rejection, reported if no valid set-point follows."""
         self._ended = 0, 0, 0
 
     def begin(self, stream: SetpointStream, now: float) -> None:
-        """Feed a stream from the present time on [s]."""
+        """Start feeding a stream."""
         self.stream, self._heard, self._refused = stream, now, None
 
     def take(self, setpoint: Setpoint | Unreadable, now: float) -> bool:
-        """Take a set-point of the client in control, and return whether the stream accepts it."""
+        """Take a set-point of the client in control; return whether the stream accepts it."""
         if isinstance(setpoint, Unreadable):
             self._refused = setpoint.why
             return False
@@ -57,25 +56,25 @@ class Setpoints:
 
     @property
     def silent_at(self) -> float:
-        """Time at which the stream counts as silent unless a set-point comes [s]; infinite without one."""
-        # A little early, since sums round: `silence` decides.
+        """Time at which the stream becomes silent without another set-point, infinite without one [s]."""
+        # Slightly early because of rounding; `silence` decides.
         return math.inf if self.stream is None else self._heard + TIMEOUT - 1e-6
 
     def silence(self, now: float) -> str | None:
-        """Return a sentence if set-points have stopped coming; None while they come."""
+        """Return a message if set-points have stopped, else None."""
         if self.stream is None or now - self._heard < TIMEOUT:
             return None
         refused = "" if self._refused is None else f"; the last one was refused: {self._refused}"
         return f"no set-point for {TIMEOUT:g} s{refused}"
 
     def end(self) -> bool:
-        """Stop feeding the stream, and add up its counts; return whether there was one."""
+        """Stop feeding the stream and add its counts; return whether there was one."""
         there, self._ended = self.stream is not None, self.counters()
         self.stream = None
         return there
 
     def counters(self) -> tuple[int, int, int]:
-        """Late, lost and limited set-points since the start, including the present stream's."""
+        """Return counts of late, lost and limited set-points since the start."""
         late, lost, limited = self._ended
         if self.stream is not None:
             late, lost, limited = (

@@ -1,5 +1,5 @@
-"""Geometry of paths: lines and arcs of the tool, blends between them, and the joints' way along them.
+"""Geometry of paths: lines, arcs and blends of the tool, and the joints' motion along them.
 
-All lengths along a path are in metres; a turn counts as `PER_RADIAN` metres a radian, of the tool on its lines and of
+Lengths along a path are in metres; a radian counts as `PER_RADIAN` metres, of the tool's turn on lines and of
 the joint that turns most in joint space.
 """

@@ -1,8 +1,8 @@
-"""Parts of a path as they were asked for, from one point to the next without blends, and where two blends meet on one.
+"""Requested parts of a path, without blends, and points where two blends meet.
 
-Between points so close that next to nothing of a line is left between two blends, curvature that rises from 0 and falls
-back to 0 at each of these points would be what slows the arm down. So the blends on both sides of such a line are drawn
-out to meet on it, with one curvature for both, and the tool leaves the line by at most `OFF`.
+If points are so close that almost no line is left between two blends, curvature that returns to 0 there would
+slow the arm down. The adjacent blends are then extended to meet on the line with common curvature; the tool
+leaves it by at most `OFF`.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,18 +18,18 @@ from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import Knots
 
 LOOKS, HALVINGS = 64, 40
-"""Places of a way at which its distance from an end is looked at, and halvings of the step in which it passes one."""
+"""Places at which a distance from an end is checked, and bisections of the step in which it is exceeded."""
 OFF = 1e-5
-"""Largest distance from a line where two blends meet on it, outside their radii [m]."""
+"""Largest deviation from a line where two blends meet, outside their radii [m]."""
 SHALLOW = 0.3
-"""Largest turn of the tool's way at a corner next to such a line [rad]."""
+"""Largest turn of the path at a corner next to such a line [rad]."""
 STEEPER = 1.5
-"""Largest ratio of the curvature where two blends meet to the smaller one of both [-]."""
+"""Largest ratio of the curvature where two blends meet to the smaller of both [-]."""
 
 
 @dataclass(frozen=True)
 class JointWay:
-    """Straight way of the joints from one posture to another."""
+    """Straight line in joint space."""
 
     start: Floats
     """Joint positions at the start, shape (n,) [rad]."""
@@ -38,7 +38,7 @@ class JointWay:
 
     @property
     def length(self) -> float:
-        """Its length [m]."""
+        """Length [m]."""
         return PER_RADIAN * float(np.abs(self.end - self.start).max())
 
     def at(self, s: float) -> tuple[Floats, Floats, Floats]:
@@ -47,10 +47,7 @@ class JointWay:
         return self.start + s * slope, slope, np.zeros_like(slope)
 
     def within(self, radius: float, position_at: Callable[[Floats], Floats], *, from_end: bool) -> float:
-        """Return the length from one end within which the tool is no farther from that end than a radius [m].
-
-        `position_at` returns the position of the tool centre point at joint positions.
-        """
+        """Return the length from one end within which the tool stays within a radius of that end [m]."""
 
         def at(s: float) -> Floats:
             return position_at(self.at(self.length - s if from_end else s)[0])
@@ -77,16 +74,16 @@ class JointWay:
 
 @dataclass(frozen=True)
 class Pacing:
-    """How fast a part of a path may be."""
+    """Speed limits of a part of a path."""
 
     velocity: float
     """Largest speed [m/s]."""
     acceleration: float
     """Largest acceleration [m/s^2]."""
     duration: float | None = None
-    """Duration instead of both [s]."""
+    """Duration that replaces both limits [s]."""
     even: bool = False
-    """Whether the speed of the tool stays the same in blends, so that only the joints limit their acceleration."""
+    """Whether blends keep the tool's speed, so that only the joints limit acceleration."""
 
     def meeting(self, other: "Pacing") -> "Pacing":
         """Return the pacing of a blend between two parts."""
@@ -100,18 +97,18 @@ class Pacing:
 
 @dataclass(frozen=True)
 class Leg:
-    """One part of a path, as it was asked for."""
+    """One requested part of a path."""
 
     way: ToolWay | JointWay
     knots: Knots
-    """The joints' way along all of it."""
+    """The joints' motion along the whole part."""
     corner: Placement
     """Pose of the tool at its end."""
     pacing: Pacing
     blend: float
     """Radius of the blend at its end [m]."""
     where: str
-    """Field of the command that it comes from, for messages."""
+    """Field of the command, for messages."""
 
     @property
     def q(self) -> Floats:
@@ -121,16 +118,16 @@ class Leg:
 
 
 class Meeting(NamedTuple):
-    """Place of a leg at which the blends before and behind it meet."""
+    """Point of a leg where the blends before and behind it meet."""
 
     s: float
     """Length from the leg's start [m]."""
     bend: Floats
-    """Second derivatives of the tool's position and turn there, shape (6,) [1/m, rad/m^2]."""
+    """Second derivatives of the tool's position and turn, shape (6,) [1/m, rad/m^2]."""
 
 
 def meetings(legs: Sequence[Leg]) -> list[Meeting | None]:
-    """Return for each leg where the blends before and behind it meet, if they do."""
+    """Return for each leg the point where its blends meet, or None."""
     corners = [_corner(*pair) for pair in pairwise(legs)]
     found: list[Meeting | None] = [None] * len(legs)
     for number in range(1, len(legs) - 1):
@@ -141,7 +138,7 @@ def meetings(legs: Sequence[Leg]) -> list[Meeting | None]:
 
 
 def _corner(leg: Leg, then: Leg) -> Floats | None:
-    """Mean curvature of the way around a corner, shape (6,); None if it is no shallow one between two lines."""
+    """Return the mean curvature around a shallow corner of two lines, shape (6,), else None."""
     if not (isinstance(leg.way, ToolLine) and isinstance(then.way, ToolLine) and leg.blend > 0.0):
         return None
     change = then.way.first - leg.way.first
@@ -161,13 +158,13 @@ def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> Meeting 
     bend = np.concatenate([_between(before[part], behind[part]) for part in (slice(3), slice(3, 6))])
     along = way.first[:3]
     speed = float(along @ along)
-    if speed > 0.0:  # the way is curved there, and not hurried
+    if speed > 0.0:  # the path is curved there, and not sped up
         bend[:3] -= (bend[:3] @ along / speed) * along
     return Meeting(0.5 * (start + end), bend)
 
 
 def _between(one: Floats, other: Floats) -> Floats:
-    """Curvature between two: their mean, or less if it would exceed the smaller one by far; 0 if they turn apart."""
+    """Return a curvature between two: their mean, limited by the smaller; 0 if they bend apart."""
     if one @ other <= 0.0:
         return np.zeros_like(one)
     mean = 0.5 * (one + other)

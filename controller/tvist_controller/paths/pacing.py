@@ -1,4 +1,4 @@
-"""Time laws of runs: the limits of tool and joints along a run, and the quickest law within them."""
+"""Time laws of runs: limits of tool and joints, and the quickest law within them."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,23 +14,23 @@ from tvist_controller.trajectory.retiming import Cells, RetimedLaw, Way, longer_
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 
 FINEST, CELLS = 5e-4, 400
-"""Smallest length of a cell [m], and the number of cells that a run is divided into if they are not smaller."""
+"""Smallest cell length [m], and largest number of cells of a run."""
 MARGIN = 1.01
 """Factor by which a derivative may exceed its samples within a cell [-]."""
 FASTEST = 1e3
-"""Factor beyond which a motion is not hurried for its duration, since the joints limit it by far [-]."""
+"""Largest factor of speeding up for a duration; the joints then limit by far [-]."""
 JOLT_SHARE = 0.3
-"""Share of the joints' jerk that each effect of the curve may use [-]."""
+"""Fraction of joint jerk available to each effect of the curve [-]."""
 BRIEFEST = 1e-3
-"""Shortest duration that is planned for: shorter ones are as impossible [s]."""
+"""Shortest duration planned for [s]."""
 TRIES = 4
-"""How often a motion that goes on is planned more slowly, for the per mille by which limits may be exceeded."""
+"""Attempts to plan an extended motion more slowly after slightly exceeding limits."""
 MOMENTS = 500
-"""Number of moments at which a motion's velocity is looked at."""
+"""Number of moments at which a motion's velocity is checked."""
 LEAST = 1e-3
-"""Smallest derivative that a speed is divided by [-]."""
+"""Smallest derivative by which a speed is divided [-]."""
 CLOSE = 1e-6
-"""Share by which a duration may be missed [-]."""
+"""Permitted relative error of a duration [-]."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class JointLimits:
     acceleration: Floats
     """Shape (n,) [rad/s^2]."""
     jerk: float
-    """Smallest of all joints [rad/s^3]."""
+    """Smallest over all joints [rad/s^3]."""
 
 
 def joined(run: Run, before: Knots | None = None) -> Knots:
-    """Return the knots of a whole run, or of one that goes on behind others."""
+    """Return the knots of a run, optionally behind other knots."""
     first, *rest = ([] if before is None else [before]) + [piece.knots for piece in run]
     s, parts = [first.s], list[tuple[Floats, ...]]([first[1:]])
     for knots in rest:
@@ -65,10 +65,10 @@ def law_of(
     *,
     goes_on: bool = False,  # whether others may continue it
 ) -> RetimedLaw:
-    """Return the quickest time law of a run, or the one of the duration that was asked for."""
+    """Return the quickest time law of a run, or the one with the requested duration."""
     asked = [piece.pacing.duration for piece in run]
     if all(asked):
-        jerk = FASTEST * limits.jerk  # durations leave the jerk to the joints
+        jerk = FASTEST * limits.jerk  # with a duration, only the joints limit the jerk
     law = quickest_law(ground.way(limits, 1.0), jerk, window, goes_on=goes_on)
     if all(asked):
         wanted, hurry = sum({piece.where: piece.pacing.duration or 0.0 for piece in run}.values()), 1.0
@@ -89,7 +89,7 @@ def going_on(
     window: float,
     slower: float,  # factor of its speed, at most 1 [-]
 ) -> RetimedLaw | None:
-    """Return the quickest law that goes on from another one; see `longer_law`, and `law_of` for the other arguments."""
+    """Return the quickest law that extends another; see `longer_law`, other arguments as in `law_of`."""
     first, known = edges
     for _ in range(TRIES):
         slowed = JointLimits(
@@ -107,12 +107,12 @@ def going_on(
 
 
 def _kept(law: RetimedLaw, curve: SplineCurve, limits: JointLimits) -> RetimedLaw:
-    """The law, slowed down by the per mille by which limits may be exceeded between the samples of a cell."""
+    """Slow the law down by the per mille by which limits may be exceeded between samples."""
     return law.slowed(law.duration * max(_excess(law, law.moments, curve, limits), 1.0))
 
 
 def _excess(law: RetimedLaw, moments: Floats, curve: SplineCurve, limits: JointLimits) -> float:
-    """Largest ratio of a speed to the one with which the joints keep their limits, at some moments [-]."""
+    """Return the largest ratio of the speed to the speed that keeps joint limits, at some moments [-]."""
     velocity, acceleration = shares(law, moments, curve, limits)
     return max(float(velocity.max()), float(np.sqrt(acceleration.max())))
 
@@ -120,7 +120,7 @@ def _excess(law: RetimedLaw, moments: Floats, curve: SplineCurve, limits: JointL
 def shares(
     law: RetimedLaw, moments: Floats, curve: SplineCurve, limits: JointLimits
 ) -> tuple[Floats, Floats]:
-    """Largest shares of the joints' limits of velocity and acceleration at some moments, each of shape (n,) [-]."""
+    """Return each joint's largest velocity and acceleration relative to its limits, each (n,) [-]."""
     s, sd, sdd = law.states(moments)
     _, slope, second = curve.derivatives(s)
     qd = np.abs(slope * sd[:, None])
@@ -129,22 +129,22 @@ def shares(
 
 
 def fastest(law: RetimedLaw, curve: SplineCurve) -> float:
-    """Largest velocity of any joint in a motion at full rate [rad/s]."""
+    """Return the largest joint velocity of a motion at full rate [rad/s]."""
     s, sd, _ = law.states(np.linspace(law.begins, law.duration, MOMENTS))
     return float(np.abs(curve.derivatives(s)[1] * sd[:, None]).max())
 
 
 class Ground(NamedTuple):
-    """What limits a run, cell by cell, before it is hurried."""
+    """Limits of a run, cell by cell, before speeding up."""
 
     places: Floats
-    """Ends of the cells, shape (c + 1,) [m]."""
+    """Cell boundaries, shape (c + 1,) [m]."""
     speed: Floats
-    """Speed of the tool that was asked for, shape (c,) [m/s]."""
+    """Requested tool speed, shape (c,) [m/s]."""
     p: Floats
-    """Share of its acceleration per unit of s̈, shape (c,) [s^2/m]."""
+    """Fraction of its acceleration limit per unit of s̈, shape (c,) [s^2/m]."""
     q: Floats
-    """Share of its acceleration per unit of ṡ², shape (c,) [s^2/m^2]."""
+    """Fraction of its acceleration limit per unit of ṡ², shape (c,) [s^2/m^2]."""
     slope: Floats
     """Bound of |dq/ds|, shape (c, n) [rad/m]."""
     second: Floats
@@ -153,7 +153,7 @@ class Ground(NamedTuple):
     """Bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]."""
 
     def then(self, first: int, last: int, run: Run, curve: SplineCurve) -> "Ground":
-        """Return what limits a run behind the part between two edges, and that part, on a curve."""
+        """Return the limits of the part between two edges followed by a run, on a curve."""
         further = ground_of(run, curve, float(self.places[last]))
         places = np.concatenate((self.places[first : last + 1], further.places[1:]))
         pairs = zip(self[1:], further[1:], strict=True)
@@ -164,8 +164,8 @@ class Ground(NamedTuple):
         return ground
 
     def way(self, limits: JointLimits, hurry: float) -> Way:
-        """Return the limits of the motion that is faster than asked for by a factor."""
-        # Joints jerk by the third derivative times ṡ³, by 3 q'' ṡ s̈, and by q' s⃛: the first two take a share each.
+        """Return the limits of the motion sped up by the factor `hurry`."""
+        # Joint jerk: q''' ṡ³ + 3 q'' ṡ s̈ + q' s⃛; each of the first two terms gets a share.
         smooth = np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(self.third, LEAST))
         even = np.minimum(hurry * self.speed, smooth)
         fastest = (limits.velocity / np.maximum(self.slope, LEAST)).min(axis=1)
@@ -184,7 +184,7 @@ class Ground(NamedTuple):
 
 
 def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> Ground:
-    """Return what limits a run that begins at a place of a curve [m]."""
+    """Return the limits of a run that starts at a place of a curve [m]."""
     largest = max((float(curve.end[0]) - start) / CELLS, FINEST)
     starts = start + np.concatenate(([0.0], np.cumsum([piece.knots.s[-1] for piece in run])))
     edges, tool = [np.array([start])], []
@@ -204,7 +204,7 @@ def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> Ground:
 
 
 def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:
-    """Speed and curvature of the tool per unit of the parameter in each cell: on legs 1 and 0."""
+    """Return the tool's speed and curvature per unit of the parameter in each cell; 1 and 0 on legs."""
     count = len(places) - 1
     if piece.bent is None:
         return np.ones(count), np.zeros(count)
@@ -213,28 +213,28 @@ def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:
 
 
 def _joints(curve: SplineCurve, places: Floats) -> tuple[Floats, Floats]:
-    """The same for the joints' way, in the lengths that turns count as."""
+    """Return `_tool` for the joints' motion, with turns counted as lengths."""
     _, slope, second = curve.derivatives(_looks(places))
     along, bent = (PER_RADIAN * _largest(np.abs(values)).max(axis=1) for values in (slope, second))
     return np.maximum(along, LEAST), bent
 
 
 def _looks(places: Floats) -> Floats:
-    """Both ends and the middle of each cell, shape (2 c + 1,)."""
+    """Return both ends and the middle of each cell, shape (2 c + 1,)."""
     looks = np.empty(2 * len(places) - 1)
     looks[::2], looks[1::2] = places, 0.5 * (places[:-1] + places[1:])
     return looks
 
 
 def _largest(values: Floats) -> Floats:
-    """Bounds of values sampled at `_looks`, for each cell, shape (c, m)."""
+    """Return bounds for each cell of values sampled at `_looks`, shape (c, m)."""
     ends = np.maximum(values[:-1:2], values[2::2])
     found: Floats = MARGIN * np.maximum(ends, values[1::2])
     return found
 
 
 def timed(pacing: Pacing, length: float) -> Pacing:
-    """Return the pacing of a leg; for a duration, that of a trapezoid which speeds up and brakes for a third of it."""
+    """Return a leg's pacing; a duration becomes a trapezoid with ramps of a third each."""
     if pacing.duration is None:
         return pacing
     duration = max(pacing.duration, BRIEFEST)

@@ -1,4 +1,4 @@
-"""Poses as rotation matrix and position, and their form on the wire: x y z [m] and rotation vector [rad]."""
+"""Poses as rotation matrix and position, and as messages: x y z [m] and rotation vector [rad]."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -16,12 +16,11 @@ class Placement(NamedTuple):
     position: Floats
 
     def __matmul__(self, other: "Placement") -> "Placement":
-        """Return a pose that is given in this frame, in the frame that this one is given in."""
         return Placement(self.rotation @ other.rotation, self.rotation @ other.position + self.position)
 
     @property
     def inverse(self) -> "Placement":
-        """The pose of this frame's reference, seen from this frame."""
+        """Pose of the reference in this frame."""
         back = self.rotation.T
         return Placement(back, -back @ self.position)
 
@@ -39,7 +38,7 @@ def placement_vector(rotation: Floats, position: Floats) -> tuple[float, float, 
 
 
 def placement(pose: Sequence[float] | None) -> Placement:
-    """Return the placement of a pose on the wire; of None, that of the frame itself."""
+    """Return the placement of a pose message; the identity for None."""
     if pose is None:
         return Placement(np.eye(3), np.zeros(3))
     return Placement(np.asarray(pin.exp3(np.array(pose[3:], dtype=float))), np.array(pose[:3], dtype=float))

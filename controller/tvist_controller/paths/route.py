@@ -1,4 +1,4 @@
-"""Paths of several legs: blends between them, and stops where there are none."""
+"""Paths of several legs: blends, and stops where there are none."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,83 +14,77 @@ from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 
 INSIDE, CLOSE = 1.0 + 1e-9, 1e-6
-"""Factor by which rounding, and length by which the joints' interpolation, may exceed a blend's radius [-, m]."""
+"""Tolerance of a blend's radius for rounding [-] and for the joints' interpolation [m]."""
 SMALLEST, SLIVER = 2e-4, 5e-4
-"""Smallest radius of a blend, and shortest rest of a part between two: rounding would slow shorter ones down [m]."""
+"""Smallest blend radius, and shortest remainder between two blends; rounding would slow shorter ones [m]."""
 SAME = 1e-9
-"""Difference between postures that is rounding [rad]."""
+"""Posture differences below this are rounding errors [rad]."""
 SHARPEST = 0.15
-"""Smallest ratio of a blend's chord to its radius for its length; it is 0 where the tool goes back as it came [-]."""
+"""Smallest ratio of a blend's chord to its radius used for its length; it is 0 for a reversal [-]."""
 BETWEEN = 8
-"""Number of places for each knot of a blend at which its distance from the corner is looked at."""
+"""Places per knot of a blend at which its distance from the corner is checked."""
 SHRINK, TRIES = 0.85, 12
-"""Factor by which a blend that leaves its radius begins closer to the corner, and how often that is tried."""
+"""Factor by which a blend that leaves its radius is shortened, and number of attempts."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A leg without what its blends replace, or a blend."""
+    """A leg without its blended parts, or a blend."""
 
     knots: Knots
-    """The joints' way."""
+    """The joints' motion."""
     pacing: Pacing
     bent: ToolBlend | EvenBlend | None
-    """Blend of the tool whose curvature counts for the acceleration."""
+    """Tool blend whose curvature affects acceleration."""
     by_joints: bool
-    """Whether the joints' acceleration counts rather than the tool's."""
+    """Whether acceleration refers to the joints rather than the tool."""
     where: str
-    """Field of the command that it comes from."""
+    """Field of the command."""
 
 
 Run = list[Piece]
-"""Pieces without a stop between them."""
+"""Pieces without stops between them."""
 
 
 @dataclass(frozen=True)
 class _Cut:
-    """A blend between two legs."""
-
     before: float
-    """Length of the first leg that it replaces [m]."""
+    """Length of the first leg replaced [m]."""
     after: float
-    """Length of the second leg that it replaces [m]."""
+    """Length of the second leg replaced [m]."""
     piece: Piece
     curve: ToolCurve | None
-    """Way of the tool; None if the joints' way is the blend."""
+    """Curve of the tool; None if the joints blend."""
 
 
 @dataclass(frozen=True)
 class Branch:
-    """Place of a run behind which further legs may change it."""
+    """Point of a run behind which further legs may change it."""
 
     s: float
-    """Length of the run up to there [m]."""
+    """Length of the run up to it [m]."""
     legs: tuple[Leg, ...]
-    """The legs from there on."""
+    """Legs from it on."""
     begun: float
-    """Length of the first of them that lies before the place [m]."""
+    """Length of the first of them before the point [m]."""
     q: Floats
     """Joint positions there, shape (n,) [rad]."""
     bend: Floats | None = None
-    """Curvature with which two blends meet there, see `Meeting`; None if they do not."""
+    """Curvature of two blends that meet there, see `Meeting`; else None."""
 
 
 class Route(NamedTuple):
-    """A path, divided into runs."""
+    """A path divided into runs."""
 
     runs: list[Run]
     skipped: list[str]
-    """A sentence for each blend that is left out."""
+    """Message for each omitted blend."""
     branches: list[Branch]
-    """Places at which its last run may go on otherwise than to the end of the last leg, in their order."""
+    """Points at which its last run may continue differently, in order."""
 
 
 def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:
-    """Divide a path into runs, from the start of its first leg or from a place on that.
-
-    Raises:
-        WayError: The joints cannot follow the path; beside a singular posture two ways lead on from it.
-    """
+    """Divide a path into runs, from a leg's start or a point on it; raise WayError if impossible."""
     route, last = Route([Run()], [], []), len(legs) - 1
     meets = meetings(legs)
     here = start
@@ -132,7 +126,7 @@ def _cut_at(
     route: Route,
     tracker: Tracker,
 ) -> _Cut | None:
-    """The blend behind a leg, if there is one; why there is none is noted."""
+    """Return the blend after a leg, else None; record the reason for an omitted one."""
     leg = legs[number]
     if leg.blend == 0.0 or number + 1 == len(legs):
         return None
@@ -146,7 +140,7 @@ def _cut_at(
 
 
 class _NoBlendError(Exception):
-    """There is no blend, for a reason in words."""
+    """A blend is impossible; the message states the reason."""
 
 
 def _check_joined(runs: list[Run], tracker: Tracker) -> None:
@@ -157,12 +151,12 @@ def _check_joined(runs: list[Run], tracker: Tracker) -> None:
 
 
 def length_of(run: Run) -> float:
-    """Length of a run [m]."""
+    """Return the length of a run [m]."""
     return sum(float(piece.knots.s[-1]) for piece in run)
 
 
 def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:
-    """A blend of the tool that begins where the joints are: a redundant arm may come there in other postures."""
+    """Start a tool blend at the actual posture, which may differ on a redundant arm."""
     piece = cut.piece
     if cut.curve is None or np.abs(piece.knots.q[0] - q).max() <= SAME:
         return cut
@@ -170,7 +164,7 @@ def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:
 
 
 def _rest_of(leg: Leg, start: float, end: float, q: Floats, tracker: Tracker) -> Piece:
-    """The part of a leg that its blends leave, from where the joints are."""
+    """Return the part of a leg left by its blends, from the present posture."""
     if start == 0.0 and end == leg.way.length and (q == leg.q).all():
         return Piece(leg.knots, leg.pacing, None, isinstance(leg.way, JointWay), leg.where)
     if isinstance(leg.way, JointWay):
@@ -182,11 +176,7 @@ def _rest_of(leg: Leg, start: float, end: float, q: Floats, tracker: Tracker) ->
 def _cut(
     leg: Leg, then: Leg, meets: tuple[Meeting | None, Meeting | None], here: Branch, tracker: Tracker
 ) -> _Cut:
-    """The blend between two legs.
-
-    Raises:
-        _NoBlendError: There is none.
-    """
+    """Return the blend between two legs, or raise _NoBlendError."""
     radius, left = leg.blend, leg.way.length - here.begun
     if radius < SMALLEST:
         raise _NoBlendError(f"is below the smallest one of {SMALLEST:g} m: give a larger radius")
@@ -226,7 +216,7 @@ def _blend(
     q: Floats,
     tracker: Tracker,
 ) -> tuple[Piece, ToolCurve | None]:
-    """A blend that replaces lengths of two legs, and the tool's way on it; q are the joints where the path has come."""
+    """Return a blend that replaces lengths of two legs, and the tool's curve; q is the present posture."""
     pacing, (before, after) = leg.pacing.meeting(then.pacing), lengths
     start = leg.way.length - before
     if isinstance(leg.way, JointWay) or isinstance(then.way, JointWay):
@@ -241,18 +231,17 @@ def _blend(
     drawn_out = meets != (None, None)
     share = _rounding(leg, first, last, drawn_out=drawn_out)
     blend = ToolBlend(first, last, leg.corner.rotation, share * (before + after))
-    curve = blend if drawn_out else evenly(blend)  # one that is drawn out is even by itself
+    curve = blend if drawn_out else evenly(blend)  # an extended one is already even
     if meets[0] is None:
         q, _, _ = _joints(leg, start, tracker, from_end=True)
     return Piece(tracker.follow(curve, q), pacing, None if pacing.even else curve, False, leg.where), curve
 
 
 def _rounding(leg: Leg, start: ToolState, end: ToolState, *, drawn_out: bool) -> float:
-    """Length of a blend, as a share of what it replaces, with which its polynomial is curved least.
+    """Return a blend's length, relative to what it replaces, for least curvature of its polynomial.
 
-    One that is drawn out to meet another is that of an arc.
-
-    Found by trial for corners of 20° to 170°: its largest curvature is then 1.1 to 1.2 times that of an arc.
+    Fitted to corners of 20° to 170°: the largest curvature is 1.1 to 1.2 times that of an arc. A blend
+    extended to meet another has the length of an arc.
     """
     places = [state.pose.position for state in (start, end)]
     away = sum(float(np.linalg.norm(place - leg.corner.position)) for place in places)
@@ -266,7 +255,7 @@ def _rounding(leg: Leg, start: ToolState, end: ToolState, *, drawn_out: bool) ->
 
 
 def _joints(leg: Leg, s: float, tracker: Tracker, *, from_end: bool) -> tuple[Floats, Floats, Floats]:
-    """Joint positions on a leg and their derivatives, followed from the posture at one of its ends."""
+    """Return joint positions on a leg with derivatives, tracked from the posture at one of its ends."""
     if isinstance(leg.way, JointWay):
         return leg.way.at(s)
     corner, near, sign = (leg.way.length, leg.knots.q[-1], -1.0) if from_end else (0.0, leg.knots.q[0], 1.0)
@@ -281,5 +270,4 @@ def _within(leg: Leg, radius: float, tracker: Tracker, *, from_end: bool) -> flo
 
 
 def _middle(knots: Knots) -> Floats:
-    """Postures at the knots and between them, shape (k, n)."""
     return SplineCurve(knots).derivatives(np.linspace(0.0, knots.s[-1], BETWEEN * (len(knots.s) - 1) + 1))[0]

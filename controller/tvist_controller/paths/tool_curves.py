@@ -12,24 +12,24 @@ from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import evaluate, hermite
 
 PER_RADIAN = 0.25
-"""Length that a turn by one radian counts as [m]."""
+"""Length equivalent to a turn by one radian [m]."""
 SHORTEST = 1e-6
-"""Length below which a part of a path counts as no motion [m]."""
+"""Length below which a part of a path is no motion [m]."""
 STRAIGHT = 1e-6
-"""Sine of an angle below which three points count as points on a line [-]."""
+"""Sine of the angle below which three points are collinear [-]."""
 STEP = 1e-5
-"""Step of numerical differences, as a share of a blend's length [-]."""
+"""Step of numerical differences relative to a blend's length [-]."""
 SLOWEST = 0.25
-"""Speed of the tool relative to the parameter, below which a blend turns back too sharply to be converted [-]."""
+"""Tool speed per parameter below which a blend is too sharp to be reparametrized [-]."""
 PIECES = 64
-"""Number of pieces of the conversion of a blend to the length of its way."""
+"""Number of pieces for reparametrizing a blend by arc length."""
 EVEN = 1e-9
-"""Difference from an even speed at the ends that is rounding [-]."""
+"""Deviation from constant speed at the ends that counts as rounding [-]."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 class ToolState(NamedTuple):
-    """Pose of the tool at a place of its path, with derivatives with respect to the length."""
+    """Pose of the tool on a path, with derivatives by length."""
 
     pose: Placement
     first: Floats
@@ -39,7 +39,7 @@ class ToolState(NamedTuple):
 
 
 class ToolCurve(ABC):
-    """Way of the tool from s = 0 to its length [m]."""
+    """Path of the tool from s = 0 to its length [m]."""
 
     length: float
 
@@ -49,18 +49,15 @@ class ToolCurve(ABC):
 
 
 class ToolWay(ToolCurve):
-    """Way of the tool that may be blended with the next one."""
+    """Path of the tool that can be blended with the next."""
 
     @abstractmethod
     def within(self, radius: float) -> float:
-        """Return the length from either end within which the tool is no farther from that end than this [m].
-
-        It may exceed the curve's length, or be infinite for one that does not move the tool centre point.
-        """
+        """Return the length from either end within the radius [m]; it may exceed the curve or be infinite."""
 
 
 class ToolLine(ToolWay):
-    """Straight line, on which the tool turns evenly by the shortest way."""
+    """Straight line with constant rotation by the shortest way."""
 
     def __init__(self, start: Placement, end: Placement) -> None:
         self._start, self._end = start, end
@@ -70,7 +67,7 @@ class ToolLine(ToolWay):
         """Velocity and angular velocity per unit of length, base frame, shape (6,) [-, rad/m]."""
 
     def within(self, radius: float) -> float:
-        """Return the length from either end within which the tool is no farther from that end than this [m]."""
+        """See `ToolWay.within`."""
         speed = float(np.linalg.norm(self.first[:3]))
         return radius / speed if speed > 0.0 else np.inf
 
@@ -82,13 +79,10 @@ class ToolLine(ToolWay):
 
 
 class ToolArc(ToolWay):
-    """Arc of the circle from one pose through a point to another pose.
+    """Arc of a circle from one pose through a point to another pose.
 
-    The tool turns with the tangent, so that the orientation at the end does not matter, or evenly to that, by
-    the shortest way.
-
-    Raises:
-        ValueError: There is no such circle: the points are on a line, or two of them are the same.
+    The tool turns with the tangent, ignoring the end orientation, or steadily to it by the shortest way.
+    Raise ValueError if points coincide or are collinear.
     """
 
     def __init__(self, start: Placement, via: Floats, end: Placement, *, tangent: bool) -> None:
@@ -113,7 +107,7 @@ class ToolArc(ToolWay):
         self._rate, self._turning = angle / self.length, turning / self.length
 
     def within(self, radius: float) -> float:
-        """Return the length from either end within which the tool is no farther from that end than this [m]."""
+        """See `ToolWay.within`."""
         share = radius / (2.0 * float(np.linalg.norm(self._out)))
         return 2.0 * float(np.arcsin(share)) / self._rate if share < 1.0 else np.inf
 
@@ -135,7 +129,7 @@ class ToolArc(ToolWay):
 
 
 class ToolPart(ToolCurve):
-    """A part of a path of the tool, in its direction or against it."""
+    """A part of a tool path, forwards or backwards."""
 
     def __init__(self, whole: ToolCurve, start: float, end: float) -> None:
         self._whole, self._from = whole, start
@@ -148,11 +142,7 @@ class ToolPart(ToolCurve):
 
 
 class ToolBlend(ToolCurve):
-    """Smooth way from one state of the tool to another: position and turn are polynomials of degree five.
-
-    The turn is counted from the orientation of the corner, which is near both; the way counts as a given
-    length.
-    """
+    """Quintic path of given length between two tool states, in position and turn relative to the corner."""
 
     def __init__(self, start: ToolState, end: ToolState, corner: Floats, length: float) -> None:
         self.length, self._corner = length, corner
@@ -176,7 +166,7 @@ class ToolBlend(ToolCurve):
         return first[:, :3], second[:, :3]
 
     def shape(self, s: Floats) -> tuple[Floats, Floats]:
-        """Return the sizes of dp/ds and d²p/ds² at k lengths, each of shape (k,) [-, 1/m]."""
+        """Return |dp/ds| and |d²p/ds²| at k lengths, each of shape (k,) [-, 1/m]."""
         first, second = self.moved(s)
         return np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
 
@@ -199,9 +189,9 @@ class ToolBlend(ToolCurve):
 
 
 def _at_corner(state: ToolState, corner: Floats) -> tuple[Floats, Floats, Floats]:
-    """Position and turn from the corner, with derivatives, each of shape (6,).
+    """Return position and turn from the corner, with derivatives, each of shape (6,).
 
-    On lines and arcs the tool turns evenly about one axis, so the turn from the corner is about that axis, too.
+    On lines and arcs the tool turns about one axis at a constant rate, so the turn from the corner has this axis, too.
     """
     turned_by, angular = turn(corner, state.pose.rotation), state.second[3:]
     if angular.any():
@@ -211,14 +201,14 @@ def _at_corner(state: ToolState, corner: Floats) -> tuple[Floats, Floats, Floats
 
 
 def evenly(blend: ToolBlend) -> "ToolBlend | EvenBlend":
-    """Return the blend with an even speed of the tool; unchanged if it nearly stops on its way."""
+    """Return the blend at constant tool speed; unchanged if it nearly stops in between."""
     speeds, _ = blend.shape(np.linspace(0.0, blend.length, PIECES + 1))
     ends = abs(float(speeds[0]) - 1.0) + abs(float(speeds[-1]) - 1.0)
     return blend if float(speeds.min()) < SLOWEST or ends > EVEN else EvenBlend(blend)
 
 
 class EvenBlend(ToolCurve):
-    """A blend whose parameter is the length of its way, so that an even parameter is an even speed."""
+    """A blend parametrized by arc length, so that a constant rate is a constant speed."""
 
     def __init__(self, blend: ToolBlend) -> None:
         self._blend = blend
@@ -243,7 +233,7 @@ class EvenBlend(ToolCurve):
         return ToolState(pose, first * rate, second * rate**2 + first * change)
 
     def shape(self, s: Floats) -> tuple[Floats, Floats]:
-        """Return the sizes of dp/ds and d²p/ds² at k lengths, each of shape (k,) [-, 1/m]."""
+        """Return |dp/ds| and |d²p/ds²| at k lengths, each of shape (k,) [-, 1/m]."""
         places, rates, changes = self._places(s)
         first, second = self._blend.moved(places)
         bent = second * rates[:, None] ** 2 + first * changes[:, None]

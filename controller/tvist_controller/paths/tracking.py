@@ -1,4 +1,4 @@
-"""The joints' way along a path of the tool: inverse kinematics from one knot to the next."""
+"""The joints' motion along a tool path: inverse kinematics from knot to knot."""
 
 from collections.abc import Sequence
 
@@ -13,20 +13,19 @@ from tvist_controller.trajectory.spline import Knots, hermite
 from tvist_plant.description import RobotDescription
 
 SPACING = 0.03
-"""Largest distance of two knots [m]."""
+"""Largest distance between knots [m]."""
 SHORT = 0.003
-"""Length below which a way needs no knot but its ends [m]."""
+"""Length below which a path needs no inner knots [m]."""
 CLOSEST = 1e-5
-"""Smallest distance of two knots; a way that needs closer ones passes a singular posture [m]."""
+"""Smallest distance between knots; a path that needs closer ones passes a singular posture [m]."""
 TOLERANCE = 1e-6
-"""Largest error of the tool between two knots [m, rad]."""
+"""Largest tool error between two knots [m, rad]."""
 REFRESHED = 3
-"""Number of times that Newton's method may get a new Jacobian on the way to a knot."""
+"""Number of Jacobian updates in Newton's method per knot."""
 FARTHEST = 1.0
-"""Angle of a joint beyond which a knot counts as another posture [rad]."""
+"""Joint angle beyond which a solution counts as another posture [rad]."""
 STEEPEST = 300.0
-"""Angle that a joint may turn for each metre of the tool's way; beyond it the arm is close to a singular posture
-[rad/m]."""
+"""Joint turn per metre of path above which the arm is close to a singular posture [rad/m]."""
 
 
 class WayError(Exception):
@@ -35,15 +34,15 @@ class WayError(Exception):
     def __init__(self, s: float, pose: Placement, q: Floats) -> None:
         super().__init__(f"no way on from {s:g} m")
         self.s = s
-        """Length at which the way ends [m]."""
+        """Length at which tracking ends [m]."""
         self.pose = pose
-        """Pose that is not reached."""
+        """Pose that cannot be reached."""
         self.q = q
         """Joint positions near that pose, shape (n,) [rad]."""
 
 
 class Tracker:
-    """Kinematics of an arm and its tool; for its tool centre point see `Arm`."""
+    """Kinematics of an arm with a tool; see `Arm` for the TCP."""
 
     def __init__(self, description: RobotDescription, tcp: Sequence[float]) -> None:
         self._tool = Arm(description, tcp)
@@ -53,7 +52,7 @@ class Tracker:
         return Placement(*self._tool.pose(q))
 
     def solve(self, goal: Placement, q: Floats) -> Floats | None:
-        """Return joint positions near q at which the tool has a pose, shape (n,) [rad]; None if Newton finds none."""
+        """Return joint positions near q with a tool pose, shape (n,) [rad]; None if Newton finds none."""
         found = q
         for _ in range(REFRESHED):
             found, error = self._tool.near(goal, found)
@@ -64,7 +63,7 @@ class Tracker:
         return None
 
     def rates(self, q: Floats, state: ToolState) -> tuple[Floats, Floats] | None:
-        """Return dq/ds and d²q/ds² of a posture on a path, each of shape (n,); None in a singular posture."""
+        """Return dq/ds and d²q/ds² of a posture on a path, each (n,); None at a singularity."""
         jacobian = self._tool.jacobian(q)
         first = _solved(jacobian, state.first)
         if first is None or np.abs(first).max() > STEEPEST:
@@ -73,21 +72,17 @@ class Tracker:
         return None if second is None else (first, second)
 
     def follow(self, curve: ToolCurve, q: Floats) -> Knots:
-        """Return the joints' way along a path of the tool.
-
-        Raises:
-            WayError: A singular posture is on the way, or its poses cannot be reached.
-        """
+        """Return the joints' motion along a tool path; raise WayError if singular or out of reach."""
         pieces = 1 if curve.length < SHORT else max(int(np.ceil(curve.length / SPACING)), 2)
         knots, step = [self._knot(curve, 0.0, q)], curve.length / pieces
-        # One after the other: of a way that leads out of the arm's reach, whatever its length, few knots are made.
+        # One by one, so that a long path out of reach fails after few knots.
         for piece in range(1, pieces + 1):
             knots += self._between(curve, knots[-1], curve.length if piece == pieces else piece * step)
         s, *rest = zip(*knots, strict=True)
         return Knots(np.array(s), *(np.array(values) for values in rest))
 
     def _between(self, curve: ToolCurve, start: "Knot", end: float) -> list["Knot"]:
-        """Knots behind one, up to a place, so close that a polynomial between two of them keeps to the path."""
+        """Return knots up to a place, close enough for a polynomial between them to keep to the path."""
         length = end - start[0]
         guess = start[1] + length * (start[2] + 0.5 * length * start[3])
         middle = 0.5 * (start[0] + end)
@@ -120,11 +115,11 @@ class Tracker:
 
 
 Knot = tuple[float, Floats, Floats, Floats]
-"""Place, joint positions and their first two derivatives."""
+"""Place, joint positions, and their first two derivatives."""
 
 
 def _solved(jacobian: Floats, wanted: Floats) -> Floats | None:
-    """Solve J x = wanted, for other arms than those with six joints in the sense of least squares."""
+    """Solve J x = wanted; in the least-squares sense unless the arm has six joints."""
     if jacobian.shape[1] == 6:
         try:
             exact: Floats = np.asarray(np.linalg.solve(jacobian, wanted), dtype=np.float64)

@@ -1,1 +1,1 @@
-"""Plans of moves and filters. They depend on an explicit state alone, so they can be made outside the tick."""
+"""Plans of moves and filters; they depend only on an explicit state, so they can be made outside the tick."""

@@ -24,24 +24,23 @@ from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.named import BUILT_IN, AnyShaper, Registry
 
 SURPLUSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
-"""`surplus` of the latest filters of all robots: source of modes, own shaper, name, number of modes, what was found."""
+"""Cache of `surplus` for all robots: source of modes, own shaper, name, number of modes, result."""
 REHEARSED = 9
-"""Ticks of a rehearsal: some filters compute new weights at every fourth tick alone."""
+"""Ticks of a rehearsal; some filters update weights only every fourth tick."""
 ESTIMATORS = ("fixed", "polynomial", "modal")
 
 
 @dataclass(frozen=True)
 class PlannedFilter:
-    """A filter with what it needs."""
+    """A filter and what it needs."""
 
     source: ModeSource
     """Source of its modes."""
     tvist: Filter
-    """The filter."""
     elastic: ElasticFeedForward | None
-    """Elastic feed-forward for the drives; None if the filter does without."""
+    """Elastic feed-forward for the drives; None if not used."""
     law: Floats | None = None
-    """Known friction of the joints, see `known_friction`; None if it is not known."""
+    """Known friction of the joints, see `known_friction`; None if unknown."""
 
 
 class FilterPlanner:
@@ -52,11 +51,7 @@ class FilterPlanner:
         self._modal = modal_source(setup.description, setup.calibration)
 
     def first(self) -> PlannedFilter:
-        """Return the robot's initial filter.
-
-        Raises:
-            ValueError: There is no such shaper for this robot.
-        """
+        """Return the robot's initial filter; raise ValueError if its shaper does not exist."""
         setup = self._setup
         try:
             return self.choose(setup.shaper, 1, setup.source(), setup.payload)
@@ -66,12 +61,10 @@ class FilterPlanner:
     def choose(
         self, name: str, modes: int, source: ModeSource, declared: Payload, where: str = "shaper"
     ) -> PlannedFilter:
-        """Return a filter by name, which comes from the field `where`, for a number of modes to suppress.
+        """Return a filter by name for a number of modes to suppress; `where` is the field of the name.
 
-        It uses the source that was chosen, or the arm's own modal estimator if the filter needs more modes.
-
-        Raises:
-            RefusalError: There is no such filter for this robot.
+        It uses the chosen source, or the arm's modal estimator if it needs more modes. Raise RefusalError if
+        there is no such filter.
         """
         wanted = wanted_modes(name, modes, where, self._known)
         if wanted > source.most and self._modal is not None:
@@ -81,11 +74,7 @@ class FilterPlanner:
         return self._with_feed_forward(source, tvist, where)
 
     def estimate(self, command: SetEstimator, now: Snapshot) -> PlannedFilter:
-        """Return the present filter with modes from another source.
-
-        Raises:
-            RefusalError: The source does not work with this filter.
-        """
+        """Return the present filter with modes of another source, or raise RefusalError."""
         source, present = choose_source(command, self._setup), now.filter
         where = "f_d" if source.calibration is None else "calibration"
         tvist = self._again(present, source, present.declared, where)
@@ -93,7 +82,7 @@ class FilterPlanner:
         return self._with_feed_forward(source, tvist, where)
 
     def with_payload(self, payload: Payload, present: FilterState) -> Filter | None:
-        """Return the present filter with the modes for another payload; None if these are not known."""
+        """Return the present filter with modes for another payload; None if these are unknown."""
         return self._again(present, present.source, payload, "mass") if present.source.knows_payload else None
 
     def like(self, present: FilterState) -> Filter:
@@ -113,7 +102,7 @@ class FilterPlanner:
         return tvist
 
     def _surplus(self, tvist: Filter, source: ModeSource) -> tuple[float, float]:
-        """The filter's `surplus` with any payload. It takes long, so that it is kept for robots that are alike."""
+        """Return the filter's `surplus` for any payload, cached because it takes long."""
         name, modes, own = tvist.name, tvist.estimator.modes, self._known.own.get(tvist.name)
         for known, same, named, with_modes, found in tuple(SURPLUSES):
             if same is own and (named, with_modes) == (name, modes) and known == source:
@@ -126,11 +115,7 @@ class FilterPlanner:
         return found
 
     def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> PlannedFilter:
-        """Add friction and the feed-forward that a filter needs, of its source or else of the robot's calibration.
-
-        Raises:
-            RefusalError: The springs are not known, or the friction is wrong.
-        """
+        """Add known friction and the feed-forward that a filter needs; raise RefusalError if impossible."""
         known = source if source.knows_payload else self._modal
         try:
             calibration = None if known is None else known.calibration
@@ -156,14 +141,20 @@ class FilterPlanner:
 
 
 def _rehearse(tvist: Filter) -> None:
-    """Shape a small motion with a copy, so that a tick of the robot loads none of the code that the filter needs."""
+    """Run a copy on a small motion, so that no tick has to load the filter's code."""
     copy = tvist.fork()
     for tick in range(REHEARSED):
         copy.filter(np.full(tvist.joints, 1e-4 * tick))
 
 
 def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) -> int:
-    """Return the number of modes that a filter needs, of `modes` to suppress; its name comes from the field `where`.
+    """Return the number of modes that a filter needs to suppress `modes`.
+
+    Args:
+        name: Name of the filter.
+        modes: Number of modes to suppress.
+        where: Field of the name, for messages.
+        known: The available shapers.
 
     Raises:
         RefusalError: There is no such filter, or it has a fixed number of modes.
@@ -181,11 +172,7 @@ def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) 
 
 
 def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str) -> Estimator:
-    """Make the chosen estimator for a number of modes.
-
-    Raises:
-        RefusalError: The source provides fewer modes.
-    """
+    """Make the chosen estimator, or raise RefusalError if its source has fewer modes."""
     try:
         return source.estimator(modes, payload)
     except EstimatorError as error:
@@ -209,11 +196,7 @@ def choose_filter(
 
 
 def choose_source(command: SetEstimator, setup: Setup) -> ModeSource:
-    """Return the source of modes for the estimator that a command asks for.
-
-    Raises:
-        RefusalError: There is no estimator of that name, or its parameters are invalid.
-    """
+    """Return the source of modes for the requested estimator, or raise RefusalError."""
     if command.name == "fixed":
         return _fixed(command, setup)
     if command.name not in ESTIMATORS:

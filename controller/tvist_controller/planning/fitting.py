@@ -1,7 +1,4 @@
-"""Motions as quick as asked, or as much slower as the limits of the joints and of their torques require.
-
-Near a limit, a motion is shaped ahead.
-"""
+"""Motions as quick as requested, or slower as limits require; near a limit, shaped in advance."""
 
 import itertools
 import math
@@ -24,25 +21,25 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
 EASY = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
-"""Limits up to which a filter's `excess` is sure, since it was determined there."""
+"""Limits up to which a filter's `excess` was determined and holds."""
 KEEPING_TRIES = 4
-"""Number of motions that are tried to keep the acceleration that was asked for."""
+"""Number of trial motions to keep the requested acceleration."""
 SHARE = 1.0 - 1e-4
-"""Share of the limit that is aimed at [-], since the peak changes a little with the motion."""
+"""Fraction of the limit to aim at; the peak varies slightly with the motion [-]."""
 TRIES = 10
-"""Number of motions that are tried before each further one is slower by a share that doubles."""
+"""Number of trial motions before each further one is slower by a fraction that doubles."""
 HASTE = 0.001
-"""The first such share [-]."""
+"""The first such fraction [-]."""
 SPLIT = 6
-"""Number of tries in which either the velocity or the acceleration is reduced, before both are."""
+"""Number of trials that reduce either velocity or acceleration, before both."""
 LOOKS = 64
-"""Number of evenly spaced moments at which a motion is looked at that is not shaped ahead, beside those of its law."""
+"""Number of evenly spaced moments checked, in addition to those of the law, if not shaped in advance."""
 BLUNTED = 1.05
-"""Largest ratio of the shaped motion's torque to that of the unshaped motion, behind which it lags [-]."""
+"""Largest ratio of the shaped motion's torque to the unshaped motion's, due to the lag [-]."""
 ROUNDING = 1e-6
-"""Share by which rounding may exceed a limit [-]."""
+"""Relative excess of a limit that counts as rounding [-]."""
 LEAST = 0.01
-"""Smallest share of a motion's own torque that is worth trying [-]: with less, gravity is what exceeds the limit."""
+"""Smallest usable fraction of a motion's own torque; below it, gravity alone exceeds the limit [-]."""
 
 
 class Slower(NamedTuple):
@@ -53,7 +50,7 @@ class Slower(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Rate at which the whole motion keeps both [-]."""
+        """Time rate at which the motion keeps both [-]."""
         return min(self.velocity, math.sqrt(self.acceleration))
 
 
@@ -61,15 +58,15 @@ AS_ASKED = Slower()
 
 
 class Need(NamedTuple):
-    """How much slower a motion has to be, and for which limit."""
+    """How much slower a motion must be, and the limit that requires it."""
 
     slower: Slower
     binding: Binding
-    """That limit."""
+    """The limit."""
     q: Floats
-    """Posture in which it would be exceeded most, shape (n,) [rad]."""
+    """Posture at which it would be exceeded most, shape (n,) [rad]."""
     exceeds: str | None = None
-    """By how much it exceeds a torque limit at any speed, in words; None if it does not."""
+    """Message if a torque limit is exceeded at any speed; else None."""
 
 
 class Fitted(NamedTuple):
@@ -77,15 +74,15 @@ class Fitted(NamedTuple):
 
     motion: PlannedMotion
     slower: Slower = AS_ASKED
-    """How much slower it is than asked."""
+    """How much slower it is than requested."""
     limited: Limited | None = None
-    """What makes it slower than asked, or what it exceeds; see `PlannedMove.limited`."""
+    """Limit that slows it down, or that it exceeds; see `PlannedMove.limited`."""
     q: Floats | None = None
-    """Posture that made it slower, shape (n,) [rad]; None if none did."""
+    """Posture that made it slower, shape (n,) [rad]; else None."""
 
 
 class Fitter:
-    """Plans motions within the limits of one robot's joints."""
+    """Plans motions within one robot's joint limits."""
 
     def __init__(self, setup: Setup) -> None:
         self._dynamics = InverseDynamics(setup.description, body(setup.payload))
@@ -100,11 +97,10 @@ class Fitter:
         tvist: Callable[[], Filter] | None,
         limits: MotionLimits | None = None,
     ) -> Fitted:
-        """Plan a motion, and anew as much slower as it exceeds a limit.
+        """Plan a motion, repeatedly slower while it exceeds a limit.
 
-        Near a limit the motion is shaped ahead by the filter that `tvist` creates. If that would take too long, it is
-        None, and the filter's `surplus` is spared. `limits` are those that were asked for; None if something else
-        determines its speed.
+        Near a limit, it is shaped in advance by the filter from `tvist`; None if that takes too long, which keeps the
+        filter's `surplus` free instead. `limits` are the requested ones; None if something else sets the speed.
         """
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
@@ -117,7 +113,7 @@ class Fitter:
             by = found.slower
             need = found if need is None else min(need, found, key=lambda each: each.slower.rate)
             if number >= SPLIT:
-                # The spread of the impulses stays, so a slower motion may use more of a limit than the last one.
+                # The impulses' duration is constant, so a slower motion may use more of a limit than the last one.
                 most = 1.0 - min(HASTE * 2.0 ** (number - TRIES), 0.5) if number >= TRIES else 1.0
                 rate = min(by.rate, most)
                 by = Slower(rate, rate**2)
@@ -135,7 +131,7 @@ class Fitter:
         return Fitted(motion, slower, need.binding.makes(what), need.q)
 
     def _need(self, motion: PlannedMotion, now: Snapshot, tvist: Callable[[], Filter] | None) -> Need | None:
-        """How much slower a motion has to be; first as its filter may exceed it most, then as it does."""
+        """Return how much slower a motion must be: bounded by the filter's surplus first, then as shaped."""
         q, qd, qdd = _states(motion)
         faster, harder = (1.0 + more for more in now.surplus)
         qd, qdd = faster * qd, harder * qdd
@@ -149,13 +145,13 @@ class Fitter:
     def _exceeded(
         self, q: Floats, qd: Floats, qdd: Floats, speeds: Floats, now: Snapshot, blunted: float
     ) -> Need | None:
-        """How much slower a motion has to be for any limit; `speeds` are its velocities between the ticks."""
+        """Return how much slower a motion must be for all limits; `speeds` are those between ticks."""
         needs = self._kinematic(q, speeds, qdd), self._dynamic(q, qd, qdd, blunted, now)
         found = [need for need in needs if need is not None]
         return min(found, key=lambda need: need.slower.rate, default=None)
 
     def _kinematic(self, q: Floats, qd: Floats, qdd: Floats) -> Need | None:
-        """How much slower a motion has to be for the joints' velocities and accelerations."""
+        """Return how much slower a motion must be for joint velocities and accelerations."""
         fast = np.abs(qd).max(axis=0, initial=0.0) / self._velocity
         hard = np.abs(qdd).max(axis=0, initial=0.0) / self._acceleration
         factors = [SHARE / float(most) if most > 1.0 + ROUNDING else 1.0 for most in (fast.max(), hard.max())]
@@ -169,10 +165,7 @@ class Fitter:
         return Need(slower, binding, q[min(int(np.argmax(np.abs(values))), len(q) - 1)])
 
     def _dynamic(self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: Snapshot) -> Need | None:
-        """How much slower a motion has to be for the torques, at which gravity stays as it is.
-
-        Where a torque is mainly that of the velocities, these are reduced, elsewhere the acceleration.
-        """
+        """Return how much slower a motion must be for torques, in velocity or acceleration as they depend."""
         dynamics, limits, factors = self._dynamics, self._torque, [1.0, 1.0]
         worst, need = 1.0, None
         for believed in now.bodies:
@@ -208,10 +201,7 @@ class Fitter:
 
 
 def _states(motion: PlannedMotion) -> tuple[Floats, Floats, Floats]:
-    """Positions, velocities and accelerations of a motion before it is shaped, each of shape (k, n).
-
-    A short acceleration may lie between evenly spaced moments, so those at which the law changes are added.
-    """
+    """Return unshaped positions, velocities, accelerations, each (k, n), also at the law's own moments."""
     moments = motion.law.moments
     known = (moments > motion.law.begins) & (moments < motion.duration)
     return motion.states(np.union1d(motion.evenly(LOOKS), moments[known]))
@@ -226,12 +216,15 @@ def keeping_motion(
 ) -> PlannedMotion:
     """Return the quickest motion whose shaped reference keeps the limits.
 
-    A filter whose weights change with the arm's posture adds the change of their spread to the acceleration, at most
-    its `excess` at easy limits. Beyond these the motion is shaped ahead, and planned anew with as much less
-    acceleration as it had too much.
+    A filter whose weights vary with posture adds to the acceleration, at most by its `excess` at easy limits.
+    Beyond these, the motion is shaped in advance and planned again with less acceleration.
 
-    The limits are those of the shaped reference, for every joint; `speed` is the initial rate of the motion's time
-    relative to the clock's [-]. The filter is not changed.
+    Args:
+        path: Straight line in joint space.
+        limits: Limits of the shaped reference for every joint.
+        tvist: The filter, which is not changed.
+        speed: Initial time rate [-].
+        agility: Limits of pauses and speed changes; None for `limits`.
 
     Raises:
         ValueError: There is no such motion.
@@ -256,10 +249,7 @@ def keeping_motion(
 
 
 def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
-    """References of the shaped motion at full rate, shape (k, n) [rad]; None if it lasts too long to simulate.
-
-    Neither the motion, which has not begun, nor the filter is changed.
-    """
+    """Return the shaped references at full rate, (k, n) [rad], None if too long; motion and filter stay unchanged."""
     path, mine = motion.path, tvist.fork()
     shaped = ShapedReference(path.posture(path.start), PERIOD)
     shaped.enter(path.posture_of, path.start)

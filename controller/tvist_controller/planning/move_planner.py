@@ -26,33 +26,33 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 
 AGILE = MotionLimits(1.5, 2.0, 100.0)
-"""Limits of pauses and changes of the speed for motions that are slower by themselves: those of `move_j` by default."""
+"""Limits of pauses and speed changes for slower motions: the defaults of `move_j`."""
 
 
 class PlannedMove(NamedTuple):
-    """A motion that may begin."""
+    """A motion ready to start."""
 
     parts: tuple[PlannedMotion, ...]
-    """Trajectories of its reference, each from rest to rest, in their order."""
+    """Consecutive trajectories of the reference, each from rest to rest."""
     velocity: float
     """Largest velocity of any joint [rad/s]."""
     limited: Limited | None
-    """The limit that made it slower than asked, or that it will exceed, with a sentence; None if there is none."""
+    """Limit, with a message, that slows it down or that it will exceed; else None."""
     skipped: tuple[str, ...] = ()
-    """A sentence for each blend that is left out."""
+    """Message for each omitted blend."""
     window: float = math.inf
-    """Longest delay of a shaper with which the limits hold at full rate [s]."""
+    """Longest shaper delay at which the limits hold at full rate [s]."""
     marks: tuple[tuple[int, float], ...] = ()
-    """For each segment of a path, the part of the motion and the length on it where the blend at the segment's end
-    begins, or where the segment ends without one [m]."""
+    """For each segment of a path, the part and the length on it [m] where the blend at its end begins, or
+    where it ends without one."""
     peak: float = math.inf
-    """Largest `Filter.peak` with which they do [-]."""
+    """Largest `Filter.peak` at which the limits hold at full rate [-]."""
     room: tuple[float, float] = (math.inf, math.inf)
-    """Ratios of the arm's velocity and acceleration to the motion's [-]."""
+    """Ratios of the arm's velocity and acceleration limits to the motion's [-]."""
     course: Course | None = None
-    """What its last part may go on from while it runs; None if it cannot."""
+    """State from which its last part can be extended while it runs; None if it cannot."""
     surplus: tuple[float, float] = (0.0, 0.0)
-    """`Filter.surplus` of the filter that it was planned for [-]."""
+    """`Filter.surplus` of the filter it was planned for [-]."""
 
 
 class MovePlanner(Fitter):
@@ -64,13 +64,7 @@ class MovePlanner(Fitter):
         self._collisions = CollisionModel(setup.description, body(setup.payload))
 
     def move(self, command: MoveJ, now: Snapshot, *, at_once: bool = False) -> PlannedMove:
-        """Plan a motion from rest; the command's content has been checked.
-
-        `at_once` leaves no time to shape the motion ahead.
-
-        Raises:
-            RefusalError: There is no such motion, or it would lead to a collision.
-        """
+        """Plan a motion from rest, or raise RefusalError; `at_once` omits shaping in advance to save time."""
         path, duration = JointLine(now.q, np.array(command.q, dtype=float)), command.duration
         limits, agility = MotionLimits(command.velocity, command.acceleration, command.jerk), None
         if duration is not None:
@@ -114,7 +108,7 @@ class MovePlanner(Fitter):
         )
 
     def _lasting(self, path: JointLine, duration: float, now: Snapshot) -> MotionLimits:
-        """Limits with which a motion takes a duration [s], or those of the arm if it takes longer with these."""
+        """Return limits with which a motion takes a duration [s], or the arm's if it takes longer anyway."""
         limits = arm_limits(self._description)
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - now.excess))
         slower = min(quickest_motion(path, spared, PERIOD).duration / duration, 1.0)
@@ -125,7 +119,7 @@ class MovePlanner(Fitter):
         )
 
     def meeting(self, way: Way, now: Snapshot) -> tuple[float, Meeting] | None:
-        """Return the share of a way after which two bodies would meet, and which; None if it is clear."""
+        """Return the position of the first meeting on a way (share of it) and the bodies, else None."""
         if self._collisions.declared is not now.body:
             self._collisions.declare(now.body)
         return self._collisions.on_way(way)

@@ -1,4 +1,4 @@
-"""Planning of motions of the tool and of paths of several parts."""
+"""Planning of tool motions and of paths of several parts."""
 
 from dataclasses import replace
 
@@ -26,21 +26,21 @@ from tvist_protocol.motions import MoveC, MoveL, MovePath
 from tvist_shaping.base import Filter
 
 POSTURES = 9
-"""Number of postures of a run at which the shaper's delay is looked up."""
+"""Number of postures of a run at which the shaper's delay is computed."""
 LOOKS = 1000
-"""Number of places of a run at which the one is sought that is hardest for a joint."""
+"""Number of places of a run searched for the one hardest for a joint."""
 SPARED = 0.99
-"""Share of the joints' limits that paths use: a shaper whose weights vary may exceed its reference a little [-]."""
+"""Fraction of joint limits that paths use; a shaper with varying weights may exceed its reference a little [-]."""
 LEAST_WINDOW = 0.08
-"""Delay of a shaper for which a path has room in any case, so that few changes of the shaper slow it down [s]."""
+"""Shaper delay for which a path always has room, so that few changes of shaper slow it down [s]."""
 AGILE = MotionLimits(0.25, 1.2, 60.0)
-"""Limits of pauses and changes of the speed for motions that are slower by themselves: those of `move_l` by default."""
+"""Limits of pauses and speed changes for slower motions: the defaults of `move_l`."""
 VARIATION = 1.1
-"""Factor by which the delay may be longer between them [-]."""
+"""Factor by which the delay may be longer between these postures [-]."""
 
 
 class PathPlanner:
-    """Plans the motions of one robot along paths."""
+    """Plans one robot's motions along paths."""
 
     def __init__(
         self, setup: Setup, filters: FilterPlanner, moves: MovePlanner, reachable: Reachable
@@ -49,14 +49,7 @@ class PathPlanner:
         self._reachable = reachable
 
     def plan(self, command: MoveL | MoveC | MovePath, now: Snapshot) -> PlannedMove | None:
-        """Plan a motion from rest, or the rest of one that goes on; the command's content has been checked.
-
-        Returns:
-            None if the running motion cannot go on any more, since its end is too near.
-
-        Raises:
-            RefusalError: There is no such motion, or it would lead to a collision.
-        """
+        """Plan a motion from rest, or an extension, None if too late; raise RefusalError if impossible."""
         tracker = Tracker(self._description, now.tcp)
         legs = list(self._reachable.legs(command, tracker, now))
         count = len(command.segments) if isinstance(command, MovePath) else 1
@@ -85,7 +78,7 @@ class PathPlanner:
     def _further(
         self, jerk: float, legs: list[Leg], count: int, tracker: Tracker, now: Snapshot
     ) -> PlannedMove | None:
-        """Plan the rest of a motion that goes on to further legs; None if its end is too near."""
+        """Plan the extension of a motion to further legs; None if its end is too near."""
         before, tvist = now.after, self._filters.like(now.filter)
         assert before is not None
         found = before.branch(now.until)
@@ -125,7 +118,7 @@ class PathPlanner:
         return _joined(moves, route, told, range(before.segments - 1, count), branch.s)
 
     def _check_clear(self, way: Way, run: Run, part: tuple[float, float], now: Snapshot) -> None:
-        """Refuse a way that something is in the way of; `part` is its start on the whole path and that's length."""
+        """Refuse a path with a collision; `part` is the start on the whole path and the latter's length."""
         found = self._moves.meeting(way, now)
         if found is None:
             return
@@ -151,10 +144,10 @@ class PathPlanner:
         count: int,
         *,
         goes_on: bool = False,
-        several: bool = True,  # whether what makes it slower is to name the part of the path
+        several: bool = True,  # whether reasons for slowing down name the part of the path
     ) -> PlannedMove:
-        """Plan a motion from rest along a run of a route with a number of segments."""
-        if not run:  # the arm is there already
+        """Plan a motion from rest along a run of a route with `count` segments."""
+        if not run:  # already there
             still = JointLine(now.q, now.q)
             motion = quickest_motion(still, arm_limits(self._description), PERIOD, now.speed)
             return PlannedMove((motion,), 0.0, None, window=0.0, peak=tvist.peak)
@@ -179,7 +172,7 @@ class PathPlanner:
         return PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak, course=course)
 
     def _curve(self, knots: Knots, run: Run, tvist: Filter, now: Snapshot) -> tuple[SplineCurve, JointLimits]:
-        """The joints' way along a run, which is within their range, and their limits on it."""
+        """Return the joints' motion along a run, checked for range, and their limits."""
         self._reachable.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         limits, peak = self._description.limits, tvist.peak
         acceleration = np.array(limits.acceleration) * (1.0 - now.excess)
@@ -194,7 +187,6 @@ class PathPlanner:
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:
-        """Longest delay of a shaper on a curve [s]."""
         found = []
         for s in np.linspace(float(curve.start[0]), float(curve.end[0]), POSTURES):
             tvist.reset(curve.posture(np.array([s])))
@@ -203,7 +195,7 @@ class PathPlanner:
 
 
 def _told(fitted: Fitted, run: Run, start: float = 0.0) -> Limited | None:
-    """Say what made a motion slower, and on which part of a path; `start` is where its run begins on its curve [m]."""
+    """Return what slowed a motion down, and where; its run starts at `start` on its curve [m]."""
     told, q, path = fitted.limited, fitted.q, fitted.motion.path
     if told is None or q is None or not isinstance(path, SplineCurve) or not run[0].where:
         return told
@@ -215,13 +207,13 @@ def _told(fitted: Fitted, run: Run, start: float = 0.0) -> Limited | None:
 
 
 class _TooLateError(Exception):
-    """Raised if a running motion cannot go on within the limits any more."""
+    """A running motion can no longer be extended."""
 
 
 def _joined(
     moves: list[PlannedMove], route: Route, told: Limited | None, segments: range, start: float = 0.0
 ) -> PlannedMove:
-    """Put the motions of a path together; `start` is where its first run begins on its curve [m]."""
+    """Join the motions of a path; its first run starts at `start` on its curve [m]."""
     return moves[-1]._replace(
         parts=tuple(part for move in moves for part in move.parts),
         velocity=max(move.velocity for move in moves),
@@ -242,7 +234,7 @@ def _course(
     window: float,
     start: float = 0.0,  # where the run begins on the curve [m]
 ) -> Course | None:
-    """What a motion may go on from; nothing if its duration was asked for."""
+    """Return the state from which a motion can be extended; None if its duration was requested."""
     if any(piece.pacing.duration is not None for piece in run):
         return None
     branches = tuple(replace(branch, s=start + branch.s) for branch in route.branches)
@@ -250,16 +242,13 @@ def _course(
 
 
 def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tuple[int, float], ...]:
-    """Where the blend at the end of each of these segments begins, see `PlannedMove.marks`.
-
-    The first run begins at this length of the first part [m].
-    """
+    """Return where each segment's end blend begins, see `PlannedMove.marks`; the first run starts at `start` [m]."""
     marks = dict[int, tuple[int, float]]()
     for part, run in enumerate(runs):
         lengths = [piece.knots.s[-1] for piece in run]
         ends = ((0.0 if part else start) + np.cumsum(lengths)).tolist()
         for number, piece in enumerate(run):
-            # On the way to another segment, the last piece of one is its blend.
+            # Before another segment, the last piece is the blend.
             last = run[-1].where == piece.where
             marks[_number(piece.where)] = (
                 part,
@@ -273,10 +262,9 @@ def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tupl
 
 
 def _number(where: str) -> int:
-    """Number of the segment that a part of the path comes from."""
     return int(where[len("segments[") : -1]) if where else 0
 
 
 def _field(where: str) -> str:
-    """Field of the command for a part of the path: a segment, or the pose of a command for one part."""
+    """Return the command's field of a part of the path: a segment, or else `pose`."""
     return where or "pose"

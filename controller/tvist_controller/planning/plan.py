@@ -1,4 +1,4 @@
-"""Plans for commands that take longer than a tick can wait: how they are made, and how long they hold."""
+"""Plans for commands that take too long for a tick: creation and validity."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
@@ -16,29 +16,29 @@ from tvist_shaping.base import Filter
 from tvist_urscript import Script
 
 Found = PlannedMove | PlannedFilter | Filter | Posture | ToolPose | Script | None
-"""What a plan may contain; None if nothing has to change."""
+"""Possible results of a plan; None if nothing changes."""
 
 
 class Planning(NamedTuple):
-    """How one type of command is planned."""
+    """How a type of command is planned."""
 
     needs: tuple[str, ...]
     """Fields of the snapshot that the plan depends on."""
     by: type
-    """Class of the planner, of which a `Planner` has one object."""
+    """Class of the planner; a `Planner` has one instance."""
     make: Callable[[Any, Any, Snapshot], Found]
-    """Returns the plan; takes the planner, the command and the state. It raises `RefusalError`."""
+    """Returns the plan for planner, command and state; raises `RefusalError`."""
     within_tick: Callable[[Any, Any, Snapshot], Found] | None = None
-    """Makes a plan that may be worse but takes no longer than a tick can wait; None if `make` is all there is."""
+    """Makes a possibly worse plan quickly enough for a tick; None if there is only `make`."""
 
 
 class Plan(NamedTuple):
-    """The outcome of a command, valid while the state that it was planned on holds."""
+    """Result of planning a command, valid while the underlying state holds."""
 
     state: Mapping[str, Any]
-    """Fields of the snapshot that it depends on, with their values."""
+    """Fields of the snapshot that it depends on."""
     found: Found | RefusalError
-    """What was planned, or why the command is refused; None if no motion may begin."""
+    """What was planned, or the refusal; None if no motion may start."""
     until: float = 0.0
     """See `Snapshot.until`."""
 
@@ -46,22 +46,22 @@ class Plan(NamedTuple):
 def _same(one: Any, other: Any) -> bool:
     if isinstance(one, np.ndarray):
         return np.array_equal(one, other)
-    if isinstance(one, tuple):  # of arrays, perhaps, whose number changes while a payload is phased in
+    if isinstance(one, tuple):  # may contain arrays, whose number changes while a payload is phased in
         return len(one) == len(other) and all(map(_same, one, other))
     return one is other or one == other
 
 
 Order = Callable[[Command, Snapshot], Callable[[], Plan]]
-"""Has a command planned on a state; returns what waits for the plan."""
+"""Orders a plan on a state; returns a function that waits for it."""
 
 
 class MakesPlans(Protocol):
-    """A `Planner`, which lies above all that uses plans."""
+    """Interface of `Planner`, which is in a higher layer than users of plans."""
 
     filters: FilterPlanner
 
     def for_lesson(self, lesson: PayloadLesson, present: FilterState) -> "Plan":
-        """Plan what the robot has learnt: the present filter for what it carries."""
+        """Plan the present filter for a payload that the robot has learnt."""
 
     def plan(
         self, command: Command, now: Snapshot, *, within_tick: bool = False, checked: bool = False
@@ -70,11 +70,10 @@ class MakesPlans(Protocol):
 
 
 class Plans:
-    """Plans of one robot, for the commands of clients and of programs: made now, or later beside the ticks.
+    """Plans of one robot, made now or outside the ticks, for commands of clients and programs.
 
-    `plan` is `Planner.plan`. `snapshot` returns the present state; for a time, that of a motion that goes on from the
-    running one, which stays as it is for this time [s]. `order` has commands planned beside the ticks; without it, the
-    tick that needs a plan makes it.
+    `plan` is `Planner.plan`. `snapshot` returns the present state or, with a time [s], that of a motion that continues
+    the running one after this time. `order` plans outside the ticks; without it, the tick that needs a plan makes it.
     """
 
     def __init__(
@@ -91,16 +90,16 @@ class Plans:
         return self._plan(command, self._snapshot(None), within_tick=within_tick)
 
     def later(self, command: Command) -> Callable[[], Plan]:
-        """Have a command planned on the present state; returns what waits for the plan."""
+        """Order a plan on the present state; return a function that waits for it."""
         return self._order(command, self._snapshot(None))
 
     def further(self, command: Command, time: float) -> Callable[[], Plan] | None:
-        """Have a path planned that goes on from the running motion, as `later`; None if that cannot go on."""
+        """Order a path that extends the running motion, as `later`; None if it cannot be extended."""
         now = self._snapshot(time)
         return self._order(command, now) if now.movable else None
 
     def hold(self, plan: Plan) -> bool:
-        """Return whether a plan that was made before is valid for the present state."""
+        """Return whether a plan is still valid in the present state."""
         goes_on = plan.state.get("after") is not None
         now = self._snapshot(0.0 if goes_on else None)
         return plan.until >= now.until and all(
@@ -108,11 +107,7 @@ class Plans:
         )
 
     def found(self, command: Command, plan: Plan | None = None) -> Any:
-        """Return what was planned for a command that is checked: the plan if it still holds, else one that is made now.
-
-        Raises:
-            RefusalError: The command cannot be carried out.
-        """
+        """Return the result for a checked command, from a valid plan or a new one; raise RefusalError."""
         if plan is None or not self.hold(plan):
             plan = self._plan(command, self._snapshot(None), checked=True)
         found = plan.found

@@ -1,4 +1,4 @@
-"""What the arm can reach: joint positions at a pose, the joints' way along parts of a path, or why not."""
+"""Reachability: joint positions at a pose, joint motion along parts of a path, and reasons for failure."""
 
 from collections.abc import Iterator, Sequence
 
@@ -30,18 +30,14 @@ from tvist_protocol.replies import Posture, ToolPose
 
 
 class Reachable:
-    """Answers questions about poses, and makes the parts of paths, for one robot."""
+    """Answers kinematic queries and creates the parts of paths for one robot."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._description = description
         self._inverse = InverseKinematics(description)
 
     def posture(self, question: k.InverseKinematics, now: Snapshot) -> Posture:
-        """Return the joint positions at which the tool has a pose, nearest to others.
-
-        Raises:
-            RefusalError: There are none, or they are outside the joints' range.
-        """
+        """Return the nearest joint positions for a tool pose; raise RefusalError without any in range."""
         near = now.q
         if question.near is not None:
             check_joints(question.near, self._description, "near")
@@ -56,11 +52,7 @@ class Reachable:
         return Posture(q=tuple(q.tolist()))
 
     def pose(self, question: k.ForwardKinematics, now: Snapshot) -> ToolPose:
-        """Return the pose that the tool has at joint positions.
-
-        Raises:
-            RefusalError: They have the wrong number, or are outside the joints' range.
-        """
+        """Return the tool pose at joint positions; raise RefusalError if invalid or out of range."""
         q = now.q
         if question.q is not None:
             check_joints(question.q, self._description)
@@ -72,7 +64,7 @@ class Reachable:
     def refusal(
         self, error: WayError, field: str, share: float, goal: Placement, tcp: Sequence[float]
     ) -> RefusalError:
-        """Return the refusal of a command whose path, by this field, ends at a share of the way, 0 to 1 [-]."""
+        """Return the refusal of a path that ends at a share of the way, 0 to 1; `field` is the command's."""
         at = f"{field}: after {100.0 * share:.0f} % of the way, at {_shown(error.pose)}"
         for pose, where in ((goal, f"{field} {_shown(goal)}"), (error.pose, at)):
             flange = pose @ placement(tcp).inverse
@@ -88,11 +80,7 @@ class Reachable:
         return RefusalError("singular", field, why)
 
     def legs(self, command: MoveL | MoveC | MovePath, tracker: Tracker, now: Snapshot) -> Iterator[Leg]:
-        """Return the parts of a command's path that move the arm, one after the other.
-
-        Raises:
-            RefusalError: The arm cannot follow one.
-        """
+        """Yield the parts of a command's path that move the arm; raise RefusalError if impossible."""
         frame, q = placement(command.frame), now.q
         before = 0 if now.after is None else now.after.segments
         for segment, where in _segments(command, before):
@@ -129,7 +117,7 @@ class Reachable:
     def _along(
         self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, now: Snapshot
     ) -> Knots:
-        """The joints' way along a leg, which is within their range."""
+        """Return the joints' motion along a leg, checked for range."""
         if isinstance(way, JointWay):
             return way.part(0.0, way.length)
         field = f"{where}.pose".removeprefix(".")
@@ -142,13 +130,7 @@ class Reachable:
         return knots
 
     def check_range(self, shares: Floats, q: Floats, field: str) -> None:
-        """Refuse joint positions beyond their range, shape (k, n) [rad], to which a field of the command leads.
-
-        They are at these shares of the way, shape (k,) [-].
-
-        Raises:
-            RefusalError: A joint is beyond its range.
-        """
+        """Refuse a path with joint positions (k, n) [rad] out of range; `shares` are their places on it."""
         most = np.array(self._description.limits.position)
         beyond = np.abs(q) > most
         if not beyond.any():

@@ -1,4 +1,4 @@
-"""What is said of a motion that is slower than asked: which limit is why. That the way is too short is no reason."""
+"""Messages about motions slower than requested: the limit responsible, unless the way is just too short."""
 
 from typing import NamedTuple
 
@@ -13,34 +13,34 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.replies import Code
 
 REACHED = 0.9
-"""Share of the speed that counts as reached: a peak between two ramps of the acceleration stays a little lower [-]."""
+"""Fraction of the speed that counts as reached; a peak between two acceleration ramps stays a little lower [-]."""
 BLUNTED = 3.0
-"""The same ratio where the way is too short for the speed: ramps take a large part of a way of millimetres [-]."""
+"""The same as a ratio if the way is too short for the speed, since ramps take much of a few millimetres [-]."""
 LATE = 1.01
-"""Ratio of durations up to which a motion takes as long as asked [-]."""
+"""Ratio of durations up to which a motion counts as on time [-]."""
 USED_UP = 0.95
-"""Share of a limit from which on it is what makes a motion slower [-]."""
+"""Fraction of a limit above which it is responsible [-]."""
 LOOKS = 65
-"""Number of places of a curve at which the speed that the joints permit is looked at."""
+"""Number of places of a curve at which the joints' permitted speed is computed."""
 LEAST = 1e-9
-"""Smallest derivative that a speed is divided by [rad/m]."""
+"""Smallest derivative by which a speed is divided [rad/m]."""
 
 
 class Binding(NamedTuple):
-    """A limit that makes a motion slower."""
+    """The limit that slows a motion down."""
 
     code: Code
     """The limit, for programs."""
     keeps: str
-    """What is achieved, for people."""
+    """The limit, in words."""
 
     def makes(self, what: str) -> "Limited":
-        """Say what it makes slower."""
+        """Return the limit with a message about what it slows down."""
         return self.code, f"{what}, so that {self.keeps}"
 
 
 Limited = tuple[Code, str]
-"""A limit, and a sentence on what it makes slower."""
+"""A limit, and a message about what it slows down."""
 
 
 _LIMITS: dict[str, tuple[Code, str, str]] = {
@@ -64,10 +64,7 @@ JERKS = Binding("limit_acceleration", "tool and joints stay within the limits of
 def slower_path(
     run: Run, curve: SplineCurve, law: RetimedLaw, limits: JointLimits, description: RobotDescription
 ) -> Limited | None:
-    """Say which limit keeps a motion along one segment from the speed or the duration that was asked for.
-
-    The law keeps the `limits` of the joints. None if it is as fast as asked, or if just the way is too short.
-    """
+    """Return the limit that prevents the speed or duration of a one-segment motion; None if just too short."""
     pacing, way = run[0].pacing, float(curve.end[0])
     if pacing.duration is not None:
         if law.duration <= LATE * pacing.duration:
@@ -91,7 +88,7 @@ def slower_path(
 
 
 def slower_joint_motion(motion: PlannedMotion, asked: MotionLimits) -> Limited | None:
-    """Say that the jerk keeps a joint motion from the speed that was asked for, unless its way is too short for it."""
+    """Return a message if jerk prevents the requested speed, unless the way is too short for it."""
     way = float(np.abs(motion.path.end - motion.path.start).max())
     _, qd, _ = motion.states(motion.evenly(3))  # it is symmetric in time, so fastest in the middle
     fastest = float(np.abs(qd).max())
@@ -102,10 +99,10 @@ def slower_joint_motion(motion: PlannedMotion, asked: MotionLimits) -> Limited |
 
 
 def longer_joint_motion(motion: PlannedMotion, asked: float) -> Limited | None:
-    """Say that a joint motion takes longer than the duration that was asked for [s], as the arm's limits require."""
+    """Return a message if the arm's limits make a joint motion longer than requested [s]."""
     return None if motion.duration <= LATE * asked else ARMS.makes(lasts(motion.duration, asked))
 
 
 def lasts(duration: float, asked: float) -> str:
-    """Say how long a motion lasts instead of what was asked for [s]."""
+    """Return words for a duration other than requested [s]."""
     return f"duration is {duration:.4g} s instead of {asked:.4g}"

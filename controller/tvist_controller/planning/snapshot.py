@@ -1,4 +1,4 @@
-"""The state between two ticks that plans depend on, and running motions that may go on behind their end."""
+"""The state between ticks that plans depend on, and running motions that can be extended."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -17,38 +17,38 @@ from tvist_protocol.values import Payload
 from tvist_urscript import Script
 
 KEPT = 1.2
-"""Time of a motion that is kept behind the arm [s]: filters keep samples of up to a second."""
+"""Part of a motion kept behind the arm [s]; filters keep up to a second."""
 SAME = 1e-9
 """Distance below which two knots are one [m]."""
 
 
 @dataclass(frozen=True)
 class Cuts:
-    """Edges of a law."""
+    """Edges of a law at which it is cut for an extension."""
 
     first: int
-    """The first one that is kept."""
+    """First one kept."""
     known: int
-    """The last one up to which the law stays the same."""
+    """Last one up to which the law stays unchanged."""
     branch: int
-    """The one behind which the path may change."""
+    """Behind this one the path may change."""
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A motion to the end of the moves that are known, and where it may go on to further ones."""
+    """A motion to the end of the known moves, and where it can be extended."""
 
     curve: SplineCurve
-    """The joints' way."""
+    """The joints' motion."""
     ground: Ground
-    """What limits the motion along it."""
+    """Limits along the curve."""
     law: RetimedLaw
     branches: tuple[Branch, ...]
-    """Places of the curve at which further moves may change it, in their order."""
+    """Points of the curve at which further moves may change it, in order."""
     segments: int
-    """Number of the path's moves so far."""
+    """Number of moves so far."""
     window: float
-    """Longest delay of a shaper for which it was planned [s]."""
+    """Longest shaper delay it was planned for [s]."""
 
     @property
     def end(self) -> Floats:
@@ -56,11 +56,7 @@ class Course:
         return self.curve.posture(self.curve.end)
 
     def branch(self, until: float) -> tuple[Cuts, Branch] | None:
-        """Return the first place at which it may change, and what stays the same there; None if that comes too soon.
-
-        Args:
-            until: Time before which it stays the same [s].
-        """
+        """Return the first point after a time [s] at which it may change, and its cuts; None if too late."""
         law, edges = self.law, self.law.edges
         moment = until * law.rate
         known = int(np.searchsorted(law.times, moment))
@@ -76,7 +72,7 @@ class Course:
         return Cuts(first, known, known), Branch(s, last.legs, begun, self.curve.posture(np.array([s])))
 
     def knots(self, cuts: Cuts) -> Knots:
-        """The knots of the part that is kept: up to where it branches."""
+        """Return the knots of the part kept, up to the branch."""
         s, old = self.law.edges, self.curve.knots
         kept = slice(
             max(int(np.searchsorted(old.s, s[cuts.first], side="right")) - 1, 0),
@@ -88,7 +84,7 @@ class Course:
 
 
 class FilterState(NamedTuple):
-    """The state that a new filter depends on."""
+    """State that a new filter depends on."""
 
     name: str
     """Name of the present filter."""
@@ -97,27 +93,27 @@ class FilterState(NamedTuple):
     source: ModeSource
     """Source of the modes."""
     declared: Payload
-    """Payload that its modes are computed with."""
+    """Payload for its modes."""
     given: Payload
-    """Payload that a client has declared: another one if the robot has found out what it carries."""
+    """Payload declared by a client; differs from it if the robot has learnt another."""
 
 
 class Snapshot(Struct, frozen=True, eq=False, gc=False):
-    """The state that any plan depends on."""
+    """State that plans depend on."""
 
     filter: FilterState
     movable: bool
-    """Whether a planned motion may begin, or go on from the running one."""
+    """Whether a planned motion may start or be extended."""
     q: Floats
-    """Joint angles of the present reference, or of the end that a motion goes on from, shape (n,) [rad]."""
+    """Joint angles of the present reference, or of the end to be extended, shape (n,) [rad]."""
     speed: float
     """Programmed speed fraction [-]."""
     slowest: float | None
-    """Velocity limit of reduced speed [rad/s]; None if the speed is not reduced."""
+    """Velocity limit of reduced mode; None if inactive [rad/s]."""
     excess: float
-    """Share by which the filter may exceed the reference's acceleration, see `Filter.excess` [-]."""
+    """`Filter.excess` of the filter: relative excess of acceleration [-]."""
     surplus: tuple[float, float]
-    """Shares by which it may exceed velocity and acceleration at the arm's limits, see `Filter.surplus` [-]."""
+    """`Filter.surplus` of the filter: relative excess of velocity and acceleration at the arm's limits [-]."""
     tcp: tuple[float, ...]
     """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
     body: Body
@@ -125,11 +121,11 @@ class Snapshot(Struct, frozen=True, eq=False, gc=False):
     bodies: tuple[Floats, ...]
     """Possible inertial parameters of the last link, see `InverseDynamics.bodies`."""
     after: Course | None = None
-    """The running motion that it goes on from; None for a motion from rest."""
+    """Running motion to be extended; None for a motion from rest."""
     until: float = 0.0
-    """Time of that motion up to which it stays the same [s]."""
+    """Time up to which that motion stays unchanged [s]."""
     script: Script | None = None
-    """The program, or the last statement that was added to it; None if no program takes statements."""
+    """The program or its last added statement; None if no program accepts statements."""
 
 
 FILTER = ("filter",)
@@ -137,6 +133,6 @@ FILTER = ("filter",)
 MOTION = ("movable", "q", "speed", "slowest", "excess", "surplus", "tcp", "body", "bodies", "filter", "after")
 """Fields that a motion depends on."""
 TOOL = ("tcp",)
-"""Fields that an answer about the tool depends on: it may be about a reference that has passed meanwhile."""
+"""Fields that an answer about the tool depends on; its reference may have passed meanwhile."""
 SCRIPT = ("script",)
 """Fields that a statement for a running program depends on."""

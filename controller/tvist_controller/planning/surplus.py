@@ -1,4 +1,4 @@
-"""How far a filter may exceed the limits of a reference that uses all of the arm's."""
+"""How far a filter may exceed the limits of a reference that uses all of the arm's limits."""
 
 from collections.abc import Iterable
 
@@ -13,30 +13,28 @@ from tvist_shaping.failures import FAILURES
 from tvist_shaping.filter import QUICKEST
 
 POSTURES = 40
-"""Number of postures at which modes are looked at."""
+"""Number of postures at which modes are computed."""
 STEP = 0.03
-"""Half the way over which their change is measured [rad]."""
+"""Half the travel over which their change is measured [rad]."""
 TIME = 0.01
 """Time over which the quickest change of modes is measured [s]."""
 MARGIN = 1.1
-"""Factor by which the largest of all postures may be larger [-]."""
+"""Margin for postures not computed [-]."""
 RISE = 15.0
-"""Ratio of D̈ to Ḋ at their largest [1/s]: the largest in random streams is half of it."""
+"""Ratio of largest D̈ to largest Ḋ, twice that of random streams [1/s]."""
 STEADY = 2.0
-"""Ratio of what a filter of constant mean delay adds in a stream to what it adds in a motion, its `excess` [-]."""
+"""Ratio of a constant-delay filter's excess in a stream to that in a motion, its `excess` [-]."""
 
 
 def surplus_of(
     tvist: Filter, estimators: Iterable[Estimator], description: RobotDescription
 ) -> tuple[float, float]:
-    """Shares by which velocity and acceleration may exceed a reference's, see `Filter.surplus` [-].
+    """Return relative excesses of velocity and acceleration over a reference's, see `Filter.surplus` [-].
 
-    While the mean delay D shrinks, the velocity is 1 - Ḋ times the reference's, and the acceleration contains
-    (1 - Ḋ)² ẍ - ẋ D̈. The modes of a smooth estimator change quickest if every joint moves at full speed in the worst
-    direction; those of an abrupt one, no quicker than `TvistFilter` lets them. Negative weights add at most what the
-    limit of acceleration permits within the filter's length.
-
-    `estimators` are that of the filter, which is not changed, for one payload each.
+    While the mean delay D shrinks, velocity is 1 - Ḋ times the reference's, and acceleration contains (1 -
+    Ḋ)² ẍ - ẋ D̈. Modes of a smooth estimator change quickest if all joints move at full speed in the worst
+    direction; those of an abrupt one at most as `TvistFilter` allows. Negative weights add at most what the
+    acceleration limit permits within the filter's length. `estimators` are the filter's, one per payload.
     """
     limits, peak = arm_limits(description), tvist.peak
     reach = np.minimum(description.limits.position, np.pi)
@@ -50,7 +48,7 @@ def surplus_of(
                 hastens = max(
                     hastens, _hastens(tvist, estimator, random.uniform(-reach, reach), limits.velocity)
                 )
-            except FAILURES:  # a user's shaper, which reports this when it is used there
+            except FAILURES:  # a user's shaper reports this when it is used
                 continue
     hastens *= MARGIN
     hardens = (2.0 + RISE * limits.velocity / limits.acceleration) * hastens + STEADY * tvist.excess
@@ -59,7 +57,7 @@ def surplus_of(
 
 
 def _hastens(tvist: Filter, estimator: Estimator, q: Floats, velocity: float) -> float:
-    """Largest -Ḋ at a posture with the joints at this velocity [-]."""
+    """Return the largest -Ḋ at a posture and joint velocity [-]."""
 
     def delay(f_d: Floats, zeta: Floats) -> float:
         return tvist.mean_delay_of(f_d, zeta) or 0.0

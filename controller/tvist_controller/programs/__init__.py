@@ -1,1 +1,1 @@
-"""Programs that the controller carries out by itself, line by line, within the tick."""
+"""Programs that the controller runs line by line within the tick."""

@@ -1,4 +1,4 @@
-"""What the functions of programs may use of the robot."""
+"""The robot's interface for functions of programs."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -22,12 +22,12 @@ from tvist_protocol.values import Payload
 from tvist_urscript import Fault
 
 OWN_TOKEN = "program"  # noqa: S105  the lease was checked when the program was played
-"""Token in the commands that a program makes, which are not sent to clients."""
+"""Token in commands of programs; it is never sent to clients."""
 
 
 @contextmanager
 def refusals_as_faults() -> Iterator[None]:
-    """End the program with an error where the robot refuses what it asks for."""
+    """End the program with an error if the robot refuses a command."""
     try:
         yield
     except RefusalError as refusal:
@@ -36,7 +36,7 @@ def refusals_as_faults() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Access:
-    """One robot, as its programs reach it."""
+    """One robot as its programs access it."""
 
     description: RobotDescription
     motion: MotionControl
@@ -44,9 +44,9 @@ class Access:
     peripherals: Peripherals
     emit: Emit
     send: Callable[[Command, Plan | None], Reply | None]
-    """Carries out a command, with a plan that was made before or without one; raises `RefusalError`."""
+    """Carries out a command, optionally with an existing plan; raises `RefusalError`."""
     plans: Plans
-    """The way to plans."""
+    """Access to plans."""
     latest: Callable[[], State]
     """State of the last tick."""
     io: Callable[[], Io]
@@ -58,6 +58,6 @@ class Access:
     forces: ToolForces
     """Forces and torques on the arm in the last tick."""
     shape_guided: bool = False
-    """Whether guided motions of programs that begin at rest are shaped."""
+    """Whether guided motions of programs that start at rest are shaped."""
     cell: LiveCell | None = None
-    """What stands around the robot; None for nothing."""
+    """The cell around the robot; None for none."""

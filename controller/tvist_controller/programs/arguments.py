@@ -1,7 +1,7 @@
-"""What a program passes to a function: checks by annotation, and conversion to the controller's types.
+"""Arguments of program functions: checks according to annotations, and conversion to the controller's types.
 
-A parameter's annotation has the check as metadata, or is a number of the protocol with its bounds, such as
-`Mass`: beyond them, a plan may take all memory. What has no such annotation is passed on as the program has it.
+A parameter's annotation contains its check as metadata, or is a number type of the protocol with bounds, such
+as `Mass`; values beyond them could make a plan take all memory. Other values are passed on unchanged.
 """
 
 import inspect
@@ -19,16 +19,13 @@ from tvist_urscript import Array, Fault, Pose
 
 Value = object
 Check = Callable[[str, Value], Any]
-"""Takes a parameter's name and a program's value; returns what the function gets, or raises a `Fault`."""
+"""Converts a program's value for a named parameter, or raises a `Fault`."""
 OF_JOINTS: Final = "joints"
-"""Stands for `several` with as many numbers as the arm has joints, which no annotation knows."""
+"""Stands for `several` with the arm's number of joints, which annotations do not know."""
 
 
 def checked(method: MethodType, joints: int) -> Callable[..., Any]:
-    """Return a method that checks its arguments as annotated; scripts give all of them, in order.
-
-    Joints is the number of the arm's, which lists that are annotated by `Joints` must have.
-    """
+    """Return a method that checks positional arguments as annotated; `Joints` have `joints` elements."""
     checks = _checks(method.__func__, joints)
     if not any(check for _, check in checks):
         return method
@@ -51,7 +48,7 @@ def _check_of(annotation: Any, joints: int) -> Check | None:
         parts = get_args(annotation)
         inner = _check_of(parts[0], joints) if NoneType in parts else None
         return None if inner is None else lambda name, value: None if value is None else inner(name, value)
-    check: Any = get_args(annotation)[-1]  # behind what the protocol says of the type
+    check: Any = get_args(annotation)[-1]  # follows the protocol's metadata
     if isinstance(check, Meta):
         return within(*bounds(annotation))
     found: Check = several(joints) if check == OF_JOINTS else check
@@ -60,7 +57,7 @@ def _check_of(annotation: Any, joints: int) -> Check | None:
 
 @cache
 def bounds(kind: object) -> tuple[float, float]:
-    """Return the least and the largest number of one of the protocol's types, such as `Mass`."""
+    """Return the bounds of one of the protocol's number types, such as `Mass`."""
     meta = get_args(kind)[1]
     return meta.ge if meta.gt is None else meta.gt, meta.le
 
@@ -95,7 +92,7 @@ def above_zero(most: float = math.inf) -> Check:
 
 
 def integer(name: str, value: Value, least: int, most: int) -> int:
-    """Return an integer within bounds; a float without a fraction counts as one."""
+    """Return an integer within bounds; a float without fraction is accepted."""
     if isinstance(value, bool) or not isinstance(value, int | float) or value != value // 1:
         raise Fault(f"{name} is {shown(value)}: it must be an integer")
     if not least <= value <= most:
@@ -109,15 +106,12 @@ def whole(least: int, most: int) -> Check:
 
 
 def either(name: str, value: Value) -> bool:
-    """Return an integer, 0 or 1, as a truth value."""
+    """Return 0 or 1 as a truth value."""
     return bool(integer(name, value, 0, 1))
 
 
 def numbers(name: str, value: Value, count: int, kind: object = Coordinate) -> tuple[float, ...]:
-    """Return the numbers of a list or a pose.
-
-    The protocol's type of one of them bounds each; angles and speeds have the bounds of coordinates.
-    """
+    """Return the numbers of a list or pose, bounded by the protocol's type `kind`."""
     if not isinstance(value, Array):
         raise Fault(f"{name} is {shown(value)}: it must be a list of {count} numbers")
     items = value.items
@@ -128,18 +122,18 @@ def numbers(name: str, value: Value, count: int, kind: object = Coordinate) -> t
 
 
 def several(count: int, kind: object = Coordinate) -> Check:
-    """Return the check for a list or a pose of so many numbers, see `numbers`."""
+    """Return the check for a list or pose of `count` numbers, see `numbers`."""
     return lambda name, value: numbers(name, value, count, kind)
 
 
 def pose(name: str, value: Value, kind: object = Coordinate) -> values.Pose:
-    """Return the six numbers of a pose; a list of six numbers counts as one."""
+    """Return the six numbers of a pose or list."""
     x, y, z, rx, ry, rz = numbers(name, value, 6, kind)
     return x, y, z, rx, ry, rz
 
 
 def flag(name: str, value: Value) -> bool:
-    """Return a truth value; numbers count as such."""
+    """Return a truth value; numbers are accepted."""
     if not isinstance(value, bool | int | float):
         raise Fault(f"{name} is {shown(value)}: it must be True or False")
     return bool(value)
@@ -175,16 +169,16 @@ Vector3 = Annotated[tuple[float, ...], several(3)]
 Vector6 = Annotated[tuple[float, ...], several(6)]
 Target = Annotated[values.Pose, pose]
 
-# ---------------------------------------------------------------------- what programs get, and texts
+# ---------------------------------------------------------------------- return values and texts
 
 
 def a_list(values: Sequence[float]) -> Array:
-    """Return a list of numbers as programs have it."""
+    """Return numbers as a list of the program."""
     return Array(tuple(values))
 
 
 def a_pose(values: Sequence[float]) -> Pose:
-    """Return a pose as programs have it."""
+    """Return numbers as a pose of the program."""
     return Pose(tuple(values))
 
 
@@ -194,7 +188,7 @@ def shown(value: Value) -> str:
 
 
 def readable(text: str) -> str:
-    """Return a text for people; parts of characters, which programs can cut out, are replaced."""
+    """Return a printable text; parts of characters, which programs can cut out, are replaced."""
     return text if text.isascii() else text.encode(errors="surrogateescape").decode(errors="replace")
 
 

@@ -1,4 +1,4 @@
-"""The arm as programs move it: one thread at a time, moves that are blended, and motions that outlast their call."""
+"""The arm as programs move it: one thread at a time, blended moves, motions that outlast their call."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,9 +12,9 @@ from tvist_protocol.transitions import Activity, after
 from tvist_urscript import Fault, Machine
 
 BRAKING = 2.0
-"""Deceleration of the fastest joint where a move follows a motion that has not ended [rad/s^2]."""
+"""Deceleration of the fastest joint before a move that follows an unfinished motion [rad/s^2]."""
 AGAIN = 10
-"""Ticks in which a thread may begin force mode again that a pause or a protective stop has ended."""
+"""Ticks in which a thread may restart force mode after a pause or protective stop ended it."""
 LOST = (
     "force mode has ended, by a pause or a protective stop, and the arm does not move on without it: call force_mode "
     "again, or end_force_mode, before it moves"
@@ -26,8 +26,8 @@ TAKEN = "another thread is controlling the robot: only one thread of a program c
 class ProgramArm:
     """Carries out the motions of one robot's programs.
 
-    `thread` returns the program that runs now and its thread's number, `lives` whether a thread still runs;
-    `spend` takes evaluations from the budget of the program that runs.
+    `thread` returns the running program and its thread's number; `lives`, whether a thread still runs;
+    `spend` takes evaluations from the running program's budget.
     """
 
     def __init__(
@@ -41,28 +41,28 @@ class ProgramArm:
         self._lives = lives
         self._rate_limit = RateLimit(access.motion, access.latest)
         self._inside: object | None = None
-        """Thread whose move has not returned."""
+        """Thread whose move has not returned yet."""
         self.driver: tuple[Machine, int] | None = None
-        """Program and number of the thread that began the guided motion."""
+        """Program and thread number that started the guided motion."""
         self._journeys: dict[object, Journey] = {}
-        """Moves of each thread that are blended, until the last of them is done."""
+        """Blended moves of each thread, until the last one is done."""
         self._journey: Journey | None = None
-        """The one that is under way."""
+        """The journey in progress."""
         self._guided: int | None = None
         self._abandoned = False
         self._asked = 0
-        """Number of threads that wait for the arm to give way."""
+        """Number of threads waiting to start compliance."""
         self._gives: object | None = None
-        """Program that lets the arm give way, until it ends that itself."""
+        """Program that made the arm compliant, until it ends that."""
         self.lead: Callable[[Segment], Turns] | None = None
-        """Makes a move while the arm gives way."""
+        """Makes a move while the arm is compliant."""
         self.waypoint: Segment | None = None
-        """Target of the present move, or of the last one."""
+        """Target of the present or last move."""
 
     # ------------------------------------------------------------------ planned moves
 
     def follow(self, segment: Segment) -> Turns:
-        """Move along a part of a path. If it is blended into the next, the program goes on meanwhile."""
+        """Move along a part of a path; if it blends into the next, the program continues meanwhile."""
         self._check_alone()
         journey = self._present()
         if journey is None:
@@ -75,21 +75,21 @@ class ProgramArm:
         yield from self._carry_out(journey)
 
     def begin(self) -> None:
-        """Begin the moves of this thread that wait for a further one, which may still come under way."""
+        """Start this thread's waiting moves, which can still be extended."""
         journey = self._present()
         if journey is not None and not journey.begun:
             self._check_alone()
             self._begin(journey)
 
     def finish(self) -> Turns:
-        """Carry out the moves of this thread to the end: no further one is blended with them."""
+        """Complete this thread's moves without another blend."""
         journey = self._present()
         if journey is not None:
             journey.closed = True
             yield from self._carry_out(journey)
 
     def _carry_out(self, journey: Journey) -> Turns:
-        """Carry out a journey until it is over, or takes a further move."""
+        """Carry out a journey until it is over or accepts another move."""
         if not (journey.closed or journey.full):
             return
         with self._moving():
@@ -105,12 +105,12 @@ class ProgramArm:
         self._present()
 
     def _led(self, journey: Journey) -> bool:
-        """Whether another thread has let the arm give way meanwhile, so that force control has to lead the moves."""
+        """Return whether another thread made the arm compliant, so that force control must lead moves."""
         waits = journey.number is None and not journey.over
         return waits and self._access.guidance.compliant is not None
 
     def _present(self) -> Journey | None:
-        """Return the moves of this thread that may be blended with a further one."""
+        """Return this thread's moves that can be blended with another one."""
         journey = self._journeys.get(self._thread())
         if journey is None or not journey.over:
             return journey
@@ -126,12 +126,12 @@ class ProgramArm:
             journey.step()
 
     def advance(self) -> None:
-        """Carry on the moves that are under way; called first in every tick in which the program is not held."""
+        """Continue the moves in progress; called first in every tick unless the program is paused."""
         if self._journey is not None and self._journey.begun:
             self._journey.step()
 
     def then(self, effect: Callable[[], None]) -> None:
-        """Do something now, or where the blend after the last move begins if moves of this thread are waiting."""
+        """Do something now, or at the start of the blend after this thread's last waiting move."""
         journey = self._present()
         if journey is None:
             effect()
@@ -140,12 +140,12 @@ class ProgramArm:
 
     @property
     def end(self) -> Segment | None:
-        """Last of the waiting moves of this thread."""
+        """This thread's last waiting move."""
         journey = self._present()
         return None if journey is None else journey.legs[-1]
 
     def _come_to_rest(self) -> Turns:
-        """Stop what still moves. In a protective stop of this tick the program is paused here."""
+        """Stop what still moves; a protective stop in this tick pauses the program here."""
         motion = self._motion
         if motion.activity is Activity.STREAMING:
             raise Fault(STREAMED)
@@ -159,11 +159,7 @@ class ProgramArm:
     # ------------------------------------------------------------------ guided motions
 
     def guide(self, start: Callable[[bool], int | None], wait: Iterator[None]) -> Turns:
-        """Begin or change a guided motion, which goes on when the call returns.
-
-        `start` begins it, shaped or not, and returns its number, or None if there is nothing to move;
-        `wait` then lets time pass until the call returns.
-        """
+        """Start or change a guided motion by `start(shaped)`, run `wait`, and return; the motion goes on."""
         yield from self.finish()
         with self._moving():
             yield from self.regain()
@@ -173,15 +169,12 @@ class ProgramArm:
             yield from wait
 
     def _stopping(self, command: str) -> bool:
-        """Whether a motion as that of a command waits for a stop under way, or in a protective stop of this tick."""
+        """Return whether a command's motion must wait for a stop in progress or a protective stop."""
         activity = self._motion.activity
         return (activity.moving or activity.protective) and after(activity, command) is None
 
     def regain(self) -> Turns:
-        """Wait for the end of a stop, and for force mode if the program has lost it and a thread begins it again.
-
-        A `Fault` says that none does.
-        """
+        """Wait for the end of a stop, and for a thread to restart a lost force mode; else raise Fault."""
         left = AGAIN
         while (stopping := self._stopping("speed_j")) or (self.lost and left > 0):
             left -= not (stopping or self._asked)
@@ -191,11 +184,11 @@ class ProgramArm:
 
     @property
     def lost(self) -> bool:
-        """Whether the program began a force mode that a stop has ended."""
+        """Whether a stop has ended a force mode that the program started."""
         return self._gives is self._thread()[0] and self._access.guidance.compliant is None
 
     def give_way(self, start: Callable[[], int]) -> Turns:
-        """Let the arm give way to forces, or change how; `start` begins that and returns its number."""
+        """Start or change compliance; `start` does that and returns the motion's number."""
         yield from self.finish()
         self._asked += 1
         try:
@@ -209,13 +202,13 @@ class ProgramArm:
         self._gives = self._thread()[0]
 
     def hold_again(self, *, by_hand: bool) -> None:
-        """End what `give_way` has begun: freedrive, or else force mode."""
+        """End freedrive or force mode started by `give_way`."""
         force, self._gives = self._access.force, None
         if force.by_hand == by_hand and self._access.guidance.compliant is not None:
             self.brake(force.end, wholly=True)
 
     def steer(self, start: Callable[[bool], int | None]) -> None:
-        """Begin or change a guided motion within a call of `guide`; see there. In a protective stop nothing happens."""
+        """Start or change a guided motion within a call of `guide`, except in a protective stop."""
         motion = self._motion
         if motion.activity.protective:
             return
@@ -228,7 +221,7 @@ class ProgramArm:
         self.driver = None if self._guided is None else self._thread()
 
     def _replace(self, start: Callable[[], int | None]) -> None:
-        """Begin a guided motion in place of the present one, which `hear` then does not miss."""
+        """Replace the guided motion without `hear` reporting the old one as stopped."""
         guided, self._guided = self._guided, None
         try:
             with refusals_as_faults():
@@ -237,7 +230,7 @@ class ProgramArm:
             self._guided = guided
 
     def in_motion(self, seconds: float) -> Iterator[None]:
-        """Let a time pass that is the motion's own: it lasts longer at a lower speed [s]. At least a tick passes."""
+        """Wait for a time that is scaled with the motion's rate [s], at least a tick."""
         while True:
             yield
             rate = self._motion.motions.speed
@@ -246,7 +239,7 @@ class ProgramArm:
                 return
 
     def halt(self, stop: Callable[[], None]) -> Turns:
-        """Stop the arm by what begins the stop of a motion, and wait until it is at rest."""
+        """Start a stop and wait until the arm is at rest."""
         yield from self.finish()
         with self._moving():
             self.brake(stop)
@@ -255,7 +248,7 @@ class ProgramArm:
                 yield
 
     def abort(self) -> None:
-        """Stop the planned move that the program makes now, if there is one; it goes on as if the move had ended."""
+        """Stop the program's present planned move, if any, and continue as if it had ended."""
         journey = self._journey
         if journey is None:
             return
@@ -265,14 +258,11 @@ class ProgramArm:
             journey.outcome = "motion_done"
 
     def brake(self, stop: Callable[[], None], *, wholly: bool = False) -> None:
-        """Begin a stop of what moves, which is the program's own will.
-
-        What gives way to forces goes on, unless the stop is to end that, too (`wholly`).
-        """
+        """Stop the present motion at the program's request; compliance only ends if `wholly`."""
         guidance = self._access.guidance
         if self._motion.activity.moving:
             self._rate_limit.charge()
-        guided, self._guided = self._guided, None  # so that `hear` does not miss it
+        guided, self._guided = self._guided, None  # so that `hear` ignores its end
         self.driver, self._abandoned = None, False
         if self._journey is not None:
             self._journey.number = None
@@ -287,7 +277,7 @@ class ProgramArm:
 
     @property
     def ends(self) -> bool:
-        """Whether nothing follows in the program that runs now."""
+        """Whether the running program has nothing left to do."""
         return self._thread()[0].at_end
 
     @property
@@ -301,7 +291,7 @@ class ProgramArm:
         return self._guided is not None
 
     def settle(self) -> None:
-        """Stop a motion whose thread has ended without another that took it over; called at the end of each turn."""
+        """Stop a motion whose thread has ended without a successor; called at the end of each turn."""
         self._rate_limit.planning = max(self._rate_limit.planning - 1, 0)
         journey = self._journey
         if journey is not None and not (journey.over or self._lives(journey.owner)):
@@ -315,16 +305,13 @@ class ProgramArm:
             del self._journeys[thread]
 
     def forget(self) -> None:
-        """Forget all motions, since the program has ended."""
+        """Forget all motions after the program's end."""
         self._inside = self.driver = self._journey = self._guided = self._gives = None
         self._journeys.clear()
         self._abandoned, self._rate_limit.planning = False, 0
 
     def hear(self, event: Event) -> bool:
-        """Handle an event of the robot; return whether it ended a motion of the program against its will.
-
-        The numbers of motions that the program itself ends are forgotten before.
-        """
+        """Handle an event; return whether it ended a motion against the program's will."""
         journey = self._journey
         moving = None if journey is None else journey.number
         if event.kind == "protective_stop":
@@ -351,7 +338,7 @@ class ProgramArm:
 
     @contextmanager
     def _moving(self) -> Iterator[None]:
-        """Keep other threads from moving the arm; a thread that is killed meanwhile leaves its motion behind."""
+        """Keep other threads from moving the arm; a thread killed meanwhile leaves its motion behind."""
         self._check_alone()
         self._inside = self._thread()
         self._abandoned = False

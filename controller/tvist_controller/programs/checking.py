@@ -1,4 +1,4 @@
-"""Checks programs without a robot."""
+"""Checks of programs without a robot."""
 
 import re
 from dataclasses import dataclass
@@ -22,22 +22,21 @@ class Finding:
     line: int
     """Line of the text, from 1."""
     column: int
-    """Column of the first character of the token at fault, from 1."""
+    """Column of the token at fault, from 1."""
     level: Literal["error", "warning"]
-    """An error keeps the program from starting; a warning mostly ends it when the place is reached."""
+    """Errors prevent the start; warnings mostly end the program when it reaches them."""
     text: str
-    """A sentence that says what is wrong."""
+    """Message."""
 
 
 def check_program(text: str) -> list[Finding]:
-    """Return what is wrong with the text of a program, in its order; empty if nothing is.
+    """Return the findings in a program's text, in order.
 
-    Errors are those of the compiler: syntax, unknown names, calls that do not fit their functions. Warnings are the
-    calls of functions that this controller does not simulate, what a robot of UR's refuses or reads otherwise, and
-    that a text of functions alone does nothing.
+    Errors are the compiler's: syntax, unknown names, wrong calls. Warnings are calls of functions that are not
+    simulated, constructs that a UR robot rejects or reads differently, and texts that only define functions.
     """
     findings = [_error(error) for error in check(text, known_signatures())]
-    # Without these functions, the same check finds the places where they are called.
+    # Checking again without these functions locates their calls.
     known = {(finding.line, finding.column) for finding in findings}
     for error in check(text, _SIMULATED):
         unknown = _UNKNOWN.fullmatch(error.text)
@@ -57,7 +56,7 @@ def check_program(text: str) -> list[Finding]:
 
 
 def _error(error: ScriptError) -> Finding:
-    """The compiler's error, with the function whose name is nearest to an unknown one."""
+    """Return the compiler's error, with the function closest to an unknown name."""
     unknown = _UNKNOWN.fullmatch(error.text)
     near = [] if unknown is None else get_close_matches(unknown[1].lower(), _NAMES, n=1, cutoff=0.75)
     said = f"{error.text} did you mean {_NAMES[near[0]]}?" if near else error.text

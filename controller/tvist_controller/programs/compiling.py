@@ -1,4 +1,4 @@
-"""The programs of one robot: built-in ones, those kept under a name, and how a text is compiled."""
+"""Programs of one robot: built-in and stored ones, and compilation."""
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
@@ -12,31 +12,31 @@ from tvist_protocol.programs import ProgramLoad, ProgramRun
 from tvist_urscript import Script, ScriptError
 
 KEPT = 8
-"""Compiled programs that are kept, since many clients send the same text again and again."""
+"""Size of the cache of compiled programs; many clients send the same text repeatedly."""
 MAX_KEPT = 100
-"""Number of programs that are kept under their names."""
+"""Largest number of stored programs."""
 WAIT: Final = "wait_program.urp"
-"""Plays until it is stopped, so that clients can try out play, pause and stop."""
+"""Runs until it is stopped, for trying play, pause and stop."""
 PAPER: Final = "paper.urp"
-"""Visits the poses in order, and returns the same way."""
+"""Visits the poses in order and returns the same way."""
 
 
 class ScriptCompiler:
-    """Compiles programs, which takes many ticks for long ones that are new."""
+    """Compiles programs; long new ones take many ticks."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._built_in = built_in(description)
         self._compile = lru_cache(KEPT)(_program)
 
     def rehearse(self) -> None:
-        """Build what compiling uses, before any program comes."""
-        from tvist_urscript import compile_script  # with the compiler, which no start waits for
+        """Build everything that compilation needs, in advance."""
+        from tvist_urscript import compile_script  # imported late, to keep the start fast
 
-        # Once as a program, and once as a statement that is added to it, which takes other ways through the compiler.
+        # A program, then a statement added to it: the compiler treats them differently.
         compile_script("sync()", known_signatures(), compile_script("sync()", known_signatures()))
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:
-        """Return the program of a command; None if it has no text and names none that is built in."""
+        """Return the program of a command; None without a text or built-in program."""
         text = command.text
         if text is None:
             assert isinstance(command, ProgramLoad)
@@ -47,7 +47,7 @@ class ScriptCompiler:
 
     @staticmethod
     def compile_statement(text: str, after: Script | None) -> Script:
-        """Return a statement that comes after a program, or after the last one that was added to it."""
+        """Compile a statement that follows a program or its last added statement."""
         if after is None:
             why = f"no program is running that waits for statements: it has to call {WAITS}()"
             raise RefusalError("wrong_mode", "", why)
@@ -81,7 +81,7 @@ def _refusal(line: int, column: int, text: str) -> RefusalError:
 
 
 def built_in(description: RobotDescription) -> dict[str, str]:
-    """Return the texts of the programs by file name; one without moves waits until it is stopped."""
+    """Return the built-in programs' texts by file name; one without moves runs until it is stopped."""
     names = list(description.poses)
     programs = {WAIT: "def wait_program():\n  while True:\n    sync()\n  end\nend\n"}
     if names:
@@ -90,7 +90,6 @@ def built_in(description: RobotDescription) -> dict[str, str]:
 
 
 def _moves(title: str, names: Sequence[str], description: RobotDescription) -> str:
-    """A program that moves to poses."""
     moves = [
         f"  movej({[float(angle) for angle in description.poses[name]]}, a=2.0, v=1.5)" for name in names
     ]
@@ -98,15 +97,15 @@ def _moves(title: str, names: Sequence[str], description: RobotDescription) -> s
 
 
 class Kept(NamedTuple):
-    """A program, and who sent it."""
+    """A program and its sender."""
 
     script: Script
     origin: str | None
-    """Address of the machine that sent its text; None if it is unknown."""
+    """Address of the machine that sent it; None if unknown."""
 
 
 class KeptPrograms:
-    """The built-in programs, which are compiled when they are loaded, and those that clients sent."""
+    """Built-in programs, compiled when loaded, and programs that clients sent."""
 
     def __init__(self, built_in: Iterable[str]) -> None:
         self._built_in = frozenset(built_in)
@@ -114,18 +113,18 @@ class KeptPrograms:
 
     @property
     def names(self) -> list[str]:
-        """Names of all, sorted."""
+        """Names of all programs, sorted."""
         return sorted(self._built_in | set(self._kept))
 
     def keep(self, name: str, kept: Kept) -> None:
-        """Keep a program under its name, in place of one that had it before."""
+        """Store a program under its name, replacing an earlier one."""
         if name not in self._kept and len(self._kept) >= MAX_KEPT:
             why = f"{MAX_KEPT} programs are kept already: send this one with program.run"
             raise RefusalError("busy", "name", why, MAX_KEPT)
         self._kept[name] = kept
 
     def find(self, name: str) -> Kept:
-        """Return a program that was kept."""
+        """Return a stored program."""
         if name not in self._kept:
             why = f"name is {name!r}: must be one of {', '.join(self.names)}"
             raise RefusalError("out_of_range", "name", why)

@@ -1,4 +1,4 @@
-"""Moves that are led to their targets by velocities: those of `servoc`, and all in force mode."""
+"""Moves steered by velocities: those of `servoc`, and all moves in force mode."""
 
 import math
 
@@ -14,21 +14,21 @@ from tvist_protocol.motions import ArcSegment, JointSegment, ProcessSegment, Seg
 from tvist_urscript import Fault
 
 ARRIVED = 1e-5
-"""Distance at which a move without a blend has arrived [m, and rad times the turn's length]."""
+"""Distance at which a move without blend has arrived [m, and rad times `TURN`]."""
 TURN = 0.25
-"""Length that a turn of 1 rad counts as [m]."""
+"""Length equivalent to a turn by 1 rad [m]."""
 SETTLING = 4.0
-"""Ticks in which the rest of the way is gone at the end."""
+"""Ticks in which the remaining distance decays at the end."""
 
 
 class ForceModeMoves:
-    """Leads one robot."""
+    """Steers one robot."""
 
     def __init__(self, access: Access, arm: ProgramArm, kinematics: ProgramKinematics) -> None:
         self._access, self._arm, self._kinematics = access, arm, kinematics
 
     def follow(self, segment: Segment) -> Turns:
-        """Move along a part of a path in the axes that are stiff; with a blend, go on from its radius."""
+        """Move along a part of a path in the stiff axes; with a blend, return at its radius."""
         if self._access.force.by_hand:
             raise Fault("in freedrive the arm follows no moves: call end_freedrive_mode before")
         if isinstance(segment, ArcSegment):
@@ -43,10 +43,7 @@ class ForceModeMoves:
             yield from self._arm.halt(lambda: guidance.stop_joints(guidance.limits.acceleration))
 
     def lead(self, segment: Segment, velocity: float, most: float, near: float) -> Turns:
-        """Lead the joints or the tool to the end of a move, until the rest of the way is no longer than `near`.
-
-        The tool accelerates with `most`; both decelerate as the move does, so that they come to rest at its end.
-        """
+        """Steer joints or tool to a move's end, until at most `near` away; the tool accelerates at `most`."""
         guidance, deceleration = self._access.guidance, segment.acceleration
 
         def start(shaped: bool) -> int:
@@ -67,7 +64,7 @@ class ForceModeMoves:
         return self._arm.guide(start, wait())
 
     def _way(self, segment: Segment) -> tuple[Floats, float]:
-        """Way to the end of a move, and its length, in joints or of the tool."""
+        """Return the remaining way of a move and its length, in joints or of the tool."""
         here = self._access.guidance.reference
         if isinstance(segment, JointSegment):
             turn = np.array(segment.q) - here

@@ -1,4 +1,4 @@
-"""What programs show, and what watches them: clients that write too rarely, and threads that miss turns."""
+"""Popups and outputs of programs, and supervision of rarely writing clients and threads that miss turns."""
 
 import re
 from collections.abc import Callable
@@ -15,16 +15,16 @@ from tvist_protocol.stream import PopupKind
 from tvist_urscript import EVALUATIONS, Fault
 
 SILENT = 5
-"""Missed turns in a row after which the arm no longer keeps the velocity that was commanded last."""
+"""Consecutive missed turns after which the arm slows down."""
 _NAME = re.compile(r"input_(int|double|bit)_register_(\d+)|input_bit_registers(\d+)_to_(\d+)")
 _BANKS: dict[str, tuple[Bank, int]] = {
     "int": ("input_int", NUMBERS), "double": ("input_double", NUMBERS), "bit": ("input_bit", BITS)
 }  # fmt: skip
 Group = Literal["digital", "analog", "bit"]
-"""What an output is: a digital terminal, an analogue one, or an output bit register."""
+"""Kind of output: digital terminal, analogue terminal, or output bit register."""
 
 SHOWS_UNTIL_FAILURE = 5
-"""Largest of UR's numbers of what an output does that is simulated."""
+"""Largest simulated number of UR's output actions."""
 _DOES = {
     1: (None, False, False),
     2: (None, True, True),
@@ -32,38 +32,35 @@ _DOES = {
     4: (None, None, False),
     SHOWS_UNTIL_FAILURE: (True, None, False),
 }
-"""What an output becomes when a program starts, when it runs no more, and when an error or a stop is why, by UR's
-numbers; None leaves it as it is."""
+"""Output value when a program starts, when it stops running, and after an error or stop, by UR's numbers;
+None for no change."""
 
 
 class Popups:
-    """The popup of one robot until somebody closes it; a newer one replaces it.
-
-    It belongs to the program that runs when it is shown, which `owner` returns.
-    """
+    """The popup of one robot, owned by the program returned by `owner`, until closed or replaced."""
 
     def __init__(self, emit: Emit, owner: Callable[[], object]) -> None:
         self._emit, self._owner = emit, owner
         self._owners: object | None = None
 
     def show(self, text: str, title: str, kind: PopupKind, *, blocking: bool) -> None:
-        """Show a popup; `blocking` says that the program waits until it is closed."""
+        """Show a popup; a blocking one makes the program wait until it is closed."""
         self._owners = self._owner()
         self._emit("popup", why=text, title=title, level=kind, blocking=blocking)
 
     @property
     def shown(self) -> bool:
-        """Whether there is a popup that nobody has closed."""
+        """Whether a popup is open."""
         return self._owners is not None
 
     def close(self, owner: object | None = None) -> None:
-        """Close the popup; if a program is given, which has ended, only one of its own."""
+        """Close the popup, or only one of a given program that has ended."""
         if owner is None or self._owners is owner:
             self._owners = None
 
 
 class RunstateOutputs:
-    """Sets outputs when the program begins to run, or runs no more since it is paused or has ended."""
+    """Sets outputs when the program starts running, is paused or ends."""
 
     def __init__(self, peripherals: Peripherals) -> None:
         self._peripherals = peripherals
@@ -71,14 +68,14 @@ class RunstateOutputs:
         self._runs = False
 
     def choose(self, group: Group, place: int, what: int) -> None:
-        """Choose what an output does from now on, by UR's number; 0 leaves it to programs."""
+        """Set an output's action by UR's number; 0 leaves it to programs."""
         self._choices.pop((group, place), None)
         if what:
             self._choices[group, place] = what
             self._apply(group, place, what, failed=False)
 
     def tell(self, *, runs: bool, failed: bool = False) -> None:
-        """Tell whether the program runs now, and if not whether an error or a stop is the reason."""
+        """Update the outputs; `failed` if an error or stop ended the program."""
         if runs == self._runs and not failed:
             return
         self._runs = runs
@@ -105,13 +102,13 @@ class _Watchdog:
     bank: Bank
     place: int
     ticks: int
-    """Ticks that may pass between two writes."""
+    """Largest interval between two writes [ticks]."""
     action: str
     since: int
 
 
 class Watchdogs:
-    """The watchdogs of one robot's program, which watch input registers."""
+    """Watchdogs of one robot's program for input registers."""
 
     def __init__(self, peripherals: Peripherals) -> None:
         self._peripherals = peripherals
@@ -119,10 +116,7 @@ class Watchdogs:
         self._tick = 0
 
     def watch(self, name: str, frequency: float, action: str) -> None:
-        """Watch an input of RTDE from now on, which has to be written with at least this frequency [Hz].
-
-        The action is `pause`, `stop`, or `ignore` to watch it no more.
-        """
+        """Watch an RTDE input to be written at a frequency [Hz]; `pause`, `stop`, or `ignore` to end this."""
         bank, place = _register(name)
         self._peripherals.changed = True
         if action == "ignore":
@@ -133,21 +127,21 @@ class Watchdogs:
 
     @property
     def names(self) -> list[str]:
-        """Names of the inputs that are watched."""
+        """Names of the watched inputs."""
         return list(self._all)
 
     def clear(self) -> None:
-        """Watch nothing any more, since the program has ended."""
+        """End all watches after the program's end."""
         self._peripherals.changed |= bool(self._all)
         self._all.clear()
 
     def begin_anew(self, tick: int) -> None:
-        """Begin anew to wait for writes, since the program is resumed at a tick."""
+        """Restart all waits when the program is resumed."""
         for watchdog in self._all.values():
             watchdog.since = tick
 
     def expired(self, tick: int) -> tuple[str, str] | None:
-        """Return the action of a watchdog whose register was not written in time, and the register's name."""
+        """Return action and register name of a watchdog that has expired, else None."""
         self._tick = tick
         for watchdog in self._all.values():
             written = max(self._peripherals.written(watchdog.bank, watchdog.place), watchdog.since)
@@ -157,7 +151,7 @@ class Watchdogs:
 
 
 def _register(name: str) -> tuple[Bank, int]:
-    """Bank and number of a register by RTDE's name."""
+    """Return bank and number of a register by RTDE's name."""
     match = _NAME.fullmatch(name)
     if match is None:
         raise Fault(f'"{name}" is no input register: it must be like "input_int_register_0"')
@@ -171,10 +165,7 @@ def _register(name: str) -> tuple[Bank, int]:
 
 
 class MissedTurns:
-    """Warns of a thread that guides the arm and misses turns, since the budget of a tick is spent before.
-
-    It slows the arm down if the thread misses several in a row.
-    """
+    """Warns about a guiding thread that misses turns for lack of budget; finally slows the arm down."""
 
     def __init__(self, arm: ProgramArm, access: Access) -> None:
         self._arm, self._emit, self._guidance = arm, access.emit, access.guidance
@@ -182,11 +173,11 @@ class MissedTurns:
         self._warned = False
 
     def clear(self) -> None:
-        """Warn anew, since another program begins."""
+        """Reset for another program."""
         self._missed, self._warned = 0, False
 
     def look(self, starved: set[object]) -> None:
-        """Look at the thread that guides the arm, after all turns; of starved programs, no thread had one."""
+        """Check the thread that guides the arm after all turns; `starved` programs had no turn at all."""
         driver = self._arm.driver
         if driver is None or not (driver[0] in starved or driver[0].missed(driver[1])):
             self._missed = 0

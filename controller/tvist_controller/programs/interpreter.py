@@ -1,4 +1,4 @@
-"""Statements that clients add to a program while it waits for them."""
+"""Statements that clients add to a program while it waits for them (interpreter mode)."""
 
 from collections import deque
 from collections.abc import Callable
@@ -13,17 +13,17 @@ from tvist_protocol.programs import MAX_SCRIPT, Interpreter
 from tvist_urscript import Fault, Machine, Script
 
 MAX_STATEMENTS = 1000
-"""Statements, of `MAX_SCRIPT` characters together, that a program takes before it is told to forget them."""
+"""Largest number of statements, with `MAX_SCRIPT` characters in total, before they must be cleared."""
 HELD = 2
-"""Statements that a program holds until it has forgotten the first ones, in units of the limits above."""
+"""Storage for statements not yet cleared, in multiples of the limits above."""
 WAITS, CLEAR = "interpreter_mode", "clear_interpreter"
-"""Functions that wait for statements, and that forget them."""
+"""Functions that wait for statements, and that clear them."""
 
 
 class StatementQueue:
     """The statements for one robot's program.
 
-    A program that calls `interpreter_mode` anywhere takes statements from its start on; they are carried out while it
+    A program that calls `interpreter_mode` anywhere accepts statements from its start; they run while it
     waits in that function.
     """
 
@@ -32,18 +32,18 @@ class StatementQueue:
     ) -> None:
         self._machine, self._arm, self._peripherals, self._emit = machine, arm, peripherals, emit
         self._program: Machine | None = None
-        """The main program if it takes statements."""
+        """The main program if it accepts statements."""
         self._queue: deque[tuple[int, Script]] = deque()
         self.last: Script | None = None
-        """What the next statement is compiled after: the last one, or the program; None if no program takes any."""
+        """What the next statement is compiled after: the last one, or the program; None if none are accepted."""
         self._lengths: deque[tuple[int, int]] = deque()
-        """Number and length of each statement that is held."""
+        """Number and length of each stored statement."""
         self._waiting = self._ending = self._clearing = self._published = False
         self._interpreted = self._executed = self._cleared = self._forgotten = 0
 
     @property
     def published(self) -> Interpreter | None:
-        """State of the statements; None before the first program that takes some."""
+        """State of the statements; None before the first program that accepts some."""
         if not self._published:
             return None
         return Interpreter(
@@ -96,11 +96,11 @@ class StatementQueue:
             self._restart(machine)
 
     def end(self) -> None:
-        """Carry out no further statements."""
+        """Carry out no more statements."""
         self._ending = True
 
     def clear(self) -> None:
-        """Forget all statements so far and what they have defined, when the one that calls this has ended."""
+        """Clear all statements and what they defined, after the one that calls this."""
         if not self._waiting or self._machine() is not self._program:
             raise Fault(f"{CLEAR} can only be called while the program waits in {WAITS}()")
         self._clearing = True
@@ -117,7 +117,7 @@ class StatementQueue:
             yield
 
     def _forget(self, machine: Machine, before: int) -> None:
-        """Forget what was carried out; functions are forgotten if their scopes have smaller numbers."""
+        """Clear executed statements, and functions whose scopes have smaller numbers."""
         self._clearing = False
         self._cleared, self._peripherals.changed = self._executed, True
         while self._lengths and self._lengths[0][0] <= self._cleared:
@@ -133,7 +133,7 @@ class StatementQueue:
     # ------------------------------------------------------------------ for clients
 
     def interpret(self, script: Script) -> int:
-        """Add a statement, and return its number."""
+        """Add a statement and return its number."""
         assert self._program is not None, "the statement was compiled after a program"
         clears = CLEAR in script.used
         self._check_room(len(script.text), clears=clears)
@@ -146,10 +146,7 @@ class StatementQueue:
         return self._interpreted
 
     def _check_room(self, length: int, *, clears: bool) -> None:
-        """Refuse a statement that makes the program too large, unless it makes room for later ones.
-
-        Those that are held until they are forgotten have room for twice as many, since a client need not wait for that.
-        """
+        """Refuse a statement that makes the program too large; uncleared ones may take twice the space."""
         held = [characters for _, characters in self._lengths]
         added = [characters for number, characters in self._lengths if number > self._forgotten]
         full = len(held) >= HELD * MAX_STATEMENTS or sum(held) + length > HELD * MAX_SCRIPT
@@ -159,7 +156,7 @@ class StatementQueue:
             raise RefusalError("busy", "text", why, MAX_STATEMENTS)
 
     def skip(self, what: Literal["statements", "move"]) -> None:
-        """Leave out the statements that wait, or the move that the program makes."""
+        """Drop the waiting statements, or the present move."""
         if what == "statements":
             self._queue.clear()
         else:

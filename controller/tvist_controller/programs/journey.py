@@ -1,4 +1,4 @@
-"""Moves of a program that are blended into one motion, which goes on while further ones come."""
+"""A program's moves blended into one motion, which can be extended while it runs."""
 
 from collections.abc import Callable, Generator
 
@@ -16,40 +16,36 @@ from tvist_protocol.transitions import Activity
 from tvist_urscript import Fault
 
 Turns = Generator[None, None, None]
-"""Course of a function that lets time pass: it yields once a tick."""
+"""Run of a waiting function; it yields once per tick."""
 Effect = Callable[[], None]
 
 DELAY, DELAY_PER_PART = 10, 4
-"""Ticks from the call of a move along a line or path to its start, and ticks more for each further part of a path:
-time to plan it beside the ticks. They do not depend on how long planning takes, so equal programs move alike.
-"""
+"""Ticks from the call of a line or path to its start, plus ticks per further part: time for planning. They do
+not depend on the planning time, so equal programs move alike."""
 FURTHER, FURTHER_PER_PART = 12, 1
-"""Ticks from the order of a plan by which the running motion goes on to further moves until it does so, and ticks more
-for each of them.
-"""
+"""Ticks from ordering an extension of the running motion until it applies, plus ticks per move."""
 MAX_PARTS = 50
-"""Number of moves that are planned at once from rest. As many wait at most: then the program waits, too."""
+"""Largest number of moves planned together from rest, and waiting; with more, the program waits."""
 MAX_FURTHER = 25
-"""Number of moves to which a running motion goes on at once."""
+"""Largest number of moves per extension of a running motion."""
 AHEAD = 150
-"""Number of moves ahead of the arm from which on no further ones are planned."""
+"""Number of moves ahead of the arm from which on no more are planned."""
 SPARE = 4
-"""Ticks more for which the running motion stays as it is, since a change of its rate looks ahead."""
+"""Further ticks for which the running motion stays unchanged, since rate changes look ahead."""
 PAUSE = 300
-"""Ticks that a stop, or a plan of a `movej` within a tick, is paid with. These two take longer than all else in a tick,
-so fewer than one tick in a hundred may have one.
-"""
+"""Ticks charged for a stop or a `movej` planned within a tick. These take longest in a tick, so fewer than
+one tick in a hundred may have one."""
 _UNREACHABLE = frozenset({"no_solution", "singular", "collision", "limit_position"})
-"""Reasons for which a motion that a program has begun ends in a protective stop."""
+"""Refusals of a started motion that cause a protective stop."""
 
 
 class RateLimit:
-    """Counts the stops and plans of a robot's programs."""
+    """Limits the rate of stops and plans of a robot's programs."""
 
     def __init__(self, motion: MotionControl, latest: Callable[[], State]) -> None:
         self._motion, self._latest = motion, latest
         self.planning = 0
-        """Ticks for which the last plan that was ordered is still being made."""
+        """Remaining ticks of the last ordered plan."""
         self._paid = 0
         """Tick at which all stops and plans are paid."""
 
@@ -59,21 +55,21 @@ class RateLimit:
         return max(self._paid - self._latest().tick, 0)
 
     def charge(self) -> None:
-        """Note a stop or a plan."""
+        """Charge for a stop or plan."""
         self._paid = self._latest().tick + self.debt + PAUSE
 
     @property
     def waits(self) -> bool:
-        """Whether the next motion has to wait, since stops and plans were too close to each other."""
+        """Whether the next motion must wait because stops and plans were too frequent."""
         return self._motion.activity is Activity.REST and self.debt > 2 * PAUSE
 
 
 class Journey:
-    """The moves of one thread that are blended, from the first one to the last, and the motion along them.
+    """The blended moves of one thread, and the motion along them.
 
-    The motion begins when the last move is known, or as many as are planned at once; `step` carries it on in every tick
-    while the thread goes on to further moves. Each plan ends at rest, so the arm stops where no further move comes in
-    time. `rest` stops what still moves, and lets time pass until a motion may begin.
+    The motion starts when the last move is known, or as many as are planned together; `step` continues it
+    every tick while the thread adds moves. Each plan ends at rest, so the arm stops where no further move
+    comes in time. `rest` stops other motion and waits until a motion may start.
     """
 
     def __init__(
@@ -82,68 +78,68 @@ class Journey:
         self._access, self._motion, self.owner = access, access.motion, owner
         self._rate_limit, self._rest = rate_limit, rest
         self.legs: list[Segment] = []
-        """Moves that the arm has not passed."""
+        """Moves not yet passed by the arm."""
         self._effects: list[list[Effect]] = []
-        """What the program does after each of them, until the next."""
+        """Effects of the program after each of them."""
         self.closed = False
-        """Whether no further move will come."""
+        """Whether no more moves will come."""
         self.number: int | None = None
         """Number of the motion while it runs."""
         self.outcome: str | None = None
         """Event that ended it."""
         self._stops_at: tuple[int, float] | None = None
-        """Progress at which its protective stop ends, see `stop`; None without one."""
+        """Progress at the end of its protective stop, see `stop`; None without one."""
         self.skipped = False
-        """True after a call of `abort`; a motion that was being planned then is not started."""
+        """Whether `abort` was called; a motion then being planned is not started."""
         self.over = False
-        """Whether there is nothing more to do."""
+        """Whether it is complete."""
         self.fault: Exception | None = None
-        """What has gone wrong, which its thread raises."""
+        """Error that its thread raises."""
         self._steps: Turns | None = None
         self._marks: list[tuple[int, float]] = []
-        """Where the blend at the end of each move under way begins, see `PlannedMove.marks`."""
+        """Where the blend at the end of each present move begins, see `PlannedMove.marks`."""
         self._further: tuple[Callable[[], Plan], int, int] | None = None
-        """Plan of further moves that was ordered, tick at which it is taken, and how many they are."""
+        """Ordered plan of an extension, tick at which it applies, and number of moves."""
         self._ends = self._refuses = False
-        """Whether the running motion goes on no further, and whether this is since a further move is impossible."""
+        """Whether the running motion cannot be extended, and whether because a further move is impossible."""
         self._count = 0
-        """Number of moves of the running motion so far."""
+        """Number of moves of the running motion."""
 
     # ------------------------------------------------------------------ for the program
 
     def add(self, leg: Segment) -> None:
-        """Take the next move."""
+        """Add the next move."""
         self.legs.append(leg)
         self._effects.append([])
 
     def then(self, effect: Effect) -> None:
-        """Do something where the blend after the last move begins."""
+        """Do something at the start of the blend after the last move."""
         self._effects[-1].append(effect)
 
     @property
     def full(self) -> bool:
-        """Whether as many moves wait as are planned at once."""
+        """Whether the largest number of moves is waiting."""
         return len(self.legs) - len(self._marks) >= MAX_PARTS
 
     @property
     def begun(self) -> bool:
-        """Whether it is under way."""
+        """Whether it has started."""
         return self._steps is not None
 
     def hand_over(self) -> list[tuple[Segment, list[Effect]]]:
-        """Leave the rest of the moves to another, with what the program does after each of them."""
+        """Return the remaining moves and effects for another to carry out."""
         self.over = True
         return list(zip(self.legs, self._effects, strict=True))
 
     def stop(self) -> None:
-        """Note that a protective stop has begun: what it passes has been passed when the program is resumed."""
+        """Record a protective stop; what it passes counts as passed on resuming."""
         move = self._motion.motions.move
         self.outcome, self._stops_at = "protective_stop", None if move is None else move.stops_at
 
     # ------------------------------------------------------------------ in every tick
 
     def step(self) -> None:
-        """Carry out what is due in this tick; the first call begins."""
+        """Do the work of this tick; the first call starts the motion."""
         if self.over:
             return
         if self._steps is None:
@@ -167,7 +163,7 @@ class Journey:
             if self.skipped:
                 break
             if isinstance(plan.found, RefusalError):
-                self._refused(plan.found, legs)  # in a protective stop, it tries again when it is resumed
+                self._refused(plan.found, legs)  # after a protective stop, resuming tries again
                 continue
             self._start(legs, plan)
             while self.outcome is None:
@@ -183,7 +179,7 @@ class Journey:
         self._pass(len(self.legs))
 
     def _tell_stop(self, ended: int) -> None:
-        """Say that the arm has stopped at a point with a blend, since the move after it was not known in time."""
+        """Warn that the arm stopped at a blend because the next move came too late."""
         comes = len(self.legs) > ended or not self.closed
         if comes and self.legs[ended - 1].blend > 0.0 and not (self._refuses or self.skipped):
             where = f"segments[{self._count - 1}]"
@@ -206,13 +202,15 @@ class Journey:
         self._count = len(legs)
 
     def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
-        """The plan of a move. Lines and paths, and joint moves in debt, begin a fixed time after it is ordered."""
+        """Plan moves; lines, paths and joint moves in debt start a fixed time after the order."""
         plans, command = self._access.plans, self._command(legs)
         if isinstance(command, MoveJ) and self._rate_limit.debt < PAUSE:
             self._rate_limit.charge()
             return plans.now(command, within_tick=True)
         while True:
-            while self._rate_limit.planning > 0:  # of a thread that was killed meanwhile: one after the other
+            while (
+                self._rate_limit.planning > 0
+            ):  # of a thread that was killed meanwhile; plan only one at a time
                 yield
             self._rate_limit.planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
             ordered = plans.later(command)
@@ -225,7 +223,7 @@ class Journey:
                 return plan
 
     def _go_on(self) -> None:
-        """Let the running motion go on to the moves that have come meanwhile."""
+        """Extend the running motion to moves that have come meanwhile."""
         if self._further is not None and not self._take():
             return
         under_way = len(self._marks)
@@ -238,15 +236,15 @@ class Journey:
             self._further = ordered, self._access.latest().tick + ticks, len(legs)
 
     def _take(self) -> bool:
-        """Take the plan of further moves when it is due; return whether more may be ordered."""
+        """Apply the plan of an extension when due; return whether another may be ordered."""
         assert self._further is not None
         ordered, due, count = self._further
         if self._access.latest().tick < due:
             return False
         plan, self._further = ordered(), None
-        if not self._access.plans.hold(plan):  # what it depends on has changed
+        if not self._access.plans.hold(plan):  # outdated
             return True
-        if not isinstance(plan.found, PlannedMove):  # the moves begin anew where the motion ends
+        if not isinstance(plan.found, PlannedMove):  # plan the moves again from the end of the motion
             self._ends, self._refuses = True, plan.found is not None
             return False
         part = self._marks[-1][0]
@@ -256,7 +254,7 @@ class Journey:
         return True
 
     def _pass_blends(self, progress: tuple[int, float] | None) -> None:
-        """Do what the program does behind the blends that the arm has begun where it has come to, see `progress`."""
+        """Apply effects behind blends that the arm has started, see `progress`."""
         while progress is not None and len(self._marks) > 1 and progress > self._marks[0]:
             del self._marks[0]
             self._pass(1)
@@ -273,7 +271,7 @@ class Journey:
             self._motion.check("move_j")
 
     def _refused(self, refusal: RefusalError, legs: list[Segment]) -> None:
-        """End a program whose move is impossible, or stop the robot if it is a line or path that leads nowhere."""
+        """End a program whose move is impossible, or stop the robot for an unreachable line or path."""
         reply = refusal.reply
         if isinstance(command_of(legs), MoveJ) or reply.code not in _UNREACHABLE:
             raise Fault(reply.why)
@@ -281,10 +279,7 @@ class Journey:
 
 
 def command_of(legs: list[Segment], *, goes_on: bool = False) -> MoveJ | MoveL | MovePath:
-    """Return the command for moves that are blended into one motion: the simplest that does.
-
-    Only a path goes on to further moves that come while the motion runs.
-    """
+    """Return the simplest command for moves blended into one motion; only a path can be extended."""
     token = OWN_TOKEN
     match [] if goes_on else legs:
         case [JointSegment() as leg]:

@@ -1,4 +1,4 @@
-"""Kinematics of the arm for programs: with the present tool, and with others."""
+"""Kinematics of the arm for programs, with any tool."""
 
 from collections.abc import Callable, Sequence
 
@@ -14,15 +14,12 @@ from tvist_plant.description import RobotDescription
 from tvist_urscript import Fault
 
 SEARCH = 900
-"""Evaluations of inverse kinematics beyond its usual cost where it searches a curve of postures."""
+"""Additional evaluations of inverse kinematics that searches a curve of postures."""
 PoseNumbers = tuple[float, float, float, float, float, float]
 
 
 class ProgramKinematics:
-    """Kinematics of a robot's tool centre point, the present one or another, in the base frame.
-
-    `spend` takes evaluations from the budget of the program that runs.
-    """
+    """Kinematics of the present or another TCP; `spend` charges the running program's budget."""
 
     def __init__(
         self, description: RobotDescription, motion: MotionControl, spend: Callable[[int], None]
@@ -34,24 +31,24 @@ class ProgramKinematics:
         self._tool = self._flange
 
     def _with(self, tcp: Sequence[float] | None) -> Arm:
-        """The kinematics of a tool; of the present one if there is none given."""
+        """Return the kinematics of a tool, by default the present one."""
         wanted = self._motion.tcp if tcp is None else tuple(tcp)
         if wanted != self._tcp:
             self._tcp, self._tool = wanted, self._flange.with_tool(wanted)
         return self._tool
 
     def tool_pose(self, q: Floats, tcp: Sequence[float] | None = None) -> PoseNumbers:
-        """Return the pose of the tool at joint positions, x y z [m] and rotation vector [rad]."""
+        """Return the tool pose at joint positions, x y z [m] and rotation vector [rad]."""
         return placement_vector(*self._with(tcp).pose(q))
 
     def jacobian(self, q: Floats, tcp: Sequence[float] | None = None) -> Floats:
-        """Return the Jacobian of the tool's velocity [m/s] and angular velocity [rad/s], shape (6, n)."""
+        """Return the Jacobian of tool velocity [m/s] and angular velocity [rad/s], shape (6, n)."""
         return self._with(tcp).jacobian(q)
 
     def posture(
         self, pose: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None = None
     ) -> tuple[float, ...]:
-        """Return the joint positions nearest to others at which the tool has a pose [rad]."""
+        """Return the joint positions nearest to `near` with a tool pose [rad]."""
         tool = placement(self._motion.tcp if tcp is None else tcp)
         flange = placement(pose) @ tool.inverse
         try:
@@ -67,6 +64,6 @@ class ProgramKinematics:
 
     @staticmethod
     def difference(start: Sequence[float], end: Sequence[float]) -> Floats:
-        """Return the way and the turn from one pose to another in the base frame, shape (6,) [m, rad]."""
+        """Return translation and rotation between two poses in the base frame, shape (6,) [m, rad]."""
         one, other = placement(start), placement(end)
         return np.concatenate([other.position - one.position, turn(one.rotation, other.rotation)])

@@ -1,4 +1,4 @@
-"""All functions of the controller that programs can call."""
+"""All functions of the controller for programs."""
 
 from collections.abc import Callable
 from functools import cache
@@ -41,12 +41,12 @@ MOVING = frozenset(names(MotionFunctions)) | {
     "freedrive_mode",
     "teach_mode",
 }
-"""Functions that move the arm, or let clients do so."""
+"""Functions that move the arm, or let clients move it."""
 
 
 @cache
 def known_signatures() -> Signatures:
-    """Return how scripts call each function; those of the language itself are in `tvist_urscript`."""
+    """Return the signature of each function; the language's own are in `tvist_urscript`."""
     return {
         **{name: one for family in FAMILIES for name, one in signatures(family).items()},
         **{name: Signature(given) for name, (given, _) in SUBJECTS.items()},

@@ -1,4 +1,4 @@
-"""The loaded program and its progress, and the programs that run beside it."""
+"""The loaded program and its progress, and secondary programs."""
 
 from dataclasses import dataclass
 
@@ -21,11 +21,11 @@ from tvist_protocol.transitions import Activity
 from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
 
 TOLD_EVERY = 50
-"""Ticks between two changes of the line in `io`, which changes with almost every tick."""
+"""Ticks between updates of the line in `io`; the line changes almost every tick."""
 GUIDED = 100
-"""Evaluations that the step of a guided motion of the program takes from the budget of its tick."""
+"""Evaluations charged to a tick's budget for a guided motion of the program."""
 MAX_BESIDE = 8
-"""Number of secondary programs that may run at once."""
+"""Largest number of concurrent secondary programs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +33,14 @@ class _Running:
     name: str
     machine: Machine
     origin: str | None
-    """Address of the machine that sent and started it; None if it is unknown, or if these are two machines."""
+    """Address of the machine that both sent and started it; None if unknown or different."""
 
 
 class ProgramPlayer:
-    """Carries out programs with the rights of the client that played them: one, and secondary ones beside it.
+    """Runs a program and secondary ones with the rights of the client that played them.
 
-    Their motions are ordinary motions: they have numbers and events, and a client may pause them; stopping one ends the
-    program. A protective stop pauses the program: after the stop is unlocked, playing resumes with the move that was
-    stopped.
+    Their motions are ordinary ones with numbers and events. A client may pause them; stopping one ends the
+    program. A protective stop pauses the program; after unlocking, playing resumes with the interrupted move.
     """
 
     def __init__(self, access: Access, safety: SafetyControl) -> None:
@@ -63,35 +62,35 @@ class ProgramPlayer:
             )
         )  # fmt: skip
         self.kept = KeptPrograms(built_in(access.description))
-        """The programs that can be loaded."""
+        """Programs that can be loaded."""
         self.name: str | None = None
-        """Name of the loaded program; None if there is none."""
+        """Name of the loaded program; None without one."""
         self.state: ProgramState = "STOPPED"
         self.loaded: Kept | None = None
         self._main: _Running | None = None
         self._all: list[_Running] = []
-        """Programs in order of age."""
+        """Programs, oldest first."""
         self._starved: set[_Running] = set()
-        """Programs for which nothing of the last tick's evaluations was left."""
+        """Programs that got none of the last tick's evaluations."""
         self.idle = True
-        """Whether no program runs, and no debt of evaluations is left, so that `advance` has nothing to do."""
+        """Whether no program runs and no evaluations are owed, so that `advance` is not needed."""
         self._told: tuple[object, ...] = ()
         self._left = EVALUATIONS
-        """Evaluations that the last tick left; below 0 they are a debt, which is paid before any program goes on."""
+        """Evaluations left by the last tick; a negative number is a debt to be paid first."""
         self._now: _Running | None = None
-        """The one whose turn it is."""
+        """The program whose turn it is."""
         self._failed = False
         """Whether the program ends by an error or a stop."""
         self.raised: list[Exception] = []
-        """Exceptions with which functions have failed that blame no argument, until a log has them."""
+        """Unexpected exceptions of functions, until logged."""
         self.line = 0
-        """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
+        """Present line, or the one at which playing would resume, from 1; 0 for none."""
         self.label: ProgramLabel | None = None
-        """Label that the program had passed at that line; None if there is none."""
+        """Label passed by the program at that line; None for none."""
 
     @property
     def present_line(self) -> int:
-        """Line of the main thread at this tick, unlike `line`, which is told now and then; 0 if there is none."""
+        """Line of the main thread in this tick, while `line` is updated at intervals; 0 for none."""
         return 0 if self._main is None else self._main.machine.line
 
     @property
@@ -106,7 +105,7 @@ class ProgramPlayer:
     # ------------------------------------------------------------------ ticks and events
 
     def advance(self, tick: int) -> None:
-        """Give every thread its turn; called first in every tick unless all is idle."""
+        """Give every thread its turn; called first in every tick unless idle."""
         self._give_turns(tick)
         self.idle = not self._all and self._left >= EVALUATIONS
         now = self.name, self.state, self.line, self.label
@@ -114,8 +113,8 @@ class ProgramPlayer:
             self._told, self._access.peripherals.changed = now, True
 
     def _give_turns(self, tick: int) -> None:
-        # Evaluations are counted rather than timed, so that a run is the same live, in lockstep and in a replay.
-        # What a tick takes beyond them, the next ticks pay.
+        # Count evaluations instead of time, so that live, lockstep and replayed runs are equal. Excess is subtracted
+        # from the next ticks.
         self.sockets.answer()
         left = self._left = min(self._left, 0) + EVALUATIONS
         if not self._all:
@@ -123,11 +122,11 @@ class ProgramPlayer:
         if self.state == "PLAYING":
             self._watch(tick)
         if self._main is not None and not self._held:
-            self._now = self._main  # what it does behind a blend is done by this program
+            self._now = self._main  # actions behind a blend belong to this program
             self.arm.advance()
             self._now = None
         left -= GUIDED if self.arm.guides else 0
-        # Whoever got nothing of the last tick's evaluations comes first, else the oldest.
+        # Threads that got no evaluations in the last tick come first, then the oldest.
         for running in sorted(self._all, key=lambda one: one not in self._starved) if left > 0 else ():
             if running not in self._all or (running is self._main and self._held):
                 continue
@@ -151,13 +150,13 @@ class ProgramPlayer:
 
     @property
     def _held(self) -> bool:
-        """Whether the program waits: in a safeguard stop and before the drives are ready nothing may move."""
+        """Whether the program must wait: paused, in a safeguard stop, or before the drives are ready."""
         motion = self._motion
         unready = motion.robot_mode is RobotMode.RUNNING and not motion.ready
         return self.state != "PLAYING" or motion.safety.safeguard or unready
 
     def _resume(self, running: _Running, left: int) -> int:
-        """Give a program its turn; return what it leaves of the evaluations."""
+        """Give a program its turn; return the remaining evaluations."""
         self._now = running
         try:
             running.machine.resume(left)
@@ -180,17 +179,16 @@ class ProgramPlayer:
             self.end(event.why or event.kind)
 
     def end(self, why: str) -> None:
-        """End all programs without stopping what moves."""
+        """End all programs without stopping motion."""
         for running in tuple(self._all):
             self._close(running, why)
 
     def stop_moving(self, why: str) -> None:
-        """End a program that may move the arm, so that no motion begins after a stop; `why` as for `end`."""
+        """End a program that may move the arm, so that no motion follows a stop."""
         if self.state == "PLAYING" and self.loaded is not None and self.loaded.script.used & MOVING:
             self.end(why)
 
     def _watch(self, tick: int) -> None:
-        """Pause or stop the program if a client has fallen silent."""
         expired = self._watchdogs.expired(tick)
         if expired is None or self._main is None:
             return
@@ -212,7 +210,7 @@ class ProgramPlayer:
         )
 
     def _finish(self, running: _Running) -> None:
-        """Handle the end of a program; the arm comes to rest with it. `halt` ends all programs, whichever says it."""
+        """Handle the end of a program and stop its motion; `halt` ends all programs."""
         if running not in self._all:
             return
         halts = running.machine.halted
@@ -245,12 +243,10 @@ class ProgramPlayer:
             self._access.force.external.use(None)
 
     def _machine(self) -> Machine:
-        """The program that runs now."""
         assert self._now is not None, "only programs call their functions"
         return self._now.machine
 
     def _thread(self) -> tuple[Machine, int]:
-        """What identifies the thread that runs now: its program and its number."""
         machine = self._machine()
         return machine, machine.thread
 
@@ -262,14 +258,14 @@ class ProgramPlayer:
     # ------------------------------------------------------------------ for commands
 
     def load(self, name: str, program: Kept, why: str) -> None:
-        """Make a program the one that is played next; one that is running ends, and the arm stops."""
+        """Load the program to play next; end a running one and stop the arm."""
         if self._main is not None:
             self._close(self._main, why)
             self._motion.stop(None, why)
         self.name, self.loaded = name, program
 
     def play(self, origin: str | None) -> None:
-        """Begin the loaded program; `origin` is the address of the machine that both sent and plays it, if known."""
+        """Start the loaded program; `origin` is the machine that both sent and plays it, if known."""
         assert self.loaded is not None, "a program is loaded before it is played"
         self._main = self._begin(self.loaded.script, self.name or self.loaded.script.name, origin)
         self.state, self.line, self._failed = "PLAYING", 1, False
@@ -278,7 +274,7 @@ class ProgramPlayer:
         self.statements.open(self._main.machine)
 
     def play_beside(self, script: Script, origin: str | None) -> None:
-        """Begin a secondary program; `origin` as for `play`."""
+        """Start a secondary program; `origin` as in `play`."""
         if sum(running is not self._main for running in self._all) >= MAX_BESIDE:
             why = f"{MAX_BESIDE} secondary programs are running: wait until one of them has ended"
             raise RefusalError("busy", "", why, MAX_BESIDE)
@@ -293,13 +289,13 @@ class ProgramPlayer:
         return running
 
     def go_on(self, tick: int) -> None:
-        """Let the paused program go on from this tick."""
+        """Resume the paused program from this tick."""
         self._watchdogs.begin_anew(tick)
         self.state = "PLAYING"
         self._runstate.tell(runs=True)
 
     def hold(self) -> None:
-        """Pause the program. A planned motion pauses on its path, a guided one is stopped."""
+        """Pause the program; planned motion pauses on its path, guided motion stops."""
         self._safety.stay_paused()
         if self._motion.activity is Activity.MOVING and self.arm.moves:
             self._motion.pause()
@@ -308,7 +304,7 @@ class ProgramPlayer:
         self._wait()
 
     def _wait(self, *, failed: bool = False) -> None:
-        """Pause the program: none of its threads has a turn any more, from this tick on."""
+        """Pause the program; its threads get no turns from this tick on."""
         self.state = "PAUSED"
         self._runstate.tell(runs=False, failed=failed)
         if self._main is not None:

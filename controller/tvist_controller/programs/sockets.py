@@ -1,8 +1,7 @@
-"""Sockets of programs: what they have received, and what waits for more.
+"""Sockets of programs: received data and waiting readers.
 
-The network is the host's: it gets orders after programs had their turn. What happened it reports before a tick, as
-`SocketNews`, which the journal contains. So a replay gets the same bytes at the same ticks. The gripper of a cell needs
-no network: it is part of the simulation, and answers a tick later.
+The network is the host's. It gets orders after the programs' turns and reports `SocketNews` before a tick, which the
+journal contains, so that a replay gets the same bytes. A cell's gripper is simulated and answers a tick later.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -20,27 +19,25 @@ from tvist_protocol.journal import Entry, SocketChange
 from tvist_urscript import Fault, Machine
 
 MAX_SOCKETS = 16
-"""Most sockets of a program at a time."""
+"""Largest number of open sockets per program."""
 
 T = TypeVar("T")
 Take = Callable[[bytes], tuple[T, int] | None]
-"""Finds what a program reads at the beginning of the received bytes: its value and its length in bytes; None as long
-as it has not arrived completely.
-"""
+"""Returns the value at the beginning of the received bytes and its length; None while incomplete."""
 
 
 class SocketNews(NamedTuple):
-    """Something that happened to a socket."""
+    """An event of a socket."""
 
     number: int
-    """Number of the socket; with `expired`, that of the wait."""
+    """Number of the socket; with `expired`, of the wait."""
     change: SocketChange
     data: bytes = b""
-    """What it has received."""
+    """Received data."""
 
     @classmethod
     def of(cls, entry: Entry) -> "SocketNews":
-        """Return the news that an entry of the journal contains."""
+        """Return the news in a journal entry."""
         if entry.socket is None or entry.change is None:
             raise ValueError(
                 f"the journal's socket entry before tick {entry.tick} has no number or no change"
@@ -49,12 +46,12 @@ class SocketNews(NamedTuple):
 
 
 class Open(NamedTuple):
-    """Connect a socket; `opened` or `failed` is the answer."""
+    """Connect a socket; answered by `opened` or `failed`."""
 
     socket: int
-    """Number of the socket; no number comes twice."""
+    """Unique number of the socket."""
     origin: str | None
-    """Address of the machine that sent and started the program; None if it is unknown."""
+    """Address of the machine that sent and started the program; None if unknown."""
     address: str
     """Name or IP address of the machine to connect to."""
     port: int
@@ -68,34 +65,34 @@ class Send(NamedTuple):
 
 
 class Close(NamedTuple):
-    """Close a socket; nothing that comes from it later counts."""
+    """Close a socket and ignore its later news."""
 
     socket: int
 
 
 class Taken(NamedTuple):
-    """A program has read bytes that a socket had received, so there is room for more."""
+    """A program has read received bytes, which makes room for more."""
 
     socket: int
     amount: int
 
 
 class Wait(NamedTuple):
-    """A program begins to wait for a socket."""
+    """A program starts to wait for a socket."""
 
     wait: int
-    """Number of the wait; no number comes twice."""
+    """Unique number of the wait."""
     socket: int
 
 
 class Waited(NamedTuple):
-    """A wait is over, so that no time has to be kept for it any more."""
+    """A wait is over; its time no longer matters."""
 
     wait: int
 
 
 class Expire(NamedTuple):
-    """Tell the program by `expired` when so much wall time has passed since it began to wait; robot time has passed."""
+    """Report `expired` when this wall time has passed since the wait began; robot time has passed already."""
 
     wait: int
     socket: int
@@ -106,13 +103,13 @@ SocketOrder = Open | Send | Close | Taken | Wait | Waited | Expire
 
 
 class SocketPorts:
-    """Carries the sockets of one robot's programs; this one has no network, so no socket can be opened.
+    """Network of one robot's programs; this base class has none, so no socket can be opened.
 
-    What happens to them later reaches the host by `Host.socket`.
+    Later events reach the host by `Host.socket`.
     """
 
     def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketNews]:
-        """Carry out orders without blocking; return news that are known at once, which count after this tick."""
+        """Carry out orders without blocking; return news known at once, which count after this tick."""
         return [SocketNews(order.socket, "failed") for order in orders if isinstance(order, Open)]
 
 
@@ -121,22 +118,21 @@ class _Socket:
     number: int
     received: bytearray = field(default_factory=bytearray)
     connected: bool | None = None
-    """True once it was opened, False if it could not be, None while it is being opened."""
+    """True after opening, False after failing, None in between."""
     open: bool = False
-    """True while it is connected."""
+    """Whether it is connected."""
     requests: Requests | None = None
-    """What the program has sent to the gripper of the cell; None for a socket of the network."""
+    """Parser of requests to the cell's gripper; None for a network socket."""
 
     def shut(self) -> None:
-        """Note that it is open no more, or that it could not be opened."""
+        """Mark as closed or failed."""
         self.connected, self.open = bool(self.connected), False
 
 
 class Sockets:
-    """The sockets of one robot's programs. Each program has its own, by name.
+    """The sockets of one robot's programs; each program has its own, by name.
 
-    `owner` returns the program that runs now, `origin` the address of the machine that sent and started it, if it
-    is known. The gripper of the cell is reached by programs, too.
+    `owner` returns the running program, `origin` the machine that sent and started it, if known.
     """
 
     def __init__(
@@ -148,17 +144,17 @@ class Sockets:
     ) -> None:
         self._emit, self._owner, self._origin, self._cell = emit, owner, origin, cell
         self.orders: list[SocketOrder] = []
-        """Orders for the network, in their order, which the host takes away."""
+        """Orders for the network, in order; the host removes them."""
         self._named: dict[tuple[Machine, str], _Socket] = {}
         self._numbered: dict[int, _Socket] = {}
         self._last = self._last_wait = 0
         self._answers: list[tuple[_Socket, bytes]] = []
-        """Answers of the gripper that programs get in the next tick."""
+        """Gripper answers for the next tick."""
         self._waits: dict[int, bool] = {}
-        """Present waits, and whether the time of each is over on the wall, too."""
+        """Present waits, and whether the wall time of each has also expired."""
 
     def hear(self, news: SocketNews) -> None:
-        """Take what happened to a socket or to a wait for one."""
+        """Take news about a socket or a wait."""
         if news.change == "expired":
             if news.number in self._waits:
                 self._waits[news.number] = True
@@ -175,18 +171,15 @@ class Sockets:
                 socket.shut()
 
     def answer(self) -> None:
-        """Pass on what the gripper has answered in the last tick."""
+        """Deliver the gripper's answers of the last tick."""
         for socket, data in self._answers:
             socket.received += data
         self._answers.clear()
 
-    # ------------------------------------------------------------------ what programs call
+    # ------------------------------------------------------------------ for programs
 
     def connect(self, name: str, address: str, port: int) -> Generator[None, None, bool]:
-        """Connect a socket, and wait until the network has opened it or failed to; return whether it is open.
-
-        One of the same name is closed first.
-        """
+        """Connect a socket, replacing one of this name, and wait for it; return whether it is open."""
         self.disconnect(name)
         owner = self._owner()
         if sum(one is owner for one, _ in self._named) >= MAX_SOCKETS:
@@ -213,7 +206,7 @@ class Sockets:
         return False
 
     def disconnect(self, name: str) -> None:
-        """Close a socket of the program; nothing happens if there is none of this name."""
+        """Close the program's socket of this name, if any."""
         if (self._owner(), name) in self._named:
             self._drop(self._owner(), name)
 
@@ -223,7 +216,7 @@ class Sockets:
         return socket is not None and socket.open
 
     def send(self, name: str, data: bytes) -> None:
-        """Send bytes; nothing happens if the socket is not open."""
+        """Send bytes if the socket is open."""
         socket = self._named.get((self._owner(), name))
         if socket is None or not socket.open:
             return
@@ -235,12 +228,11 @@ class Sockets:
     def read(
         self, name: str, take: Take[T], timeout: float, meanwhile: Callable[[int], None]
     ) -> Generator[None, None, T | None]:
-        """Read from a socket what `take` finds, and wait until it has arrived.
+        """Read from a socket what `take` finds, waiting until it has arrived.
 
-        What has arrived incompletely stays for the next call. A read that fails takes at least a tick, so that a loop
-        of them lets time pass; it returns None if the time is over, or if the socket was closed before.
-        The time-out [s] is counted in robot time, but not less on the wall; it is for ever if it is not above 0.
-        `meanwhile` is called with the number of ticks that have passed, before each further one.
+        Incomplete data stays for the next call. A failed read returns None after at least a tick, so that loops let
+        time pass: on timeout, or if the socket was closed before. The timeout [s] counts robot time, but at least as
+        much wall time; none if not above 0. `meanwhile` is called with the ticks passed before each further tick.
         """
         socket = self._named.get((self._owner(), name))
         if socket is None:
@@ -267,7 +259,7 @@ class Sockets:
                 meanwhile(waited)
 
     def close(self, owner: Machine) -> None:
-        """Close all sockets of a program, which has ended."""
+        """Close all sockets of a program that has ended."""
         for one, name in tuple(self._named):
             if one is owner:
                 self._drop(one, name)
@@ -275,7 +267,6 @@ class Sockets:
     # ------------------------------------------------------------------ parts
 
     def _take(self, socket: _Socket, take: Take[T]) -> tuple[T, int] | None:
-        """Remove what is read from the received bytes."""
         found = take(bytes(socket.received)) if socket.received else None
         if found is not None:
             del socket.received[: found[1]]
@@ -286,7 +277,7 @@ class Sockets:
 
     @contextmanager
     def _waiting(self, socket: _Socket) -> Iterator[int]:
-        """Wait for a socket; the number of the wait is returned."""
+        """Wait for a socket within a context; return the number of the wait."""
         self._last_wait = wait = self._last_wait + 1
         self._waits[wait] = False
         self._order(socket, Wait(wait, socket.number))
@@ -297,7 +288,7 @@ class Sockets:
             self._order(socket, Waited(wait))
 
     def _order(self, socket: _Socket, order: SocketOrder) -> None:
-        """Give an order to the network, unless the socket is one of the gripper."""
+        """Order something from the network, unless the socket is the gripper's."""
         if socket.requests is None:
             self.orders.append(order)
 

@@ -27,7 +27,7 @@ of postures."""
 
 
 def page() -> str:
-    """Return the page of reference that lists all functions."""
+    """Return the reference page of all functions."""
     parts = [HEAD]
     for functions in FAMILIES:
         rows = [
@@ -57,7 +57,6 @@ def page() -> str:
 
 
 def _call(name: str, one: Signature) -> str:
-    """A call with its parameters and their defaults."""
     parameters = [
         parameter.name if parameter.default is REQUIRED else f"{parameter.name}={_shown(parameter.default)}"
         for parameter in one.parameters
@@ -70,7 +69,6 @@ def _shown(value: object) -> str:
 
 
 def _what(functions: type, name: str) -> str:
-    """First paragraph of a function's description."""
     text = getdoc(getattr(functions, name)) or ""
     return " ".join(text.partition("\n\n")[0].split())
 

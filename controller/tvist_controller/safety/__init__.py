@@ -1,1 +1,1 @@
-"""What stops the arm: the safety system, dangers, faults, and the payload that torques contradict or teach."""
+"""Safety: the safety system, monitors, faults, and detection and learning of the payload."""

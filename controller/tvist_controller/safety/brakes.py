@@ -1,4 +1,4 @@
-"""Stop of category 0: the power is off, and the brakes bring the arm to rest whatever torque that takes."""
+"""Stop of category 0: power off, and brakes that stop the arm with any torque needed."""
 
 import numpy as np
 import pinocchio as pin
@@ -9,20 +9,19 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, payload_inertia, rigid_model
 
 HOLD = 1.25
-"""Least ratio of a brake's torque to the load by gravity and the other joints, so that it holds what it stops [-]."""
+"""Least ratio of a brake's torque to the load by gravity and other joints [-]."""
 LONGEST = 5.0
-"""Time after which the arm counts as stopped in any case [s]."""
+"""Time after which the arm counts as stopped [s]."""
 
 
 def brake(description: RobotDescription, carried: Payload, state: Target, period: float) -> Known:
-    """Simulate the rigid arm under its brakes, from a state of motion, in ticks of `period` seconds.
+    """Simulate the rigid arm under its brakes from a state of motion, in ticks of `period` seconds.
 
-    Each joint is slowed down by the torque of its brake, which is taken to be as large as its drive's; once at rest,
-    it stays there. The rotors turn along:
+    Each joint is slowed down by its brake, assumed as strong as its drive, and stays at rest afterwards. With rotors:
 
         (M(q) + B) q̈ + C(q, q̇) q̇ + g(q) = -τ_b sgn(q̇)    over the joints that still turn.
 
-    Brakes do not follow a path, so the arm leaves the path that it was on.
+    Brakes do not follow a path, so the arm leaves its path.
     """
     model = rigid_model(description, Payload())
     if carried.mass > 0.0:

@@ -1,4 +1,4 @@
-"""Records the motions of a robot, has them studied, and keeps the lessons until the arm rests."""
+"""Records a robot's motions, has them studied, and keeps the lessons until the arm rests."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,29 +15,29 @@ from tvist_plant.user_file import named
 from tvist_protocol.lessons import PayloadLesson
 
 LONGEST = 10_000
-"""Number of ticks of the longest motion that is recorded; of a longer one nothing is kept."""
+"""Longest recorded motion; longer ones are dropped [ticks]."""
 AFTER = 150
-"""Number of ticks that are recorded after a motion has ended, in which the arm rings down."""
+"""Recording time after the end of a motion, for the ring-down [ticks]."""
 
 
 @dataclass(frozen=True)
 class MotionRecord:
-    """A motion of T ticks, of which the last ones are at rest."""
+    """A motion of T ticks with its ring-down."""
 
     q: Floats
     """Measured joint angles, shape (T, n) [rad]."""
     moments: Floats
     """Measured motor torques on the joint side, shape (T, n) [N m]."""
     stop: int
-    """Number of ticks until the commands rested."""
+    """Number of ticks until the commands came to rest."""
     whole: bool
-    """True if it went as planned: shaped from rest to rest, without a stop, a stream or a bypass of the filter."""
+    """Whether it was a shaped motion from rest to rest, without stop, stream or bypass."""
     beliefs: FilterState
-    """What the controller took the arm for, and shaped with."""
+    """State of filter and payload assumed by the controller."""
 
 
 Record = Callable[[], MotionRecord]
-"""Makes the record of a motion that has ended, which takes longer than a tick has."""
+"""Creates the record of a completed motion, which takes longer than a tick."""
 
 
 class MotionRecorder:
@@ -50,11 +50,7 @@ class MotionRecorder:
         self._beliefs: FilterState | None = None
 
     def take(self, sample: Sample, present: Callable[[], FilterState]) -> Record | None:
-        """Take a tick in which the drives hold or move the arm; return the motion that is complete with it.
-
-        That may be one that the next one has cut short; None if there is none. What is believed at present is asked
-        for at the beginning of a motion only.
-        """
+        """Take a tick with drives on; return the motion it ends, if any; `present` is called at its start."""
         resting, done = sample.mode.at_rest, None
         if not resting and (not self._moves or self._stop):
             done = self._finished()
@@ -74,7 +70,7 @@ class MotionRecorder:
         return done
 
     def forget(self) -> None:
-        """Drop the present motion, since the drives do not hold the arm, or it was placed elsewhere."""
+        """Drop the present motion, because the drives are off or the arm was placed elsewhere."""
         self._moves, self._samples, self._ticks, self._stop = False, [], 0, 0
 
     def _finished(self) -> Record | None:
@@ -92,49 +88,47 @@ class MotionRecorder:
 
 
 Work = Callable[[], None]
-"""A study, which takes a fraction of a second and touches nothing that ticks use."""
+"""A study; it takes a fraction of a second and touches nothing that ticks use."""
 Later = Callable[[Work], Callable[[], bool]]
-"""Has a study made beside the ticks; returns what tells whether it has ended."""
+"""Starts a study outside the ticks; returns a function that tells whether it has ended."""
 
 
 Study = Callable[[MotionRecord], PayloadLesson | None]
-"""Returns what a motion teaches; None if it teaches nothing.
-
-One thread at a time calls it. What is learnt is in its lessons alone, so a replay studies nothing.
-"""
+"""Returns what a motion teaches, None for nothing; called by one thread at a time. All results are in the
+lessons, so a replay studies nothing."""
 Plans = Callable[[PayloadLesson, FilterState], Plan]
-"""Plans what a lesson changes."""
+"""Plans the change that a lesson requires."""
 
 
 def at_once(work: Work) -> Callable[[], bool]:
-    """Study within the tick; with the clocks lockstep and free a tick may take as long as it likes."""
+    """Study within the tick, which may take any time with the clocks lockstep and free."""
     work()
     return lambda: True
 
 
 WAITING = 16
-"""Studies that may wait: of motions that are made faster than studied, such as at a high speed, some teach nothing."""
+"""Largest number of waiting studies; motions beyond, made faster than they can be studied, teach nothing."""
 
 
 class Taught(NamedTuple):
-    """A lesson, and what it depends on."""
+    """A lesson and what it depends on."""
 
     beliefs: FilterState
-    """What the controller took the arm for during the motion."""
+    """State assumed by the controller during the motion."""
     lesson: PayloadLesson
     """What was learnt."""
     plan: Plan | None
-    """Plan for it; None if there is none yet."""
+    """Plan for the lesson; None if not yet planned."""
 
 
 class Experience:
-    """What a robot makes of its motions, which are studied in their order."""
+    """Learning from a robot's motions, studied in order."""
 
     def __init__(
         self,
         study: Study,
-        later: Later = at_once,  # has a study made beside the ticks
-        plan: Plans | None = None,  # of what a lesson changes; None: in the tick that takes it
+        later: Later = at_once,  # runs a study in parallel
+        plan: Plans | None = None,  # plans the changes of a lesson; None to plan in the tick that applies it
     ) -> None:
         self._recorder = MotionRecorder()
         self._study, self._later, self._plan = study, later, plan
@@ -146,10 +140,10 @@ class Experience:
     def watch(
         self,
         sample: Sample,
-        present: Callable[[], FilterState],  # what the controller takes the arm for
+        present: Callable[[], FilterState],  # the controller's assumptions about the arm
         *,
         held: bool,  # whether the drives hold the arm
-        placements: int,  # number of times that the arm was put somewhere, see `ControlCycle`
+        placements: int,  # number of times that the arm was placed, see `ControlCycle`
     ) -> None:
         """Take a tick."""
         if placements != self._placements or not held:
@@ -173,16 +167,16 @@ class Experience:
         self._under_way.append((self._later(study), learnt))
 
     def void(self) -> None:
-        """Drop what is being learnt of motions so far, since it is to be forgotten, or the arm carries another load."""
+        """Drop all studies in progress, because of `forget` or another load."""
         self._under_way = []
 
     def lessons(self) -> Iterator[Taught]:
-        """Yield the lessons of all finished studies, once; to be asked while the arm rests."""
+        """Yield the lessons of finished studies once; call while the arm rests."""
         while self._under_way and self._under_way[0][0]():
             yield from self._under_way.pop(0)[1]
 
     def raised(self) -> Sequence[Exception]:
-        """Return what studies have raised, once, and not the same with every motion."""
+        """Return new exceptions of studies, each message only once."""
         if not self._raised:
             return ()
         raised, self._raised = self._raised, []

@@ -1,4 +1,4 @@
-"""Deliberate faults: those of `simulation.inject`, applied to the arm or the safety system."""
+"""Deliberate faults of `simulation.inject`, applied to the arm or the safety system."""
 
 import heapq
 import math
@@ -19,7 +19,7 @@ from tvist_protocol.simulation import SimulationInject
 
 
 def check_fault(command: SimulationInject, description: RobotDescription) -> None:
-    """Refuse a fault that no such robot can have."""
+    """Refuse a fault that this robot can never have."""
     joints = description.joints
     fault = FAULTS.get(command.fault)
     if fault is None:
@@ -38,7 +38,7 @@ def check_fault(command: SimulationInject, description: RobotDescription) -> Non
 
 
 _NEEDED: dict[str, Callable[..., Any]] = {"torque": Plant.push, "nan": Plant.make_nan}
-"""Method of the plant that a fault needs."""
+"""Method of the plant needed by a fault."""
 
 
 class Faults:
@@ -55,7 +55,7 @@ class Faults:
                 partial(safety.emergency, "system"), partial(safety.end_emergency, "system"),
             ),
         }  # fmt: skip
-        """Functions that start and end each input of the safety system."""
+        """Functions that start and end each safety input."""
         self._momentary: dict[str, Callable[[], None]] = {
             "protective_stop": lambda: motion.protect("a protective stop was injected"),
             "normal": safety.release,
@@ -64,18 +64,14 @@ class Faults:
             "fault": lambda: safety.cut_power("the safety system failed", "fault"),
             "nan": motion.cycle.plant.make_nan,
         }
-        """Functions for the faults that have no duration."""
+        """Functions of faults without duration."""
         self._plant = motion.cycle.plant
         self._push = np.zeros(motion.cycle.description.joints)
         self._ends: list[tuple[int, int, str, Callable[[], None]]] = []
         self._number = count()
 
     def inject(self, command: SimulationInject, tick: int) -> None:
-        """Start a fault.
-
-        Raises:
-            RefusalError: The plant does not support it.
-        """
+        """Start a fault, or raise RefusalError if the plant does not support it."""
         fault, seconds = command.fault, command.seconds
         needed = _NEEDED.get(fault)
         if needed is not None and not self._plant.can(needed):
@@ -88,7 +84,7 @@ class Faults:
             self._add(joint, value)
             self._at(ends, fault, lambda: self._add(joint, -value))
             return
-        # An input that is set again or released no longer ends at the earlier time.
+        # Setting or releasing an input cancels its earlier end time.
         self._forget({*self._inputs} if fault == "normal" else {fault})
         if fault in self._inputs:
             begin, end = self._inputs[fault]
@@ -100,23 +96,23 @@ class Faults:
 
     @property
     def next_end(self) -> float:
-        """Number of the tick in which the next fault ends; infinite if none does."""
+        """Tick in which the next fault ends; infinite if none does."""
         return self._ends[0][0] if self._ends else math.inf
 
     def end(self, tick: float = math.inf) -> None:
-        """End the faults whose time is over before a tick."""
+        """End faults that expire before a tick."""
         while self._ends and self._ends[0][0] <= tick:
             heapq.heappop(self._ends)[-1]()
 
     def clear(self) -> None:
-        """End all present faults, and release the arm."""
+        """End all present faults and external torques."""
         self.end()
         self._push[:] = 0.0
         if self._plant.can(Plant.push):
             self._plant.push(self._push)
 
     def _forget(self, faults: set[str]) -> None:
-        """Drop the end times of faults; those with a duration then last until something else ends them."""
+        """Drop the end times of faults, which then last until ended otherwise."""
         self._ends = [one for one in self._ends if one[2] not in faults]
         heapq.heapify(self._ends)
 

@@ -1,4 +1,4 @@
-"""What stops the arm or warns by the signals of a tick: drives beyond their limits, and a shaper that fails."""
+"""Monitors of a tick's signals: drives beyond their limits, and failing shapers."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -14,13 +14,13 @@ from tvist_controller.motion.monitor import Finding, Monitor
 from tvist_plant.plant import PERIOD
 
 ALLOWED = 0.01
-"""How long a drive may exceed its limit [s]."""
+"""Permitted duration of an overload [s]."""
 TICKS = round(ALLOWED / PERIOD)
 
 
 @compiled_for_ticks
 def exceeds(values: Floats, limits: Floats) -> bool:
-    """Return whether a magnitude exceeds its limit, each argument of shape (n,)."""
+    """Return whether any magnitude exceeds its limit, arguments of shape (n,)."""
     for j in range(limits.shape[0]):  # noqa: SIM110  numba has no generators
         if abs(values[j]) > limits[j]:
             return True
@@ -28,7 +28,7 @@ def exceeds(values: Floats, limits: Floats) -> bool:
 
 
 class Overload(Monitor):
-    """Finds a joint whose drive has exceeded its torque limit [N m] for longer than `ALLOWED`."""
+    """Detects a joint whose drive exceeds its torque limit [N m] for longer than `ALLOWED`."""
 
     needs: ClassVar = "drives"
 
@@ -39,7 +39,7 @@ class Overload(Monitor):
         exceeds(self._limits, self._limits)  # loads compiled code, which takes many ticks
 
     def look(self, sample: Sample) -> Finding | None:
-        """Return the longest excess, if it is too long; the count then begins anew."""
+        """Return the longest overload if too long, and restart the count."""
         moment = sample.measured.moment
         if not exceeds(moment, self._limits):
             if self._any:
@@ -64,17 +64,14 @@ class Overload(Monitor):
 
 
 class ShaperMonitor(Monitor):
-    """Finds a shaper whose function fails, and warns when it or its feed-forward cannot work as intended.
-
-    A warning comes once, until all works again.
-    """
+    """Detects a failing shaper, and warns once if it or its feed-forward cannot work as intended."""
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
         self._clipped = self._limited = False
 
     def look(self, sample: Sample) -> Finding | None:
-        """Return what is wrong with the filter, or what keeps its feed-forward from leading enough."""
+        """Return a fault of the filter, or a limit on its feed-forward."""
         line_filter, mode = self._cycle.filter, self._cycle.mode
         if (fault := line_filter.fault) is not None:  # the filter continues with old weights
             return Finding(fault, None, "protective_stop")

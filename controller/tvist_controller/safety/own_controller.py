@@ -1,7 +1,4 @@
-"""A robot with a controller of its own, which is only watched, or through which the robot is moved.
-
-What that controller says becomes our state; if the robot is moved through it, what it forbids is obeyed.
-"""
+"""A robot with its own controller, whose reports become the state here, and whose safety state is obeyed."""
 
 from enum import IntEnum
 
@@ -26,14 +23,14 @@ REFUSED = (
     "the robot is only watched: its own controller moves and stops it, and nothing is sent to it from here; command it "
     "at its own interfaces or its teach pendant, or serve it with --enable-motion"
 )
-"""Why a command is refused that would concern the arm."""
+"""Refusal of commands that affect a watched arm."""
 _NO_STOP = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.UNDEFINED})
 SAME_MASS = 0.05
-"""Largest difference of two masses that count as equal [kg]."""
+"""Mass difference below which masses count as equal [kg]."""
 
 
 class RemoteStatus:
-    """Mirrors what the robot's own controller says, cycle by cycle."""
+    """Mirrors the reports of the robot's own controller, cycle by cycle."""
 
     def __init__(self, plant: RealArm, peripherals: Peripherals, emit: Emit) -> None:
         self._plant, self._peripherals, self._emit = plant, peripherals, emit
@@ -42,11 +39,11 @@ class RemoteStatus:
 
     @property
     def missed(self) -> int:
-        """Number of the robot's cycles that did not arrive."""
+        """Number of lost cycles."""
         return 0 if self._sight is None else self._sight.missed
 
     def tell(self, sight: Sight, before: Sight | None) -> None:
-        """Emit what people should know, and take over the tool; `before` is what it said before."""
+        """Emit warnings and take over the tool; `before` is the previous report."""
         for why in sight.told:
             self._emit("warning", why=why)
         if sight.tool is not None and (before is None or sight.tool != before.tool):
@@ -56,13 +53,13 @@ class RemoteStatus:
             self._io, self._peripherals.changed = io, True
 
     def declared(self, payload: Payload) -> Payload:
-        """Return the payload that the robot was told; `payload` if it does not say."""
+        """Return the payload set on the robot, or `payload` if not reported."""
         if self._sight is None or self._sight.payload is None:
             return payload
         return payload_of(self._sight.payload)
 
     def io(self, io: Io, *, force: bool) -> Io:
-        """Return `io` with what the robot says of itself; its force at the tool only if that is wanted."""
+        """Return `io` with the robot's own values, and its tool force if wanted."""
         sight = self._sight
         if sight is None:
             return io
@@ -77,7 +74,7 @@ class RemoteStatus:
 
 
 class Watching(RemoteStatus):
-    """Follows one such robot."""
+    """Follows a robot that is only watched."""
 
     def __init__(
         self, plant: RealArm, peripherals: Peripherals, emit: Emit, cycle: ControlCycle, modes: RobotModes
@@ -87,10 +84,7 @@ class Watching(RemoteStatus):
         modes.now = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
 
     def look(self) -> int | None:
-        """Take what the robot said in its next cycle; return the number of its tick, None if it has said nothing.
-
-        `tell_cycle` then reports what has changed, once the tick has this number.
-        """
+        """Take the next report; return its tick, None without one; `tell_cycle` then emits the changes."""
         self._before = self._sight
         try:
             self._sight = self._plant.sight()
@@ -100,7 +94,7 @@ class Watching(RemoteStatus):
         return self._sight.tick
 
     def tell_cycle(self) -> None:
-        """Emit what the present cycle has changed."""
+        """Emit the changes of the present cycle."""
         sight, before = self._sight, self._before
         if sight is None or sight is before:
             return
@@ -108,7 +102,7 @@ class Watching(RemoteStatus):
         _, safety, _ = self._modes.now = sight.modes
         if before is not None and safety != before.modes[1]:
             why = f"the robot reports safety_mode {_name(SafetyMode, safety)}"
-            # A `protective_stop` would let clients unlock it, which can be done at the robot only.
+            # Not a `protective_stop`: that could be unlocked by clients, this one only at the robot.
             self._emit("warning" if safety in _NO_STOP else "safety_stop", why=why)
 
     def sample(self) -> Sample:
@@ -118,12 +112,12 @@ class Watching(RemoteStatus):
 
     @property
     def speed(self) -> float:
-        """Share of the programmed speed [-]."""
+        """Fraction of the programmed speed [-]."""
         return 0.0 if self._sight is None else self._sight.speed
 
 
 class Supervision(RemoteStatus):
-    """Follows one such robot; motion and safety are those of our control line."""
+    """Follows a robot moved through its own controller; motion and safety are those of this controller."""
 
     def __init__(
         self,
@@ -137,7 +131,7 @@ class Supervision(RemoteStatus):
         self._motion, self._safety = motion, safety
 
     def look(self) -> None:
-        """Take what it has said since the last tick; to be called before each."""
+        """Take the reports since the last tick; call before each tick."""
         before, sight = self._sight, self._plant.seen()
         self._sight = sight
         self.tell(sight, before)
@@ -150,11 +144,7 @@ class Supervision(RemoteStatus):
             self._emit("warning", why=why)
 
     def check(self, command: Command) -> None:
-        """Refuse what this server cannot do at the robot.
-
-        Raises:
-            RefusalError: It is asked to.
-        """
+        """Raise RefusalError for commands that this server cannot apply to the robot."""
         if isinstance(command, SetIo | SimulationSetInputs):
             why = "inputs and outputs are those of the robot, to which only set-points are sent: switch them there"
             raise RefusalError("wrong_mode", "", why)
@@ -164,12 +154,11 @@ class Supervision(RemoteStatus):
             raise RefusalError("wrong_mode", "mass", why)
 
     def io(self, io: Io, *, force: bool) -> Io:
-        """Return `io` with what the robot says of itself, apart from what clients set here."""
+        """Return `io` with the robot's own values, except what clients set here."""
         kept = {name: getattr(io, name) for name in ("payload", "target_speed_fraction")}
         return msgspec.structs.replace(super().io(io, force=force), **kept)
 
     def _scale(self, sight: Sight) -> None:
-        """Scale motions by the robot's speed slider."""
         slider, motions = 1.0 if sight.slider is None else sight.slider, self._motion.motions
         before = motions.wanted_speed
         motions.scale(slider)
@@ -179,7 +168,7 @@ class Supervision(RemoteStatus):
             )
 
     def _obey(self, mode: int) -> None:
-        """Let our safety system be in the robot's safety mode; protective stops come with the halt that they cause."""
+        """Take over the robot's safety mode; protective stops come with the halt they cause."""
         system = self._motion.safety
         system.safeguard = mode == SafetyMode.SAFEGUARD_STOP
         system.emergencies.clear()

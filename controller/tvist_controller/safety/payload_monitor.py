@@ -1,4 +1,4 @@
-"""Detection of a wrong payload, from the torque that the drives' feedback adds to the feed-forward."""
+"""Detection of a wrong payload from the torque that the drives' feedback adds to the feed-forward."""
 
 from typing import ClassVar
 
@@ -17,26 +17,26 @@ from tvist_plant.model import carries_weight
 from tvist_plant.plant import GRAVITY, PERIOD
 
 EVERY = 10
-"""Number of ticks that are averaged into one measurement."""
+"""Ticks averaged per measurement."""
 MEMORY = 2.0
-"""Time in which the weight of a measurement decays to 1/e [s]; many periods of a vibration."""
+"""Time constant of the memory, many periods of a vibration [s]."""
 RECENT = 0.1
-"""The same for the mass that a warning names [s]: the long memory still holds what was before a part was picked up."""
+"""Shorter time constant for the mass in a warning, because the long memory includes the time before a pick-up [s]."""
 ENOUGH = 1.0
-"""Observation time required for a judgement [s]."""
+"""Observation time before a judgement [s]."""
 TOLERATED = 0.5
-"""Error of the declared mass that is tolerated [kg]."""
+"""Tolerated error of the declared mass [kg]."""
 FRICTION = 0.4
-"""Share of the Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
+"""Fraction of each joint's Coulomb friction that may be unknown, with the worst sign [-]."""
 STUDIED = 1.0
-"""Time at rest after a motion in which a robot that follows its payload has studied it [s]."""
+"""Time at rest after which a robot that learns its payload has studied a motion [s]."""
 PATIENCE = 20.0
-"""Longest time for which a doubt waits for that [s]."""
+"""Longest time that a doubt waits for that [s]."""
 
 
 @compiled_for_ticks
 def add(total: Floats, moment: Floats, expected: Floats) -> None:
-    """Add what a moment has beyond the expected one to a sum, each of shape (n,) [N m]."""
+    """Add the difference of a moment from the expected one to a sum, each of shape (n,) [N m]."""
     for j in range(total.shape[0]):
         total[j] += moment[j] - expected[j]
 
@@ -53,7 +53,7 @@ def correlate(
     fade: Floats,  # what is left of each memory after these ticks, shape (2,) [-]
     sums: Floats,  # yᵀ W y [1/kg²], yᵀ W r and φ Σ |y_j| W_j F_j [1/kg] in each memory, shape (3, 2); changed
 ) -> None:
-    """Compare the feedback of the drives with the torques that a kilogram needs, y."""
+    """Correlate the drives' feedback with the torques y of one kilogram."""
     per_kg = np.empty(q.shape[0])
     torques(chain, q, qd, qdd, GRAVITY, scratch, per_kg)
     square = product = bound = 0.0
@@ -70,30 +70,26 @@ def correlate(
 
 
 class PayloadMonitor(Monitor):
-    """Compares the payload that the drives feel with the declared one, in motion and at rest.
+    """Compares the declared payload with drive torques, in motion and at rest.
 
-    The torque that a drive's feedback adds to the feed-forward is what the model does not explain. A mass error μ
-    adds y(q, q̇, q̈) μ, with y the torque for 1 kg at the declared payload's centre of mass. Over some time, the
-    estimate is
+    The torque r that a drive's feedback adds to the feed-forward is what the model does not explain. A mass error μ
+    adds y(q, q̇, q̈) μ, with y the torque of 1 kg at the declared centre of mass. The estimate over some time is
 
         μ = Σ yᵀ W r / Σ yᵀ W y,   W = diag(1/F²),      |error of μ| <= Σ_j Σ |y_j| W_j φ F_j / Σ yᵀ W y
 
-    where the bound covers any unknown friction of up to φF in each joint. Vibrations have zero mean and cancel out. A
-    warning requires that μ exceed what friction and the tolerated error of the declaration explain together. In an
-    upright posture, where gravity has no lever arm, there is therefore no warning.
+    where the bound covers unknown friction of up to φF per joint. Vibrations have zero mean and cancel. A warning
+    requires that μ exceed the bound plus the tolerated error, so there is none in an upright posture, where gravity has
+    no lever arm.
 
-    An arm with only vertical axes is not judged: it feels its payload only while it accelerates, and there a soft joint
-    delays what its drive feels.
+    Arms with only vertical axes are not judged: they feel the payload only in acceleration, delayed by soft joints. A
+    changed frequency would be less clear, and visible only in vibration: 3 kg instead of 5 kg change the frequency by a
+    fifth, but the shoulder's torque by half.
 
-    A deviating frequency would show the error too, but only while the arm vibrates, and less clearly: 3 kg instead of
-    5 kg change the frequency by a fifth and the shoulder's torque by half.
-
-    A robot that follows its payload finds it after a motion by itself. There the warning waits as long as that may
-    still come, until a motion has been studied in vain, and is about the payload that is assumed. So there is one
-    verdict at a time.
+    A robot that learns its payload does so after a motion. The warning waits until a motion has been studied in vain,
+    and then refers to the assumed payload, so that there is one verdict at a time.
     """
 
-    needs: ClassVar = "drives alone"  # else what the tool touches would be taken for a payload
+    needs: ClassVar = "drives alone"  # else contact of the tool would look like a payload
 
     def __init__(self, description: RobotDescription, declared: Payload, *, follows: bool = False) -> None:
         self._follows = follows
@@ -112,11 +108,7 @@ class PayloadMonitor(Monitor):
         self._correlate(np.zeros((QDD + 1, len(still))), nothing)
 
     def declare(self, payload: Payload, ticks: int, *, found: bool = False, told: bool = False) -> None:
-        """Set another payload: discard past measurements, and wait for the ticks in which it is phased in.
-
-        If the robot has `found` it, it is assumed, not declared; `told` says whether a warning has told
-        already that the arm carries something else.
-        """
+        """Set another payload and discard measurements; `found` by the robot itself, `told` in a warning."""
         self.payload = payload
         self._called = "assumed" if found else "declared"
         self._arm.chain[-2, BODY:] = self._arm.on_flange(Payload(mass=1.0, com=payload.com))
@@ -132,22 +124,21 @@ class PayloadMonitor(Monitor):
         self._be_sure()
 
     def _be_sure(self) -> None:
-        """Forget a doubt."""
         self._doubted = self._rested = 0.0
         self._moved = False
 
     @property
     def excess(self) -> tuple[float, float]:
-        """Estimated mass error of the declaration, and its bound from friction, which may be infinite [kg]."""
+        """Estimated error of the declared mass, and its bound due to friction, possibly infinite [kg]."""
         return self._estimate(0)
 
     def _estimate(self, memory: int) -> tuple[float, float]:
-        """The same with `MEMORY`, 0, or with `RECENT`, 1."""
+        """Return error and bound with `MEMORY` (0) or `RECENT` (1)."""
         square, product, bound = self._sums[:, memory].tolist()
         return (0.0, np.inf) if square <= 0.0 else (product / square, bound / square)
 
     def look(self, sample: Sample) -> Finding | None:
-        """Return once that the payload cannot be right; then nothing until another is set."""
+        """Return once that the payload cannot be right, until another is set."""
         if self._wait > 0:
             self._wait -= 1
             return None
@@ -173,7 +164,7 @@ class PayloadMonitor(Monitor):
         if self._follows and self._waits(at_rest):
             return None
         mass, bound = self._estimate(1)
-        if not _contradicts(mass, bound):  # what is named has to contradict the declaration, too
+        if not _contradicts(mass, bound):  # the reported mass must contradict the declaration, too
             return None
         self._warned = True
         felt = self.payload.mass + mass
@@ -188,7 +179,7 @@ class PayloadMonitor(Monitor):
         )
 
     def _waits(self, at_rest: bool) -> bool:
-        """Take `EVERY` ticks of doubt; return whether a motion may still tell what the arm carries."""
+        """Add `EVERY` ticks of doubt; return whether learning may still find the payload."""
         span = EVERY * PERIOD
         self._doubted += span
         self._moved = self._moved or not at_rest
@@ -197,5 +188,5 @@ class PayloadMonitor(Monitor):
 
 
 def _contradicts(mass: float, bound: float) -> bool:
-    """Return whether an estimated error of the declared mass is beyond its bound and what is tolerated [kg]."""
+    """Return whether an estimated mass error exceeds its bound plus the tolerance [kg]."""
     return abs(mass) > TOLERATED + bound

@@ -1,12 +1,12 @@
-"""What the arm carries, from the torques of its motors in a motion and the angles that it measured meanwhile.
+"""Estimation of the carried payload from motor torques and angles of a motion.
 
-In means over 20 ms, the torques of an arm that carries a mass m, with its centre at c + d, are
+For means over 20 ms, the torques of an arm with mass m and its centre at c + d are
 
     τ = Y_l(q, q̇, q̈) 1 + B q̈ + F(q̇) + Y_m m + Y_c m d
 
-Y_l holds a column for each link and Y_m that of a kilogram at c, by inverse dynamics at the *measured* angles. So
-neither springs nor the drives' gains have to be known. All else that may be wrong is estimated along with m and m d,
-and counts as known to the deviation of `UNKNOWN`: it costs certainty, and makes no error that looks like a mass.
+Y_l has a column per link, Y_m is that of a kilogram at c, by inverse dynamics at the *measured* angles, so
+that springs and drive gains are not needed. All other uncertain quantities are estimated with m and m d, with
+the prior deviations `UNKNOWN`: they reduce certainty instead of appearing as a mass.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.values import Payload
 
 BLOCK = 10
-"""Number of ticks that are averaged."""
+"""Ticks averaged per block."""
 LEAST = 20
 """Smallest number of blocks of a motion."""
 UNKNOWN = {
@@ -37,39 +37,37 @@ UNKNOWN = {
     "link": 0.03,
     "rotor": 0.2,
 }
-"""Deviations, for each joint: Coulomb friction as a share of it; that of half its width; what grows with speed, as a
-share of Coulomb friction at 1 rad/s; the torque sensor's gain; friction at rest; the mass of the link; the rotor's
-inertia [-].
-"""
+"""Prior deviations per joint [-]: Coulomb friction, relative; effect of half its width; viscous friction at 1 rad/s
+relative to Coulomb friction; gain of the torque sensor; friction at rest; mass of the link; rotor inertia."""
 FRICTION = ("friction", "friction's width", "viscous friction", "standing")
-"""What of it is friction."""
+"""Which of these are friction."""
 NOISE = (0.08, 0.001)
-"""Noise of a mean, as a share of the joint's Coulomb friction, plus one of its torque limit [-]."""
+"""Noise of a mean: fraction of Coulomb friction plus fraction of the torque limit [-]."""
 STICKING = 0.3
-"""Share of the Coulomb friction that is noise where a joint moves so slowly that its sign is not sure [-]."""
+"""Fraction of Coulomb friction that is noise at speeds too low for a certain sign [-]."""
 CENTRE = 0.05
-"""Deviation of an unknown payload's centre of mass from the robot file's, along each axis [m]."""
+"""Deviation of an unknown payload's centre from the robot file's, per axis [m]."""
 FARTHEST = 0.3
-"""Largest distance of a centre of mass from the flange along each axis that is believed [m]."""
+"""Largest plausible distance of a centre of mass from the flange, per axis [m]."""
 DECLARED = (0.1, 0.01)
-"""Deviation of what is declared, in mass [kg] and centre of mass [m]."""
+"""Deviation of a declared payload: mass [kg] and centre [m]."""
 DRIFT = (0.2, 0.01)
-"""The same of what may have become of it since the last motion."""
+"""Deviation due to changes since the last motion: mass [kg] and centre [m]."""
 LIGHT = 0.25
-"""Mass below which nothing is said of the centre of mass [kg]."""
+"""Mass below which the centre of mass is not estimated [kg]."""
 DEAD = 0.25
-"""Smallest change of mass that is taught [kg]."""
+"""Smallest change of mass that is reported [kg]."""
 SURE = 2.0
-"""Number of standard deviations by which a payload has changed for sure [-]."""
+"""Number of standard deviations for a certain change [-]."""
 VAGUE = 0.35
 """Deviation of the mass above which a motion teaches nothing [kg]."""
 PUSHED = 3.0
-"""Mean square of the residuals over their noise above which something else has pushed the arm [-]."""
+"""Mean squared residual relative to noise above which something else pushed the arm [-]."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Mass and centre of mass with their covariance; its units are those of `x`."""
+    """Mass and centre of mass with covariance, in the units of `x`."""
 
     x: Floats
     """Mass [kg] and centre of mass [m], shape (4,)."""
@@ -91,29 +89,26 @@ class Equations:
     """Linear equations of a motion, weighted by their noise."""
 
     at: Floats
-    """Mass [kg] and centre of mass [m] about which they are linear, shape (4,)."""
+    """Mass [kg] and centre of mass [m] of the linearisation, shape (4,)."""
     rows: Floats
-    """Columns of the mass, of the first moment, and of all else that may be wrong, shape (N n, 4 + k)."""
+    """Columns of mass, first moment, and all other uncertain quantities, shape (N n, 4 + k)."""
     bare: Floats
-    """What the arm needs without a payload, shape (N n,)."""
+    """Torques of the arm without payload, shape (N n,)."""
     measured: Floats
     """Measured torques, shape (N n,)."""
     others: Floats
-    """Deviations of all else, and of the sensors' gains, shape (k + n,) [-]."""
+    """Prior deviations of the others and of sensor gains, shape (k + n,) [-]."""
     joints: int
-    """Number of joints n."""
+    """Number n of joints."""
 
     def solve(self, prior: Estimate) -> Estimate | None:
-        """Return mass and centre of mass; None if something else pushed the arm, or a value is missing.
-
-        The prior is what is known without the motion; its `x` is `at`.
-        """
+        """Return mass and centre of mass, given a prior about `at`; None if pushed, or not finite."""
         if not (np.isfinite(self.rows).all() and np.isfinite(self.measured).all()):
             return None
         mass, per_kg = float(self.at[0]), self.rows[:, 0]
         right = self.measured - self.bare - mass * per_kg
         known = np.diag(np.concatenate([np.zeros(4), self.others**-2.0]))
-        for _ in range(3):  # first moments are as uncertain, and a gain as much wrong, as the mass is large
+        for _ in range(3):  # errors of first moments and gains grow with the mass
             scale = np.array([1.0, *[max(mass, LIGHT)] * 3])
             known[:4, :4] = np.linalg.inv(prior.covariance * np.outer(scale, scale))
             gains = _each((self.bare + mass * per_kg).reshape(-1, self.joints))
@@ -129,10 +124,10 @@ class Equations:
 
 
 class PayloadStudent:
-    """Follows the payload from motion to motion; see `experience.Study`.
+    """Tracks the payload from motion to motion; see `experience.Study`.
 
-    A motion is first judged alone. If its mass is that of what was known before, both are combined, as a Kalman filter
-    does; else the payload has changed, and what was known is void.
+    A motion is first judged alone. If its mass agrees with the earlier estimate, both are combined as in a
+    Kalman filter; otherwise the payload has changed and the earlier estimate is dropped.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -149,7 +144,7 @@ class PayloadStudent:
         self._believed: Payload | None = None
 
     def study(self, motion: MotionRecord) -> PayloadLesson | None:
-        """Return what the arm carries, if it differs from what is believed by more than `DEAD`, for sure."""
+        """Return the carried payload if it certainly differs from the assumed one by more than `DEAD`."""
         believed = motion.beliefs.declared
         if not motion.whole or len(motion.moments) < LEAST * BLOCK:
             return None
@@ -185,13 +180,13 @@ class PayloadStudent:
         return PayloadLesson(payload=payload, why=why, beyond=beyond)
 
     def _inertia(self, mass: float, believed: Payload) -> tuple[float, float, float, float, float, float]:
-        """Scale the inertia of what is believed, or of the robot file's payload, with the mass."""
+        """Scale the inertia of the assumed or the robot file's payload with the mass."""
         like = believed if believed.mass >= LIGHT else self._own
         xx, xy, xz, yy, yz, zz = (mass / like.mass * value if like.mass else 0.0 for value in like.inertia)
         return xx, xy, xz, yy, yz, zz
 
     def _equations(self, motion: MotionRecord, at: Floats) -> Equations:
-        """Return the equations of a motion about a mass [kg] and centre of mass [m], shape (4,)."""
+        """Return a motion's equations about a mass [kg] and centre of mass [m], shape (4,)."""
         speeds = np.gradient(motion.q, PERIOD, axis=0)
         q, qd, measured = _means(motion.q), _means(speeds), _means(motion.moments)
         qdd, centre = np.gradient(qd, BLOCK * PERIOD, axis=0), at[1:]
@@ -208,7 +203,7 @@ class PayloadStudent:
         others = [UNKNOWN[name] for name in [*own, "link", "sensor"] for _ in links]
         slow = np.zeros_like(qd) if self._linear else np.exp(-np.square(qd / self._width))
         weight = 1.0 / np.hypot(self._noise, STICKING * self._friction * slow)
-        weight[[0, -1]] = 0.0  # their accelerations are differences to one side
+        weight[[0, -1]] = 0.0  # their accelerations are one-sided differences
         rows = np.stack([per_kg, *(side / 0.01 for side in sides), *columns], axis=-1)
         bare = np.sum(links, axis=0) + own["rotor"] + own["friction"]
         return Equations(
@@ -217,12 +212,12 @@ class PayloadStudent:
         )  # fmt: skip
 
     def _payload(self, centre: Floats, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """Torques that a kilogram needs, with its centre in the flange frame, shape (N, n) [N m/kg]."""
+        """Return the torques of a kilogram with its centre in the flange frame, shape (N, n) [N m/kg]."""
         x, y, z = centre.tolist()
         return self._torques(q.shape[1] - 1, self._arm.on_flange(Body(mass=1.0, com=(x, y, z))), q, qd, qdd)
 
     def _torques(self, link: int, body: Floats, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """Torques that the arm needs if one of its links alone has mass, shape (N, n) [N m]."""
+        """Return the torques if only one link has mass, shape (N, n) [N m]."""
         self._arm.chain[:, BODY:] = 0.0
         self._arm.chain[link, BODY:] = body
         return self._arm.torques(q, qd, qdd)
@@ -234,12 +229,12 @@ def _means(values: Floats) -> Floats:
 
 
 def _each(values: Floats) -> list[Floats]:
-    """Return a column for each joint that has its values alone."""
+    """Return one column set per joint that contains only its values."""
     return [values * (np.arange(values.shape[1]) == joint) for joint in range(values.shape[1])]
 
 
 def experience_of(setup: Setup, later: Later = at_once, plan: Plans | None = None) -> Experience | None:
-    """Return what a robot makes of its motions; None if it learns nothing of them."""
+    """Return a robot's learning from its motions; None if it learns nothing."""
     if setup.adapt != "payload":
         return None
     return Experience(PayloadStudent(setup.description).study, later, plan)

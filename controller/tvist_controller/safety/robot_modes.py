@@ -1,4 +1,4 @@
-"""Robot mode, safety mode and runtime state, and why a robot stands, for clients that connect after the event."""
+"""Robot mode, safety mode, runtime state, and the reason for a stop, for clients that connect later."""
 
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_protocol.info import StopReason
@@ -13,28 +13,27 @@ _KEEP_POWER = frozenset({SafetyMode.PROTECTIVE_STOP, SafetyMode.SAFEGUARD_STOP})
 
 
 class RobotModes:
-    """The modes of a robot, looked up when they may have changed, and the stop that keeps it from moving."""
+    """The robot's modes, updated when they may have changed, and the stop that blocks it."""
 
     def __init__(self, motion: MotionControl) -> None:
         self._motion = motion
         self._stops: dict[SafetyMode, Event] = {}
-        """Event of each stop that may still hold, by the safety mode that it caused, the newest last."""
+        """Events of stops that may still hold, by resulting safety mode, newest last."""
         self.now = 0, 0, 0
-        """Robot mode, safety mode and runtime state."""
         self.update()
 
     def update(self) -> None:
-        """Look them up; to be called in every tick in which they may have changed."""
+        """Update the modes; call in every tick in which they may have changed."""
         motion = self._motion
         robot, safety = motion.robot_mode, motion.safety_mode
         if safety in _MAY_MOVE and robot is RobotMode.RUNNING:
             self._stops.clear()
         self.now = int(robot), int(safety), int(motion.runtime)
-        # A paused motion comes to a standstill without any event.
+        # A paused motion stops without an event.
         motion.changed = motion.activity is Activity.PAUSED
 
     def hear(self, event: Event) -> None:
-        """Take an event, which may be a stop or end one."""
+        """Take an event, which may start or end a stop."""
         self._motion.changed = True
         if event.kind not in {"protective_stop", "safety_stop"}:
             return
@@ -45,10 +44,7 @@ class RobotModes:
 
     @property
     def stop_reason(self) -> StopReason | None:
-        """The stop that keeps the robot from moving; None if there is none, or it had no event.
-
-        If the safety system allows motion again and the power is still off, that is the last stop that cut the power.
-        """
+        """The stop that blocks the robot, or cut the power still off; None without one or its event."""
         robot, safety, event = self._motion.robot_mode, self._motion.safety_mode, None
         if safety not in _MAY_MOVE:
             event = self._stops.get(safety)
@@ -58,15 +54,12 @@ class RobotModes:
         return None if event is None else StopReason(tick=event.tick, code=event.code, why=event.why or "")
 
     def forget_stops(self) -> None:
-        """Discard all stops, since the robot was set to a mode."""
+        """Discard all stops, because the robot mode was set."""
         self._stops.clear()
 
 
 def _cause(event: Event, mode: SafetyMode) -> SafetyMode | None:
-    """Safety mode that an event explains, NORMAL for a loss of power alone; None if it is not known.
-
-    The present mode is the most severe of all conditions; another stop may have caused it.
-    """
+    """Return the safety mode that an event explains, NORMAL for a mere loss of power, None if unknown."""
     if event.kind == "protective_stop":
         return SafetyMode.PROTECTIVE_STOP
     if event.category == 2:

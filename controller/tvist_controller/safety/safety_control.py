@@ -1,4 +1,4 @@
-"""Actions of the safety system: reduced speed, stops of UR's categories 0, 1 and 2, power and protective stops."""
+"""Actions of the safety system: reduced speed, stops of categories 0, 1 and 2, power, protective stops."""
 
 from collections.abc import Sequence
 
@@ -21,18 +21,17 @@ from tvist_protocol.values import ResetMode
 
 
 class SafetyControl:
-    """Carries out what the safety system's inputs request, what its faults require, and what becomes of the power."""
+    """Carries out safety inputs, reactions to faults, and changes of power."""
 
     def __init__(self, motion: MotionControl, emit: Emit) -> None:
         self._motion, self._emit = motion, emit
         self.monitors: Sequence[Monitor] = ()
-        """All that judges the signals of a tick, in the order in which it does."""
         self._held = True
         self._resumes_by_itself = False
-        """Whether the motion that a safeguard has paused resumes by itself when the safeguard is released."""
+        """Whether a motion paused by a safeguard resumes when it is released."""
 
     def reduce(self, *, reduced: bool) -> None:
-        """Slow motions down, or let them speed up again; stop a stream, since its client determines its timing."""
+        """Slow motions down or end that; stop a stream, since its client determines its speed."""
         motion, system = self._motion, self._motion.safety
         if reduced == system.reduced:
             return
@@ -45,7 +44,7 @@ class SafetyControl:
         self._emit("warning", why=f"safety_mode is {motion.safety_mode.name}: speed is {share}")
 
     def safeguard(self, *, stopped: bool) -> None:
-        """Stop with category 2, or allow motion again: a motion pauses and later resumes, a stream ends."""
+        """Stop with category 2 (pause a motion, end a stream), or release that."""
         motion, system = self._motion, self._motion.safety
         if stopped == system.safeguard:
             return
@@ -57,7 +56,7 @@ class SafetyControl:
             return
         why = "a safeguard asked for a stop"
         if not motion.activity.moving:
-            # Although nothing moves and nothing ends, this now keeps the robot from moving.
+            # Nothing moves or ends, but this now blocks motion.
             self._emit("safety_stop", why=why, category=2, duration=0.0, way=0.0)
             return
         if after(motion.activity, "pause") is None:
@@ -69,11 +68,11 @@ class SafetyControl:
         self._emit("safety_stop", why=why, category=2, duration=duration, way=way)
 
     def stay_paused(self) -> None:
-        """Note that a client has paused the motion as well, which then waits for its `resume`."""
+        """Make a paused motion wait for the client's `resume`."""
         self._resumes_by_itself = False
 
     def emergency(self, whose: Emergency) -> None:
-        """Stop with category 1: on the path, then without power until it is released."""
+        """Stop with category 1: on the path, then power off until released."""
         pressed = self._motion.safety.emergencies
         if whose not in pressed:
             pressed.add(whose)
@@ -81,11 +80,11 @@ class SafetyControl:
             self._motion.end("power_off", why, kind="safety_stop", category=1)
 
     def end_emergency(self, whose: Emergency) -> None:
-        """Release an emergency stop; the power stays off until it is switched on again."""
+        """Release an emergency stop; the power stays off."""
         self._motion.safety.emergencies.discard(whose)
 
     def release(self) -> None:
-        """Release all inputs: speed, safeguard and emergency stops."""
+        """Release reduced speed, safeguard and emergency stops."""
         self.reduce(reduced=False)
         self.safeguard(stopped=False)
         self._motion.safety.emergencies.clear()
@@ -93,11 +92,7 @@ class SafetyControl:
     # ------------------------------------------------------------------ power, brakes and protective stops
 
     def power_on(self, *, release_brakes: bool = True) -> None:
-        """Power the arm and release its brakes; those of an arm without power may stay closed.
-
-        Raises:
-            RefusalError: The arm is moving, is in a protective stop, or does not tell where it stands.
-        """
+        """Power the arm and release its brakes, if wanted; raise RefusalError if not possible now."""
         motion = self._motion
         trigger, held = "power_on" if release_brakes else "power", motion.robot_mode is RobotMode.RUNNING
         motion.check(trigger)
@@ -106,11 +101,7 @@ class SafetyControl:
         motion.go(trigger)
 
     def _hold(self) -> None:
-        """Let the line begin where the arm stands, which is about to be held.
-
-        Raises:
-            RefusalError: It does not tell where that is, or may not be held.
-        """
+        """Start the line where the arm stands before it is held; raise RefusalError if that is impossible."""
         try:
             self._begin_where_it_stands()
         except ValueError as error:
@@ -119,23 +110,16 @@ class SafetyControl:
             self._motion.power.halted = None
 
     def _begin_where_it_stands(self) -> None:
-        """Let the line begin where an arm stands that cannot be placed.
+        """Start the line at the position of an arm that cannot be placed; raise ValueError if unknown.
 
-        Without power such an arm may have been moved, its brakes stop it where they do, and it sinks until its drives
-        hold it.
-
-        Raises:
-            ValueError: It does not tell where that is.
+        Without power it may have been moved, brakes stop it anywhere, and it sinks until its drives hold it.
         """
         cycle = self._motion.cycle
         if not isinstance(cycle.plant, SimulatedArm):
             cycle.reset(cycle.position)
 
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
-        """Stop with category 0: the power is off, and the brakes close at once.
-
-        The safety system latches a violation or fault until it is restarted.
-        """
+        """Stop with category 0: power off and brakes closed; latch a violation or fault until a restart."""
         motion, cycle, plan = self._motion, self._motion.cycle, None
         if latched is not None:
             motion.safety.latched = latched
@@ -151,22 +135,18 @@ class SafetyControl:
         motion.tell_end(plan, why, None, "safety_stop", 0)
 
     def unlock(self) -> None:
-        """Unlock a protective stop.
-
-        Raises:
-            RefusalError: There is no protective stop, or the arm is still stopping.
-        """
+        """Unlock a protective stop; raise RefusalError without one, or while still stopping."""
         power = self._motion.power
         if power is not None and power.halted is not None:
             self._motion.check("unlock_protective_stop")
             self._hold()
         self._motion.go("unlock_protective_stop")
-        for monitor in self.monitors:  # what was found before the unlock does not count again
+        for monitor in self.monitors:  # ignore findings before the unlock
             if monitor.needs == "drives":
                 monitor.restart()
 
     def watch(self, sample: Sample) -> None:
-        """Warn or stop the arm by what the latest tick has shown."""
+        """Warn or stop the arm according to the monitors of the latest tick."""
         motion = self._motion
         held = motion.robot_mode is RobotMode.RUNNING
         if held and not self._held:
@@ -195,7 +175,7 @@ class SafetyControl:
             monitor.restart()
 
     def watch_power(self, sample: Sample) -> None:
-        """Stop the arm if it says that it cannot go on, and let the line begin where it is about to be held."""
+        """Stop an arm that reports trouble, and restart the line where one is about to be held."""
         motion = self._motion
         if motion.power is not None:
             held = motion.power.halted is None
@@ -211,7 +191,7 @@ class SafetyControl:
                     self.cut_power(str(error), "fault")
 
     def _let_go(self, halt: Halt, sample: Sample) -> None:
-        """End all motion at once, since the arm's own controller has stopped it."""
+        """End all motion at once, because the arm's own controller has stopped it."""
         motion = self._motion
         motion.abandon(halt.why)
         motion.cycle.reset(sample.measured.q, measured=sample.measured)
@@ -220,9 +200,9 @@ class SafetyControl:
         self._emit("protective_stop" if protective else "safety_stop", why=halt.why)
 
     def recover(self, error: PlantError, seed: int) -> Sample:
-        """Go on after the arm has failed: a simulated one is placed at rest at its reference, in a protective stop.
+        """Recover from a failed arm: place a simulated one at rest at its reference, in a protective stop.
 
-        One that cannot be placed, or fails again at once, gets no power until the safety system is restarted.
+        One that cannot be placed, or fails again at once, stays without power until the safety system is restarted.
         """
         motion, cycle = self._motion, self._motion.cycle
         placed = isinstance(cycle.plant, SimulatedArm)
@@ -231,7 +211,7 @@ class SafetyControl:
             sample = cycle.reset(position, seed=seed)
             if placed:
                 sample = cycle.step()
-        except (ValueError, PlantError):  # it goes on failing; `power_on` asks it again
+        except (ValueError, PlantError):  # still failing; `power_on` tries again
             placed, sample = False, cycle.reset(position, measured=cycle.sample.measured)
         if placed:
             why = f"{why}: the simulation put the arm at rest at its reference"
@@ -251,7 +231,7 @@ class SafetyControl:
         return sample
 
     def put(self, mode: ResetMode | None) -> None:
-        """Set the robot mode of an arm that was placed somewhere at rest; None for the present mode, at rest."""
+        """Set the robot mode after a reset; None for the present mode, at rest."""
         motion = self._motion
         if mode is not None:
             motion.activity = PUT[mode]

@@ -1,1 +1,1 @@
-"""Where modes, shapers and plants come from."""
+"""Sources of modes, shapers and plants."""

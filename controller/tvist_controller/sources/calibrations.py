@@ -1,7 +1,4 @@
-"""Calibrations that come with the package, and what is made of one: estimators, elastic feed-forward, friction.
-
-The modes of an arm follow from its masses, the declared payload and a calibration's springs and drives.
-"""
+"""Calibrations of the package, and their products: estimators, elastic feed-forward, friction."""
 
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -54,10 +51,9 @@ def available() -> tuple[str, ...]:
 
 @cache
 def default_for(model: str) -> str | None:
-    """Name of the calibration that a robot uses unless another one is named; None if there is none.
+    """Return the default calibration of a robot model, None without one.
 
-    It is the first, by name, of those that come with the package, are for this model and have the paper's polynomials;
-    if none has them, the first for this model.
+    It is the package's first by name with the paper's polynomials for this model, or else the first for this model.
     """
     own = [name for name in available() if load(name).robot == model]
     return next((name for name in own if load(name).polynomial is not None), own[0] if own else None)
@@ -67,10 +63,10 @@ def load(calibration: str | Path) -> Calibration:
     """Read and check a calibration.
 
     Args:
-        calibration: Name of a calibration that comes with the package, or path of a file.
+        calibration: Name of a calibration of the package, or path of a file.
 
     Raises:
-        CalibrationError: The calibration does not exist or is invalid; the message names the file and the key.
+        CalibrationError: It does not exist or is invalid; the message names file and key.
         UserFileError: The file is not text, too large or nested too deeply.
     """
     try:
@@ -101,8 +97,7 @@ def estimator_of(calibration: Calibration) -> Polynomial:
 def fits(calibration: Calibration, payload: Payload, estimator: str = "polynomial") -> bool:
     """Return whether a calibration is valid for a payload.
 
-    A modal model is valid for any payload. Polynomials are valid for the payload they were made with, to within 2 %
-    of its mass and 10 mm of its centre.
+    A modal model is valid for any payload, polynomials for theirs within 2 % of mass and 10 mm of centre.
     """
     if estimator == "modal" or calibration.polynomial is None:
         return True
@@ -117,9 +112,9 @@ def fits(calibration: Calibration, payload: Payload, estimator: str = "polynomia
 def modal_estimator(
     calibration: Calibration, description: RobotDescription, payload: Payload, modes: int = MODES
 ) -> Modal:
-    """Return an estimator of the arm's lowest modes; it uses no springs or drives of the robot file.
+    """Return an estimator of the arm's lowest modes without using springs and drives of the robot file.
 
-    This takes less than a millisecond, so a payload can be declared between two ticks.
+    It takes less than a millisecond, so a payload can be declared between two ticks.
     """
     known = _modal(calibration, description)
     flexible = flexible_model(description, Body(mass=payload.mass, com=payload.com, inertia=payload.inertia))
@@ -135,7 +130,7 @@ def modal_estimator(
 def elastic_feed_forward(
     tvist: Filter, description: RobotDescription, calibration: Calibration
 ) -> ElasticFeedForward | None:
-    """Create the elastic feed-forward that a filter needs, with a calibration's springs; None if it does without."""
+    """Create the elastic feed-forward for a filter from a calibration's springs; None if not used."""
     if tvist.feed_forward == "rigid":
         return None
     parameters = _modal(calibration, description).parameters
@@ -154,11 +149,11 @@ def elastic_feed_forward(
 def known_friction(
     tvist: Filter | None, description: RobotDescription, calibration: Calibration | None
 ) -> Floats | None:
-    """Return the friction that is fed forward in full with a filter, see `LAWS`; None for a share of Coulomb friction.
+    """Return friction to feed forward in full, see `LAWS`; None for a fraction of Coulomb friction.
 
-    If the robot file says how the motors stick, it is that of the file. Unshaped, for which the filter is None, and
-    with the paper's filter it is not, since the tails of Table 2 are what a share of Coulomb friction leaves.
-    Otherwise it is what was identified.
+    It is the robot file's, if that contains stiction, else the identified one. Without shaping (`tvist` None)
+    and with the paper's filter, the robot file's is not used, since the tails of Table 2 are due to a
+    fraction of Coulomb friction.
     """
     plain = tvist is None or isinstance(tvist, TvistFilter)
     described = None if plain else described_friction(description)
@@ -168,7 +163,7 @@ def known_friction(
 
 
 def _modal(calibration: Calibration, description: RobotDescription) -> ModalModel:
-    """Return the modal model of a calibration of this arm."""
+    """Return a calibration's modal model; raise EstimatorError if missing or of another robot."""
     if calibration.modal is None:
         wanted = "a model that tvist identify makes; this calibration has polynomials alone"
         raise EstimatorError("modal", None, wanted)
@@ -178,7 +173,7 @@ def _modal(calibration: Calibration, description: RobotDescription) -> ModalMode
 
 
 def mass_matrix(flexible: FlexibleModel) -> Callable[[Floats], Floats]:
-    """M(q) of the arm with unbent links, in the coordinates of its joints and its bending, shape (L, L)."""
+    """Return M(q) of the arm with unbent links, in coordinates of joints and bending, shape (L, L)."""
     data, coordinates = flexible.model.createData(), np.zeros(flexible.model.nv)
 
     def at(q: Floats) -> Floats:
@@ -209,7 +204,7 @@ def drivetrain(
 
 
 def friction_law(parameters: Sequence[ModalParameter], description: RobotDescription) -> Floats | None:
-    """Return the friction of each joint, rows F_c, F_s/F_c, v_s, w and F_v, shape (5, n); None if it is not known."""
+    """Return each joint's friction, rows F_c, F_s/F_c, v_s, w, F_v, shape (5, n); None if unknown."""
     if all(parameter.quantity not in FRICTION for parameter in parameters):
         return None
     law = np.array([_values(parameters, quantity, range(description.joints)) for quantity in FRICTION])
@@ -226,7 +221,6 @@ def friction_law(parameters: Sequence[ModalParameter], description: RobotDescrip
 def _values(
     parameters: Sequence[ModalParameter], quantity: Quantity, places: range | tuple[int, ...]
 ) -> list[float]:
-    """Return a quantity of each joint or link."""
     said = [(j, one.value) for one in parameters if one.quantity == quantity for j in one.joints]
     numbers = sorted(place for place, _ in said)
     if numbers != sorted(places):

@@ -21,7 +21,7 @@ class ModeSource:
     """A chosen estimator with its parameters."""
 
     name: SourceName
-    """Name on the wire."""
+    """Name in messages."""
     description: RobotDescription
     """The robot."""
     calibration: Calibration | None = None
@@ -38,7 +38,7 @@ class ModeSource:
 
     @cached_property
     def fits_arm(self) -> bool | None:
-        """Whether the calibration was measured on the arm of the robot file; None if the calibration does not say."""
+        """Whether the calibration was measured on the robot file's arm; None if unknown."""
         measured = None if self.calibration is None else self.calibration.provenance.arm
         return None if measured is None else measured == fingerprint(self.description)
 
@@ -61,7 +61,7 @@ class ModeSource:
 
 
 def first_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource:
-    """Return a robot's initial source of modes; without a calibration the robot is yet to be identified."""
+    """Return a robot's initial source of modes; without calibration, before identification, a fixed one."""
     if calibration is None:
         return ModeSource("fixed", description, f_d=(10.0,), zeta=(0.2,))
     name: SourceName = "modal" if calibration.polynomial is None else "polynomial"
@@ -69,11 +69,7 @@ def first_source(description: RobotDescription, calibration: Calibration | None)
 
 
 def modal_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource | None:
-    """Return the source `modal` of a robot, from its own calibration or from one that comes with the package.
-
-    Without a calibration, the robot is yet to be identified, and none of the package is used. None if there
-    is no modal model.
-    """
+    """Return a robot's source `modal`, from its calibration or one of the package; None without any."""
     if calibration is None:
         return None
     for one in (calibration, *map(load, available())):

@@ -1,8 +1,4 @@
-"""Python files of the user's own, named as FILE.py:NAME, with a shaper or a plant in them.
-
-Only the command line, a configuration and a state file can name files. A client on the network cannot, and a recording
-never causes a file to be run.
-"""
+"""Users' Python files with a shaper or plant (FILE.py:NAME), never named by network clients or recordings."""
 
 import hashlib
 import re
@@ -20,33 +16,33 @@ _FILE = re.compile(r"(?P<file>.*\.py)(?::(?P<attribute>.*))?", re.DOTALL)
 
 
 class OwnFileError(ValueError):
-    """There is no such shaper or plant, or it cannot be made; the message gives its place and the reason."""
+    """A shaper or plant does not exist or cannot be made; the message states place and reason."""
 
 
 class OwnFile(NamedTuple):
-    """What a file contains under a name."""
+    """What a file defines under a name."""
 
     file: str
     attribute: str
     sha256: str
-    """SHA-256 of the bytes that were run, in hexadecimal; it does not cover what the file imports."""
+    """SHA-256 of the bytes that were run, in hexadecimal, without imported files."""
     found: object
 
 
 def is_file(place: str) -> bool:
-    """Whether something is given as FILE.py:NAME rather than by its name."""
+    """Return whether a place has the form FILE.py:NAME."""
     return _FILE.fullmatch(place) is not None
 
 
 def ends(failure: BaseException) -> bool:
-    """Whether a signal ends the process while a file's code runs, by an exit of a kind of its own."""
+    """Return whether an exception is a signal's own kind of SystemExit, which must end the process."""
     return isinstance(failure, SystemExit) and type(failure) is not SystemExit
 
 
 def run_file(place: str, kind: str, may_be_one: Callable[[object], bool]) -> OwnFile:
-    """Run FILE.py of FILE.py:NAME, and return what it contains under the name.
+    """Run the file of FILE.py:NAME and return what it defines under the name; raise OwnFileError.
 
-    If there is no such name, the message gives those whose value may be one.
+    If the name is missing, the message lists those that may be meant.
     """
     named = _FILE.fullmatch(place)
     if named is None:
@@ -70,13 +66,13 @@ def run_file(place: str, kind: str, may_be_one: Callable[[object], bool]) -> Own
 
 
 def is_of_file(value: object) -> bool:
-    """Return whether a value can be called, and was defined in a file that was run rather than imported there."""
+    """Return whether a value is callable and was defined in the file itself, not imported."""
     return callable(value) and str(getattr(value, "__module__", None)).startswith("tvist_own_")
 
 
 @lru_cache(maxsize=8)
 def load_again(load: Callable[[str], Any], kind: str, place: str, sha256: str) -> Any:
-    """Load a shaper or a plant again in a worker process."""
+    """Load a shaper or plant again in a worker process; raise OwnFileError if the file has changed."""
     found = load(place)
     if found.sha256 != sha256:
         raise OwnFileError(f"{kind} {place}: the file has changed since it was first loaded")
@@ -87,7 +83,7 @@ def _run(content: bytes, place: str, kind: str, sha256: str) -> ModuleType:
     file = place.rpartition(":")[0]
     module = ModuleType(f"tvist_own_{kind}_{sha256[:16]}")
     module.__file__ = str(Path(file).resolve())
-    sys.modules[module.__name__] = module  # dataclasses and others look their own module up there
+    sys.modules[module.__name__] = module  # dataclasses look up their module there
     try:
         exec(compile(content, module.__file__, "exec"), module.__dict__)  # noqa: S102  it is what the user asked for
     except (Exception, SystemExit) as failure:

@@ -1,4 +1,4 @@
-"""Plants by name: those of `VARIANTS`, from a file, given as FILE.py:NAME, or from an installed package."""
+"""Plants by name: `VARIANTS`, files given as FILE.py:NAME, installed packages."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -16,42 +16,42 @@ from tvist_plant.variants import VARIANTS, Variant
 from tvist_plant.world.scene_file import SceneError, find_scene
 
 GROUP = "tvist.plants"
-"""Group of the entry points by which installed packages offer plants."""
+"""Entry-point group for plants of installed packages."""
 WORLD = "world:"
-"""What precedes the name of a scene in the place of a plant that is the arm in it."""
+"""Prefix of the place of a plant that is the arm in a scene."""
 Maker = Callable[[RobotDescription, Payload], Plant]
-"""Makes a plant of a robot's description and the payload that it carries."""
+"""Makes a plant from a robot's description and its carried payload."""
 
 
 class RecordedPlant(Struct, frozen=True):
-    """Description of a plant, as a recording contains it."""
+    """Reference to a plant in a recording."""
 
     place: str
     """FILE.py:NAME, a name of `VARIANTS` or of an installed plant, or `WORLD` and a scene."""
     sha256: str = ""
-    """SHA-256 of the file, in hexadecimal; empty if it is installed."""
+    """SHA-256 of the file in hexadecimal; empty for an installed plant."""
 
 
 @dataclass(frozen=True)
 class OwnPlant:
-    """A plant that was found, and is yet to be made."""
+    """A plant that was found but not yet made."""
 
     place: str
     """FILE.py:NAME, a name of `VARIANTS` or of an installed plant, or `WORLD` and a scene."""
     sha256: str
-    """SHA-256 of the file that was read, in hexadecimal; empty if it is installed."""
+    """SHA-256 of the file in hexadecimal; empty for an installed plant."""
     maker: Maker | Variant = field(compare=False)
     """Makes the plant."""
 
     @property
     def recorded(self) -> RecordedPlant:
-        """Description of the plant for a recording."""
+        """Reference to the plant for a recording."""
         return RecordedPlant(self.place, self.sha256)
 
     def make(self, description: RobotDescription, carried: Payload, seed: int = 0) -> Plant:
-        """Make the plant for one robot with the payload that it carries, as far as the server knows.
+        """Make the plant for a robot with its carried payload, as known to the server; raise OwnFileError.
 
-        The seed is that of what a plant of `VARIANTS` draws; others are not told.
+        Only plants of `VARIANTS` use the seed.
         """
         if isinstance(self.maker, Variant):
             try:
@@ -62,7 +62,7 @@ class OwnPlant:
             made = self.maker(description, carried)
             if is_plant(made):
                 return called(made, description.joints)
-        except (PlantError, SceneError) as error:  # it says in a sentence why it cannot be made
+        except (PlantError, SceneError) as error:  # its message gives the reason
             said = f"{error}" if self.place.startswith(WORLD) else f"plant {self.place}: {error}"
             raise OwnFileError(said) from error
         except (Exception, SystemExit) as error:
@@ -74,7 +74,7 @@ class OwnPlant:
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the plant as its name, since a maker cannot be pickled."""
+        """Pickle by name, since a maker cannot be pickled."""
         return load_again, (load_plant, "plant", self.place, self.sha256)
 
 
@@ -82,8 +82,8 @@ def load_plant(place: str) -> OwnPlant:
     """Find a plant.
 
     Args:
-        place: FILE.py:NAME, where NAME is a class or function that takes a `RobotDescription` and a `Payload` and
-            makes a `Plant`; or a name of `VARIANTS`, or of an entry point of the group `tvist.plants`.
+        place: FILE.py:NAME, where NAME takes a `RobotDescription` and a `Payload` and makes a `Plant`; or a
+            name of `VARIANTS` or of an entry point in the group `tvist.plants`.
 
     Raises:
         OwnFileError: There is none.
@@ -111,7 +111,7 @@ def load_plant(place: str) -> OwnPlant:
 
 
 def load_world(scene: str) -> OwnPlant:
-    """Find the arm in a scene, by its name in the package or the path of a file in MuJoCo's format."""
+    """Find the arm in a scene of the package, or in an MJCF file."""
     file = find_scene(scene)
 
     def make(description: RobotDescription, carried: Payload) -> Plant:
@@ -125,7 +125,7 @@ def load_world(scene: str) -> OwnPlant:
 
 
 def named_plants() -> list[str]:
-    """Names of the plants of this package, and of those that installed ones offer."""
+    """Return the names of the package's and of installed plants."""
     return [*VARIANTS, *sorted(entry_points(group=GROUP).names)]
 
 

@@ -1,8 +1,4 @@
-"""Shapers from the user's own files, given as FILE.py:NAME.
-
-Only the command line, a configuration and a state file can name files. A client on the network chooses among the names
-of loaded shapers, and a recording never causes a file to be run.
-"""
+"""Shapers from users' files (FILE.py:NAME), never loaded for network clients or recordings."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,38 +15,38 @@ from tvist_shaping.own import check_range, check_shaper, shaper_of
 from tvist_shaping.shaper import Shaper
 
 _POSTURES, _MARGIN = 64, 1.1
-"""Number of postures in which an arm's modes are looked at, and the factor beyond them that a shaper has to support."""
+"""Number of postures at which modes are computed, and the margin that a shaper must support."""
 
 
 class RecordedShaper(Struct, frozen=True):
-    """Description of a shaper from a file, as a recording contains it."""
+    """Reference to a file's shaper in a recording."""
 
     name: str
-    """Name on the wire and in tables."""
+    """Name in messages and tables."""
     file: str
-    """Path of the file, as it was given."""
+    """Path of the file as given."""
     attribute: str
     """Name of the shaper in the file."""
     sha256: str
-    """SHA-256 of the file, in hexadecimal."""
+    """SHA-256 of the file in hexadecimal."""
 
 
 @dataclass(frozen=True)
 class OwnShaper:
-    """A shaper that was loaded from a file."""
+    """A shaper loaded from a file."""
 
     file: str
-    """Path of the file, as it was given."""
+    """Path of the file as given."""
     attribute: str
     """Name of the shaper in the file."""
     sha256: str
-    """SHA-256 of the bytes that were run, in hexadecimal; it does not cover what the file imports."""
+    """SHA-256 of the bytes that were run, in hexadecimal, without imported files."""
     shaper: AnyShaper = field(compare=False)
-    """The shaper, checked for every mode that a client may send."""
+    """The shaper, checked for all modes that a client may send."""
 
     @property
     def name(self) -> str:
-        """Name on the wire and in tables."""
+        """Name in messages and tables."""
         return self.shaper.name
 
     @property
@@ -60,23 +56,23 @@ class OwnShaper:
 
     @property
     def recorded(self) -> RecordedShaper:
-        """Description of the shaper for a recording."""
+        """Reference to the shaper for a recording."""
         return RecordedShaper(self.name, self.file, self.attribute, self.sha256)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the shaper as the name of its file, since a function cannot be pickled."""
+        """Pickle by file name, since a function cannot be pickled."""
         return load_again, (load_own, "shaper", self.place, self.sha256)
 
 
 def load_own(place: str) -> OwnShaper:
-    """Run a file and check the shaper that it contains under a name.
+    """Run a file and check its shaper.
 
     Args:
         place: FILE.py:NAME. NAME is a function (f_d [Hz], ζ [-]) -> `Impulses`, a `Shaper` or a `FirShaper`.
 
     Raises:
-        OwnFileError: The file or the name does not exist, running the file raises an exception, the name is not a
-            shaper, or the shaper fails for a mode.
+        OwnFileError: File or name does not exist, running the file raises, the name is no shaper, or the
+            shaper fails for a mode.
         UserFileError: The file is not text, or is larger than 4 MiB.
     """
     file, attribute, sha256, found = run_file(place, "shaper", _may_be_one)
@@ -91,7 +87,7 @@ def load_own(place: str) -> OwnShaper:
 
 
 def check_for(own: OwnShaper, estimator: Estimator, joints: int) -> None:
-    """Try a shaper with the modes that an arm has anywhere, and a tenth beyond."""
+    """Check a shaper for all modes of an arm, plus a tenth; raise OwnFileError if it fails."""
     looking = estimator.fork()
     anywhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, joints))
     f_d, zeta = np.array([looking.settle(q) for q in anywhere])[:, :, 0].T

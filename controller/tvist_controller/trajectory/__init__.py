@@ -11,7 +11,6 @@ from tvist_controller.trajectory.stop import JointStop, PathStop, SlowedStop
 from tvist_controller.trajectory.stream import SetpointStream
 
 AnyStop = JointStop | PathStop | SlowedStop
-"""Any stop."""
 
 __all__ = [
     "AnyStop",

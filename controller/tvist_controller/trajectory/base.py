@@ -1,4 +1,4 @@
-"""Base of all sources of references, and those that do not compute anything."""
+"""Base of all sources of references, and the trivial ones."""
 
 import copy
 from abc import ABC, abstractmethod
@@ -12,65 +12,62 @@ from tvist_controller.trajectory.path import Path
 
 @dataclass(frozen=True)
 class Forecast:
-    """How soon and how hard a trajectory along a path will brake, as far as is known without simulating it.
-
-    All values refer to the path's parameter, which for a straight line in joint space is the posture.
-    """
+    """When and how hard a trajectory will brake, in its path's parameter, as known without simulation."""
 
     path: Path
     """Path of the trajectory."""
     end: Floats
-    """Parameter at its end if it is not interrupted, shape (m,) [rad]."""
+    """Parameter at its uninterrupted end, shape (m,) [rad]."""
     braking: float
     """Largest future deceleration of the leading entry [rad/s^2]."""
     jerk: float
     """Largest future jerk of the leading entry [rad/s^3]."""
     steady: float
-    """Time before it begins to slow down [s]; 0 if that is not known."""
+    """Time before it starts braking, 0 if unknown [s]."""
     turns: bool = False
     """Whether it may turn back on its path."""
 
 
 class Trajectory(ABC):
-    """A reference with one sample for each tick: the parameter of its path, or joint positions if it has no path."""
+    """A reference with one sample per tick: its path's parameter, or joint positions without a path."""
 
     path: Path | None = None
-    """Path of the trajectory; None if all joints move independently, as in streams and in stops of each joint."""
+    """Path of the trajectory; None if joints move independently, as in streams and joint stops."""
     limits: MotionLimits | None = None
-    """Limits that its samples keep; None if it bypasses the filter or is at rest."""
+    """Limits of its samples; None if it bypasses the filter or is at rest."""
     acceleration: float = 0.0
-    """Limit that every joint keeps in a stop [rad/s^2]; 0 for other trajectories."""
+    """Acceleration limit of every joint in a stop; 0 for other trajectories [rad/s^2]."""
     foreseeable: bool = True
-    """Whether it can be simulated ahead; False if it depends on external input."""
+    """Whether it can be simulated ahead; False with external input."""
 
     @abstractmethod
     def next(self) -> Floats:
-        """Return the sample of the next tick, shape (m,) or (n,) [rad]. It must not be modified."""
+        """Return the sample of the next tick, shape (m,) or (n,) [rad]; do not modify it."""
 
     @property
     @abstractmethod
     def finished(self) -> bool:
-        """Whether the last sample was the final one, after which all samples are equal."""
+        """Whether the last sample was the final one; all later ones are equal."""
 
     def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:  # noqa: B027  most need not
-        """Leave room for a filter that comes into use now; only references without a plan have to.
+        """Leave room for a new filter; needed only by references without a plan.
 
-        `spared` returns the limits of a reference whose shaped reference keeps the given limits and those of
-        the arm; for None, only the latter.
+        `spared(limits)` returns limits of a reference whose shaped reference keeps these and the arm's limits
+        (None: only the arm's).
         """
 
     @property
     def standing(self) -> bool:
-        """Whether its samples stay equal until a command comes: it is finished, or paused."""
+        """Whether samples stay equal until a command: finished or paused."""
         return self.finished
 
     @property
     def forecast(self) -> Forecast | None:
-        """Forecast of its motion; None if it has no path."""
+        """Forecast of its motion; None without a path."""
         return None
 
     def fork(self) -> Self:
-        """Return an independent copy of the present state, to simulate this trajectory ahead."""
+        """Return an independent copy, for simulating ahead."""
         return copy.copy(self)
 
 
@@ -91,7 +88,7 @@ class Rest(Trajectory):
 
 
 class Known(Trajectory):
-    """At least one position, shape (n,) [rad], one a tick of `period` seconds; the last is kept."""
+    """A list of positions, shape (n,) [rad], one per tick of `period` seconds; keeps the last."""
 
     def __init__(self, positions: Sequence[Floats], period: float) -> None:
         self._positions, self._period = positions, period
@@ -104,7 +101,7 @@ class Known(Trajectory):
 
     @property
     def end(self) -> Floats:
-        """The last position, shape (n,) [rad]."""
+        """Last position, shape (n,) [rad]."""
         return self._positions[-1]
 
     def next(self) -> Floats:

@@ -1,4 +1,4 @@
-"""References that a client guides: each of its commands replaces the one before."""
+"""References guided by a client, each command of which replaces the previous one."""
 
 import copy
 import math
@@ -17,26 +17,25 @@ LOOKAHEAD = (0.03, 0.2)
 GAIN = (100.0, 2000.0)
 """Range of the gain [1/s^2]."""
 DAMPED = 3.0
-"""Smallest gain times the square of the lag [-]: damping of 0.87, with an overshoot of 0.4 %."""
+"""Smallest gain times squared lag: damping 0.87, overshoot 0.4 % [-]."""
 DELAY = 1.5
-"""Ticks by which T exceeds the lookahead: with them, and half a tick for each posture is held for one, `target_q`
-follows two ticks later than the lookahead, since the differentiator takes a tick, too.
-"""
+"""Ticks by which T exceeds the lookahead. With half a tick because postures are held for one, `target_q` lags
+by the lookahead plus two ticks, one of them in the differentiator."""
 THERE = 1e-7
-"""Distance from the posture, and change within a tick, below which the posture is reached [rad]."""
+"""Distance, and change per tick, below which the posture is reached [rad]."""
 
 
 class StuckError(Exception):
-    """No reference follows that keeps to what was commanded; the message gives the reason."""
+    """The commanded reference cannot continue; the message states the reason."""
 
 
 class Guided(Trajectory):
-    """A reference that follows the latest command until another one comes."""
+    """A reference that follows the latest command."""
 
     limits: MotionLimits
     foreseeable = False
     rate: float
-    """Rate of its time relative to the clock's [-]."""
+    """Time rate [-]."""
 
     @property
     @abstractmethod
@@ -45,7 +44,7 @@ class Guided(Trajectory):
 
     @abstractmethod
     def adopt(self, limits: MotionLimits) -> None:
-        """Keep other limits of the joints from now on; `pace` must follow."""
+        """Set other joint limits; call `pace` afterwards."""
 
     def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:
         """See `Trajectory.adapt`."""
@@ -53,15 +52,11 @@ class Guided(Trajectory):
 
     @abstractmethod
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Set the programmed speed fraction [-] and the velocity limit of reduced speed, if it is reduced [rad/s]."""
+        """Set the programmed speed fraction [-] and the velocity limit of reduced mode, if active [rad/s]."""
 
 
 class Following(Guided):
-    """Passes a signal through a `Limiter`: within the arm's limits, the joints' range and the available torque.
-
-    The client determines the timing of the signal, so the speed slider has no effect on it; reduced speed limits the
-    velocity.
-    """
+    """Passes a client's signal, timed by the client, through a `Limiter`; reduced mode limits velocity."""
 
     def __init__(
         self,
@@ -90,7 +85,7 @@ class Following(Guided):
         self._follow(self.state)
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Set the speed that is reported, and the velocity limit."""
+        """Set the reported speed and the velocity limit."""
         self.rate = speed
         velocity = self._arm.velocity if slowest is None else min(slowest, self._arm.velocity)
         if velocity != self.limits.velocity:
@@ -99,12 +94,11 @@ class Following(Guided):
 
 
 class Servo(Following):
-    """Follows the posture p of the latest command as a damped spring would: q̈ = k (p - q - T q̇).
+    """Follows the posture p of the latest command like a damped spring: q̈ = k (p - q - T q̇).
 
-    A posture that moves with constant velocity is followed with a lag of T, whatever the gain k. T is the lookahead
-    plus 1.5 ticks, so that `target_q` follows commands with a lag of lookahead plus two ticks. The gain decides how
-    quickly the velocity changes: with a high one, the posture is approached with the time constant T from the start;
-    with a low one, the motion begins and ends more gently. A gain below 3/T² would overshoot, and is raised to that.
+    At constant velocity the lag is T for any gain k. T is the lookahead plus 1.5 ticks, so that `target_q`
+    lags commands by the lookahead plus two ticks. A high gain approaches with time constant T from the start;
+    a low one starts and ends more gently. Gains below 3/T² would overshoot and are raised to that.
     """
 
     def __init__(
@@ -120,14 +114,14 @@ class Servo(Following):
         self.aim(self._q, LOOKAHEAD[0], GAIN[0])
 
     def aim(self, posture: Floats, lookahead: float, gain: float) -> None:
-        """Follow another posture; time constant [s] and gain [1/s^2] are clipped to `LOOKAHEAD` and `GAIN`."""
+        """Follow another posture; lookahead [s] and gain [1/s^2] are clipped to their ranges."""
         self._posture = np.array(posture, dtype=float)
         lag = min(max(lookahead, LOOKAHEAD[0]), LOOKAHEAD[1]) + DELAY * self._period
         k = max(min(max(gain, GAIN[0]), GAIN[1]), DAMPED / lag**2)
         self._step = _step(k, k * lag, self._period)
 
     def fork(self) -> Self:
-        """Return an independent copy of the present state."""
+        """Return an independent copy."""
         other = copy.copy(self)
         other._limiter = copy.copy(self._limiter)  # noqa: SLF001  one of its own kind
         return other
@@ -150,7 +144,7 @@ class Servo(Following):
 
 
 def _step(k: float, damping: float, h: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Transition of distance and velocity over one tick of ẍ = -k x - damping ẋ, exactly."""
+    """Return the exact transition of distance and velocity over a tick of ẍ = -k x - damping ẋ."""
     decay, square = 0.5 * damping, 0.25 * damping**2 - k
     if square > 0.0:
         root = math.sqrt(square)

@@ -1,4 +1,4 @@
-"""Limiter of a stream's velocity, acceleration, jerk and torque; a stream within the limits passes unchanged."""
+"""Limiter of a stream's velocity, acceleration, jerk and torque; streams within limits pass unchanged."""
 
 import math
 from typing import Protocol
@@ -13,18 +13,18 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 Bools = npt.NDArray[np.bool_]
 
 STOPS = 0.8
-"""Share of the acceleration that the torque permits with which a joint must be able to stop inside its range, since
-the permitted one changes on the way [-]."""
+"""Fraction of the acceleration allowed by torque with which a joint must be able to stop in range; the margin
+is for changes on the way [-]."""
 HEAVY = 8.0
-"""Acceleration below which the torque hardly ever keeps a joint of an arm [rad/s^2]."""
+"""Acceleration below which torque hardly ever limits a joint [rad/s^2]."""
 TOLERANCE = 1e-6
-"""Share by which rounding may exceed a limit [-]."""
+"""Relative excess of a limit that counts as rounding [-]."""
 ROUNDING = 2e-15
-"""Error of differences by the rounding of positions [rad]."""
+"""Error of differences due to rounding of positions [rad]."""
 STEP, BEND, QD, QDD, DIFFERENCES = range(5)
-"""Rows of differences: first and second one [rad], and as velocity and acceleration; their number."""
+"""Rows of differences: first and second [rad], then as velocity and acceleration; number of rows."""
 FIT, FAR = 1, 2
-"""Bits of what `judge` returns: all joints fit; all are far from the ends of their range."""
+"""Bits of `judge`: all joints fit; all are far from the ends of their range."""
 
 
 @compiled_for_ticks
@@ -40,7 +40,7 @@ def judge(
     now: Floats,  # result: differences, shape (4, n)
     fits: Bools,  # result: which joints fit, shape (n,)
 ) -> int:
-    """Find which joints' differences are and can stay within limits; return the sum of `FIT` and `FAR`."""
+    """Find the joints whose differences are and can stay within limits; return the sum of `FIT` and `FAR`."""
     fastest = (1.0 + TOLERANCE) * velocity + ROUNDING
     hardest = (1.0 + TOLERANCE) * acceleration + 2.0 * ROUNDING
     harshest = (1.0 + TOLERANCE) * jerk + 4.0 * ROUNDING
@@ -77,36 +77,35 @@ def judge(
 
 
 class TorqueRoom(Protocol):
-    """The motion that the joints' torques permit."""
+    """Motion that joint torques permit."""
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
-        """Return whether a state of motion keeps within the permitted torques."""
+        """Return whether a state keeps the permitted torques."""
 
     def acceleration(self, q: Floats, qd: Floats) -> float:
-        """Largest acceleration that all joints may have at once, in any direction [rad/s^2]."""
+        """Return the largest acceleration that all joints may have at once, in any direction [rad/s^2]."""
 
 
 class Limiter:
-    """Follows a position signal exactly while that is within the limits; otherwise catches up time-optimally.
+    """Follows a position signal exactly while within limits; otherwise catches up time-optimally.
 
-    The limits apply to the reference's first, second and third differences. A signal within the limits passes
-    unchanged to the last bit: differences of a sampled motion are means of its derivatives, so a motion that keeps
-    the limits in continuous time keeps them here. A signal counts as too fast if its velocity would exceed the limit
-    before the jerk limit lets its acceleration return to zero, and as too far if it could not come to rest inside the
-    joint's range.
+    Limits apply to first, second and third differences. A signal within limits passes unchanged to the last
+    bit, as does any motion that keeps them in continuous time, because differences are means of derivatives.
+    A signal is too fast if its velocity would exceed the limit before its acceleration can return to zero,
+    and too far if it could not stop in range.
 
-    Each joint is limited independently. A joint that lags behind is controlled relative to the signal's position,
-    velocity and acceleration, so that it also catches up with a moving signal.
+    Joints are limited independently. A joint that lags is controlled relative to the signal's position,
+    velocity and acceleration, and so catches up with a moving signal.
     """
 
     ADVANTAGE = 0.001
-    """Share of the velocity limit by which a joint that lags behind may always be faster than its signal [-]."""
+    """Fraction of the velocity limit by which a lagging joint may always be faster than its signal [-]."""
     NEAR = 1e-4
-    """Permitted overshoot of a signal that brakes [rad]."""
+    """Permitted overshoot over a braking signal [rad]."""
     HOPELESS = 0.95
-    """Share of a limit above which a signal counts as being at the limit [-]."""
+    """Fraction of a limit above which a signal is at the limit [-]."""
     AUTHORITY = 0.001
-    """Share of the acceleration limit that is reserved for catching up [-]."""
+    """Fraction of the acceleration limit reserved for catching up [-]."""
 
     def __init__(
         self,
@@ -130,7 +129,7 @@ class Limiter:
         )  # derivatives, if they differ from those of the differences
         self._behind: Bools | None = None  # which joints are not on the signal, if any
         self.behind = 0.0
-        """Time by which joints lag behind a signal that is at its limits, so that they cannot catch up [s]."""
+        """Lag of joints that cannot catch up with a signal at its limits [s]."""
         # Within this position, no state within the limits needs a check of the range.
         slow = limits.acceleration if torque is None else min(limits.acceleration, HEAVY)
         ramp, swing = limits.acceleration / limits.jerk, limits.velocity / slow
@@ -188,7 +187,7 @@ class Limiter:
         return q, qd, qdd
 
     def _passed(self, q: Floats, now: Floats, bend_before: Floats | None = None) -> Floats:
-        """State, shape (3, n), of joints on the signal: derivatives of the cubic through the last four positions."""
+        """Return the state (3, n) of joints on the signal, from the cubic through the last four positions."""
         h, limit, step, bend = self._period, self._limits.acceleration, now[STEP], now[BEND]
         change = bend - (self._now[BEND] if bend_before is None else bend_before)
         mean = bend / (h * h)
@@ -197,7 +196,7 @@ class Limiter:
         return np.stack((q, step / h + h * (mean / 6.0 + qdd / 3.0), qdd))
 
     def _meets(self, qd: Floats, now: Floats) -> Bools:
-        """Return which joints, if placed on the signal now, can continue on it within the limits."""
+        """Return the joints that can continue on the signal within limits if placed there now."""
         h, limits, step, bend = self._period, self._limits, now[STEP], now[BEND]
         signal = self._signal_acceleration(qd, limits.acceleration)
         following = (qd - step / h) / h + 0.5 * signal  # second difference at the next tick
@@ -207,19 +206,18 @@ class Limiter:
         return meets
 
     def _accelerations(self) -> tuple[float, float]:
-        """Accelerations that limit and torque permit now, and with which a stop is sure to be possible [rad/s^2]."""
+        """Return the permitted acceleration now, and one that certainly allows a stop [rad/s^2]."""
         limit = self._limits.acceleration
         room = math.inf if self._torque is None else self._torque.acceleration(*self.state[:2])
         return min(limit, room), min(limit, STOPS * room)
 
     def _stoppable(self, state: Floats, limit: float) -> Bools:
-        """Return which joints can come to rest inside their range with an acceleration, with two ticks to spare."""
+        """Return the joints that can stop in range with an acceleration, two ticks to spare."""
         (q, qd, qdd), jerk = state, self._limits.jerk
         sign = np.sign(qd)
         speed, rise = np.abs(qd), sign * qdd
         ramp = np.abs(rise) / jerk
-        # The shortest stop from zero acceleration, plus the way from here to its start, or minus the way from there
-        # to here.
+        # Shortest stop from zero acceleration, plus or minus the distance between its start and the present state.
         top = speed + 0.5 * jerk * ramp**2
         gentle = top < limit**2 / jerk
         swing = top / limit + limit / jerk
@@ -246,7 +244,7 @@ class Limiter:
         return clipped
 
     def _held_back(self, q: Floats, qd: Floats, passed: Floats, fits: Bools) -> tuple[Floats, Bools]:
-        """State, shape (3, n), if not all joints pass unchanged, and which joints do."""
+        """Return the state (3, n) if not all joints pass unchanged, and which do."""
         limits, (limit, sure) = self._limits, self._accelerations()
         state = passed if fits.all() else np.where(fits, passed, self._catch_up(q, qd, limit, fits))
         if self._torque is not None and not self._torque.allows(*state):
@@ -256,7 +254,7 @@ class Limiter:
                 state = np.where(fits, passed, self._catch_up(q, qd, limit, fits))
         sign = np.sign(state[2])
         fast = sign * state[1] + state[2] ** 2 / (2.0 * limits.jerk) > limits.velocity
-        # The last ticks of the way to a signal that rests near the end of the range need no ticks to spare.
+        # Close to a signal at rest near the end of the range, no spare ticks are needed.
         lands = (qd == 0.0) & (np.abs(q) <= self._reach) & (np.abs(q - self.q) <= self.NEAR)
         for astray, goal in (
             (fast, sign * limits.velocity),
@@ -269,7 +267,7 @@ class Limiter:
         return state, fits
 
     def _catch_up(self, q: Floats, qd: Floats, limit: float, fits: Bools) -> Floats:
-        """State, shape (3, n), one tick on the way to a signal that continues with its present acceleration."""
+        """Return the state (3, n) a tick later when catching up with a signal of constant acceleration."""
         request, limits, h = self._catch_request, self._limits, self._period
         fastest = (1.0 - self.ADVANTAGE) * limits.velocity
         present = self.state
@@ -279,7 +277,7 @@ class Limiter:
         request.current_position = (present[0] - (q - h * (qd - 0.5 * h * qdd))).tolist()
         request.current_velocity = (present[1] - (qd - h * qdd)).tolist()
         request.current_acceleration = (present[2] - qdd).tolist()
-        # Gain no more on the signal than the lag, even if the signal brakes as hard as permitted.
+        # Do not overtake the signal, even if it brakes with the limit.
         closing = (np.abs(q - self.q) + self.NEAR) * limits.acceleration / np.maximum(np.abs(qd), 1e-9)
         request.max_velocity = np.minimum(limits.velocity - qd, closing).tolist()
         request.min_velocity = np.maximum(-limits.velocity - qd, -closing).tolist()
@@ -291,7 +289,7 @@ class Limiter:
         return np.stack((q, qd, qdd)) + relative
 
     def _change_to(self, qd: Floats, limit: float) -> Floats:
-        """State, shape (3, n), one tick on the shortest way to a velocity."""
+        """Return the state (3, n) a tick later on the shortest way to a velocity."""
         request, h = self._brake_request, self._period
         present = self.state
         request.current_position, request.current_velocity = present[0].tolist(), present[1].tolist()
@@ -305,7 +303,7 @@ class Limiter:
 
 
 def _after_a_tick(generator: ruckig.Ruckig, request: ruckig.InputParameter) -> Floats | None:
-    """State, shape (3, n), one tick later; None if ruckig finds no trajectory."""
+    """Return the state (3, n) a tick later; None if ruckig finds no trajectory."""
     result = ruckig.OutputParameter(request.degrees_of_freedom)
     generator.reset()  # otherwise ruckig would continue an old trajectory if its state happens to recur
     try:

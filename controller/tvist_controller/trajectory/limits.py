@@ -10,7 +10,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """Limits that apply to each joint, or to each entry of a path's parameter."""
+    """Limits of each joint, or each entry of a path's parameter."""
 
     velocity: float
     """Velocity limit [rad/s]."""

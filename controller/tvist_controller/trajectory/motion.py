@@ -1,4 +1,4 @@
-"""Planned motions: a time law along a path, whose time passes at an adjustable rate."""
+"""Planned motions: a time law along a path, with an adjustable time rate."""
 
 import copy
 from typing import Protocol, Self
@@ -13,45 +13,43 @@ from tvist_controller.trajectory.path import Path
 from tvist_controller.trajectory.spline import SplineCurve
 
 LOOK_AHEAD = 2.0
-"""Ticks that a change of the pace looks ahead on the path."""
+"""Ticks that a rate change looks ahead on the path."""
 
 LONGEST_LOOK = 1500
-"""Ticks over which a motion is compared with its pause; a motion that lasts longer is not about to end."""
+"""Ticks over which a motion is compared with its pause; longer ones are not about to end."""
 SOONER = 25
-"""Ticks by which a pause must come to rest sooner than the motion to be worthwhile."""
+"""Ticks that a pause must save to be worthwhile."""
 
 SURELY = 0.12
-"""If the motion begins to brake later than this plus the pause's extra time, the pause is certainly sooner [s]."""
+"""If the motion brakes later than this plus the pause's extra time, the pause is certainly sooner [s]."""
 
 
 class TimeLaw(Protocol):
-    """Time law of a path's parameter, from rest at its start to rest at its end; it never turns back."""
+    """Time law of a path's parameter from rest at its start to rest at its end, never turning back."""
 
     limits: MotionLimits
     """Limits for every entry of the parameter."""
     duration: float
     """Duration from rest to rest [s]."""
     brakes_at: float
-    """Time at which it begins to slow down [s]."""
+    """Time at which it starts braking [s]."""
     begins: float
-    """Time from which on it is known: above 0 for one whose beginning has been forgotten [s]."""
+    """Time from which it is known, above 0 if its beginning was dropped [s]."""
 
     @property
     def moments(self) -> Floats:
-        """Times at which velocity or acceleration may be largest [s]; some may be before it is known."""
+        """Times of possibly largest velocity or acceleration; some may be before `begins` [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
-        """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""
+        """Return the parameter [rad], its velocity and acceleration [rad, s] at a time [s], m each."""
 
 
 class DoubleS:
     """Time-optimal motion from rest to rest within limits, shape (m,) [rad], all entries in phase.
 
-    The entry with the longest way determines the duration (Biagiotti and Melchiorri 2008, ch. 3.4). With the paper's
-    limits of 1.5 rad/s, 2.0 rad/s² and 100 rad/s³, the acceleration ramps last 20 ms.
-
-    Raises:
-        ValueError: There is no such motion within these limits, or it would last for hours.
+    The entry with the longest distance determines the duration (Biagiotti and Melchiorri 2008, ch. 3.4). With
+    the paper's 1.5 rad/s, 2.0 rad/s² and 100 rad/s³, acceleration ramps last 20 ms. Raise ValueError if it
+    would last for hours.
     """
 
     def __init__(self, start: Floats, end: Floats, limits: MotionLimits) -> None:
@@ -65,26 +63,25 @@ class DoubleS:
         self._trajectory = ruckig.Trajectory(m)
         try:
             ruckig.Ruckig(m).calculate(request, self._trajectory)
-        except (ruckig.RuckigError, ValueError) as error:  # ruckig's way to fail above 7600 s
+        except (ruckig.RuckigError, ValueError) as error:  # ruckig fails above 7600 s
             raise ValueError(
                 f"no motion goes from {start.tolist()} to {end.tolist()} in less than two hours within "
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
             ) from error
         self.limits = limits
-        """Limits that it keeps."""
         self.begins = 0.0
-        """Time from which on it is known [s]."""
+        """Time from which it is known [s]."""
         self.duration = float(self._trajectory.duration)
         """Duration from rest to rest [s]."""
-        # The motion from rest to rest is symmetric in time: it brakes for as long as it accelerates.
+        # Motion from rest to rest is symmetric in time.
         leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
         self.brakes_at = self.duration - sum(leading.t[:3])
-        """Time at which it begins to slow down [s]."""
+        """Time at which it starts braking [s]."""
         self.moments: Floats = np.cumsum(leading.t)
-        """Times at which the jerk changes, so that velocity or acceleration may be largest [s]."""
+        """Times at which the jerk changes, with possibly largest velocity or acceleration [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
-        """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""
+        """See `TimeLaw.at`."""
         position, velocity, acceleration = self._trajectory.at_time(time)[:3]
         return position, velocity, acceleration
 
@@ -92,8 +89,8 @@ class DoubleS:
 class PlannedMotion(Trajectory):
     """A planned motion from rest to rest.
 
-    Its samples are the path's parameter; for a straight line in joint space these are the joint positions.
-    The limits of a change of its rate are at least those of the law, which may be slow.
+    Samples are the path's parameter; on a straight line in joint space, joint positions. Limits of a rate
+    change are at least those of the law, which may be slow.
     """
 
     path: Path
@@ -109,25 +106,24 @@ class PlannedMotion(Trajectory):
     ) -> None:
         self.path, self._period = path, period
         self.law = law
-        """Its time law."""
         self.agility = law.limits if agility is None else agility
-        """Limits that a change of the rate keeps."""
+        """Limits of a rate change."""
         self.limits = law.limits
         self.duration = law.duration
-        """Duration from rest to rest at full speed [s]."""
+        """Duration at full speed [s]."""
         self.speed = speed
-        """Target of the rate of its time, 0 to 1 [-]."""
+        """Target time rate, 0 to 1 [-]."""
         self._pace = Pace(self.agility, period, speed)
         # Time on the path, as whole ticks since the rate last changed, so that rounding errors do not add up.
         self._since, self._ticks = 0.0, 0
 
     @property
     def share(self) -> float:
-        """Completed share of its way, 0 to 1 [-]."""
+        """Completed fraction of the way, 0 to 1 [-]."""
         return 1.0 if self.finished else self._share_at(self.time)
 
     def time_at(self, share: float) -> float:
-        """Time at full speed at which a share of the way, 0 to 1, is completed [s]."""
+        """Return the time at full speed at which a fraction of the way, 0 to 1, is completed [s]."""
         early, late = self.law.begins, self.duration
         for _ in range(40):
             middle = 0.5 * (early + late)
@@ -143,17 +139,17 @@ class PlannedMotion(Trajectory):
         return (now[leading] - start[leading]) / way if way != 0.0 else 1.0
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Positions, velocities and accelerations of the joints at k times at full speed [s], each of shape (k, n)."""
+        """Return joint positions, velocities and accelerations at k times at full speed [s], each (k, n)."""
         return self.path.states(
             *(np.array(values) for values in zip(*map(self.law.at, times.tolist()), strict=True))
         )
 
     def evenly(self, count: int) -> Floats:
-        """Evenly spaced times from the first one that is known to the end, shape (count,) [s]."""
+        """Return evenly spaced times from the first known one to the end, shape (count,) [s]."""
         return np.linspace(self.law.begins, self.duration, count)
 
     def next(self) -> Floats:
-        """Advance by one tick and return the parameter, which is exactly the path's end from the end time on."""
+        """Advance by one tick and return the parameter, exactly the path's end from the end time on."""
         if self._pace.steady(self.speed):
             self._ticks += 1
         else:
@@ -167,7 +163,7 @@ class PlannedMotion(Trajectory):
         return self.path.end if time >= self.duration else np.array(self.law.at(time)[0])
 
     def go_on(self, longer: "PlannedMotion") -> None:
-        """Go on as a longer motion, which is the same until now and for some ticks more, along a `SplineCurve`."""
+        """Continue as a longer motion along a `SplineCurve`, equal until now and for some ticks."""
         assert isinstance(self.path, SplineCurve)
         assert isinstance(longer.path, SplineCurve)
         self.path.become(longer.path)
@@ -177,17 +173,17 @@ class PlannedMotion(Trajectory):
 
     @property
     def rate(self) -> float:
-        """Present rate of its time [-]."""
+        """Present time rate [-]."""
         return self._pace.rate
 
     @property
     def standing(self) -> bool:
-        """Whether it has reached its end, or is paused and has come to a standstill."""
+        """Whether it has reached its end, or is paused and stands."""
         return self.finished or (self.rate == 0.0 and self.steady)
 
     @property
     def forecast(self) -> Forecast:
-        """Forecast of its motion; the time of braking is known only while its rate is constant."""
+        """Forecast of its motion; the time of braking is known only at constant rate."""
         time, rate = self.time, self._pace.rate
         known = rate > 0.0 and self.steady
         limits = self.limits if self.steady else self.agility
@@ -210,15 +206,14 @@ class PlannedMotion(Trajectory):
         return float(np.abs(self.law.at(self.time)[1]).max()) * self._pace.rate
 
     def hold(self, acceleration: float) -> bool:
-        """Pause the motion, if it then stands noticeably sooner than by continuing; return whether it pauses.
+        """Pause the motion if it then stands noticeably sooner; return whether it pauses.
 
-        Near the end hardly any acceleration is left for a pause, which would only draw the end out. While
-        slowing down, `acceleration` is the limit for every entry of the parameter, at most that of its
-        agility.
+        Near the end hardly any acceleration is left for a pause, which would only take longer. `acceleration`
+        is the limit for every entry of the parameter while slowing down, at most that of `agility`.
         """
         paused = self.fork()
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
-        most, forecast = self.limits.acceleration, self.forecast  # it brakes so by itself
+        most, forecast = self.limits.acceleration, self.forecast  # the motion's own braking
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
         hardest = self.agility.acceleration <= most
         if forecast.steady == 0.0 and self.rate == 1.0 and self.steady and hardest:
@@ -229,24 +224,24 @@ class PlannedMotion(Trajectory):
         return True
 
     def release(self, speed: float) -> None:
-        """Resume after a pause, at a rate [-]."""
+        """Resume after a pause at a rate [-]."""
         self.speed, self._pace.acceleration = speed, self.agility.acceleration
 
     def fork(self) -> Self:
-        """Return an independent copy of the present state, with a pace of its own."""
+        """Return an independent copy."""
         other = copy.copy(self)
         other._pace = self._pace.fork()  # noqa: SLF001  one of its own kind
         return other
 
     def paced_at(self, rate: float) -> Self:
-        """Return a copy that has not begun, at another rate [-]."""
+        """Return a copy that has not started, at another rate [-]."""
         other = self.fork()
         other.speed, other._pace = rate, Pace(self.agility, self._period, rate)  # noqa: SLF001  one of its own kind
         return other
 
     @property
     def time(self) -> float:
-        """Elapsed time of the motion, at full speed [s]."""
+        """Elapsed time at full speed [s]."""
         return self._since + self._ticks * self._pace.rate * self._period
 
     @property
@@ -258,16 +253,23 @@ class PlannedMotion(Trajectory):
 def quickest_motion(
     path: Path, limits: MotionLimits, period: float, speed: float = 1.0, agility: MotionLimits | None = None
 ) -> PlannedMotion:
-    """Return the double-S motion along a path from rest to rest within limits of its parameter; see `PlannedMotion`.
+    """Return the double-S motion along a path from rest to rest within limits of its parameter.
+
+    Args:
+        path: The path.
+        limits: Limits of its parameter.
+        period: Tick [s].
+        speed: Initial time rate [-].
+        agility: Limits of a rate change; None for `limits`.
 
     Raises:
-        ValueError: There is no such motion within these limits, or it would last for hours.
+        ValueError: There is no such motion, or it would last for hours.
     """
     return PlannedMotion(path, DoubleS(path.start, path.end, limits), period, speed, agility)
 
 
 def _stands_sooner(paused: PlannedMotion, free: PlannedMotion) -> bool:
-    """Return whether the paused motion stands noticeably sooner than the free one, and is never ahead of it."""
+    """Return whether the paused motion stands noticeably sooner than the free one and is never ahead."""
     for _ in range(LONGEST_LOOK):
         if paused.standing or free.standing:
             break
@@ -281,5 +283,5 @@ def _stands_sooner(paused: PlannedMotion, free: PlannedMotion) -> bool:
 
 
 def at_least(limits: MotionLimits, acceleration: float, jerk: float) -> MotionLimits:
-    """Return limits of which acceleration and jerk are at least these."""
+    """Return limits with at least this acceleration and jerk."""
     return MotionLimits(limits.velocity, max(limits.acceleration, acceleration), max(limits.jerk, jerk))

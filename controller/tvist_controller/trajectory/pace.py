@@ -1,4 +1,4 @@
-"""Rate at which a trajectory's own time passes: speed slider, pause and resume."""
+"""Time rate of a trajectory: speed slider, pause and resume."""
 
 import copy
 from collections.abc import Sequence
@@ -10,23 +10,21 @@ import ruckig
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 QUICKEST = 20.0
-"""Largest change of the rate per second [1/s]: from standstill to full speed takes at least 1/20 s."""
+"""Largest change of the rate; from standstill to full speed takes at least 1/20 s [1/s]."""
 
 
 class Pace:
-    """Rate r of a trajectory's time relative to the clock's, 0 to 1, whose changes keep the limits of the motion.
+    """Time rate r of a trajectory, 0 to 1, whose changes keep the motion's limits.
 
-    Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. So ṙ may have any value that keeps |q̈|
-    within the limit of every joint; near the limits a motion is neither slowed down nor sped up until its own curve
-    leaves room. The rate approaches its target time-optimally within that room, with limited jerk of its own
-    (ruckig), in ticks of `period` seconds.
+    Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. ṙ may have any value that keeps |q̈| within
+    every joint's limit, so near the limits the rate does not change until the curve leaves room. The rate approaches
+    its target time-optimally within that room, with limited jerk (ruckig), in ticks of `period` seconds.
     """
 
     def __init__(self, limits: MotionLimits, period: float, rate: float) -> None:
         self.limits, self._period = limits, period
-        """Limits for every joint."""
         self.acceleration = limits.acceleration
-        """Acceleration limit for every joint [rad/s^2]: the motion's, or less."""
+        """Acceleration limit of every joint, the motion's or less [rad/s^2]."""
         self.rate, self._slope = rate, 0.0
         self._open()
 
@@ -36,20 +34,20 @@ class Pace:
         self._request.control_interface = ruckig.ControlInterface.Velocity
 
     def fork(self) -> Self:
-        """Return an independent copy of the present state."""
+        """Return an independent copy."""
         other = copy.copy(self)
         other._open()  # noqa: SLF001  one of its own kind
         return other
 
     def steady(self, target: float) -> bool:
-        """Return whether the rate has reached its target and stays there."""
+        """Return whether the rate stays at its target."""
         return self.rate == target and self._slope == 0.0
 
     def advance(self, target: float, curve: Sequence[Floats]) -> float:
-        """Advance by one tick towards a target rate [-] and return the time that passes on the path [s].
+        """Advance by one tick towards a target rate [-]; return the time that passes on the path [s].
 
-        `curve` has q' [rad/s] and q'' [rad/s^2], each of shape (2, n), at the present point of the path and
-        just ahead: the rate must suit all of them, since a tick has a finite length.
+        `curve` has q' [rad/s] and q'' [rad/s^2], each (2, n), at the present point and just ahead; the rate
+        must suit both, since a tick has finite length.
         """
         rooms = [self._room(qd, qdd) for qd, qdd in curve]
         # ruckig requires limits on both sides of zero, so leave a little room in both directions.
@@ -70,7 +68,7 @@ class Pace:
         return max(float(self._result.new_position[0]), 0.0)
 
     def _room(self, qd: Floats, qdd: Floats) -> tuple[float, float]:
-        """Lowest and highest ṙ that keep every joint within its acceleration [1/s]."""
+        """Return the range of ṙ that keeps every joint within its acceleration [1/s]."""
         lowest, highest = -QUICKEST, QUICKEST
         own = qdd * self.rate**2
         for velocity, acceleration in zip(qd.tolist(), own.tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""Path of a planned motion, independent of time: joint positions as a function of a parameter."""
+"""Paths of planned motions: joint positions as a function of a parameter."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -11,70 +11,63 @@ from tvist_shaping.base import Posture
 
 
 class Way(NamedTuple):
-    """Motion to be checked for collisions."""
+    """Motion to check for collisions."""
 
     at: Callable[[float], Floats]
-    """Returns the joint positions at a share of the way, 0 to 1, shape (n,) [rad]."""
+    """Function from a fraction of the way, 0 to 1, to joint positions (n,) [rad]."""
     turned: Floats
-    """Bound of the angle that each joint turns, shape (n,) [rad]; for a part of the way, times its share."""
+    """Bound of each joint's turn, proportional for a part of the way, shape (n,) [rad]."""
 
 
 class Path(ABC):
     """Joint positions q(x) as a function of a parameter x.
 
-    Time laws, the TVIST filter and stops act on the parameter, so their results stay on the path, however it curves.
-    The parameter has shape (m,) and moves straight from `start` to `end`. Its unit is that of the path: radians for a
-    straight line in joint space, metres for a path of the tool.
+    Time laws, the TVIST filter and stops act on the parameter, so results stay on any path. The parameter has
+    shape (m,) and goes straight from `start` to `end`, in radians for a straight line in joint space, in
+    metres for a tool path.
     """
 
     posture_of: Posture | None
-    """Converts the parameter to joint positions; None if the parameter is the joint positions."""
+    """Function from parameter to joint positions; None if they are the same."""
 
     def __init__(self, start: Floats, end: Floats) -> None:
         self.start, self.end = start, np.array(end, dtype=float)
-        """Parameter at the start and at the end, each of shape (m,)."""
+        """Parameter at start and end, each of shape (m,)."""
         way = self.end - start
         farthest = float(np.abs(way).max())
         self.direction = way / farthest if farthest > 0.0 else np.zeros(len(start))
-        """Direction from start to end, with a largest entry of 1 or -1, or all 0 if start equals end; shape (m,)."""
+        """Direction from start to end with a largest entry of ±1, or zeros if equal, shape (m,)."""
         self.leading = int(np.argmax(np.abs(self.direction)))
-        """Index of the leading entry, which moves farthest."""
+        """Index of the entry that moves farthest."""
         self._sign = float(self.direction[self.leading])
 
     @abstractmethod
     def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return q, q̇ and q̈, shape (n,) or (k, n) [rad, s], for one or k states of the parameter.
-
-        Those are x, its velocity [1/s] and its acceleration [1/s^2], each of shape (m,) or (k, m).
-        """
+        """Return q, q̇ and q̈, (n,) or (k, n) [rad, s], for x, ẋ [1/s] and ẍ [1/s^2], (m,) or (k, m)."""
 
     @abstractmethod
     def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:
-        """Return velocities and accelerations for a change of the motion's rate, shape (2, k).
+        """Return velocities and accelerations for rate changes, shape (2, k).
 
-        They are scaled so that `acceleration`, the limit of the parameter's [1/s^2], is that of every column.
-        Velocity and acceleration of the parameter x are those at full rate, each of shape (m,) [1/s, 1/s^2].
+        They are scaled so that `acceleration`, the parameter's limit [1/s^2], applies to every column. ẋ
+        [1/s] and ẍ [1/s^2] are those at full rate, each of shape (m,).
         """
 
     @abstractmethod
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
-        """Return the parameter's limits in a stop; None if the curve alone uses up those of the joints.
-
-        The stop begins at x, shape (m,), and is never faster than `velocity` [1/s]; that of the joints'
-        limits is ignored.
-        """
+        """Return the parameter's limits in a stop from x, (m,), at up to `velocity` [1/s]; None for none."""
 
     @abstractmethod
     def way(self, start: Floats, end: Floats) -> Way:
-        """Return the part of the path between two parameters, shape (m,), to be checked for collisions."""
+        """Return the part between two parameters, shape (m,), for collision checks."""
 
     @property
     def whole(self) -> Way:
-        """The whole path, to be checked for collisions."""
+        """The whole path for collision checks."""
         return self.way(self.start, self.end)
 
     def forwards(self, values: Floats) -> float:
-        """Leading entry of a velocity, acceleration or step of the parameter, shape (m,); positive towards the end."""
+        """Return the leading entry of a velocity, acceleration or step (m,), positive towards the end."""
         return self._sign * float(values[self.leading])
 
     def posture(self, x: Floats) -> Floats:
@@ -83,26 +76,23 @@ class Path(ABC):
 
 
 class JointLine(Path):
-    """The straight line between two postures in joint space, each of shape (n,) [rad].
-
-    Its parameter is the posture itself, so shaping the parameter shapes the posture.
-    """
+    """Straight line between two postures in joint space, shape (n,) [rad]; the parameter is the posture."""
 
     posture_of = None
 
     def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the states of the parameter unchanged."""
+        """Return the parameter's states unchanged."""
         return x, xd, xdd
 
     def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:  # noqa: ARG002  one limit for all
-        """Return the derivatives of the parameter."""
+        """Return the parameter's derivatives."""
         return np.array((xd, xdd))
 
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits:  # noqa: ARG002  no curvature
-        """Return the limits of the joints unchanged."""
+        """Return the joints' limits unchanged."""
         return limits
 
     def way(self, start: Floats, end: Floats) -> Way:
-        """Return the straight line from one posture to the other."""
+        """Return the straight line between two postures."""
         way = end - start
         return Way(lambda share: start + share * way, way)

@@ -1,4 +1,4 @@
-"""Timing of a stream: set-points are played late enough for late ones to arrive."""
+"""Play-out timing of a stream, delayed enough for late set-points to arrive."""
 
 import math
 from collections import deque
@@ -8,30 +8,29 @@ from tvist_controller.trajectory.limits import MotionLimits
 WINDOW = 128
 """Number of set-points over which lateness is observed, in four parts."""
 MAX_PERIODS, MAX_SECONDS = 2.0, 0.02
-"""Longest wait for late set-points, relative to the earliest; the larger of the two applies."""
+"""Longest wait for late set-points relative to the earliest; the larger value applies."""
 SPARE = 1
-"""Periods that a stream slower than the tick is delayed in any case, so that it may begin with jitter [-]."""
+"""Additional delay of a stream slower than the tick, for jitter at the start [periods]."""
 SLACK = 0.3
-"""Unnecessary delay that is tolerated, so that the delay need not change all the time [periods]."""
+"""Tolerated excess delay, which avoids constant changes [periods]."""
 SHARE = 0.05
-"""Share of the limits that a change of the delay may use [-]."""
+"""Fraction of the limits available to a change of delay [-]."""
 CALM = 0.5
-"""Time after which a delay that the limits made necessary is reduced, if it is no longer needed [s]."""
+"""Time after which a delay required by the limits is reduced if no longer needed [s]."""
 SLOW = 0.05
-"""Share of the velocity limit below which the stream must be for that [-]."""
+"""Fraction of the velocity limit below which the stream must be for that [-]."""
 CLOSE = 1e-6
-"""Difference below which the delay counts as equal to its target [ticks]."""
+"""Difference below which the delay equals its target [ticks]."""
 
 
 class PlayOut:
-    """Position in a stream that is played at each tick, in sequence numbers.
+    """Position of a stream to play at each tick, in sequence numbers.
 
-    The sender's clock differs from ours, and the transport delay varies. The lateness of set-point k is the tick
-    before which it arrived, minus k periods. Play-out waits for the latest of the recent set-points, but not much
-    longer than the earliest needs. So it compensates jitter, follows a clock that is slow or fast, and does not wait
-    for a gap. The delay approaches its target through three first-order lags in series, which cannot overshoot. With
-    q' the stream's velocity and D the delay, q̈ contains a term -q' D̈. The lags' time constant limits this term, and
-    the corresponding one in jerk, to a share of the limits; at rest the time constant is zero.
+    The sender's clock may differ, and transport delay varies. The lateness of set-point k is the tick before which it
+    arrived minus k periods. Play-out waits for the latest of recent set-points, but not much longer than the earliest
+    needs. So it compensates jitter, follows a slow or fast clock, and does not wait for gaps. The delay D approaches
+    its target through three first-order lags, without overshoot. With stream velocity q', q̈ contains -q' D̈; the lags'
+    time constant, zero at rest, limits this term and its jerk to a fraction of the limits.
     """
 
     def __init__(
@@ -55,12 +54,12 @@ class PlayOut:
 
     @property
     def delay(self) -> float:
-        """Time from the arrival of the earliest set-points until their position is reached [ticks]."""
+        """Time from arrival of the earliest set-points to their play-out [ticks]."""
         return self._lags[2] - self._earliest
 
     @property
     def position(self) -> tuple[int, float]:
-        """An integer origin and the play-out position relative to it [sequence numbers]."""
+        """Integer origin, and play-out position relative to it [sequence numbers]."""
         # Rounded, so that it is exactly an integer where it should be.
         return self._origin, round((self._now - self._lags[2]) / self._ticks, 9)
 
@@ -72,7 +71,7 @@ class PlayOut:
         return round(self._now - (sequence - self._origin) * self._ticks, 6)
 
     def hear(self, sequence: int) -> None:
-        """Take note of a set-point that arrived before the coming tick."""
+        """Record a set-point that arrived before the coming tick."""
         lateness = self._lateness(sequence)
         if lateness - self._earliest > self._most:
             return  # too late to wait for
@@ -90,10 +89,7 @@ class PlayOut:
             self._wanted = wanted
 
     def advance(self, speed: float, behind: float) -> None:
-        """Advance by one tick, at the velocity of the fastest joint in the stream [rad/s].
-
-        If the reference cannot catch up, it lags `behind` the stream [s].
-        """
+        """Advance by one tick at the fastest joint's velocity [rad/s]; `behind`: the reference's lag [s]."""
         self._now += 1
         delay = self._lags[2]
         if behind > 0.0:
@@ -120,5 +116,5 @@ class PlayOut:
 
     @property
     def rate(self) -> float:
-        """Set-points played per tick, at present [-]."""
+        """Set-points played per tick [-]."""
         return (1.0 - self._rate) / self._ticks

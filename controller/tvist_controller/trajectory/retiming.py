@@ -1,13 +1,11 @@
-"""Time laws along curves whose limits change on the way: as fast as these permit, with bounded jerk.
+"""Time laws along curves with varying limits: the quickest with bounded jerk.
 
-In the phase plane of s and b = ṡ², a constant acceleration is a straight line, db/ds = 2 s̈. A pass backwards and one
-forwards through the cells of the curve find the largest b that the limits permit (Bobrow, Dubowsky and Gibson 1985,
-with bounds that do not depend on the sign of s̈). Its motion has steps of the acceleration; the mean of s(t) over the
-last `ramp` seconds has none, and bounded jerk.
+In the phase plane of s and b = ṡ², constant acceleration is a straight line, db/ds = 2 s̈. A backward and a forward
+pass through the curve's cells find the largest permitted b (Bobrow, Dubowsky and Gibson 1985, with bounds independent
+of the sign of s̈). Its acceleration has steps; the moving mean of s(t) over `ramp` seconds has none, and bounded jerk.
 
-Such a mean, and every shaper behind it, mixes moments of the motion, so it passes a place at speeds that belong to
-its neighbourhood. The joints' limits in a cell therefore hold for all cells that the motion is in within a window of
-time.
+This mean, and any shaper behind it, mixes moments of the motion and so passes a place at speeds of its neighbourhood.
+Joint limits in a cell therefore hold for all cells passed within a time window.
 """
 
 from bisect import bisect_right
@@ -19,27 +17,26 @@ from tvist_controller._compiled import compiled
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 TOOL_SHARE = 0.25
-"""Share of the shaper's window for which limits of the tool hold [-]. The speed changes so little within it that the
-shaped tool exceeds its acceleration in a bend by a hundredth. The whole window would cost half a second on some bends.
-"""
+"""Fraction of the shaper's window for which tool limits hold [-]. The speed changes so little within it that the shaped
+tool exceeds its acceleration in a bend by a hundredth; the whole window would cost half a second on some bends."""
 LEAST = 1e-9
-"""Smallest value that is divided by."""
+"""Smallest divisor."""
 ROUNDS = 3
-"""How often limits that last for a window of time are put on a motion, an odd number."""
+"""Rounds of applying windowed limits to a motion, an odd number."""
 ROUNDING = 1e-9
-"""Share by which rounding may exceed a limit [-]."""
+"""Relative excess of a limit that counts as rounding [-]."""
 AT_REST: Floats = np.zeros(1)
-"""What is known of ṡ² of a motion from rest."""
+"""Known ṡ² of a motion from rest."""
 SHORTLY = 1e-9
-"""Time before and after a change of the acceleration at which it is looked at [s]."""
+"""Time offset from a change of acceleration at which it is evaluated [s]."""
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Limits along a curve, constant in each of c cells: ṡ ≤ fastest, and p |s̈| + q ṡ² ≤ 1 for each of r rows."""
+    """Limits along a curve, constant per cell: ṡ ≤ fastest, and p |s̈| + q ṡ² ≤ 1 for each of r rows."""
 
     fastest: Floats
-    """Largest ṡ in each cell, shape (c,) [1/s]."""
+    """Largest ṡ per cell, shape (c,) [1/s]."""
     p: Floats
     """Shape (c, r) [s^2 per unit of s]."""
     q: Floats
@@ -48,28 +45,27 @@ class Cells:
 
 @dataclass(frozen=True)
 class Way:
-    """Everything that limits a motion along a curve."""
+    """All limits of a motion along a curve."""
 
     edges: Floats
-    """Ends of the cells, rising from 0, shape (c + 1,)."""
+    """Cell boundaries, rising from 0, shape (c + 1,)."""
     joints: Cells
-    """Limits of the joints, which the shaped motion keeps, too."""
+    """Joint limits, which the shaped motion also keeps."""
     tool: Cells
-    """Limits of the tool, which it may exceed a little."""
+    """Tool limits, which the shaped motion may exceed slightly."""
     slope: Floats
-    """Bound of |dq/ds| of any joint in each cell, shape (c,)."""
+    """Bound of any joint's |dq/ds| per cell, shape (c,)."""
     jerk: float
-    """Jerk of the joints that changes of s̈ may cause [rad/s^3]."""
+    """Joint jerk available for changes of s̈ [rad/s^3]."""
 
 
 @compiled
 def passes(
     edges: Floats, highest: Floats, p: Floats, q: Floats, known: Floats
 ) -> Floats:  # pragma: no cover  compiled
-    """Return the largest b = ṡ² at the c + 1 edges, zero at the last one; `p` and `q` as in `Cells`.
+    """Return the largest b = ṡ² at the c + 1 edges, zero at the last; `p` and `q` as in `Cells`.
 
-    `highest` is the largest b in each of the c cells. The first edges keep their `known` values, shape (k,):
-    only a 0 for a motion from rest.
+    `highest` is the largest b per cell. The first edges keep their `known` values, shape (k,): just 0 from rest.
     """
     count, rows = p.shape
     begun = len(known)
@@ -97,10 +93,9 @@ def passes(
 def widened(
     times: Floats, window: float, values: Floats, lowest: bool
 ) -> Floats:  # pragma: no cover  compiled
-    """Return for each cell the largest value, or the lowest, of all cells that are passed within a window of time.
+    """Return for each cell the largest (or lowest) value of all cells passed within ± a time window [s].
 
-    The window is to either side [s]; `times` are those at the edges, shape (c + 1,) [s], and `values` has a
-    row for each cell, shape (c, r).
+    `times` are those at the edges, shape (c + 1,) [s]; `values` has a row per cell, shape (c, r).
     """
     count, rows = values.shape
     out = values.copy()
@@ -119,10 +114,9 @@ def widened(
 
 @compiled
 def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
-    """Let a motion go on evenly for a ramp between speeding up and braking, so that its jerk is not twice that of both.
+    """Insert constant speed for a ramp [s] between acceleration and braking, which halves their jerk.
 
-    It stays as it is up to the edge of number `known`; if it brakes there, it first goes on evenly. The ramp
-    is in seconds; `b` is ṡ² at the edges, both of shape (c + 1,).
+    The motion is unchanged up to edge `known`, and first constant if it brakes there; `b` is ṡ² at the edges, (c + 1,).
     """
     out, last = b.copy(), len(b) - 1
     number = known + 1
@@ -143,7 +137,7 @@ def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragm
                 high += 1
             else:
                 break
-            if max(out[low], out[high]) <= 0.0:  # it is as short as a ramp
+            if max(out[low], out[high]) <= 0.0:  # no longer than a ramp
                 break
             most = max(out[low], out[high])
         for number in range(low + 1, high):
@@ -152,27 +146,26 @@ def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragm
 
 
 class RetimedLaw:
-    """The time law of a curve's parameter: the mean over `ramp` seconds of a motion with constant accelerations.
+    """Time law of a curve's parameter: moving mean over `ramp` seconds of piecewise constant accelerations.
 
-    Its acceleration changes at most at the edges, shape (c + 1,), where ṡ² is `b`: 0 at the last one, and
-    nowhere else but at the first one. `rate` is that of its time relative to the clock's, above 0. `start` is
-    the time at the first edge, before the mean and at a rate of 1 [s]; if `b` is not 0 there, the motion is
-    known only from a ramp later on.
+    Acceleration changes only at the edges (c + 1,), where ṡ² is `b`: 0 at the last and possibly the first
+    one. `rate` is the time rate, above 0. `start` is the time at the first edge, before the mean and at rate
+    1 [s]; if `b` is not 0 there, the motion is known only a ramp later.
     """
 
     def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0, start: float = 0.0) -> None:
         self.edges, self.b = edges, b
-        """Places at which the acceleration may change, and ṡ² there, each of shape (c + 1,)."""
+        """Places where acceleration may change, and ṡ² there, each of shape (c + 1,)."""
         self.ramp, self.rate = ramp, rate
-        """Time over which the mean is taken, at a rate of 1 [s], and rate of its time [-]."""
+        """Averaging time at rate 1 [s], and time rate [-]."""
         speeds, times = np.sqrt(b), start + arrivals(edges, b)
         self.times: Floats = times
-        """Times at the edges before the mean and at a rate of 1, shape (c + 1,) [s]."""
+        """Times at the edges before the mean, at rate 1, shape (c + 1,) [s]."""
         spans, here = np.diff(times), edges - edges[0]
         accelerations = 0.5 * np.diff(b) / np.diff(edges)
         areas = np.cumsum(spans * (here[:-1] + spans * (speeds[:-1] / 2.0 + spans * accelerations / 6.0)))
-        # The motion before the mean, from the first edge on: its integral, s, ṡ and s̈ when each cell begins; before the
-        # first and behind the last, it is at rest.
+        # Motion before averaging: integral of s, s, ṡ and s̈ at the start of each cell; at rest before the first and
+        # after the last.
         self._times = np.concatenate(([-np.inf], times))
         self._begun = np.concatenate(([start], times))
         self._pieces = np.zeros((4, len(edges) + 1))
@@ -184,10 +177,10 @@ class RetimedLaw:
         self.duration = float(times[-1] + ramp) / rate
         """Duration from rest to rest [s]."""
         self.begins = 0.0 if b[0] == 0.0 else (start + ramp) / rate
-        """Time from which on it is known [s]."""
+        """Time from which it is known [s]."""
         braking = int(np.flatnonzero(accelerations < 0.0)[0])
         self.brakes_at = float(times[braking]) / rate
-        """Time at which it begins to slow down [s]."""
+        """Time at which it starts braking [s]."""
         changes = np.concatenate((times + SHORTLY, times + ramp - SHORTLY))
         changes = changes if b[0] == 0.0 else changes[changes >= start + ramp]
         jerk = (
@@ -195,22 +188,21 @@ class RetimedLaw:
         )
         most = float(np.abs(accelerations).max())
         self.limits = MotionLimits(float(speeds.max()) * rate, most * rate**2, jerk * rate**3)
-        """Limits that it keeps."""
 
     @property
     def moments(self) -> Floats:
-        """Times at which velocity or acceleration may be largest: where a cell begins, half a ramp and a ramp later."""
+        """Times of possibly largest velocity or acceleration: each cell's start, and up to a ramp later [s]."""
         times = self._times[1:]
         return np.concatenate((times, times + 0.5 * self.ramp, times + self.ramp)) / self.rate
 
     def slowed(self, duration: float) -> "RetimedLaw":
-        """Return the same law in a longer duration [s]; this one if it takes as long already."""
+        """Return the law stretched to a longer duration [s]."""
         if duration <= self.duration:
             return self
         return RetimedLaw(self.edges, self.b, self.ramp, self.rate * self.duration / duration)
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
-        """Parameter, its velocity [1/s] and its acceleration [1/s^2] at a time [s]."""
+        """Return the parameter, its velocity [1/s] and its acceleration [1/s^2] at a time [s]."""
         rate, ramp = self.rate, self.ramp
         late, early = self._moment(time * rate), self._moment(time * rate - ramp)
         s, sd, sdd = ((after - before) / ramp for after, before in zip(late, early, strict=True))
@@ -223,13 +215,12 @@ class RetimedLaw:
         return self._origin + s, sd * rate, sdd * rate**2
 
     def _moment(self, time: float) -> tuple[float, float, float]:
-        """∫s, s and ṡ of the motion before the mean."""
         begun, area, s, sd, sdd = self._rows[bisect_right(self._starts, time) - 1]
         t = time - begun
         return area + t * (s + t * (sd / 2.0 + t * sdd / 6.0)), s + t * (sd + 0.5 * t * sdd), sd + t * sdd
 
     def _before(self, times: Floats) -> Floats:
-        """∫s, s, ṡ and s̈ of the motion before the mean, shape (4, k)."""
+        """Return ∫s, s, ṡ and s̈ of the motion before the mean, shape (4, k)."""
         numbers = np.searchsorted(self._times, times, side="right") - 1
         t = times - self._begun[numbers]
         area, s, sd, sdd = self._pieces[:, numbers]
@@ -239,7 +230,7 @@ class RetimedLaw:
 
 
 def arrivals(edges: Floats, b: Floats) -> Floats:
-    """Times at which a motion is at the edges of its cells, shape (c + 1,) [s]; arguments as of `RetimedLaw`."""
+    """Return the times at cell edges, shape (c + 1,) [s]; arguments as in `RetimedLaw`."""
     speeds = np.sqrt(b)
     return np.concatenate(([0.0], np.cumsum(2.0 * np.diff(edges) / (speeds[:-1] + speeds[1:]))))
 
@@ -247,8 +238,8 @@ def arrivals(edges: Floats, b: Floats) -> Floats:
 def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False) -> RetimedLaw:
     """Return the quickest law within the limits along a curve.
 
-    The jerk limit is that of s [1/s^3]; within the window of time a shaper mixes moments of the motion [s].
-    Others may continue a law that `goes_on`, with its ramp.
+    The jerk limit is that of s [1/s^3]; within the window [s], a shaper mixes moments of the motion. A law
+    that `goes_on` can be extended with its ramp.
     """
     lengths = np.diff(way.edges)
     b = _passed(way.edges, way.joints, way.tool, AT_REST)
@@ -256,7 +247,7 @@ def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False)
     ramp = float(max(accelerations.max() / jerk, (way.slope * accelerations).max() / way.jerk))
     b = _lastingly(way, b, ramp, window, AT_REST)
     law = RetimedLaw(way.edges, level(way.edges, b, ramp, 0) if goes_on else b, ramp)
-    if law.limits.jerk > jerk * (1.0 + 1e-6):  # it changes from speeding up to braking within a ramp
+    if law.limits.jerk > jerk * (1.0 + 1e-6):  # it goes from acceleration to braking within a ramp
         ramp *= law.limits.jerk / jerk
         law = RetimedLaw(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp)
     return law
@@ -265,14 +256,13 @@ def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False)
 def longer_law(
     way: Way, jerk: float, window: float, before: RetimedLaw, first: int, known: int
 ) -> RetimedLaw | None:
-    """Return the quickest law that is equal to another one up to an edge, and goes on behind the end of that.
+    """Return the quickest law equal to another up to an edge and continuing behind that one's end.
 
-    The way begins with edge `first` of the law `before`, which gives the ramp, too; up to edge `known` of the
-    way, both laws are equal. Jerk and window as in `quickest_law`. None if it cannot keep the limits from
-    there on.
+    The way begins with edge `first` of `before`, which also gives the ramp; both laws are equal up to the
+    way's edge `known`. Jerk and window as in `quickest_law`. None if the limits cannot be kept from there.
     """
     fixed, ramp, start = before.b[first : first + known + 1], before.ramp, float(before.times[first])
-    # The ramp being given, it is the acceleration that has to keep the jerk.
+    # The ramp is fixed, so limit the acceleration to keep the jerk.
     joints = replace(way.joints, p=np.maximum(way.joints.p, way.slope[:, None] / (way.jerk * ramp)))
     tool = replace(way.tool, p=np.maximum(way.tool.p, 1.0 / (jerk * ramp)))
     way = replace(way, joints=joints, tool=tool)
@@ -282,11 +272,11 @@ def longer_law(
 
 
 def _lastingly(way: Way, b: Floats, ramp: float, window: float, known: Floats) -> Floats:
-    """Largest ṡ² at the edges within the limits that hold within a window of time; b is that without a window.
+    """Return the largest ṡ² at the edges within windowed limits; `b` is that without window.
 
-    The faster a motion is, the farther it comes within the window, and the longer limits hold on its way. So a motion
-    that is planned on the times of a faster one is too slow; one on the times of that, too fast; and one on the times
-    of the latter is between both, so that it keeps the limits that hold on its own times.
+    A faster motion comes farther within the window, so more limits apply. Planning on the times of a faster
+    motion is too slow, on the times of that too fast, and on the times of the latter in between, which keeps
+    the limits of its own times.
     """
     around = window + ramp
     for _ in range(ROUNDS):
@@ -297,7 +287,7 @@ def _lastingly(way: Way, b: Floats, ramp: float, window: float, known: Floats) -
 
 
 def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
-    """Limits that hold for a window of time around a motion that is at the edges at these times."""
+    """Return limits that hold for a time window around a motion with these edge times."""
     return Cells(
         widened(times, window, cells.fastest[:, None], True)[:, 0],
         widened(times, window, cells.p, False),
@@ -306,7 +296,7 @@ def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
 
 
 def _goes_on(way: Way, b: Floats, known: int) -> bool:
-    """Return whether a motion keeps the limits in the cell behind an edge, though it is given up to there."""
+    """Return whether a motion fixed up to an edge keeps the limits in the cell behind it."""
     cell = slice(known, known + 1)
     acceleration = 0.5 * (b[known + 1] - b[known]) / (way.edges[known + 1] - way.edges[known])
     return all(
@@ -316,7 +306,7 @@ def _goes_on(way: Way, b: Floats, known: int) -> bool:
 
 
 def _passed(edges: Floats, joints: Cells, tool: Cells, known: Floats) -> Floats:
-    """Largest ṡ² at the edges within the limits of joints and tool; see `passes`."""
+    """Return the largest ṡ² at the edges within limits of joints and tool; see `passes`."""
     p, q = np.hstack((joints.p, tool.p)), np.hstack((joints.q, tool.q))
     highest = np.minimum(joints.fastest, tool.fastest) ** 2
     return passes(edges, np.minimum(highest, 1.0 / np.maximum(q.max(axis=1), LEAST)), p, q, known)

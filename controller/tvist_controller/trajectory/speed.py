@@ -1,4 +1,4 @@
-"""Velocities of the joints or of the tool, approached with constant acceleration."""
+"""Velocities of joints or tool, approached with constant acceleration."""
 
 from collections.abc import Iterator
 
@@ -12,35 +12,33 @@ from tvist_controller.trajectory.speed_step import FOUND, SINGULAR, speed_step
 from tvist_plant.chain import WIDTH
 
 HALVINGS = 8
-"""Number of times that a change of velocity may be halved if the torque or the joints do not permit it."""
+"""Number of times a velocity change may be halved if torque or joints do not permit it."""
 TRIES = 4
-"""Number of these halvings that are tried in one tick, from twice the share of the tick before on."""
+"""Number of halvings tried per tick, starting at twice the last fraction."""
 STANDING = 1e-6
-"""Velocity below which all joints count as standing where a motion is taken over [rad/s]."""
+"""Velocity below which joints count as standing when a motion is taken over [rad/s]."""
 STEADY = 1e-12
-"""Velocity below which a motion whose time hardly passes counts as being at rest [rad/s or m/s]."""
+"""Velocity below which a motion with nearly stopped time is at rest [rad/s or m/s]."""
 ROUNDING = 1e-9
-"""Share of a tick by which rounding may delay the end of a change [-]."""
+"""Fraction of a tick by which rounding may delay the end of a change [-]."""
 USED = 0.95
-"""Share of the joints' acceleration that the tool is planned with; the rest is for the curvature within a tick [-]."""
+"""Fraction of joint acceleration used to plan the tool; the rest is for curvature within a tick [-]."""
 LOST_SHARE = 1e-3
-"""Share of a twist in lost directions above which joints that stand cannot begin it, more than what rounding and a
-nearly singular posture cost [-].
-"""
+"""Fraction of a twist in lost directions above which standing joints cannot start it; higher than the effect
+of rounding and nearly singular postures [-]."""
 
 
 class Speed(Guided):
-    """Accelerates all joints, or the tool, to a velocity and keeps it.
+    """Accelerates joints or tool to a velocity and keeps it.
 
-    The trajectory has a time of its own, in which the velocity u approaches its goal with constant acceleration, all of
-    its entries in phase; the reference has the velocity r u, with the rate r of that time. So at a constant rate,
-    velocities are multiplied by r and accelerations by r². The rate changes as quickly as the acceleration permits.
-    There is no jerk limit. In each tick the way is that of the mean of the velocities at its beginning and at its end;
-    if the torque or a joint's limits do not suffice, the velocity changes less, still in phase.
+    In the trajectory's own time, velocity u approaches its goal with constant acceleration, all entries in phase. The
+    reference has velocity r u with the time rate r, so a constant rate scales velocities by r and accelerations by r².
+    The rate changes as quickly as acceleration permits; jerk is not limited. Each tick moves by the mean of its initial
+    and final velocities. If torque or joint limits do not suffice, the velocity changes less, still in phase.
 
-    A tool goes straight: its pose is integrated, and the joints follow it by Newton's method, so the tool does not
-    drift. Near a singular posture the joints' way q(s) has a large second derivative with respect to the tool's way, so
-    q'' ṡ² may use up only a share of the joints' acceleration. This slows the tool down before it gets there.
+    A tool moves straight: its pose is integrated and tracked by Newton's method, so it does not drift. Near singular
+    postures the joints' path q(s) has a large second derivative; q'' ṡ² may use only a fraction of joint acceleration,
+    which slows the tool down beforehand.
     """
 
     def __init__(
@@ -57,16 +55,16 @@ class Speed(Guided):
         self._torque, self._period = torque, period
         self.adopt(limits)
         self.arm = arm
-        """The arm whose tool has the velocity; None for velocities of the joints."""
+        """The arm whose tool has the velocity; None for joint velocities."""
         n, fastest = len(self._q), float(np.abs(self._qd).max())
-        # The present step of a tool is the one that was made, even if the joints count as standing.
+        # A tool continues from the actual step, even if the joints count as standing.
         self._step = period * (self._qd - 0.5 * period * self._qdd)
         if stands := fastest <= STANDING:
             self._qd = np.zeros(n)
         self.rate = max(rate, min(fastest / limits.velocity, 1.0))
         self._speed, self._slowest = rate, limits.velocity
         self._share = 1.0
-        """Share of the acceleration that was tried last [-]."""
+        """Fraction of the acceleration tried last [-]."""
         self._chain, self._inverse = np.empty((0, WIDTH)), np.eye(n)
         self._place, moving = np.zeros((4, 3)), self._qd
         """Rotation and position of the tool, shape (4, 3)."""
@@ -78,33 +76,30 @@ class Speed(Guided):
         self._most: tuple[float, ...] = (np.inf,)
 
     def aim(self, goal: Floats, *accelerations: float) -> None:
-        """Approach other velocities of the joints [rad/s], or of the tool in the base frame [m/s, rad/s].
+        """Approach other joint velocities [rad/s], or tool velocities in the base frame [m/s, rad/s].
 
-        The acceleration is that of the joint whose velocity changes most [rad/s^2]; or there are two, the
-        tool's linear [m/s^2] and angular one [rad/s^2].
+        Accelerations: that of the joint that changes most [rad/s^2], or the tool's linear [m/s^2] and angular
+        one [rad/s^2].
         """
         self._goal, self._most = np.array(goal, dtype=float), accelerations
 
     def come_to_rest(self) -> None:
-        """Approach zero, with the acceleration of the last command, until another one comes."""
+        """Approach zero with the last command's acceleration, until the next command."""
         self._goal = np.zeros_like(self._goal)
 
     def adopt(self, limits: MotionLimits) -> None:
-        """See `Guided.adopt`. The jerk is that of the acceleration changing its sign within a tick."""
+        """See `Guided.adopt`; the jerk is that of reversing the acceleration within a tick."""
         self._arm_limits, self.limits = limits, abrupt(limits, self._period)
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Set the speed; the present one is kept until the next tick."""
+        """Set the speed; the present one stays until the next tick."""
         self._speed, self._slowest = speed, self._arm_limits.velocity if slowest is None else slowest
         if not self._u.any():
             self.rate = self._wanted_rate
 
     @property
     def _wanted_rate(self) -> float:
-        """The commanded rate, or one at which joints that are or will be faster than permitted keep the limit.
-
-        Of a tool, the joints' velocities on its way are not known ahead: `speed_step` looks at them.
-        """
+        """The commanded rate, or less to keep joint limits, which for a tool `speed_step` handles."""
         if self.arm is not None:
             return self._speed
         fastest = max(float(np.abs(self._goal).max()), float(np.abs(self._u).max()))
@@ -112,7 +107,7 @@ class Speed(Guided):
 
     @property
     def _accelerations(self) -> Floats:
-        """Accelerations in use: that of the joints, or both of the tool."""
+        """Accelerations in use: of the joints, or both of the tool."""
         most = np.array(self._most)
         return most if self.arm is not None else np.minimum(most, self._arm_limits.acceleration)
 
@@ -132,15 +127,11 @@ class Speed(Guided):
 
     @property
     def finished(self) -> bool:
-        """Whether joints or tool have come to rest as commanded."""
+        """Whether it has come to rest as commanded."""
         return not (self._goal.any() or self._u.any())
 
     def next(self) -> Floats:
-        """Advance by one tick and return the position of the joints.
-
-        Raises:
-            StuckError: The joints cannot move the tool on in its direction.
-        """
+        """Advance by one tick and return the joint positions; raise StuckError if it cannot continue."""
         if self.finished:
             self._step = self._qd = self._qdd = np.zeros_like(self._q)
             return self._q
@@ -180,16 +171,13 @@ class Speed(Guided):
 
     @property
     def _lag(self) -> float:
-        """What a joint's acceleration is multiplied by in the difference from its step before [s^2].
-
-        That of joints is from the velocity at the beginning of the tick; that of a tool is from the step before.
-        """
+        """Factor from acceleration to step change [s^2]: half a tick squared for joints, a whole one for tools."""
         return (0.5 if self.arm is None else 1.0) * self._period**2
 
     def _ranges(self) -> Floats:
-        """Least and largest change of each joint's step, and largest step, shape (3, n) [rad].
+        """Return least and largest change of each joint's step, and largest step, shape (3, n) [rad].
 
-        A joint may get faster, but for the way to zero only what lets a stop keep its velocity.
+        Acceleration away from zero is limited so that a stop can keep the velocity limit.
         """
         h, limits, speed = self._period, self._arm_limits, np.abs(self._qd)
         most = (1.0 + ROUNDING if self.arm is None else USED) * limits.acceleration
@@ -202,7 +190,7 @@ class Speed(Guided):
         return np.stack((-down * self._lag, up * self._lag, h * np.maximum(limits.velocity, speed)))
 
     def _shares(self) -> Iterator[float]:
-        """Shares of the acceleration to try in a tick, at last none: no tick may take long [-]."""
+        """Yield fractions of the acceleration to try in a tick, finally 0, so that no tick takes long [-]."""
         top = min(max(2.0 * self._share, 0.5**HALVINGS), 1.0)
         for halved in range(TRIES):
             self._share = top * 0.5**halved
@@ -220,5 +208,5 @@ class Speed(Guided):
 
 
 def abrupt(limits: MotionLimits, period: float) -> MotionLimits:
-    """Return limits with which the joints may change the sign of their acceleration within a tick."""
+    """Return limits with which joints may reverse their acceleration within a tick."""
     return MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)

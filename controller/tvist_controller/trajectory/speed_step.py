@@ -1,4 +1,4 @@
-"""One tick of joints, or of a tool that goes straight: the joints' positions within their limits, compiled."""
+"""One tick of joints, or of a tool that moves straight: joint positions within their limits, compiled."""
 
 import math
 
@@ -12,26 +12,26 @@ from tvist_plant.model import Floats
 FOUND, IMPOSSIBLE, SINGULAR = 0, 1, 2
 
 BENT_SHARE = 0.5
-"""Share of the joints' acceleration that the curvature of their way may use up at a constant speed [-]."""
+"""Fraction of joint acceleration available to the curvature of the joints' path at constant speed [-]."""
 MORE = 1e-6
-"""Share by which rounding may exceed a limit [-]."""
+"""Relative excess of a limit that counts as rounding [-]."""
 LOOK = 5.0
-"""Ticks over which that curvature is measured, ahead of the tool."""
+"""Ticks ahead over which the curvature is measured."""
 FARTHEST_LOOK = 0.05
-"""Largest angle of a joint over which it is measured [rad]."""
+"""Largest joint angle over which it is measured [rad]."""
 SLOWEST = 0.01
-"""Share of the commanded speed below which the tool counts as stuck [-]."""
+"""Fraction of the commanded speed below which the tool is stuck [-]."""
 CORRECTIONS = 4
-"""Largest number of Newton's steps."""
+"""Largest number of Newton steps."""
 OFF = 1e-7
-"""Error of the tool's pose that is not permitted [m or rad]."""
+"""Permitted error of the tool's pose [m or rad]."""
 FLAT = 1e-12
-"""Factor of a rate that counts as zero."""
+"""Factor of a rate treated as zero."""
 
 
 @compiled_for_ticks
 def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[float, float]:
-    """Return the lowest and the highest r with low ≤ x + r y ≤ high everywhere; the first is larger if none fits."""
+    """Return the range of r with low ≤ x + r y ≤ high everywhere; the first is larger if there is none."""
     lowest, highest = -math.inf, math.inf
     for i in range(len(x)):
         if abs(y[i]) < FLAT:
@@ -47,9 +47,9 @@ def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[floa
 def rate_by_bend(
     chain: Floats, q: Floats, slope: Floats, u: Floats, ahead: float, acceleration: float
 ) -> float:
-    """Return the rate that the curvature of the joints' way permits; `slope` becomes the larger one now and ahead.
+    """Return the rate that path curvature permits; `slope` becomes the larger of now and ahead.
 
-    Near a singular posture the joints' way bends: its second derivative times the speed squared accelerates them.
+    Near a singular posture the joints' path bends: its second derivative times squared speed is acceleration.
     """
     n = len(q)
     jacobian, inverse, later_q = np.empty((6, n)), np.empty((n, 6)), np.empty(n)
@@ -80,10 +80,9 @@ def speed_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
     goal: Floats,  # result: those a tick later
     q: Floats,  # result: positions of the joints a tick later, shape (n,) [rad]
 ) -> tuple[int, float]:
-    """Follow the mean of two velocities for a tick, at the rate that the joints' limits and their way permit.
+    """Follow the mean of two velocities for a tick, at the rate that joint limits and curvature permit.
 
-    Returns that rate at the end, and FOUND; IMPOSSIBLE if the limits do not permit it; or SINGULAR if the
-    curvature permits next to no speed.
+    Returns FOUND and the final rate; or IMPOSSIBLE due to limits; or SINGULAR if curvature permits hardly any speed.
     """
     rate, speed, slowest, acceleration, lag, h = given[0], given[1], given[2], given[3], given[4], given[5]
     n, straight = len(q), chain.shape[0] > 0

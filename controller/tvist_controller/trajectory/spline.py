@@ -1,4 +1,4 @@
-"""Curves in joint space as splines of degree five through known derivatives."""
+"""Curves in joint space: quintic splines through known derivatives."""
 
 from typing import NamedTuple
 
@@ -9,17 +9,17 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.path import Path, Way
 
 SAMPLES = np.linspace(0.0, 1.0, 9)
-"""Places in each interval at which derivatives are sampled for their bounds."""
+"""Places in each interval at which derivatives are sampled for bounds."""
 ENOUGH = 1.05
-"""Factor from the largest sample of a derivative to a bound of it [-]."""
+"""Factor from a derivative's largest sample to its bound [-]."""
 CURVED_SHARE = 0.5
-"""Largest share of the joints' acceleration and jerk that the curve itself may use up during a motion [-]."""
+"""Largest fraction of joint acceleration and jerk that the curve itself may use in a motion [-]."""
 LOOKS = 12
-"""Number of times that the range of a stop is widened before the whole rest of the curve is taken."""
+"""Number of times a stop's range is widened before the whole rest of the curve is used."""
 
 
 class Bends(NamedTuple):
-    """Upper bounds of a curve's derivatives with respect to its parameter s, on a part of it."""
+    """Bounds of derivatives with respect to s on a part of a curve."""
 
     slope: Floats
     """|dq/ds| of each joint, shape (n,) [rad per unit of s]."""
@@ -30,10 +30,10 @@ class Bends(NamedTuple):
 
 
 class Knots(NamedTuple):
-    """Places of a curve with its first two derivatives there."""
+    """Points of a curve with first and second derivatives."""
 
     s: Floats
-    """Parameters, rising, of a part of a path from 0, shape (k,)."""
+    """Parameters, rising, from 0 for a part of a path, shape (k,)."""
     q: Floats
     """Joint positions, shape (k, n) [rad]."""
     slope: Floats
@@ -45,10 +45,9 @@ class Knots(NamedTuple):
 def hermite(
     length: float | Floats, start: tuple[Floats, Floats, Floats], end: tuple[Floats, Floats, Floats]
 ) -> Floats:
-    """Coefficients of the polynomial of degree five with given values and first two derivatives at both ends.
+    """Return the quintic with given values and first two derivatives (..., m) at both ends.
 
-    The ends have the distance `length`, an array for several polynomials at once; values and derivatives have
-    shape (..., m). The coefficients are of rising powers of the distance from the start, shape (6, ..., m).
+    The ends are `length` apart, an array for several polynomials. Coefficients of rising powers have shape (6, ..., m).
     """
     h = length
     p0, v0, a0 = start
@@ -67,8 +66,8 @@ def evaluate(
 ) -> None:  # pragma: no cover  compiled
     """Evaluate a spline and its first three derivatives, shape (4, p, n), at p parameters.
 
-    The k intervals end at the knots, shape (k + 1,); beyond them the outermost polynomial continues. The
-    coefficients are of rising powers, shape (k, 6, n).
+    The k intervals end at the knots (k + 1,); beyond them the outermost polynomials continue. Coefficients of
+    rising powers have shape (k, 6, n).
     """
     last = len(knots) - 2
     joints = coefficients.shape[2]
@@ -92,23 +91,20 @@ def evaluate(
 
 
 class SplineCurve(Path):
-    """A curve through knots whose positions and first two derivatives are known.
+    """A curve through knots with known positions and first two derivatives.
 
-    Its parameter s goes from 0 or another start to an end above that, in any unit. Interpolation may pass either end by
-    a thousandth of a tick's step, where the outermost polynomials continue. With ṡ, s̈ and s⃛ the joints have
+    Its parameter s rises from any start, in any unit. Interpolation may pass either end by a thousandth of a
+    tick's step, where the outermost polynomials continue. With ṡ, s̈ and s⃛ the joints have
 
         q̇ = q' ṡ,    q̈ = q' s̈ + q'' ṡ²,    q⃛ = q' s⃛ + 3 q'' ṡ s̈ + q''' ṡ³,
 
-    so bounds of the derivatives convert limits of the joints into limits of s. `most` limits the acceleration of each
-    joint while the motion's rate changes, shape (n,) [rad/s^2]; None if the limit of the parameter suffices.
-
-    Raises:
-        ValueError: The knots are not finite, or do not move any joint.
+    so bounds of the derivatives convert joint limits to limits of s. `most` limits each joint's acceleration
+    during rate changes, shape (n,) [rad/s^2]; None if the parameter's limit suffices. Raise ValueError if
+    knots are not finite or do not move any joint.
     """
 
     def __init__(self, knots: Knots, most: Floats | None = None) -> None:
         self.knots = knots
-        """The knots."""
         self._knots = np.ascontiguousarray(knots.s)
         ends = [
             (knots.q[part], knots.slope[part], knots.second[part]) for part in (slice(-1), slice(1, None))
@@ -125,7 +121,6 @@ class SplineCurve(Path):
         if not start < end < np.inf:
             raise ValueError(f"length is {end - start}: must be more than 0")
         self.bends = self._bends(0, len(lengths))
-        """Bounds of its derivatives."""
         slope, second, third = self.bends
         if not 0.0 < float(slope.max()) < np.inf:
             raise ValueError(f"slope is {slope.tolist()}: must be finite, and of one joint more than 0")
@@ -135,38 +130,38 @@ class SplineCurve(Path):
         self._most, self.posture_of = most, self._posture
 
     def become(self, other: "SplineCurve") -> None:
-        """Go on as another curve, which is the same between where this one is used now and its end."""
-        posture_of = self.posture_of  # what shapes on this curve keeps it
+        """Continue as another curve that is equal between the present point and this one's end."""
+        posture_of = self.posture_of  # captured by what is shaped on this curve
         self.__dict__.update(other.__dict__)
         self.posture_of = posture_of
         self._one = np.empty_like(self._one)
 
     def third(self, s: Floats) -> Floats:
-        """Return d³q/ds³ at k points, shape (k, n); it may have steps at the knots."""
+        """Return d³q/ds³ at k points, shape (k, n), with possible steps at knots."""
         third: Floats = self._evaluate(s)[3]
         return third
 
     def derivatives(self, s: Floats) -> tuple[Floats, Floats, Floats]:
-        """Evaluate the spline."""
+        """Return q and its first two derivatives at k points, each of shape (k, n)."""
         q, slope, second, _ = self._evaluate(s)
         return q, slope, second
 
     def bends_within(self, start: float, end: float) -> Bends:
-        """Bounds of the derivatives between two parameters."""
+        """Return bounds of derivatives between two parameters."""
         last = len(self._slope)
         low = min(max(int(np.searchsorted(self._knots, start, side="right")) - 1, 0), last - 1)
         high = min(max(int(np.searchsorted(self._knots, end, side="left")), low + 1), last)
         return self._bends(low, high)
 
     def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the joints' state of motion, by the chain rule."""
+        """Return the joints' state by the chain rule."""
         q, slope, second = self.derivatives(x.reshape(-1))
         xd, xdd = xd.reshape(-1, 1), xdd.reshape(-1, 1)
         qd, qdd = slope * xd, slope * xdd + second * xd**2
         return (q[0], qd[0], qdd[0]) if x.ndim == 1 else (q, qd, qdd)
 
     def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:
-        """Return the parameter's derivatives and, if they are limited, those of the joints."""
+        """Return the parameter's derivatives and, if limited, those of the joints."""
         own = np.array((xd, xdd))
         if self._most is None:
             return own
@@ -174,7 +169,7 @@ class SplineCurve(Path):
         return np.concatenate((own, np.array((qd, qdd)) * (acceleration / self._most)), axis=1)
 
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
-        """Return the limits that the curve leaves at this velocity, from x on for as far as a stop takes."""
+        """Return the limits that the curve leaves at this velocity for a stop from x."""
         start, end = float(x[0]), float(self.end[0])
         span = 0.1 * velocity
         for look in range(LOOKS):
@@ -214,7 +209,7 @@ class SplineCurve(Path):
 
 
 def kept_by(bends: Bends, limits: MotionLimits, velocity: float) -> MotionLimits | None:
-    """Limits that a part of a curve leaves at a velocity; the acceleration leaves a share of the jerk."""
+    """Return the limits left by a part of a curve at a velocity; acceleration leaves a fraction of jerk."""
     slope, second, third = float(bends.slope.max()), bends.second, bends.third
     acceleration = (limits.acceleration - second * velocity**2) / slope
     bent = CURVED_SHARE * limits.jerk - third * velocity**3

@@ -1,4 +1,4 @@
-"""Stops: of independent joints, along a path, and of a known motion that becomes slower and slower."""
+"""Stops: of independent joints, along a path, and by slowing a known motion down."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from tvist_controller.trajectory.path import Path
 
 
 class Slowing(Trajectory):
-    """The shortest way to rest of several entries, each within limits of acceleration and jerk."""
+    """Shortest way to rest of several entries, each within limits of acceleration and jerk."""
 
     def __init__(
         self,
@@ -23,16 +23,16 @@ class Slowing(Trajectory):
     ) -> None:
         self._slowing = _slowing(start, acceleration, jerk)
         self.acceleration, self.jerk = acceleration, jerk
-        """Limits of the joints' acceleration [rad/s^2] and of the entries' jerk [rad/s^3]."""
+        """Limits of joint acceleration [rad/s^2] and of the entries' jerk [rad/s^3]."""
         self._period, self._ticks = period, 0
 
     @property
     def duration(self) -> float:
-        """Time from its start until rest [s]."""
+        """Duration [s]."""
         return float(self._slowing.duration)
 
     def at(self, time: float) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration at a time after the start [s], each of shape (n,)."""
+        """Return position, velocity and acceleration at a time after the start [s], each of shape (n,)."""
         position, velocity, acceleration = self._slowing.at_time(min(time, self.duration))[:3]
         return np.array(position), np.array(velocity), np.array(acceleration)
 
@@ -60,7 +60,7 @@ class Slowing(Trajectory):
 
 
 class JointStop(Slowing):
-    """Shortest stop within limits of acceleration and jerk; every joint stops as soon as it can."""
+    """Shortest stop within limits of acceleration and jerk; each joint stops as soon as it can."""
 
     def __init__(
         self, q: Floats, qd: Floats, qdd: Floats, *, acceleration: float, jerk: float, period: float
@@ -69,7 +69,7 @@ class JointStop(Slowing):
 
     @property
     def end(self) -> Floats:
-        """Position at which the stop ends, shape (n,) [rad]."""
+        """Final position, shape (n,) [rad]."""
         return self.at(self.duration)[0]
 
     @property
@@ -84,17 +84,16 @@ class JointStop(Slowing):
 
 
 class PathStop(Slowing):
-    """Shortest stop along a path within limits of acceleration and jerk of its parameter.
+    """Shortest stop along a path within limits of its parameter's acceleration and jerk.
 
-    Its samples are the parameter, so it stays on the path; on a straight line in joint space, all joints stay in
-    phase. No other motion on the same path, from the same state and within the same limits, that does not turn back
-    is slower at any moment or comes to rest sooner: the stop always has the lowest possible acceleration, until the
-    acceleration has to return to zero. A stop that brakes at least as hard as the motion would ever have done is
-    therefore never ahead of the motion.
+    Samples are the parameter, so the stop stays on the path. No other motion on the path from the same state,
+    within the same limits and without turning back, is slower at any moment or rests sooner: the stop always
+    has the lowest possible acceleration until that must return to zero. A stop that brakes at least as hard
+    as the motion ever would is therefore never ahead of the motion.
 
-    It brakes from its first step with full jerk: the second difference b of the positions played last becomes b -
-    jerk·h, and the stop continues from the state of motion that central differences give with this step. If the
-    motion is so slow that the limits let it stand at once, it does.
+    It brakes with full jerk from the first step: the second difference b of the last positions becomes b -
+    jerk·h, and the stop continues from the state that central differences give for this step. If the limits
+    allow it to stand at once, it does.
     """
 
     path: Path
@@ -125,14 +124,14 @@ class PathStop(Slowing):
         super().__init__(([0.0], [speed], [bend]), braking, jerk, period)
         self.path, self._origin, self.acceleration = path, x, acceleration
         self.braking = braking
-        """Acceleration limit for the parameter [rad/s^2]."""
+        """Acceleration limit of the parameter [rad/s^2]."""
 
     def share(self, time: float) -> float:
-        """Distance that the parameter has covered at a time after the start [rad]."""
+        """Return the distance covered by the parameter at a time after the start [rad]."""
         return float(self._slowing.at_time(min(time, self.duration))[0][0])
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the joints at k times after the start, shape (k, n)."""
+        """Return joint position, velocity and acceleration at k times after the start, shape (k, n)."""
         x, xd, xdd = (each * self.path.direction for each in super().states(times))
         return self.path.states(self._origin + x, xd, xdd)
 
@@ -143,7 +142,7 @@ class PathStop(Slowing):
 
     @property
     def end(self) -> Floats:
-        """Joint positions at which the stop ends, shape (n,) [rad]."""
+        """Final joint positions, shape (n,) [rad]."""
         return self.path.posture(self._sample(self.duration))
 
     def _sample(self, time: float) -> Floats:
@@ -151,11 +150,10 @@ class PathStop(Slowing):
 
 
 class SlowedStop(Trajectory):
-    """A motion whose time passes ever more slowly until it stands.
+    """A motion whose time slows down until it stands.
 
-    Where the path has tight bends ahead, for which the motion slows down by itself, a stop that knows only the path's
-    curvature finds no limits that suit all of them. This one passes them as the motion would have, only later: it is
-    on the path, never ahead of the motion, and no faster.
+    If tight bends lie ahead, for which the motion itself slows down, no limits based on curvature alone suit a stop.
+    This one passes the bends as the motion would, only later: on the path, never ahead of the motion, and no faster.
     """
 
     path: Path
@@ -173,12 +171,12 @@ class SlowedStop(Trajectory):
         self.path, self.acceleration, self.jerk = path, acceleration, jerk
         slowing = _slowing(([0.0], [1.0], [0.0]), acceleration / fastest, jerk / fastest)
         self.duration = float(slowing.duration)
-        """Time from its start until rest [s]."""
+        """Duration [s]."""
         self._period, self._ticks = period, 0
         ticks = np.arange(int(np.ceil(self.duration / period)) + 1)
         times = [float(slowing.at_time(min(tick * period, self.duration))[0][0]) for tick in ticks.tolist()]
         self._samples = _between(ahead, np.array(times) / period)
-        """Its samples, of which the first is the newest one of the motion."""
+        """Samples, beginning with the motion's newest one."""
         joints = np.array([path.posture(x) for x in (ahead[0], *self._samples, self._samples[-1])])
         self._states = (
             joints[1:-1],
@@ -188,15 +186,15 @@ class SlowedStop(Trajectory):
 
     @property
     def hardest(self) -> float:
-        """Largest acceleration of any joint in it [rad/s^2]."""
+        """Largest acceleration of any joint [rad/s^2]."""
         return float(np.abs(self._states[2]).max())
 
     def share(self, time: float) -> float:
-        """Distance that the parameter has covered at a time after the start."""
+        """Return the distance covered by the parameter at a time after the start."""
         return self.path.forwards(self._samples[self._number(time)] - self._samples[0])
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the joints at k times after the start, each of shape (k, n)."""
+        """Return joint position, velocity and acceleration at k times after the start, each (k, n)."""
         numbers = [self._number(time) for time in times.tolist()]
         q, qd, qdd = (each[numbers] for each in self._states)
         return q, qd, qdd
@@ -223,7 +221,7 @@ class SlowedStop(Trajectory):
 
     @property
     def end(self) -> Floats:
-        """Joint positions at which the stop ends, shape (n,) [rad]."""
+        """Final joint positions, shape (n,) [rad]."""
         end: Floats = self._states[0][-1]
         return end
 
@@ -232,7 +230,7 @@ class SlowedStop(Trajectory):
 
 
 def _between(ahead: Floats, ticks: Floats) -> Floats:
-    """Samples of a motion between its ticks, which count from the second: cubic splines through four of them."""
+    """Interpolate a motion between its ticks, counted from the second sample, by cubic splines."""
     last = len(ahead) - 1
     number = np.minimum(ticks.astype(int), last - 1) + 1
     t = (ticks - (number - 1))[:, None]

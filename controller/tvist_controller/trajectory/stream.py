@@ -1,4 +1,4 @@
-"""Set-points from a client, played in the order of their sequence numbers."""
+"""A client's set-points, played in order of sequence numbers."""
 
 import math
 from collections import deque
@@ -20,13 +20,12 @@ BRIDGED = 2
 class SetpointStream(Following):
     """A reference generated from a client's set-points.
 
-    At the controller's own rate, set-points pass through unchanged. Slower ones are the control points of a cubic
-    B-spline, which keeps the limits that they keep. The spline needs two periods, and a third is spare for jitter, so
-    the reference is three periods minus a tick late. If set-points arrive later, or by another clock, play-out waits
-    as long as necessary (`PlayOut`). A set-point that is missing when it is due is replaced by a point on the
-    parabola through its neighbours. If no set-points arrive at all, the reference comes to rest within the limits
-    until the stream continues. After a gap, and if the sender runs ahead, play-out continues with the newest
-    set-point. The result passes through the `Limiter`.
+    At the controller's rate, set-points pass unchanged. Slower ones are control points of a cubic B-spline,
+    which keeps the limits that they keep. The spline needs two periods and a third is for jitter, so the
+    reference is late by three periods minus a tick, or more if set-points come later or by another clock
+    (`PlayOut`). A set-point missing when due is replaced by a point on the parabola through its neighbours.
+    If none arrive, the reference comes to rest within limits until the stream continues. After a gap, or if
+    the sender runs ahead, play-out continues with the newest. The result passes the `Limiter`.
     """
 
     def __init__(
@@ -56,19 +55,19 @@ class SetpointStream(Following):
         self._speed = 0.0
         self._pause: JointStop | None = None
         self.sequence: int | None = None
-        """Number of the newest accepted set-point; the reference reaches it after the delay."""
+        """Number of the newest accepted set-point, which the reference reaches after the delay."""
         self.late = 0
-        """Number of set-points that were too late to be played, or duplicates."""
+        """Number of late or duplicate set-points."""
         self.lost = 0
-        """Number of sequence numbers that were skipped; a gap counts as at most `MAX_WAITING`."""
+        """Number of skipped sequence numbers; a gap counts at most `MAX_WAITING`."""
         self.limited = 0
-        """Number of ticks in which the limits kept the reference from following the set-points."""
+        """Number of ticks in which limits kept the reference from the set-points."""
 
     MAX_WAITING = 1000
-    """Largest number of set-points that may wait for their play-out."""
+    """Largest number of set-points waiting for play-out."""
 
     def offer(self, sequence: int, q: Floats) -> bool:
-        """Take a set-point; return False if it is too late to be played, or too many are waiting."""
+        """Take a set-point; return False if it is too late or too many are waiting."""
         known = bool(self._real) and sequence <= self._real[-1][0]
         if known or sequence in self._waiting or len(self._waiting) >= self.MAX_WAITING:
             self.late += 1
@@ -91,28 +90,27 @@ class SetpointStream(Following):
         return reference
 
     def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:
-        """Keep lower limits from now on, if the filter needs that; see `Trajectory.adapt`."""
+        """Reduce the limits if the filter requires; see `Trajectory.adapt`."""
         if (limits := spared(self.limits)) != self.limits:
             self.adopt(limits)
 
     @property
     def end(self) -> JointStop:
-        """How it comes to rest inside its own limits."""
+        """Stop within the stream's limits."""
         limits = self.limits
         return JointStop(*self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period)
 
     @property
     def finished(self) -> bool:
-        """Always False, since a stream is ended from outside."""
+        """Always False: a stream is ended from outside."""
         return False
 
     @property
     def delay(self) -> float:
-        """Time from the arrival of the earliest set-points until the curve reaches them [s]."""
+        """Time from arrival of the earliest set-points until the curve reaches them [s]."""
         return 0.0 if self._play_out is None else self._play_out.delay * self._period
 
     def _receive(self) -> None:
-        """Take over the set-points that arrived since the last tick."""
         play_out, newest = self._play_out, max(self._waiting)
         self.sequence = newest
         if play_out is None:
@@ -133,7 +131,7 @@ class SetpointStream(Following):
                 self.late += 1
 
     def _restart(self, newest: int) -> PlayOut:
-        """Continue with the newest set-point; the others that wait become the curve's last points."""
+        """Continue with the newest set-point; other waiting ones become the curve's last points."""
         self._head = self._real[-1][0]
         for sequence in sorted(self._waiting):
             if sequence != newest:
@@ -146,7 +144,6 @@ class SetpointStream(Following):
         return self._play_out
 
     def _evaluate(self, play_out: PlayOut) -> tuple[Floats, Floats]:
-        """Position [rad] and velocity [rad/s] of the stream."""
         origin, offset = play_out.position
         after = math.ceil(offset)
         if not self._complete(origin + after + self._look_ahead - 1):
@@ -156,7 +153,7 @@ class SetpointStream(Following):
         return q, qd
 
     def _complete(self, needed: int) -> bool:
-        """Extend the curve up to a number, as far as there are points for it."""
+        """Extend the curve to a number if there are points for it; return whether there are."""
         while self._head < needed:
             missing = self._head + 1
             if self._waiting:
@@ -183,7 +180,7 @@ class SetpointStream(Following):
         self._real.append((sequence, q))
 
     def _make_up(self, sequence: int, known: tuple[tuple[int, Floats], ...]) -> None:
-        """Replace a missing set-point by a point on the parabola through those before and after it."""
+        """Replace a missing set-point by a point on the parabola through its neighbours."""
         (last, q), (before, q_before) = known[-1], known[-2]
         chord = (q - q_before) / (last - before)
         point = q + (sequence - last) * chord
@@ -195,7 +192,6 @@ class SetpointStream(Following):
         self._head = sequence
 
     def _wait(self) -> tuple[Floats, Floats]:
-        """Come to rest, and wait until the stream continues."""
         if self._pause is None:
             self._pause = self.end
         return self._pause.next(), self._pause.velocity
@@ -206,10 +202,7 @@ def linear(
     u: float,  # place between the last two, 0 < u ≤ 1; at 1 the value is exactly the last point [-]
     rate: float,  # of u [1/s]
 ) -> tuple[Floats, Floats, float]:
-    """Interpolate linearly between the last two points; the slope is that of the parabola through the last three.
-
-    Returns the value, its derivative with respect to time, and the largest absolute value of that.
-    """
+    """Interpolate linearly, with the slope of a parabola; return the value, its derivative, and the largest slope."""
     found = np.empty((2, len(points[0])))
     fastest = on_parabola(points[1], points[2], points[3], u, rate, found)
     return found[0], found[1], fastest
@@ -218,9 +211,9 @@ def linear(
 def cubic(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Floats, float]:
     """Evaluate the uniform cubic B-spline between the middle two of four points; see `linear`.
 
-    Its second derivative varies linearly from one second difference of the points to the next, and its third
-    derivative is their third difference, so it keeps the points' limits of velocity, acceleration and jerk. The curve
-    passes the points at a distance of q''/6, on the inside of the bend (de Boor 1978, ch. IX to XI).
+    Its second derivative varies linearly between the points' second differences and its third is their third
+    difference, so it keeps the points' limits of velocity, acceleration and jerk. It passes the points at a
+    distance of q''/6 on the inside of the bend (de Boor 1978, ch. IX to XI).
     """
     v = 1.0 - u
     found = np.empty((2, len(points[0])))
@@ -232,7 +225,7 @@ def cubic(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Floa
 
 @compiled_for_ticks
 def on_parabola(before: Floats, middle: Floats, last: Floats, u: float, rate: float, found: Floats) -> float:
-    """Compute what `linear` returns: value and derivative, shape (2, n), and the largest derivative."""
+    """Compute the results of `linear`: value and derivative (2, n), and the largest derivative."""
     fastest = 0.0
     for j in range(last.shape[0]):
         fall, rise = middle[j] - before[j], last[j] - middle[j]
@@ -253,7 +246,7 @@ def on_cubic(
     rate: float,
     found: Floats,
 ) -> float:
-    """Compute what `cubic` returns, as `on_parabola`, from the weights of the points' differences."""
+    """Compute the results of `cubic`, as `on_parabola`, from weights of the points' differences."""
     fastest = 0.0
     for j in range(first.shape[0]):
         # Use differences, so that equal points give exactly their own value.

@@ -1,4 +1,4 @@
-"""Advice for a robot that shakes, from logs of its motions: what rings, and which shaper to take."""
+"""Find in logs of a robot's motions what rings, and recommend a shaper."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,21 +16,21 @@ from tvist_lab.metrics.ring_down import SKIP, WINDOWS
 from tvist_lab.recordings.recording import MissingColumnError
 
 EARLY = 0.15
-"""Time by which a shaper may be still later than the earliest one, over the time until still without any [-]."""
+"""How much later than the earliest shaper one may settle, as a share of the settling time without any [-]."""
 CLOSE = 5.0
-"""Vibration that it may leave beyond the least of these [%]."""
+"""Vibration that a shaper may leave beyond the least of these [percentage points]."""
 SIMPLE = (ROBOT, ONE, EACH)
 """Where modes can come from, the simplest first."""
 RIPPLES = ("actual_qd", "actual_current", "actual_moment", "actual_q")
 """Columns in which a joint shows that the arm shakes it."""
 LIGHTEST = 0.005
-"""Least damping ratio of an arm; what is damped less is a hum of the sensor [-]."""
+"""Smallest damping ratio of an arm [-]; anything damped less is hum of the sensor."""
 AGREED = 2
-"""Least number of motions that must show the same frequency."""
+"""Smallest number of motions that must show the same frequency."""
 
 
 class RingingMode(NamedTuple):
-    """A mode that motions have in common."""
+    """A mode that several motions share."""
 
     f_d: float
     """Median of the damped frequencies [Hz]."""
@@ -39,46 +39,46 @@ class RingingMode(NamedTuple):
     zeta: float
     """Median of the damping ratios [-]."""
     zeta_interval: tuple[float, float]
-    """The same of the damping ratios [-]."""
+    """From the lowest to the highest end of the motions' 95 % intervals [-]."""
     motions: int
-    """Number of motions that ring in it."""
+    """Number of motions in which it rings."""
     amplitude: float
-    """Largest |α| of it at a stop [m/s²]."""
+    """Its largest |α| at a stop [m/s²]."""
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What logs say about vibration, and what to do."""
+    """Vibration found in logs, and the recommended shaper."""
 
     ringing: Sequence[Stop]
     """Unshaped stops whose vibration stands out."""
     quiet: Sequence[Stop]
-    """Unshaped stops after which nothing noticeable is felt."""
+    """Unshaped stops without noticeable vibration."""
     shaped: Sequence[tuple[int, int, str]]
-    """Motions that had a shaper already: place of the file, number in it, and the shaper's name, as far as known."""
+    """Motions that already had a shaper: index of the file, number in it, and the shaper's name if known."""
     refused: Sequence[tuple[int, int, str]]
-    """Motions that could not be measured, and why."""
+    """Motions that could not be measured: index of the file, number in it, and the reason."""
     modes: Sequence[RingingMode]
-    """Modes that ring, the one of most motions first."""
+    """Modes that ring; the mode of most motions comes first."""
     options: Sequence[Option]
-    """All shapers, the one that is still first before the others."""
+    """All shapers, by settling time."""
     best: Option | None
-    """The one to take; None if none brings anything."""
+    """Best shaper; None if none helps."""
     smoothed_percent: float | None = None
-    """What a running mean as long as the best shaper would leave, median [%]."""
+    """Vibration left by a running mean as long as the best shaper, median [%]."""
     slowed_percent: float | None = None
-    """What slower limits that cost the same time would leave, by the modes, median [%]."""
+    """Vibration that slower limits with the same added time would leave, according to the modes, median [%]."""
     weak: tuple[float, int] | None = None
-    """Frequency by the joints alone [Hz], and the number of motions that show it, where nothing felt the tool."""
+    """If nothing measured the tool: frequency seen in the joints [Hz], and the number of motions that show it."""
 
     @property
     def still_s(self) -> float:
-        """Median of the time from a stop until still, without a shaper [s]; infinite if not within the rest."""
+        """Median settling time of the tool without a shaper [s]; infinite if it does not settle within the rest."""
         return median(one.unshaped.still for one in self.ringing)
 
 
 def advise(logs: Sequence[Measured]) -> Advice:
-    """Judge by logs which shaper a robot needs."""
+    """Recommend a shaper from logs of one robot."""
     stops, shaped, refused = _sorted_out(logs)
     loud = [one for one in stops if one.rings]
     quiet = [one for one in stops if not one.rings]
@@ -97,7 +97,7 @@ def advise(logs: Sequence[Measured]) -> Advice:
 def _sorted_out(
     logs: Sequence[Measured],
 ) -> tuple[list[Stop], list[tuple[int, int, str]], list[tuple[int, int, str]]]:
-    """Unshaped stops, motions that had a shaper, and motions that cannot be measured."""
+    """Return unshaped stops, motions that had a shaper, and motions that cannot be measured."""
     stops, shaped, refused = [], [], []
     for file, log in enumerate(logs):
         for place, motion in enumerate(log.motions):
@@ -118,13 +118,9 @@ def _sorted_out(
 
 
 def recommended(found: Sequence[Option], still: float) -> Option | None:
-    """Choose among shapers that keep the limits.
-
-    Of those that are still about as early as the earliest, and leave about as little as the least, it takes the one
-    that needs to know least about the modes, and of these the shortest.
-
-    `still` is the time until still without a shaper [s].
-    """
+    """Choose among shapers that keep the limits; `still` is the settling time without a shaper [s]."""
+    # Among those that settle about as early as the earliest and leave about as little as the best, take the
+    # one that depends least on the modes, then the shortest.
     fair = [one for one in found if one.keeps_limits and one.left_percent < 100.0 - CLOSE]
     if not fair:
         return None
@@ -136,7 +132,7 @@ def recommended(found: Sequence[Option], still: float) -> Option | None:
 
 
 def ringing_modes(stops: Sequence[Stop]) -> list[RingingMode]:
-    """Gather the modes of stops that differ by at most 7 % in frequency, the one of most motions first."""
+    """Group the modes of stops that differ by at most 7 % in frequency; the mode of most motions comes first."""
     pool = [(place, mode) for place, one in enumerate(stops) for mode in one.result.modes]
     found = []
     while pool:
@@ -167,9 +163,9 @@ def _median(values: Iterable[float | None]) -> float | None:
 
 
 def frequency_of_joints(logs: Sequence[Measured]) -> tuple[float, int] | None:
-    """Find the frequency with which encoders or currents swing after stops: weak evidence, they hardly feel the tool.
+    """Return f_d [Hz] seen in encoders or currents after stops, and the number of motions that show it.
 
-    Returns f_d [Hz] and the number of motions that show it; None if no two motions agree within 7 %.
+    This is weak evidence, since joints hardly feel the tool. None if no two motions agree within 7 %.
     """
     seen = [(place, f_d) for place, found in enumerate(_swings(logs)) for f_d in found]
     groups = [[one for one in seen if abs(one[1] / middle - 1.0) <= NEAR] for _, middle in seen]
@@ -179,7 +175,7 @@ def frequency_of_joints(logs: Sequence[Measured]) -> tuple[float, int] | None:
 
 
 def _swings(logs: Sequence[Measured]) -> Iterator[list[float]]:
-    """Frequencies that the joints show after each motion [Hz]."""
+    """Yield the frequencies that the joints show after each motion [Hz]."""
     for log in logs:
         recording = log.recording
         for motion in log.motions:

@@ -1,4 +1,4 @@
-"""An advice in sentences, with the command that follows it, and as plain values."""
+"""Express an advice as sentences, as the command that applies it, and as plain values."""
 
 import math
 from collections import Counter
@@ -16,7 +16,7 @@ NAMED = 3
 
 
 def verdict(advice: Advice, logs: Sequence[Measured]) -> list[str]:
-    """Return the advice, and the reasons for it."""
+    """Return the advice and its reasons as sentences."""
     said = [_first(advice)]
     if advice.ringing:
         said.append(_ringing(advice))
@@ -123,10 +123,9 @@ def _against(modes: Modes) -> str:
 
 
 def command(advice: Advice, logs: Sequence[Measured]) -> list[str]:
-    """Return the lines that apply an advice; none if there is nothing to apply.
-
-    A robot of this controller is told over the network, another one's reference goes through the library.
-    """
+    """Return the lines that apply an advice; none if there is nothing to apply."""
+    # A robot of this controller gets the shaper over the network; the reference of another robot goes through
+    # the library.
     best = advice.best
     if best is None:
         return []
@@ -159,7 +158,7 @@ def _joints(logs: Sequence[Measured]) -> int:
 
 
 def as_dict(advice: Advice, logs: Sequence[Measured]) -> dict[str, Any]:
-    """Convert an advice to plain values, as `tvist log advise --json` prints it."""
+    """Convert an advice to plain values for `tvist log advise --json`."""
     return {
         "verdict": verdict(advice, logs),
         "command": command(advice, logs),

@@ -1,4 +1,4 @@
-"""Shapers that could be used, aimed at modes of other motions than they are judged by, and what else would help."""
+"""Candidate shapers, each judged on other stops than those its modes were found in, and alternatives to shaping."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -18,47 +18,48 @@ from tvist_shaping import SHAPERS, Impulses, ShapingError, product, residual
 Modes = tuple[tuple[float, float], ...]
 """(f_d, ζ) of each mode, the lowest first [Hz, -]."""
 BEGIN = (0.05, 0.2)
-"""Damping ratios at which a search may begin [-]."""
+"""Damping ratios from which a search starts [-]."""
 DAMPED = (0.005, 0.4)
-"""Range of damping ratios that are searched [-]."""
+"""Range of damping ratios in a search [-]."""
 BESIDE = (0.7, 1.4)
-"""Range of frequencies that are searched, over the lowest and the highest of the modes of a fit [-]."""
+"""Range of frequencies in a search, relative to the lowest and the highest fitted mode [-]."""
 ANY = (5.0, 25.0)
-"""The same where no modes are known [Hz]."""
+"""Range of frequencies in a search if no modes are known [Hz]."""
 TRIALS = 60
-"""Largest number of steps of a search for each mode."""
+"""Largest number of search steps for each mode."""
 ENOUGH = 12
-"""Largest number of stops from which modes are found: of more, the loudest."""
+"""Number of stops from which modes are found; if there are more, the loudest count."""
 ONE, EACH, ROBOT = "one for all", "each its own", "the robot's calibration"
-"""Where the modes come from: the same for all motions, others for each motion, what the robot estimated itself."""
+"""Scope of the modes: one set for all motions, one for each motion, or the robot's own estimate."""
 COPIES = 48
-"""Number of copies of the reference that stand for a running mean."""
+"""Number of copies of the reference that approximate a running mean."""
 
 
 @dataclass(frozen=True)
 class Aim:
-    """Modes against which a shaper is made, motion by motion."""
+    """Modes for which a shaper is designed, by motion."""
 
     scope: str
     """`ONE`, `EACH` or `ROBOT`."""
     modes: Mapping[int, Modes]
-    """Number of the motion to the modes to use from now on."""
+    """Modes to use from now on, by number of the motion."""
     judged: Mapping[Stop, Modes]
-    """Stop to modes that were found without it, where there are repetitions."""
+    """Modes by which each stop is judged, found without it if there are repetitions."""
     optimistic: frozenset[Stop] = frozenset()
-    """Stops whose modes were found in themselves, since nothing else was recorded."""
+    """Stops that are judged by modes found in themselves, since nothing else was recorded."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """A shaper, aimed."""
+    """A shaper designed for some modes."""
 
     shaper: str
     aim: Aim
     left: Mapping[Stop, Left]
-    """What it would leave after each stop, by convolution."""
+    """Predicted vibration after each stop, by convolution."""
     by_modes: Mapping[Stop, float]
-    """The same by the modes of each stop, as a share of the energy's root [-]; only where modes are known."""
+    """Vibration left according to each stop's modes, as root of the share of their energy [-]; only where
+    modes are known."""
     added: Mapping[Stop, float]
     """Time by which each motion ends later [s]."""
 
@@ -74,42 +75,42 @@ class Option:
 
     @cached_property
     def percent(self) -> Mapping[Stop, float]:
-        """Return the rms that it would leave after each stop, over that unshaped [%]."""
+        """Vibration left after each stop, rms over that without a shaper [%]."""
         return {stop: 100.0 * left.rms / stop.unshaped.rms for stop, left in self.left.items()}
 
     @property
     def left_percent(self) -> float:
-        """Median of these [%]."""
+        """Median of the vibration left [%]."""
         return median(self.percent.values())
 
     @property
     def modes_percent(self) -> float | None:
-        """Median of what is left by the modes [%]; None where none are known."""
+        """Median of the vibration left according to the modes [%]; None if no modes are known."""
         return 100.0 * median(self.by_modes.values()) if self.by_modes else None
 
     @property
     def added_s(self) -> float:
-        """Median of the time that it adds [s]."""
+        """Median of the added time [s]."""
         return median(self.added.values())
 
     @property
     def still_s(self) -> float:
-        """Median of the time from the unshaped stop until still [s]; infinite if that was not within the rest."""
+        """Median settling time after the unshaped stop [s]; infinite if it does not settle within the rest."""
         return median(left.still for left in self.left.values())
 
     @property
     def keeps_limits(self) -> bool:
-        """Whether the shaped motion keeps the limits of velocity and acceleration that the unshaped one kept."""
+        """Whether the shaped motion keeps the velocity and acceleration limits of the unshaped one."""
         return SHAPERS[self.shaper].peak <= 1.0
 
 
 def impulses_of(shaper: str, modes: Modes) -> Impulses:
-    """Impulses of a shaper of the catalogue for modes."""
+    """Return the impulses of a shaper of the catalogue for some modes."""
     return product([SHAPERS[shaper].function(f_d, zeta) for f_d, zeta in modes])
 
 
 def options(stops: Sequence[Stop]) -> list[Option]:
-    """Judge every shaper of the catalogue by stops that ring, at least one; those that fit none are left out."""
+    """Judge every shaper of the catalogue on stops that ring (at least one); shapers that fit none are left out."""
     return [
         option
         for aim in _aims(stops)
@@ -136,12 +137,12 @@ def _judged(name: str, aim: Aim) -> Option | None:
 
 
 def by_the_modes(stop: Stop, impulses: Impulses) -> float | None:
-    """Root of the share of a stop's modes' energy that impulses leave [-]; None if no modes are known."""
+    """Return the root of the share of energy that impulses leave of a stop's modes [-]; None if no modes are known."""
     return left_of_modes(stop, lambda f_d, zeta: float(residual(f_d, zeta, impulses)))
 
 
 def left_of_modes(stop: Stop, left: Callable[[float, float], float]) -> float | None:
-    """Root of the share of a stop's modes' energy that is left [-]; None if no modes are known.
+    """Return the root of the share of energy left of a stop's modes [-]; None if no modes are known.
 
     `left` gives for f_d [Hz] and ζ of a mode the share of its amplitude that is left [-].
     """
@@ -155,9 +156,9 @@ def left_of_modes(stop: Stop, left: Callable[[float, float], float]) -> float | 
 
 
 def smoothed(stop: Stop, added: float) -> float | None:
-    """Return the vibration that remains if a running mean smooths the reference and so lowers its jerk [%].
+    """Return the vibration left if a running mean as long as `added` [s] smooths the reference [%].
 
-    The mean is as long as `added` [s], by which the motion ends later. None if too little rest was recorded.
+    The mean lowers the jerk, and the motion ends later by `added`. None if too little rest was recorded.
     """
     try:
         left = stop.left(np.full(COPIES, 1.0 / COPIES), np.linspace(0.0, added, COPIES))
@@ -167,12 +168,11 @@ def smoothed(stop: Stop, added: float) -> float | None:
 
 
 def slowed(stop: Stop, added: float) -> float | None:
-    """What the modes of a stop would have left if the whole motion were slower, so that it takes longer [%].
+    """Return the vibration left of a stop's modes if the whole motion took `added` [s] longer [%].
 
-    A mode with poles λ is left with an amplitude in proportion to |∫ v(t) exp(λ* (t - T)) dt|, where v is the speed of
-    the reference and T its end. Slowed by a factor k, that is the same integral with k λ.
-
-    The motion takes longer by `added` [s]. None if no modes or no joint angles are known.
+    A mode with poles λ is left with an amplitude in proportion to |∫ v(t) exp(λ* (t - T)) dt|, where v is the
+    speed of the reference and T its end. For a motion slowed by a factor k, this is the same integral with k
+    λ. None if no modes or no joint angles are known.
     """
     time, speed = _speed(stop)
     if time[-1] <= time[0]:
@@ -188,7 +188,7 @@ def slowed(stop: Stop, added: float) -> float | None:
 
 
 def _speed(stop: Stop) -> tuple[Floats, Floats]:
-    """Time until the reference stops [s], and the speed of the joint that moves farthest [rad/s]."""
+    """Return times until the reference stops [s], and the speed of the joint that moves farthest [rad/s]."""
     recording, motion = stop.measured.recording, stop.motion
     rows = slice(motion.start, motion.reference_stop + 2)
     q, time = recording[followed(recording)][rows], recording.time[rows]
@@ -215,7 +215,7 @@ def _aims(stops: Sequence[Stop]) -> list[Aim]:
 
 
 def _estimated(stop: Stop) -> Modes:
-    """Modes that the robot itself estimated where a motion ended; none if it had no calibration."""
+    """Return the modes that the robot itself estimated at the end of a motion; none without a calibration."""
     recording, row = stop.measured.recording, stop.motion.shaped_stop
     f_d, zeta = (recording[name][row] for name in ("estimated_f_d", "estimated_zeta"))
     info = recording.info
@@ -224,7 +224,7 @@ def _estimated(stop: Stop) -> Modes:
 
 
 def _held_out(stops: Sequence[Stop], count: int) -> tuple[dict[Stop, Modes], frozenset[Stop]]:
-    """Modes of each stop, found in the other half of the stops; and the stop itself if it is the only one."""
+    """Return each stop's modes, found in the other half of the stops, and the stop itself if it is the only one."""
     if len(stops) == 1:
         return {stops[0]: best_modes(stops, count)}, frozenset(stops)
     ordered = sorted(stops, key=lambda one: one.group)  # so that each half has its share of the repetitions
@@ -234,13 +234,9 @@ def _held_out(stops: Sequence[Stop], count: int) -> tuple[dict[Stop, Modes], fro
 
 
 def best_modes(stops: Sequence[Stop], count: int) -> Modes:
-    """Find the modes for which zero-vibration shapers would leave least of some stops.
-
-    They are better for shaping than the modes of a fit: where an arm has more modes than a shaper, the best aim lies
-    between them.
-
-    They are in the order of frequency.
-    """
+    """Find the modes for which ZV shapers would leave least after some stops, in the order of frequency."""
+    # These modes suit shaping better than fitted ones: if an arm has more modes than a shaper, the best aim lies
+    # between them.
     loudest = sorted(stops, key=lambda one: -one.unshaped.rms)[:ENOUGH]
     before = sum(one.unshaped.rms**2 for one in loudest)
 

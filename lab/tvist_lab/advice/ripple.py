@@ -1,8 +1,8 @@
-"""Vibration that an arm's gears excite, which no shaper of the reference takes away.
+"""Vibration excited by an arm's gears, which no shaper of the reference removes.
 
-A strain wave gear has a kinematic error with two waves for each turn of its motor. While the arm brakes, their
-frequency falls through that of each mode. What they excite depends on the way of the joints in time: it is fitted to a
-recorded stop and computed anew along the shaped motion, and only the rest of the vibration is shaped.
+A strain wave gear has a kinematic error with two waves per turn of its motor. While the arm brakes, their frequency
+falls through that of each mode. The vibration they excite depends on the path of the joints in time: it is fitted to a
+recorded stop and computed anew for the shaped motion; only the rest of the vibration is shaped.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,50 +16,48 @@ from tvist_lab.metrics.ring_down import decay_rate
 from tvist_lab.recordings import Floats
 
 WAVES = 202.0
-"""Waves of the error for a turn of a joint: of gears with a ratio of 101, as most of UR's [-]."""
+"""Waves of the error per turn of a joint [-]: of gears with a ratio of 101, as most of UR's."""
 WINDOW = (-0.6, 0.5)
-"""Time around the stop in which it is fitted [s]."""
+"""Time around the stop in which the waves are fitted [s]."""
 BRAKING = 0.5
-"""Weight of the time before the stop, in which the arm's own acceleration is less well described [-]."""
+"""Weight of the time before the stop [-], in which the arm's own acceleration is described less well."""
 ERROR = 2e-5
-"""Way of the tool by which the gears' errors may move it: 2e-5 rad at a metre [m]."""
+"""Displacement of the tool by which gear errors may move it: 2e-5 rad at one metre [m]."""
 ALIKE = 15.0
-"""Factor by which neighbouring samples of what a fit leaves are worth less than independent ones [-]."""
+"""Factor by which neighbouring samples of a fit's residual are worth less than independent ones [-]."""
 PHASES = (np.sin, np.cos)
-"""Waves in both phases."""
 TURNS = 0.05
-"""Smallest way of a joint that counts [rad]."""
+"""Smallest travel of a joint that counts [rad]."""
 
 Poles = tuple[complex, ...]
 """Pole of each mode [1/s]."""
 
 
 class Ripple(NamedTuple):
-    """The gears' share of the vibration around a stop."""
+    """The gears' part of the vibration around a stop."""
 
     poles: Poles
     weights: Floats
     """Shape (columns of `_excited`, 3)."""
 
     def along(self, q: Floats, ends: Floats, period: float) -> Floats:
-        """Return the acceleration that the gears excite along a way of the joints [m/s²].
+        """Return the acceleration that the gears excite along a path of the joints [m/s²].
 
-        `q` [rad] has shape (T, n); `ends`, shape (2, n), are the smallest and largest angle of each joint on the
-        recorded way.
+        `q` [rad] has shape (T, n); `ends`, shape (2, n), are the smallest and largest angles of the recorded path.
         """
         return np.asarray(np.column_stack(list(_excited(q, ends, self.poles, period))) @ self.weights)
 
 
 def poles_of(modes: Sequence[tuple[float, float]]) -> Poles:
-    """Return the poles of modes, each with f_d [Hz] and ζ [-]."""
+    """Return the poles of modes given by f_d [Hz] and ζ [-]."""
     return tuple(complex(-decay_rate(f_d, zeta), 2.0 * np.pi * f_d) for f_d, zeta in modes)
 
 
 def fitted(time: Floats, alpha: Floats, q: Floats, poles: Poles) -> Ripple | None:
-    """Fit the gears' share of a recorded stop, beside what the reference excites.
+    """Fit the gears' part of a recorded stop, beside what the reference excites.
 
-    `time` after the stop [s], evenly spaced, has shape (T,), `alpha` [m/s²] (T, 3), `q` [rad] (T, n). None if no mode
-    or no turning joint is known.
+    `time` after the stop [s], evenly spaced, has shape (T,), `alpha` [m/s²] (T, 3), `q` [rad] (T, n). None if
+    no mode or no turning joint is known.
     """
     period, ends = float(time[1] - time[0]), np.array([q.min(axis=0), q.max(axis=0)])
     gears = list(_excited(q, ends, poles, period))
@@ -74,7 +72,7 @@ def fitted(time: Floats, alpha: Floats, q: Floats, poles: Poles) -> Ripple | Non
     left, waves = (one - others @ (others.T @ one) for one in (left, waves))
     mode = np.resize(np.repeat(np.arange(len(poles)), len(PHASES) * 2), len(gears))
     ways = _directions(time, alpha, poles)[mode]
-    # A prior for the waves keeps what is merely not described well from being taken for them.
+    # Without a prior, the waves would absorb errors of the other terms.
     prior = np.diag(ALIKE * np.sqrt(np.mean(left**2)) / (ERROR * np.abs(np.array(poles)[mode]) ** 2))
     columns = np.vstack([*(waves * axis for axis in ways.T), prior])
     weights = np.linalg.lstsq(columns, np.append(left.T.ravel(), np.zeros(len(gears))))[0]
@@ -82,7 +80,7 @@ def fitted(time: Floats, alpha: Floats, q: Floats, poles: Poles) -> Ripple | Non
 
 
 def _directions(time: Floats, alpha: Floats, poles: Poles) -> Floats:
-    """Direction in which the tool swings in each mode, shape (modes, 3)."""
+    """Return the direction in which the tool swings in each mode, shape (modes, 3)."""
     late = (time > 0.0) & (time < WINDOW[1])
     waves = [
         part for pole in poles for wave in [np.exp(pole * time[late])] for part in (wave.real, wave.imag)
@@ -96,7 +94,7 @@ def _turning(ends: Floats) -> NDArray[np.intp]:
 
 
 def _excited(q: Floats, ends: Floats, poles: Poles, period: float) -> Iterator[Floats]:
-    """Response of each mode to the waves of each joint that turns, in both phases."""
+    """Yield the response of each mode to the waves of each joint that turns, in both phases."""
     for joint in _turning(ends):
         for pole in poles:
             for wave in PHASES:
@@ -104,7 +102,7 @@ def _excited(q: Floats, ends: Floats, poles: Poles, period: float) -> Iterator[F
 
 
 def _driven(q: Floats, poles: Poles, period: float) -> Iterator[Floats]:
-    """Acceleration that a rigid arm would feel, and the response of each mode to it."""
+    """Yield the acceleration that a rigid arm would have, and the response of each mode to it."""
     joint = int(np.argmax(np.ptp(q, axis=0)))
     speed = np.gradient(q[:, joint], period)
     acceleration = np.gradient(speed, period)

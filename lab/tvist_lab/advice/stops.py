@@ -1,8 +1,8 @@
-"""Recorded stops, and what would be felt after them if the reference had been a weighted sum of delayed copies.
+"""Recorded stops, and the vibration predicted if the reference had been a weighted sum of delayed copies.
 
-A shaper makes such a sum of the reference, and an arm that is nearly linear does the same with its acceleration. Once
-the last copy has stopped, only acceleration takes part that was recorded after the stop, when the arm is not driven.
-What the gears excite is no such sum, see `ripple`.
+A shaper makes such a sum of the reference, and a nearly linear arm responds with the same sum of
+accelerations. After the last copy has stopped, the prediction uses only what was recorded after the stop,
+when the arm is not driven. Vibration excited by the gears is no such sum, see `ripple`.
 """
 
 import math
@@ -24,57 +24,54 @@ from tvist_lab.recordings import Floats, Recording
 from tvist_shaping import Impulses
 
 LATE = 0.02
-"""Time after a stop from which vibration counts: until then a filtered sensor still shows the braking [s]."""
+"""Time after a stop from which vibration counts [s]; until then a filtered sensor still shows the braking."""
 COUNTED = (0.2, 0.5)
-"""Shortest and longest time for which it counts [s]."""
+"""Shortest and longest time for which vibration counts [s]."""
 TAIL = 0.2
-"""Time at the end of a rest that shows the sensor's noise [s]."""
+"""Time at the end of a rest from which the sensor's noise is found [s]."""
 SAME_DURATION = 0.05
-"""Largest difference of the duration of repetitions, as a share of it [-]."""
+"""Largest relative difference between the durations of repetitions [-]."""
 LOUD = 3.0
-"""Least rms of a vibration over that of the sensor's noise [-]."""
+"""Smallest rms of a vibration over that of the sensor's noise [-]."""
 NONLINEAR = 0.05
-"""Share that is left in any case: f_d of a real UR5 rises by 3 % as it rings down, for which zv leaves 5 % [-]."""
+"""Share that always remains [-]: f_d of a real UR5 rises by 3 % during a ring-down, for which zv leaves 5 %."""
 FELT = 0.05
-"""Least rms of a vibration that is worth a shaper [m/s²]."""
+"""Smallest rms of a vibration that is worth a shaper [m/s²]."""
 
 
 class Left(NamedTuple):
-    """What is felt after a stop."""
+    """Vibration after a stop."""
 
     rms: float
-    """rms of |α| later than 20 ms after the stop, for up to 0.5 s, without the sensor's noise [m/s²]."""
+    """rms of |α| from 20 ms after the stop, for up to 0.5 s, without the sensor's noise [m/s²]."""
     still: float
-    """Time from the unshaped stop until |α| stays below 0.1 m/s², or what noise reaches [s]; infinite if it does not
-    within the rest.
-    """
+    """Time from the unshaped stop until |α| stays below 0.1 m/s² or the noise [s]; infinite if not within the rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """A motion's end with the rest after it."""
+    """The end of a motion with the rest after it."""
 
     file: int
-    """Place of its file among those given, from 0."""
     number: int
     """Number of the motion in its file, from 1."""
     measured: Measured
     motion: MotionRows
     result: MotionResult
     time: Floats
-    """Times after the arm's stop, from the start of the motion on, evenly spaced, shape (T,) [s]."""
+    """Times relative to the arm's stop, from the start of the motion, evenly spaced, shape (T,) [s]."""
     alpha: Floats
     """Acceleration of the tool below 60 Hz, shape (T, 3) [m/s²]."""
     q: Floats
-    """Joint angles of the reference, or the measured ones, shape (T, n) [rad]."""
+    """Joint angles of the reference, else the measured ones, shape (T, n) [rad]."""
     noise: float
-    """Mean square of the sensor's noise over all axes [m²/s⁴]."""
+    """Mean square of the sensor's noise, summed over the axes [m²/s⁴]."""
     group: int = field(default=0)
-    """Number of the motion of which this is a repetition, from 0."""
+    """Index of the motion of which this is a repetition."""
 
     @classmethod
     def of(cls, measured: Measured, place: int, file: int = 0) -> "Stop":
-        """Cut a motion out of a measured log."""
+        """Cut a motion out of a measured log; raise NotMeasurableError if too little rest was recorded."""
         recording, motion = measured.recording, measured.motions[place]
         time, alpha = felt(recording, motion, slice(motion.start, motion.end))
         time = time - recording.time[motion.arm_stop(recording)]
@@ -98,7 +95,7 @@ class Stop:
 
     @cached_property
     def way(self) -> Way:
-        """Where the motion begins and ends."""
+        """Start and target of the motion."""
         return Way.of(self.measured.recording, self.motion)
 
     @property
@@ -113,12 +110,12 @@ class Stop:
 
     @cached_property
     def unshaped(self) -> Left:
-        """What was felt."""
+        """Recorded vibration."""
         return self.left(np.ones(1), np.zeros(1))
 
     @property
     def rings(self) -> bool:
-        """Whether vibration stands out of the noise, and would be worth a shaper."""
+        """Whether the vibration exceeds the noise and is worth a shaper."""
         return self.unshaped.rms > max(FELT, LOUD * math.sqrt(self.noise))
 
     @cached_property
@@ -128,7 +125,7 @@ class Stop:
 
     @cached_property
     def _of_gears(self) -> Floats:
-        """What the gears excited in the recorded motion, shape (T, 3) [m/s²]."""
+        """Acceleration excited by the gears in the recorded motion, shape (T, 3) [m/s²]."""
         return np.zeros_like(self.alpha) if self._ripple is None else self._waves(self._ripple, self.q)
 
     def _waves(self, ripple: Ripple, q: Floats) -> Floats:
@@ -138,8 +135,8 @@ class Stop:
     def after(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> Floats:
         """Acceleration if the reference were a sum of delayed copies, shape (T, 3) [m/s²].
 
-        The copies have sizes with the sum 1 and delays [s], the largest last; `gears` counts what these excite along
-        the new way.
+        The sizes of the copies sum to 1; the largest delay [s] is last. `gears` adds what the gears excite
+        along the new path.
         """
         shaped = self._sum(self.alpha - self._of_gears, sizes, delays)
         if gears and self._ripple is not None:
@@ -151,7 +148,7 @@ class Stop:
         return np.asarray(np.tensordot(sizes, moved, axes=1).T)
 
     def left(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> Left:
-        """What would be felt; see `after`."""
+        """Return the predicted vibration, see `after`; raise NotMeasurableError if too little rest remains."""
         shaped, late = self.after(sizes, delays, gears=gears), self.time - float(delays[-1]) - LATE
         counts = (late > 0.0) & (late <= COUNTED[1])
         if late[-1] < COUNTED[0]:
@@ -169,12 +166,12 @@ class Stop:
 
 
 def followed(recording: Recording) -> str:
-    """Return the column of joint angles that is nearest to the reference."""
+    """Return the column of joint angles that is closest to the reference."""
     return next(one for one in ("reference_q", "target_q", "actual_q") if one in recording)
 
 
 def _noise(tail: Floats, period: float) -> float:
-    """Mean square of the noise over all axes [m²/s⁴]: of a tail that still rings, what its modes leave."""
+    """Return the mean square of the noise, summed over the axes [m²/s⁴]: without the modes if the tail still rings."""
     rings = fit_ring_down(tail, period, modes=2, offset=True, skip=0.0, window=TAIL)
     return 3.0 * rings.rms**2 if rings.r_squared > RINGS else float(np.sum(np.var(tail, axis=0)))
 
@@ -184,12 +181,12 @@ def _at(times: Floats, time: Floats, values: Floats) -> Floats:
 
 
 def shaped_by(stop: Stop, impulses: Impulses, *, gears: bool = True) -> Left:
-    """What would be felt after a stop with a shaper; see `Stop.left`."""
+    """Predict the vibration after a stop with a shaper; see `Stop.left`."""
     return stop.left(np.asarray(impulses.A), np.asarray(impulses.tau), gears=gears)
 
 
 def grouped(stops: Sequence[Stop]) -> list[Stop]:
-    """Return the stops with the numbers of their motions, and with the least noise that each file's sensor shows."""
+    """Number the stops by motion, and give them the smallest noise of each file's sensor."""
     noise = {
         file: min(one.noise for one in stops if one.file == file) for file in {one.file for one in stops}
     }

@@ -1,1 +1,1 @@
-"""Speed on this machine: how many robots it runs, how late these are, and how fast it computes one."""
+"""Speed of this machine: how many robots it runs, how late their ticks are, and how fast one is computed."""

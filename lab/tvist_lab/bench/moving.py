@@ -1,4 +1,4 @@
-"""Processor time of a tick of a robot in this process, and of its parts, while the arm moves."""
+"""Processor time of a robot's tick in this process, and of its parts, while the arm moves."""
 
 import gc
 import time
@@ -31,26 +31,26 @@ from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_shaping import TvistFilter, shaper
 
 TICKS = 500
-"""Number of ticks of a run: the first second of the motion from Q1 to Q3, which lasts longer with every filter."""
+"""Ticks of a run: the first second of the motion from Q1 to Q3, which lasts longer with every filter."""
 LIMITS = MotionLimits(1.5, 2.0, 100.0)
 
 Floats = NDArray[np.float64]
 Run = Callable[[], float]
-"""Measures something once, and returns the result, here the processor time of a tick [µs]."""
+"""Makes one run and returns its result, here the processor time of a tick [µs]."""
 
 
 class Arm(Protocol):
-    """An arm that drives move."""
+    """An arm moved by drives."""
 
     def reset(self, command: DriveCommand) -> object:
-        """Put it to rest at a position."""
+        """Put the arm to rest at a position."""
 
     def step(self, command: DriveCommand) -> object:
-        """Move it for a period."""
+        """Simulate one period."""
 
 
 def line_tick(shaper: str) -> Run:
-    """Return what measures a tick of the whole line, from messages to encoded states, with a shaper by its name."""
+    """Measure a tick of the whole line with a shaper, from messages to encoded states."""
     host, token, send = _robot(shaper)
     host.subscribe("state", len)
 
@@ -63,7 +63,7 @@ def line_tick(shaper: str) -> Run:
 
 
 def stream_tick(every: int) -> Run:
-    """Return what measures a tick of the line with `zv`, fed with set-points, one every so many ticks."""
+    """Measure a tick of the line with `zv`, fed with one set-point every `every` ticks."""
     host, token, send = _robot("zv")
     setpoints = [
         encode(Setpoint(token=token, sequence=number, q=tuple(q.tolist())))
@@ -89,7 +89,7 @@ def stream_tick(every: int) -> Run:
 
 
 def _robot(shaper: str) -> tuple[LoopbackHost, str, Callable[[Command], None]]:
-    """Return a robot, the token of a client that has control, and what sends its commands."""
+    """Return a robot, the token of a client in control, and a function that sends its commands."""
     host = LoopbackHost(free_setup(truth=False, shaper=shaper))
     host.request("bench", encode(TakeControl(client="bench")))
     lease = host.controller.session.lease
@@ -102,13 +102,13 @@ def _robot(shaper: str) -> tuple[LoopbackHost, str, Callable[[Command], None]]:
 
 
 def plant_tick() -> Run:
-    """Return what measures a tick of our plant."""
+    """Measure a tick of the simulated arm."""
     setup = free_setup(truth=False)
     return arm_tick(FlexibleArm(setup.description, body(setup.payload)))
 
 
 def arm_tick(arm: Arm) -> Run:
-    """Return what measures a tick of an arm that makes the motion."""
+    """Measure a tick of an arm that makes the motion."""
     setup = free_setup(truth=False)
     dynamics = InverseDynamics(setup.description, body(setup.payload))
     commands = [DriveCommand(q, np.zeros_like(q), dynamics.gravity(q)) for q in motion()]
@@ -125,7 +125,7 @@ def arm_tick(arm: Arm) -> Run:
 
 
 def cycle_tick() -> Run:
-    """Return what measures a tick of Figure 6 with `zv`, without what is around it."""
+    """Measure a tick of Figure 6 with `zv`, without what surrounds it."""
     setup = free_setup(truth=False)
     payload, start, target = body(setup.payload), np.array(pose("Q1")), np.array(pose("Q3"))
     cycle = ControlCycle(
@@ -145,18 +145,18 @@ def cycle_tick() -> Run:
 
 
 def line_filter(setup: Setup) -> TvistFilter:
-    """Return the filter of a setup with its estimator."""
+    """Return a setup's filter with its estimator."""
     return TvistFilter(shaper(setup.shaper), setup.estimator(), joints=setup.description.joints)
 
 
 def motion() -> list[Floats]:
-    """References of a run, each of shape (n,) [rad]."""
+    """Return the references of a run, each of shape (n,) [rad]."""
     trajectory = quickest_motion(JointLine(np.array(pose("Q1")), np.array(pose("Q3"))), LIMITS, PERIOD)
     return [trajectory.next() for _ in range(TICKS)]
 
 
 def us_per_tick(go: Callable[[], Any]) -> float:
-    """Return the processor time of a tick of a run [µs]."""
+    """Return the processor time of one tick of a run [µs]."""
     gc.collect()
     began = time.thread_time()
     go()

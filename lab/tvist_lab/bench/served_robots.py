@@ -1,4 +1,4 @@
-"""Served robots: punctuality, response times and use of resources of one, and how many one core runs."""
+"""Measure served robots: punctuality, response times and load of one, and how many one core runs."""
 
 import asyncio
 import os
@@ -32,13 +32,13 @@ COMMANDS = 200
 NUMBERS = (1, 2, 4, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64)
 """Numbers of robots to try, in order."""
 FAILURES = 2
-"""Consecutive failing numbers after which no larger ones are tried; a single failure may be the machine's fault."""
+"""Consecutive failures after which no larger numbers are tried; a single one may be the machine's fault."""
 TRIES = 2
-"""Number of tries, of which the better counts, since other load on the machine only ever adds lateness."""
+"""Number of tries, of which the better counts, since other load only adds lateness."""
 MISSED = 0.001
 """Share of its ticks that each robot may miss [-]."""
 SETTLE = 2
-"""Number of telemetry messages ignored at first, so that the start is not measured."""
+"""Number of telemetry messages ignored at first, to exclude the start."""
 
 
 async def one_robot(
@@ -71,7 +71,7 @@ async def one_robot(
 
 
 async def punctuality(server: Served, seconds: float) -> tuple[dict[str, float], float]:
-    """Return the lateness of its ticks, and the share of a core that it uses."""
+    """Return the lateness of the ticks, and the share of a core that the server uses."""
     robot = server.robot
     heard: list[Telemetry] = []
     states = 0
@@ -98,7 +98,7 @@ async def punctuality(server: Served, seconds: float) -> tuple[dict[str, float],
 
 
 async def _setpoints(robot: Robot, arm: Arm, seconds: float) -> list[float]:
-    """Times from sending each set-point to the arrival of the first state with this or a newer one [s]."""
+    """Return the times from sending each set-point to the first state with this or a newer one [s]."""
     middle = np.array((await robot.state()).target_q)
     sent: list[float] = []
     took: list[float] = []
@@ -124,7 +124,7 @@ async def _setpoints(robot: Robot, arm: Arm, seconds: float) -> list[float]:
 
 
 async def _commands(arm: Arm) -> list[float]:
-    """Round trips of commands, each sent at a random moment within a period [s]."""
+    """Return the round-trip times of commands, each sent at a random moment within a period [s]."""
     chance, took = random.Random(0), []  # noqa: S311  no secret
     for _ in range(COMMANDS):
         await asyncio.sleep(chance.uniform(0.0, 2.0 * PERIOD))
@@ -140,12 +140,9 @@ def _percentiles(seconds: Iterable[float]) -> dict[str, float]:
 
 
 def over_all(heard: Sequence[Telemetry]) -> dict[str, float]:
-    """Lateness of all ticks that several telemetry messages cover [µs].
-
-    The largest value is exact. The 99th percentile is an upper bound, which at most one tick in a hundred can have
-    exceeded: in each second, no tick was later than the second's largest value, one in a hundred was later than its
-    99th percentile, and half were later than its median.
-    """
+    """Return the lateness of all ticks covered by several telemetry messages [µs]."""
+    # The maximum is exact; the 99th percentile is an upper bound that at most one tick in a hundred can have
+    # exceeded, since each message gives the maximum, 99th percentile and median of one second.
     if not heard:
         nothing = float("nan")
         return {"late_p50_us": nothing, "late_p99_us": nothing, "late_max_us": nothing}
@@ -158,7 +155,7 @@ def over_all(heard: Sequence[Telemetry]) -> dict[str, float]:
 
 
 def missed_share(heard: Sequence[Telemetry]) -> float:
-    """Share of the ticks due between the first and the last telemetry message that were missed [-]; NaN for none."""
+    """Return the share of due ticks that were missed between the first and last message [-]; NaN for none."""
     if not heard or heard[0].due_ticks is None or heard[-1].due_ticks is None:
         return float("nan")
     due = heard[-1].due_ticks - heard[0].due_ticks
@@ -175,25 +172,21 @@ def _bound(p50: np.ndarray[Any, Any], p99: np.ndarray[Any, Any], largest: np.nda
 
 
 def cpu_seconds(pid: int) -> float:
-    """Processor time used by all threads of a process together [s]."""
+    """Return the processor time used by all threads of a process [s]."""
     used = psutil.Process(pid).cpu_times()
     return float(used.user + used.system)
 
 
 def rss_mb(pid: int) -> float:
-    """Resident memory of a process [MB]."""
+    """Return the resident memory of a process [MB]."""
     return float(psutil.Process(pid).memory_info().rss) / 1e6
 
 
 async def robots_at_500_hz(seconds: float, tell: Callable[[str], None], options: Sequence[str] = ()) -> int:
-    """Return the largest number of robots in one process on one core such that none misses more than `MISSED`.
+    """Return the largest number of robots in one process on one core of which none misses more than `MISSED`.
 
-    A client, on another core if there is one, reads every state of every robot.
-
-    Args:
-        seconds: How long each number is measured [s].
-        tell: Called with a description of each measurement before it starts.
-        options: Further options of `tvist serve`.
+    A client, on another core if there is one, reads every state. Each number is measured for `seconds`;
+    `tell` receives a description before each measurement.
     """
     most, failed = 0, 0
     for number in NUMBERS:

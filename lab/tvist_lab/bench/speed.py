@@ -1,4 +1,4 @@
-"""All that `tvist bench` measures, and the machine that it measures."""
+"""All measurements of `tvist bench`, and a description of the machine."""
 
 import asyncio
 import os
@@ -19,38 +19,28 @@ from tvist_plant.plant import PERIOD
 from tvist_server.punctual import processors
 
 REPETITIONS = 7
-"""Number of runs of which the median counts, after a first one that does not."""
+"""Number of runs of which the median counts, after a warm-up."""
 OF_MANY = 0.4
 """Time for which each number of robots is measured, as a share of the time for one robot [-]."""
 LIBRARIES = ("tvist", "eclipse-zenoh", "mcap", "msgspec", "mujoco", "numba", "numpy", "pin", "ruckig")
-"""Distributions whose versions matter for speed."""
+"""Distributions whose versions affect speed."""
 
 
 class Machine(Struct, frozen=True):
-    """What figures depend on besides the program itself."""
+    """The machine on which figures depend."""
 
     cpu: str
-    """Name of the processor."""
     cores: int
-    """Number of cores that this process may use."""
+    """Number of cores available to this process."""
     system: str
-    """Operating system with its release."""
     python: str
-    """Version of Python."""
     libraries: dict[str, str]
-    """Versions of the libraries."""
     load: float
-    """Number of processes that ran on average in the minute before the start."""
+    """Average number of running processes in the minute before the start."""
 
 
 def speed(seconds: float, shaper: str, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Measure.
-
-    Args:
-        seconds: Duration of each measurement in real time [s]; 0 to serve no robot.
-        shaper: Name of the robots' shaper.
-        tell: Called with a description of each measurement before it starts.
-    """
+    """Measure for `seconds` each, or with 0 serve no robot; `tell` receives a description before each measurement."""
     result: dict[str, Any] = {
         "machine": msgspec.to_builtins(this_machine()),
         "seconds": seconds,

@@ -1,7 +1,4 @@
-"""The two figures of an advice: the worst stop with and without the shaper, and what each shaper leaves for its time.
-
-Their text is large, since they are made to be posted and seen on a phone.
-"""
+"""Figures of an advice: the worst stop with and without the shaper, and vibration left against added time."""
 
 from typing import Any
 
@@ -27,25 +24,25 @@ from tvist_lab.metrics import amplitude
 from tvist_lab.metrics.common_clock import STILL
 
 LARGE = 1.65
-"""Size of text over the usual one [-]."""
+"""Factor on the usual size of text [-]: these figures are often viewed on a phone."""
 SHOWN = (-100.0, 1000.0)
 """Time shown before and after the stop [ms]."""
 NAMED = 4
-"""Number of shapers on the front that are named beside the recommended one."""
+"""Number of shapers on the front that are named besides the recommended one."""
 LEAST = 0.5
 """Lowest share that is drawn [%]."""
 OTHERS = np.linspace(0.01, 1.0, 30)
-"""Times of smoothing that are drawn, as shares of the longest shaper's [-]."""
+"""Durations of smoothing, as shares of the longest shaper's [-]."""
 
 
 def advice_figures(advice: Advice) -> tuple[Figure, Figure]:
-    """Return both figures of an advice that recommends a shaper: its worst stop, and what shapers cost."""
+    """Return the figures of an advice that recommends a shaper: its worst stop, and the cost of each shaper."""
     with rc_context({"font.size": LARGE * rcParams["font.size"]}):
         return _worst_stop(advice), _costs(advice)
 
 
 def _worst_stop(advice: Advice) -> Figure:
-    """|α| around the stop that rings most, as recorded, and as predicted with the recommended shaper."""
+    """Draw |α| around the stop that rings most, as recorded and as predicted with the recommended shaper."""
     assert advice.best is not None
     stop = max(advice.best.left, key=lambda one: one.unshaped.rms)
     impulses = impulses_of(advice.best.shaper, advice.best.aim.judged[stop])
@@ -67,7 +64,7 @@ def _worst_stop(advice: Advice) -> Figure:
 
 
 def _costs(advice: Advice) -> Figure:
-    """What each shaper leaves against the time that it adds, medians over the stops that ring."""
+    """Draw what each shaper leaves against the time that it adds, medians over the stops that ring."""
     figure, (panel,) = panels(1, 3.7)
     fair = [one for one in advice.options if one.keeps_limits]
     longest = max(one.added_s for one in fair)
@@ -97,7 +94,7 @@ def _costs(advice: Advice) -> Figure:
 
 
 def _place(option: Option) -> tuple[float, float]:
-    """Time that a shaper adds [ms], and what it leaves [%]."""
+    """Return the time that a shaper adds [ms], and what it leaves [%]."""
     return 1e3 * option.added_s, option.left_percent
 
 
@@ -106,7 +103,7 @@ def _short(option: Option) -> str:
 
 
 def _front(fair: list[Option], best: Option | None) -> list[Option]:
-    """Some of the shapers that no shorter one beats, apart from the recommended one."""
+    """Return some of the shapers that no shorter one beats, without the recommended one."""
     front, least = [], np.inf
     for one in sorted(fair, key=lambda one: (one.added_s, one.left_percent)):
         if one.left_percent < 0.8 * least:

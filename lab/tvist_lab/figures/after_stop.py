@@ -1,4 +1,4 @@
-"""How the tool shakes after a motion: without and with shaping, and in several recordings."""
+"""Vibration of the tool after a motion, without and with shaping and in several recordings."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -42,21 +42,17 @@ from tvist_lab.recordings import Floats, Recording
 SHOWN = (-50.0, 350.0)
 """Time shown before and after the end of the unshaped motion's reference [ms]."""
 HEADROOM = 1.6
-"""Height of the axis over the larger peak [-]: the end of the braking shows, and the peaks are not small."""
+"""Height of the axis over the larger peak [-]: shows the end of the braking without shrinking the peaks."""
 WORDS_AT = 100.0
-"""Time at which the names of the curves begin [ms]."""
+"""Time at which the names of the curves start [ms]."""
 BEFORE, AFTER = 100.0, 600.0
 """Time shown before and after the stop of the first of several curves [ms]."""
 
 
 def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure:
-    """|α| of the tool around the end of one motion without and with shaping, on one clock.
+    """Draw |α| around the end of one motion without and with shaping; time 0 is the unshaped reference's stop.
 
-    Time is zero where the reference without shaping ends.
-
-    Raises:
-        RecordingError: The true acceleration was not recorded.
-        NotMeasurableError: Nothing was recorded after a stop.
+    Raises RecordingError without a true acceleration, NotMeasurableError if nothing was recorded after a stop.
     """
     recording, motion = unshaped
     length = float(recording.time[motion.reference_stop] - recording.time[motion.start])
@@ -98,7 +94,7 @@ def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure
 
 
 def _compare_rest(panel: Axes, before: float | None, after: float | None) -> None:
-    """Mark from when the tool is at rest, and the time between both moments [ms]."""
+    """Mark the times at which the tool comes to rest, and the interval between them [ms]."""
     words = f"the tool is at rest (below {STILL:g} m/s²)"
     if before is not None and after is not None:
         for moment, style in ((before, OF_UNSHAPED), (after, OF_SHAPED)):
@@ -116,21 +112,16 @@ class Shown(NamedTuple):
     """A panel of `compared_figure`."""
 
     name: str
-    """The motion, for the heading."""
     curves: Mapping[str, Recorded]
-    """Name of each curve to what was recorded."""
+    """Recorded motion of each curve, by the curve's name."""
     said: str = ""
-    """Words written into the panel."""
 
 
 def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> Figure:
-    """|α| of several motions, a panel for each, all to one scale; each on a clock that begins with the motion.
+    """Draw |α| of several motions, one panel each, on one scale; time 0 is the start of the motion.
 
-    Motions that cannot be drawn are left out, and of more than eight names of curves the rest. Curves with the names
-    `unshaped` are drawn in the colour of what is not shaped.
-
-    Raises:
-        NotMeasurableError: None of them has an accelerometer, or enough rest.
+    Motions that cannot be drawn are left out; of more than eight curve names, the rest is. Curves named in
+    `unshaped` have the colour of unshaped motions. Raises NotMeasurableError if no motion can be drawn.
     """
     drawn = [(one, curves) for one in motions if (curves := _around_stop(one.curves))]
     if not drawn:
@@ -139,7 +130,7 @@ def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> F
     rows = -(-len(drawn) // columns)
     figure, axes = panels(rows, 0.9 + 2.1 * rows, columns=columns, share_x=False, share_y=True)
     names = list(dict.fromkeys(name for _, curves in drawn for name in curves))
-    # What is not shaped has the colour of its own, unless it is compared with its like.
+    # A single unshaped curve has the colour of unshaped motions.
     plain = [name for name in names if name in unshaped]
     alone = len(plain) == 1
     names = plain + [name for name in names if name not in plain] if alone else names
@@ -164,7 +155,7 @@ def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> F
 
 
 def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, tuple[Floats, Floats, float]]:
-    """Time after the stop of the first curve [s], |α|, and its peak after the curve's own stop and 10 ms [m/s²]."""
+    """Return time after the first curve's stop [s], |α|, and its peak from 10 ms after the curve's own stop [m/s²]."""
     curves = {}
     (first, motion), *_ = recorded.values()
     stop = float(first.time[motion.arm_stop(first)] - first.time[motion.start])
@@ -178,6 +169,6 @@ def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, tuple[Floats, Fl
 
 
 def vibration_figure(unshaped: Recording, shaped: Recording, number: int) -> Figure:
-    """|α| of one move around its stop, unshaped and shaped."""
+    """Draw |α| of one move around its stop, unshaped and shaped."""
     curves = {name: (one, motions(one)[0]) for name, one in (("Unshaped", unshaped), ("Shaped", shaped))}
     return compared_figure([Shown(f"Move {number}", curves)], ["Unshaped"])

@@ -1,4 +1,4 @@
-"""Calibrations compared with what was measured, and over the workspace with the truth."""
+"""Figures of calibrations, compared with measurements and, over the workspace, with the truth."""
 
 from typing import Any
 
@@ -27,17 +27,17 @@ LABELS = {
     "f_d_hz": ("$f_d$", "damped frequency of the lowest mode", "Hz"),
     "zeta": (r"$\zeta$", "damping ratio of the lowest mode", "–"),
 }
-"""Key of a map to its symbol, its meaning and its unit."""
+"""Symbol, meaning and unit of each map, by its key."""
 NARROW = 5.0
-"""Width up to which maps are one below the other [inch]."""
+"""Width up to which maps are drawn one below the other [inch]."""
 LEVELS = 9
 """Largest number of levels of a map."""
 
 
 def identified_figure(name: str, measured: Floats, fitted: Floats) -> Figure:
-    """The lowest mode by fits that did not see a ring-down, against what that ring-down alone tells.
+    """Draw the lowest mode of each ring-down: fitted without it against measured in it alone.
 
-    Both have f_d [Hz] and ζ [-] of each ring-down, shape (2, N); the name is the calibration's.
+    `measured` and `fitted` hold f_d [Hz] and ζ [-], shape (2, N); `name` is the calibration's.
     """
     figure, axes = panels(2, 7.6, share_x=False)
     for panel, own, others, quantity in zip(
@@ -52,11 +52,9 @@ def identified_figure(name: str, measured: Floats, fitted: Floats) -> Figure:
 
 
 def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
-    """Draw one quantity, "f_d_hz" or "zeta", as identified, as it truly is, and the error; `words` say of what.
-
-    The three maps are side by side, and in a narrow figure one below the other. White areas are left out: the arm
-    would touch itself or the floor there.
-    """
+    """Draw maps of "f_d_hz" or "zeta": identified, true, and the error; `words` complete the heading."""
+    # White areas are left out because the arm would touch itself or the floor there. In a narrow figure the
+    # maps are stacked.
     symbol, meaning, unit = LABELS[key]
     if beside := rcParams["figure.figsize"][0] > NARROW:
         figure, axes = panels(1, 3.0, columns=3, share_x=False, share_y=True)
@@ -84,7 +82,7 @@ def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
 def _map(
     panel: Axes, found: WorkspaceMap, values: Floats, levels: Floats, heading: str, *, labelled: bool
 ) -> QuadContourSet:
-    """Filled contours, with lines between them, and the robot's poses."""
+    """Draw filled contours with lines between them, and the robot's poses."""
     title(panel, heading)
     rows, across = (np.degrees(angles) for angles in found.angles)
     panel.grid(visible=False)
@@ -115,5 +113,4 @@ def _map(
 
 
 def _levels(low: float, high: float) -> Floats:
-    """Round levels that include a range."""
     return np.asarray(MaxNLocator(LEVELS).tick_values(low, max(high, low + 1e-3 * abs(low) + 1e-6)))

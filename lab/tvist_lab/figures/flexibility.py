@@ -1,4 +1,4 @@
-"""Figure 1: where an arm is flexible, and what each spring adds to the deflection of its tool."""
+"""Figure 1: where an arm is flexible, and how much each spring deflects its tool."""
 
 from typing import Any
 
@@ -35,15 +35,15 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping import Fixed
 
 RAISED = 0.6
-"""Angle of the shoulder over the stretched arm at which the motion starts [rad]."""
+"""Angle of the shoulder above the stretched arm at which the motion starts [rad]."""
 WATCHED = 0.3
-"""Time after the stop in which the largest deflection is looked for [s]."""
+"""Time after the stop in which the largest deflection is sought [s]."""
 MAGNIFIED = 600.0
-"""By how much the deflection is drawn larger [-]."""
+"""Magnification of the deflection [-]."""
 
 
 class _Arm:
-    """The stretched UR5e with 5 kg: where it is, with its springs deflected."""
+    """The stretched UR5e with 5 kg and deflected springs."""
 
     def __init__(self, description: RobotDescription) -> None:
         self.payload = body(paper_payload(description))
@@ -52,10 +52,9 @@ class _Arm:
         self._data = self.flexible.model.createData()
 
     def line(self, springs: Floats) -> Floats:
-        """Positions of joints and of the middles of bending links, from the base to the flange, shape (P, 3) [m].
+        """Return the joints and the middles of bending links, from base to flange, shape (P, 3) [m].
 
-        Args:
-            springs: Angles of the gears, and of the virtual joints of bending links, two of each [rad].
+        `springs` holds the angles of the gears, and two for each bending link [rad].
         """
         model, gears = self.flexible.model, len(self.q)
         y = np.zeros(model.nq)
@@ -66,11 +65,11 @@ class _Arm:
         return np.array([np.zeros(3), *joints, self._data.oMf[self.flexible.flange].translation])
 
     def moved(self, springs: Floats) -> float:
-        """Distance by which springs displace the flange [m]."""
+        """Return the distance by which springs displace the flange [m]."""
         return float(np.linalg.norm(self.line(springs)[-1] - self.line(0.0 * springs)[-1]))
 
     def largest_deflection(self, description: RobotDescription) -> Floats:
-        """Stop the shoulder, unshaped, and return the springs' angles where the flange is farthest from rest."""
+        """Stop the shoulder unshaped; return the spring angles when the flange is farthest from rest."""
         start = self.q + RAISED * np.eye(len(self.q))[1]
         unshaped = choose_filter("none", Fixed([10.0], [0.1]), description.joints)
         cycle = ControlCycle(
@@ -91,8 +90,8 @@ class _Arm:
 def figure_1() -> Figure:
     """Draw the UR5e with 5 kg, stretched out, at its largest deflection after a stop of the shoulder.
 
-    Top: the arm from the side, rigid and as it bends, drawn larger. Bottom: by how much each gear and each link alone
-    displaces the flange.
+    Top: the arm from the side, rigid and with magnified bending. Bottom: displacement of the flange by each
+    gear and link.
     """
     description = load("ur5e").clean()
     arm = _Arm(description)

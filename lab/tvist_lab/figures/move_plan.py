@@ -1,4 +1,4 @@
-"""The moves of an identification: where the arm stands, and where it is going to ring."""
+"""Figure of the moves of an identification."""
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +12,7 @@ from tvist_plant.model import rigid_model
 
 
 def move_plan_figure(plan: JogPlan) -> Figure:
-    """Draw the arm from the side and from above: as it stands, in every posture on the way, and where it rings."""
+    """Draw the arm from the side and from above: at present, in every posture on the way, and where it rings."""
     model = rigid_model(plan.arm.description, body(plan.arm.payloads[0]))
     data = model.createData()
 

@@ -1,4 +1,4 @@
-"""Figures 3, 7 and 8: what a shaper does to a mode and a reference, and how a filter makes samples of it."""
+"""Figures 3, 7 and 8: effect of a shaper on a mode and a reference, and how a filter computes samples."""
 
 from typing import Any
 
@@ -25,13 +25,12 @@ from tvist_lab.figures.style import (
 from tvist_lab.recordings import Floats
 
 PERIOD = 0.002
-"""Tick [s]."""
+"""Control period [s]."""
 ACCELERATION = 2.0
 """Acceleration of the references [rad/s²]."""
 RISE = 0.15
-"""Time in which the reference of figure 3 reaches its end [s]."""
+"""Time in which the reference of figure 3 reaches its target [s]."""
 BUFFERED = 22
-"""Number of samples in the buffer of figure 8."""
 
 
 def figure_3() -> Figure:
@@ -82,7 +81,7 @@ def figure_3() -> Figure:
 
 
 def figure_7() -> Figure:
-    """Draw ZV while f_d falls, with the delay of its second impulse rounded to ticks or between them.
+    """Draw ZV while f_d falls, with the delay of its second impulse rounded to ticks or exact.
 
     Top: the delay. Middle: deviation of the shaped reference from the exact one. Bottom: its acceleration.
     """
@@ -91,7 +90,7 @@ def figure_7() -> Figure:
     trains = [tvist_shaping.zv(float(f_d), zeta) for f_d in 10.0 - 1.4 / duration * time]
 
     def reference(time: float) -> float:
-        """Position of a joint that accelerates from rest [rad]."""
+        """Return the position of a joint that accelerates from rest [rad]."""
         ramp = velocity / ACCELERATION
         return 0.5 * ACCELERATION * min(time, ramp) ** 2 + velocity * max(time - ramp, 0.0)
 
@@ -137,10 +136,10 @@ def figure_7() -> Figure:
 
 
 def figure_8() -> Figure:
-    """Draw how the filter makes one sample.
+    """Draw how the filter computes one sample.
 
-    Top: its parts. Middle: the samples in the buffer, the reference interpolated between them, and the two delayed
-    values that the impulses of this tick pick. Bottom: the impulses.
+    Top: its parts. Middle: buffered samples, the interpolated reference, and the two delayed values that the
+    impulses of this tick select. Bottom: the impulses.
     """
     impulses = tvist_shaping.zv(14.35, 0.14)  # the second one is between two ticks
     line = tvist_shaping.DelayLine(1, BUFFERED + 4)
@@ -150,7 +149,7 @@ def figure_8() -> Figure:
     out = np.zeros(1)
 
     def at(delay: float) -> float:
-        """The reference a number of ticks ago, as the filter interpolates it [mrad]."""
+        """Return the reference `delay` ticks ago, as the filter interpolates it [mrad]."""
         line.gather(np.ones(1), np.array([delay]), out)
         return 1e3 * float(out[0])
 
@@ -189,7 +188,7 @@ def figure_8() -> Figure:
 
 
 def _draw_parts(panel: Axes) -> None:
-    """The parts of the filter as boxes, from its input to its output, with what goes between them."""
+    """Draw the parts of the filter as boxes from input to output, with their signals."""
     panel.set_axis_off()
     panel.set(xlim=(-0.45, 3.75), ylim=(-1.25, 0.55))
     box = {"boxstyle": "round,pad=0.5", "facecolor": tint(FAINT, 0.15), "edgecolor": INK}

@@ -1,4 +1,4 @@
-"""Figure 2: an actuator with flexibility, and an inertia that depends on a second angle."""
+"""Figure 2: a flexible actuator with an inertia that depends on a second angle."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,17 +21,17 @@ from tvist_lab.figures.style import (
 from tvist_lab.one_joint import Modes, Plucked
 
 APART = 0.62
-"""Distance between the shoulders of two poses that are drawn side by side [m]."""
+"""Distance between the shoulders of neighbouring poses in the figure [m]."""
 WORDS = ("\nincreased inertia", "", "\ndecreased inertia")
 """The paper's words for the first and the last pose."""
 SPRING_TURNS = 2.5
 
 
 def figure_2(modes: Modes) -> Figure:
-    """Draw the arm at the three angles of the elbow, and its frequency and damping over that angle.
+    """Draw the arm at three elbow angles, and its frequency and damping over that angle.
 
-    Top: the arm from above, with its inertia about the shoulder. Below: f_d and ζ by the formula, as lines, and as the
-    simulated arm's accelerometer shows them after a pluck, as points.
+    Top: the arm from above, with its inertia about the shoulder. Below: f_d and ζ, as lines from the formula
+    and as points from the simulated accelerometer after a pluck.
     """
     figure, (arms, frequencies, dampings) = panels(3, 7.2, share_x=False, ratios=(1.35, 1.25, 0.8))
     title(arms, f"The arm from above, with {modes.description.payload.mass:g} kg")
@@ -71,7 +71,7 @@ def figure_2(modes: Modes) -> Figure:
 
 
 def _draw_arm(panel: Axes, x: float, upper: float, forearm: float, pose: Plucked, word: str) -> None:
-    """One pose, with its shoulder at (x, 0): the upper arm points up, the forearm is turned by q."""
+    """Draw one pose with its shoulder at (x, 0), the upper arm upright and the forearm turned by the elbow."""
     elbow = pose.elbow
     tip = x + forearm * np.sin(elbow), upper + forearm * np.cos(elbow)
     panel.plot([x, x], [upper, upper + 0.62 * forearm], color=FAINT, linewidth=0.9, linestyle=LIMIT)

@@ -1,4 +1,4 @@
-"""Figures 15 and 16: what the paper's metrics mean, on recorded motions."""
+"""Figures 15 and 16: the paper's metrics, explained on recorded motions."""
 
 from collections.abc import Mapping, Sequence
 
@@ -32,7 +32,6 @@ from tvist_lab.recordings import Floats
 BEFORE, AFTER = 60.0, 150.0
 """Time shown in figure 15 before the unshaped reference's stop and after the last mark [ms]."""
 STOPS = {"$t_b$, $t_b^*$": "stop of the reference and of the shaped one"}
-"""What two symbols mean."""
 SYMBOLS = {
     "$E$": "distance of the tool from where it comes to rest",
     **STOPS,
@@ -42,28 +41,22 @@ SYMBOLS = {
     r"$t_\mathrm{stb}$": "stabilisation time",
     r"$e_\mathrm{os}$": "overshoot",
 }
-"""What the symbols in figure 15 mean."""
 LEAD, TAIL = 0.1, 0.4
-"""Time shown in figure 16 before the unshaped reference stops, and after the shaped one [s]."""
+"""Time shown in figure 16 before the unshaped reference's stop and after the shaped one's [s]."""
 QUIET = 0.2
-"""Time at the end of the recorded rest that shows the noise [s]."""
+"""Time at the end of the recorded rest from which the noise is found [s]."""
 LOUD = 1.2
-"""Height over the largest noise from which a peak is one of a vibration [-]; a decay needs two of them."""
+"""Ratio to the largest noise above which a peak belongs to a vibration [-]; a decay needs two such peaks."""
 DASHES = (0, (4, 2))
-"""Dash pattern of a fitted curve."""
 ARROW = {"arrowstyle": "<->", "color": INK, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
-"""An arrow over a span, with two heads."""
 BOTH = {"Unshaped": (OF_UNSHAPED, "$t_b$"), "Shaped": (OF_SHAPED, "$t_b^*$")}
 """Style of each recording, and the symbol of its stop."""
 
 
 def figure_15(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
-    """Draw E of one motion around its stop, unshaped and shaped, with the times and the overshoot of the former.
+    """Draw E of one motion around its stop, unshaped and shaped, with the unshaped motion's times and overshoot.
 
-    Where E never settles, its curves are drawn without these marks.
-
-    Raises:
-        NotMeasurableError: The attained position cannot be determined, because too little rest was recorded.
+    If E never settles, the marks are missing. Raises NotMeasurableError if too little rest was recorded.
     """
     figure, (panel,) = panels(1, 3.9)
     title(panel, f"{name}: marks of the unshaped motion")
@@ -93,7 +86,7 @@ def figure_15(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
 
 
 def _mark(panel: Axes, curve: Floats, found: Settling, top: float) -> None:
-    """Mark t_enter, t_cycle, t_stb and e_os on a curve of times [ms] and E [mm]."""
+    """Mark t_enter, t_cycle, t_stb and e_os on a curve of E [mm] over time [ms]."""
     limit, enter, cycle = 1e3 * REPEATABILITY, 1e3 * found.enter, 1e3 * found.cycle
     for moment, name, away, side in ((enter, "enter", -4, "right"), (cycle, "cycle", 4, "left")):
         panel.plot([moment], [limit], "o", color=INK, markersize=5.0, markerfacecolor="white", zorder=5)
@@ -109,18 +102,14 @@ def _mark(panel: Axes, curve: Floats, found: Settling, top: float) -> None:
 
 
 def _span(panel: Axes, ends: Sequence[float], height: float, words: str) -> None:
-    """An arrow over a span of time, with words over it."""
     panel.annotate("", (ends[0], height), (ends[1], height), arrowprops=ARROW, zorder=5)
     note(panel, words, (0.5 * (ends[0] + ends[1]), height), (0, 3), ha="center", va="bottom")
 
 
 def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
-    """|α| around the stop of each motion, unshaped and shaped, with the fitted decay from t_b on.
+    """Draw |α| around the stop of each motion, unshaped and shaped, with the decay fitted from t_b.
 
-    Time is zero when the reference starts.
-
-    Raises:
-        NotMeasurableError: Less than 0.3 s were recorded after a stop.
+    Time 0 is the start of the reference. Raises NotMeasurableError if less than 0.3 s were recorded after a stop.
     """
     figure, axes = panels(len(motions), 0.6 + 2.0 * len(motions), share_x=False)
     for panel, (name, both) in zip(axes, motions.items(), strict=True):
@@ -147,13 +136,13 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
 
 
 def _draw(panel: Axes, recorded: Recorded, style: Series, label: str) -> tuple[Residual, str]:
-    """Draw one recording; return its residual vibration, and how it was found if not from a drawn decay."""
+    """Draw one recording; return its residual vibration, and the method if it was not a drawn decay."""
     recording, motion = recorded
     start, rv = recording.time[motion.start], residual(recording, motion)
     alpha = amplitude(tool_acceleration(recording))
     rows = slice(motion.start, motion.end)
     panel.plot(recording.time[rows] - start, alpha[rows], **style.line(1.1, label=label))
-    # At the end of the recorded rest nothing but the sensor's noise is left.
+    # At the end of the recorded rest, only the sensor's noise is left.
     quiet = int(np.searchsorted(recording.time, recording.time[motion.end - 1] - QUIET))
     noise = np.max(alpha[max(quiet, motion.shaped_stop + 1) : motion.end])
     if np.count_nonzero(rv.peaks > LOUD * noise) <= 1:

@@ -1,4 +1,4 @@
-"""ShaperBench's figure: time until the arm is still against the residual vibration after the shaped stop."""
+"""ShaperBench's figure: settling time of the arm against the residual vibration after the shaped stop."""
 
 import math
 from collections.abc import Sequence
@@ -21,14 +21,13 @@ from tvist_lab.figures.style import (
 )
 
 NOTICEABLE = 1.01
-"""Largest peak over its limit that is drawn as one that keeps it [-]; a filter's own ripple stays below."""
+"""Largest peak over its limit that still counts as keeping it [-]; a filter's own ripple stays below."""
 
 
 def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
-    """Draw each ranked shaper as a point, with medians over arms, moves and payload errors, and the front as a line.
-
-    A triangle exceeds a limit of the motion by more than 1 %; beside it is the largest peak over its limit.
-    """
+    """Draw the medians of each ranked shaper over arms, moves and payload errors, and the Pareto front as a line."""
+    # A triangle marks a shaper that exceeds a limit of the motion by more than 1 %, with its largest peak
+    # over the limit.
     figure, (panel,) = panels(1, 4.6)
     panel.set_yscale("log")
     placed: list[tuple[float, float, bool]] = []
@@ -73,10 +72,8 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
 
 
 def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
-    """Draw the time until the arm is still against the shaper's delay, median and 90th percentile of each shaper.
-
-    On the line, an arm is still as soon as its shaped reference stops.
-    """
+    """Draw median and 90th percentile of the settling time against each shaper's delay."""
+    # On the diagonal, the arm is at rest as soon as its shaped reference stops.
     figure, (panel,) = panels(1, 4.2)
     known = [row for row in rows if row["time_until_still_ms_median"] is not None]
     for place, row in enumerate(sorted(known, key=lambda row: float(row["declared_delay_ms_median"]))):
@@ -105,23 +102,23 @@ def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
 
 
 def _slowest(row: dict[str, Any]) -> float:
-    """90th percentile of the time until still, or the median where more than a tenth never are [ms]."""
+    """Return the 90th percentile of the settling time [ms], or the median if over a tenth never settle."""
     slow = row["time_until_still_ms_p90"]
     return float(row["time_until_still_ms_median"] if slow is None else slow)
 
 
 def _excess(row: dict[str, Any]) -> float:
-    """Largest peak of acceleration or velocity over its limit [-]."""
+    """Return the largest peak of acceleration or velocity over its limit [-]."""
     return max(float(row[f"reference_{kind}_ratio_max"]) for kind in ("acceleration", "velocity"))
 
 
 def _point(row: dict[str, Any]) -> tuple[float, float]:
-    """Residual vibration [m/s²] and time until still [ms]."""
+    """Return residual vibration [m/s²] and settling time [ms]."""
     return row["residual_m_s2_median"], row["time_until_still_ms_median"]
 
 
 def _beside(place: int, point: tuple[float, float], points: Sequence[tuple[float, float]]) -> bool:
-    """Return whether to put a name on the right: away from a neighbour of similar height, else alternately."""
+    """Whether to put a name on the right: away from a neighbour of similar height, else alternately."""
     x, y = point
     level = [other for other, height in points if abs(math.log(y / height)) < 0.12]
     if any(0.0 < other - x < 45.0 for other in level):

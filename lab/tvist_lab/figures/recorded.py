@@ -1,4 +1,4 @@
-"""Figures 12 to 14: everything recorded of a motion, unshaped and shaped on one clock."""
+"""Figures 12 to 14: all recorded signals of a motion, unshaped and shaped."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,31 +24,27 @@ from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
 
 LEAD, REST = 0.1, 1.0
-"""Time shown before the reference starts, and after the shaped one has stopped [s]."""
+"""Time shown before the reference's start and after the shaped reference's stop [s]."""
 NEAR = 0.15
-"""Largest distance to the attained position on the axis [mm]; five times the repeatability."""
+"""Largest distance to the final position on the axis [mm]; five times the repeatability."""
 SYMBOLS = {
     r"$\ddot q^*$": "acceleration of the shaped reference",
     "$E$": "distance of the tool from where it comes to rest",
 } | OF_ALPHA
-"""What the symbols on the axes mean."""
 MODE = {
     "estimated_f_d": ("$f_d$", "damped frequency", "Hz", (5.0, 16.0), 5.0),
     "estimated_zeta": (r"$\zeta$", "damping ratio", "–", (0.1, 0.4), 0.1),
 }
-"""Columns of the shaper's mode: symbol, meaning, unit, what the axis shows at least, and the distance of its ticks."""
+"""Columns of the shaper's mode: symbol, meaning, unit, smallest range of the axis, distance of its ticks."""
 
 Recorded = tuple[Recording, MotionRows]
-"""A recording and one of its motions."""
 
 
 def motion_figure(name: str, *recorded: Recorded) -> Figure:
-    """Draw over time: accelerations of the reference, E, |α|, and the shaper's mode unless it is constant.
+    """Draw accelerations of the reference, E, |α| and, unless it is constant, the shaper's mode over time.
 
-    It is of one recorded motion, or of the same one without and with shaping. Time is zero when the reference starts.
-
-    Raises:
-        NotMeasurableError: The attained position cannot be determined, because too little rest was recorded.
+    `recorded` is one motion, or the same motion without and with shaping; time 0 is the start of the
+    reference. Raises NotMeasurableError if too little rest was recorded.
     """
     styles = {"Unshaped": OF_UNSHAPED, "Shaped": OF_SHAPED} if len(recorded) > 1 else {"Recorded": OF_SHAPED}
     varying = [column for column in MODE if any(_varies(*one, column) for one in recorded)]
@@ -61,7 +57,7 @@ def motion_figure(name: str, *recorded: Recorded) -> Figure:
         rows = slice(int(ends[0]), min(int(ends[1]) + 1, motion.end))
         time = recording.time[rows] - start
         how = style.line(1.1)
-        # Dashes of equal curves would fill each other's gaps.
+        # Dashes of equal curves would fill each other's gaps and look solid.
         for number, (qdd, _) in enumerate(_alike(recording["target_qdd"][rows])):
             accelerations.plot(time, qdd, label=None if number else label, **how)
         E = 1e3 * distance(recording, motion)
@@ -93,13 +89,13 @@ def motion_figure(name: str, *recorded: Recorded) -> Figure:
 
 
 def _varies(recording: Recording, motion: MotionRows, column: str) -> bool:
-    """Whether a mode changes during a motion, by more than a part in a thousand."""
+    """Whether a mode changes during a motion by more than 0.1 %."""
     values = recording[column][motion.start : motion.shaped_stop + 1]
     return bool(len(values) and np.any(np.ptp(values, axis=0) > 1e-3 * np.abs(values[0])))
 
 
 def _name_joints(panel: Axes, recording: Recording, motion: MotionRows) -> None:
-    """Write names of joints beside their accelerations; joints that move alike share a line and its label."""
+    """Label the accelerations with joint names; joints that move alike share a line and a label."""
     qdd = recording["target_qdd"][motion.start : motion.shaped_stop + 2]
     size = np.max(np.abs(qdd), axis=1)
     plateau = int(np.argmax(size > 0.98 * size.max()))
@@ -112,7 +108,7 @@ def _name_joints(panel: Axes, recording: Recording, motion: MotionRows) -> None:
 
 
 def _alike(qdd: Floats) -> list[tuple[Floats, list[int]]]:
-    """Accelerations that differ, shape (T,) [rad/s²], each with the joints that have it."""
+    """Return the distinct accelerations, shape (T,) [rad/s²], each with its joints."""
     near = 0.02 * float(np.max(np.abs(qdd)))
     groups: list[tuple[Floats, list[int]]] = []
     for joint, values in enumerate(qdd.T):

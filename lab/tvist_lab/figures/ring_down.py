@@ -1,4 +1,4 @@
-"""A ring-down: how the tool vibrates after a stop, at which frequencies, and how they die away."""
+"""Figure of a ring-down: vibration after a stop, its frequencies, and their decay."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ from tvist_lab.recordings import Floats
 BEFORE, AFTER = 0.1, 0.7
 """Time shown before and after the stop [s]."""
 BLOCK = 0.2
-"""Duration of the data of one spectrum of the spectrogram [s]: what changes faster is smeared over it."""
+"""Duration of the data of one spectrum of the spectrogram [s]; faster changes are smeared over it."""
 HIGHEST = 45.0
 """Largest frequency shown [Hz]."""
 RANGE = 40.0
@@ -40,17 +40,14 @@ LINES = 4096
 def ring_down_figure(name: str, recorded: Recorded) -> Figure:
     """Draw the tool's acceleration after a stop, the mode fitted to it, its spectrum and its spectrogram.
 
-    Top: the acceleration along the axis in which the tool vibrates most, with the envelope of the fit. Middle: the
-    spectrum of all three axes together after the stop. Bottom: levels of all axes relative to the largest.
-
-    Raises:
-        NotMeasurableError: The accelerometer was not recorded, or less rest than a fit needs.
+    Top: the axis that vibrates most, with the envelope of the fit. Middle: spectrum of all axes after the stop.
+    Bottom: levels relative to the largest. Raises NotMeasurableError without accelerometer or enough rest.
     """
     recording, motion = recorded
     period = recording.period
     late, alpha = felt(recording, motion, slice(motion.start, motion.end))
     late = late - float(recording.time[motion.arm_stop(recording)])
-    # Samples at even times around the stop; missing ones are interpolated.
+    # Resample at even times around the stop, which fills in missing samples.
     ends = max(late[0], -BEFORE - BLOCK), min(late[-1], AFTER)
     time: Floats = period * np.arange(round(ends[0] / period), round(ends[1] / period) + 1)
     alpha = np.column_stack([np.interp(time, late, axis) for axis in alpha.T])
@@ -109,7 +106,6 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
 
 
 def _draw_levels(panel: Axes, time: Floats, alpha: Floats, fit: RingDown) -> None:
-    """The spectrogram of all axes together."""
     period = float(time[1] - time[0])
     size = min(round(BLOCK / period), len(alpha))
     overlap, padded = size - max(size // 50, 1), max(512, 8 * size)

@@ -1,4 +1,4 @@
-"""Style sheets of matplotlib, in which figures are drawn, and the files of figures."""
+"""Style sheets and files of figures."""
 
 import shutil
 from collections.abc import Iterator
@@ -15,40 +15,35 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 STYLES = ("paper", "slides")
-"""Style sheets besides the usual one: words in a text beside the figure, and larger type."""
+"""Style sheets besides the default: for papers, with text beside the figure, and for slides, with larger type."""
 SUFFIX = ".mplstyle"
-"""End of the name of a style sheet."""
 RANGES = {"figure.figsize": (2.0, 40.0), "savefig.dpi": (30.0, 2400.0)}
-"""Least and largest width [inch] and resolution [dots per inch] that a file may set."""
+"""Range of width [inch] and resolution [dots per inch] in a style sheet."""
 WIDTH, COLUMN = 183.0 / 25.4, 89.0 / 25.4
-"""Width of two columns of a journal and of one [inch]."""
+"""Width of two columns of a journal, and of one [inch]."""
 NOT_OF_STYLE = ("backend", "interactive", "savefig.directory", "savefig.format", "toolbar")
-"""Settings of the program that draws, not of its figures."""
+"""Settings of the drawing program rather than of its figures."""
 SMALLER = 0.8
-"""Size of text and lines over one column, as a share of that over two [-]."""
+"""Size of text and lines for one column, relative to that for two [-]."""
 SIZES = ("font.size", "lines.linewidth", "lines.markersize")
 """Settings to which all other sizes are relative."""
 STABLE: dict[str, dict[str, Any]] = {
     ".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}
 }  # fmt: skip
-"""Metadata without the date and the program's version, so that equal figures give equal files."""
+"""Metadata without date and program version, so that equal figures give equal files."""
 in_print: ContextVar[bool] = ContextVar("in_print", default=False)
-"""Whether figures have no headings and explanations, because a caption has them."""
+"""Whether figures have no headings and explanations, because a caption holds them."""
 
 
 class StyleError(ValueError):
-    """A style sheet cannot be used; the message says why."""
+    """A style sheet cannot be used; the message tells why."""
 
 
 @contextmanager
 def house_style(*styles: str) -> Iterator[None]:
-    """Draw and save figures in this style.
+    """Draw and save figures in the given styles: any of `STYLES`, or paths of style sheets; later ones win.
 
-    Args:
-        styles: Any of `STYLES`, and paths of your own style sheets; later ones take precedence.
-
-    Raises:
-        StyleError: One of them is neither, cannot be read, or has an unknown setting or a wrong value.
+    Raises StyleError if a style is unknown, unreadable, or has a wrong setting.
     """
     settings: Any = house_settings(*styles)
     before = in_print.set("paper" in styles)
@@ -60,7 +55,7 @@ def house_style(*styles: str) -> Iterator[None]:
 
 
 def house_settings(*styles: str) -> dict[str, Any]:
-    """Return matplotlib's settings of `house_style`, for a notebook that has one style throughout."""
+    """Return matplotlib's settings of `house_style`, for a notebook that keeps one style."""
     settings, own = _shipped("house"), dict[str, Any]()
     for style in styles:
         if style in STYLES:
@@ -72,7 +67,7 @@ def house_settings(*styles: str) -> dict[str, Any]:
                 f"style is {style!r}: must be {', '.join(STYLES)} or a file that ends in {SUFFIX}"
             )
     settings |= own
-    # Text remains readable in a narrow figure; one's own sheet may say how large it is, whatever the width.
+    # Text shrinks less than a narrow figure, to stay readable; a user's sheet may fix its size.
     narrow = np.interp(settings["figure.figsize"][0], (COLUMN, WIDTH), (SMALLER, 1.0))
     for name in SIZES:
         settings[name] *= 1.0 if "font.size" in own else float(narrow)
@@ -80,7 +75,6 @@ def house_settings(*styles: str) -> dict[str, Any]:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """The settings of a user's style sheet."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -111,16 +105,9 @@ def _shipped(name: str) -> dict[str, Any]:
 
 
 def save(figure: Figure, path: str | Path) -> Path:
-    """Write a figure; the suffix determines the format, and missing folders are created.
+    """Write a figure in the format of the suffix, create missing folders, and return the path.
 
-    In the style `paper`, what its headings and explanations say is written beside it, as NAME.txt.
-
-    Args:
-        figure: The figure, in the style in which it was drawn.
-        path: File to write.
-
-    Returns:
-        Path of the file.
+    In the style `paper`, headings and explanations are written beside it, as NAME.txt.
     """
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -131,12 +118,12 @@ def save(figure: Figure, path: str | Path) -> Path:
 
 
 def headed(figure: Figure | SubFigure) -> list[Axes]:
-    """Return the panels whose heading is left out: it is their label. That of a colour bar begins with "<"."""
+    """Return the panels without visible heading, which is their label; labels of colour bars start with "<"."""
     return [panel for panel in figure.axes if not str(panel.get_label() or "<").startswith("<")]
 
 
 def caption(figure: Figure) -> str:
-    """Return what headings and explanations of a figure say; letters name panels if several have headings."""
+    """Return headings and explanations of a figure; letters name panels if several have headings."""
     headings = [str(panel.get_label()) for panel in headed(figure)]
     if len(headings) > 1:
         headings = [f"{letter}: {words}" for letter, words in zip(ascii_lowercase, headings, strict=False)]

@@ -1,4 +1,4 @@
-"""What studies show: medians over their axes, shapers beside each other, and every move as a point."""
+"""Figures of studies: medians over their axes, shapers side by side, and every move as a point."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -25,9 +25,9 @@ from tvist_lab.study.work import Row
 from tvist_lab.words import MANY
 
 EACH = 0.22
-"""Height of a setting of a sweep [inch]."""
+"""Height for each setting of a sweep [inch]."""
 LONG = 16
-"""Number of letters from which on a name takes two lines."""
+"""Length from which a name takes two lines [letters]."""
 FLOOR = 1e-4
 """Smaller peaks are drawn at this value [m/s²]."""
 
@@ -35,11 +35,9 @@ FLOOR = 1e-4
 def study_figure(
     summary: Sequence[dict[str, Any]], by: Sequence[str], show: Sequence[str], *, few: bool
 ) -> Figure:
-    """Draw medians, with a band from the 5th to the 95th percentile; of few rows, from the least to the most.
-
-    They are lines with bands if the first axis is numeric, otherwise dots with bars. The other axes are named with the
-    method.
-    """
+    """Draw medians with a band from the 5th to the 95th percentile; with few rows, from minimum to maximum."""
+    # If the first axis is numeric, draw lines with bands, else dots with bars. Names show the other axes
+    # and the method.
     places = list(dict.fromkeys(entry[by[0]] if by else "" for entry in summary))
     lines: dict[str, list[dict[str, Any]]] = {}
     for entry in summary:
@@ -78,7 +76,7 @@ def _dots(
     *,
     both: bool = False,
 ) -> None:
-    """Draw values with bars, a line of the panel for each name: low, middle and high of each name, by series."""
+    """Draw values with bars, one line per name; each series has low, middle and high of every name."""
     for number, (label, values) in enumerate(series):
         style = SERIES[number % len(SERIES)]
         y = np.arange(len(names)) + 0.65 * ((number + 0.5) / len(series) - 0.5)
@@ -92,7 +90,7 @@ def _dots(
 
 
 def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> Figure:
-    """Draw the median of the reduction with a bar to its 5th percentile, and the median of the delay, by setting."""
+    """Draw the median reduction with a bar to its 5th percentile, and the median delay, for each setting."""
     names = list(dict.fromkeys(settings))
     shapers = list(dict.fromkeys(entry["shaper"] for entry in entries))
     height = 1.9 + EACH * (1.0 + 0.3 * len(shapers)) * len(names)
@@ -126,9 +124,9 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
 def robustness_figure(
     cells: Mapping[str, Sequence[dict[str, Any]]], errors: Mapping[str, Sequence[float]]
 ) -> Figure:
-    """Draw the median of the reduction with a bar to its 5th percentile, each the worse of ± an error, by shaper.
+    """Draw the reduction by shaper, median with a bar to the 5th percentile, the worse of ± each error.
 
-    `cells` are those of `tvist_lab.studies.robustness`: entries of each kind of error, by shaper, ordered by delay.
+    `cells` are entries by kind of error, ordered by delay; see `tvist_lab.studies.robustness`.
     """
     sizes = {kind: sorted({abs(error) for error in those}) for kind, those in errors.items()}
     every = {(kind, one["shaper"], one["error"]): one for kind, those in cells.items() for one in those}
@@ -159,14 +157,14 @@ def robustness_figure(
 
 
 def _label(name: str) -> str:
-    """A shaper's name in two lines if it is long."""
+    """Break a long shaper name into two lines."""
     words = name.split("_")
     half = (len(words) + 1) // 2
     return name if len(name) < LONG else "_".join(words[:half]) + "_\n" + "_".join(words[half:])
 
 
 def residual_by_move_figure(rows: Sequence[Row]) -> Figure:
-    """Peak |α| after the stop, shaped against unshaped, one point per row; and the distribution of the reductions."""
+    """Draw peak |α| after the stop, shaped against unshaped, by move, and the distribution of the reductions."""
     reductions = np.sort([row["reduction_percent"] for row in rows if row["reduction_percent"] is not None])
     several = reductions.size >= MANY
     figure, (above, *rest) = panels(

@@ -1,8 +1,7 @@
-"""What figures are drawn with: series that differ to the colour-blind, and words that explain every axis.
+"""Building blocks of figures: panels, series that colour-blind readers can tell apart, legends and notes.
 
-A figure is drawn within `with house_style():`, whose style sheet has its sizes and colours. Each colour has
-dashes and a marker of its own. Dashed lines are drawn over full ones, so that both are seen where they coincide,
-and nothing that stands for data is transparent.
+Draw a figure within `with house_style():`, whose style sheet sets sizes and colours. Each colour has its own dashes
+and marker. Dashed lines lie over solid ones, so that both show where they coincide; no data is transparent.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,47 +21,44 @@ from numpy.typing import NDArray
 from tvist_lab.figures.sheets import headed, in_print
 
 SHAPED, UNSHAPED, THIRD = "C0", "C1", "C2"
-"""Colours of what is shaped, of what is not, and of a third series, as places in the style sheet's cycle."""
+"""Colours of shaped, unshaped and a third series, as places in the style sheet's cycle."""
 INK = "#1F2933"
 """Colour of text and axes."""
 FAINT = "#8A8A8A"
 """Colour of limits and other auxiliary lines."""
 MUTED = "#5B6670"
-"""Colour of less important text."""
+"""Colour of secondary text."""
 LIMIT = (0, (4, 3))
 """Dashes of limits and other auxiliary lines."""
 ALPHA = r"$|\alpha|$ (m/s²)"
-"""Label of the axis of the tool's acceleration."""
+"""Axis label for the tool's acceleration."""
 OF_ALPHA = {r"$|\alpha|$": "acceleration of the tool, without gravity"}
-"""What its symbol means."""
 USUAL = {"lines.linewidth": 1.4, "lines.markersize": 4.0, "font.size": 8.0}
-"""Sizes of the usual style, to which those in this package are relative [pt]."""
+"""Sizes of the default style, to which those in this package are relative [pt]."""
 NEAR = 0.035
-"""Points that are closer than this share of the axis share a name [-]."""
+"""Share of the axis below which neighbouring points share a name [-]."""
 
 
 class Series(NamedTuple):
-    """How one of several curves is drawn."""
+    """Style of one curve among several."""
 
     cycled: str
-    """Its colour, as a place in the style sheet's."""
     dashes: Any
-    """Line style of matplotlib."""
     marker: str
 
     @property
     def color(self) -> str:
-        """Its colour in the style sheet that is in use, as #rrggbb."""
+        """Colour in the present style sheet, as #rrggbb."""
         return to_hex(self.cycled)
 
     def line(self, width: float = USUAL["lines.linewidth"], **more: Any) -> dict[str, Any]:
-        """Return the arguments of `plot` for a curve of this width in the usual style [pt]."""
+        """Return the arguments of `plot` for a curve, with its width in the default style [pt]."""
         above = 2.0 if self.dashes == "-" else 2.5
         wide = width * _scale("lines.linewidth")
         return {"color": self.color, "linestyle": self.dashes, "linewidth": wide, "zorder": above, **more}
 
     def points(self, size: float = USUAL["lines.markersize"], **more: Any) -> dict[str, Any]:
-        """Return the arguments of `plot` for points of this size in the usual style [pt], without a line."""
+        """Return the arguments of `plot` for points without a line, with their size in the default style [pt]."""
         large = size * _scale("lines.markersize")
         return {"color": self.color, "linestyle": "none", "marker": self.marker, "markersize": large, **more}
 
@@ -77,19 +73,17 @@ SERIES = (
     Series("C6", (0, (2, 2)), "X"),
     Series("C7", (0, (8, 2, 3, 2)), "*"),
 )
-"""Styles of curves, in the order in which they are used."""
 OF_SHAPED, OF_UNSHAPED, OF_THIRD = SERIES[:3]
-"""Styles of what is shaped, of what is not, and of a third one."""
 
 
 def _scale(name: str) -> float:
-    """How much larger a size of the style sheet is than in the usual one [-]."""
+    """Return the ratio of a size in the style sheet to the default [-]."""
     settings: Any = rcParams
     return float(settings[name]) / USUAL[name]
 
 
 def tint(color: str, share: float = 0.2) -> str:
-    """Mix a share of a colour with white, to fill areas without being transparent."""
+    """Mix a share of a colour with white, to fill areas without transparency."""
     red, green, blue = (share * part + 1.0 - share for part in to_rgb(color))
     return to_hex((red, green, blue))
 
@@ -103,18 +97,10 @@ def panels(
     share_y: bool = False,
     ratios: Sequence[float] | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Create a figure of panels, as wide as the style sheet says.
+    """Create a figure as wide as the style sheet says; return it and its panels row by row.
 
-    Args:
-        rows: Number of rows.
-        height: Height of the figure in the usual style [inch]; larger type makes it higher.
-        columns: Number of panels side by side.
-        share_x: Whether all panels of a column share the lowest one's axis.
-        share_y: Whether all panels of a row share the leftmost one's axis.
-        ratios: Relative heights of the rows.
-
-    Returns:
-        The figure, and its panels row by row.
+    `height` is in inches in the default style (larger type makes it higher); with `share_x` the panels of a column
+    share the lowest axis, with `share_y` those of a row the leftmost; `ratios` are the heights of the rows.
     """
     size = rcParams["figure.figsize"][0], height * _scale("font.size") ** 0.5
     figure = Figure(figsize=size, layout="constrained")
@@ -131,7 +117,7 @@ def panels(
 
 
 def decades(panel: Axes, *axes: str) -> None:
-    """Label logarithmic axes, "x" or "y", in plain numbers: 1, 2, 5 of a decade, or all digits of a part."""
+    """Label logarithmic axes "x" or "y" in plain numbers: 1, 2, 5 per decade, or all digits within one."""
     for name in axes:
         axis = panel.xaxis if name == "x" else panel.yaxis
         axis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -139,7 +125,7 @@ def decades(panel: Axes, *axes: str) -> None:
 
 
 class _Digits(Formatter):
-    """Labels of the ticks between powers of ten."""
+    """Tick labels between powers of ten."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:  # noqa: ARG002  the interface's
         low, high = (1.0, 1.0) if self.axis is None else self.axis.get_view_interval()
@@ -148,7 +134,7 @@ class _Digits(Formatter):
 
 
 def title(panel: Axes, words: str) -> None:
-    """Write a panel's heading; in print, it is for the caption, and letters name several panels."""
+    """Write a panel's heading; for print it becomes part of the caption, and letters name several panels."""
     if not in_print.get():
         panel.set_title(words, wrap=True)
         return
@@ -159,13 +145,7 @@ def title(panel: Axes, words: str) -> None:
 
 
 def legend(figure: Figure, panel: Axes, symbols: Mapping[str, str] | None = None) -> None:
-    """Draw one legend for the whole figure above its panels, with the entries of one panel.
-
-    Args:
-        figure: The figure.
-        panel: The panel.
-        symbols: Symbols to explain below the panels, see `explain`.
-    """
+    """Draw one legend above all panels with the entries of `panel`, and explain symbols below, see `explain`."""
     handles, labels = panel.get_legend_handles_labels()
     for columns in range(len(labels), 0, -1):
         box = figure.legend(handles, labels, loc="outside upper right", ncols=columns)
@@ -177,7 +157,7 @@ def legend(figure: Figure, panel: Axes, symbols: Mapping[str, str] | None = None
 
 
 def explain(figure: Figure, symbols: Mapping[str, str]) -> None:
-    """Write below the panels what the symbols on the axes mean; in print, it is for the caption."""
+    """Explain the symbols on the axes below the panels; for print in the caption."""
     said = [f"{symbol}: {meaning}" for symbol, meaning in symbols.items()]
     if in_print.get():
         figure.set_label(". ".join(said))
@@ -186,7 +166,7 @@ def explain(figure: Figure, symbols: Mapping[str, str]) -> None:
 
 
 def literal(words: str) -> str:
-    """Return words that matplotlib writes as they are, whatever a user called a file."""
+    """Escape words for matplotlib, such as a file name with $."""
     plain = words.replace("$", r"\$")
     return f" {plain}" if plain.startswith("_") else plain
 
@@ -197,7 +177,7 @@ def dashed(panel: Axes, height: float, *, color: str = INK, width: float = 0.8, 
 
 
 def dotted(panel: Axes, at: float, *, color: str = FAINT, width: float = 0.9) -> None:
-    """Draw a moment: a dotted line from the bottom to the top of a panel."""
+    """Draw a moment: a dotted vertical line through a panel."""
     panel.axvline(at, color=color, linewidth=width, linestyle=":")
 
 
@@ -208,15 +188,7 @@ def note(
     offset: tuple[float, float] | None = None,
     **how: Any,
 ) -> Text:
-    """Write small text within a panel.
-
-    Args:
-        panel: The panel.
-        words: The text.
-        at: Point, in data coordinates unless `xycoords` names others.
-        offset: Distance of the text from the point [pt].
-        how: Further arguments of `annotate`.
-    """
+    """Write small text at a point in data coordinates, unless `xycoords` names others, with an offset [pt]."""
     backing = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
     if offset is not None:
         how |= {"xytext": offset, "textcoords": "offset points"}
@@ -224,21 +196,14 @@ def note(
 
 
 def remark(panel: Axes, words: str, at: tuple[float, float], **how: Any) -> Text:
-    """Write small text at a place of a panel, as shares of its width and height; see `note`."""
+    """Write small text at a place given as shares of a panel's width and height; see `note`."""
     return note(panel, words, at, xycoords="axes fraction", **how)
 
 
 def name_over(
     panel: Axes, x: NDArray[np.float64], highest: NDArray[np.float64], names: Sequence[str]
 ) -> None:
-    """Write names upwards from the highest point at each place; names of places that are close share a line.
-
-    Args:
-        panel: The panel.
-        x: Places, shape (N,).
-        highest: Highest point at each place, shape (N,).
-        names: N names.
-    """
+    """Write names upwards from the highest point at each x, both of shape (N,); close names share a line."""
     near = NEAR * float(np.ptp(x))
     groups: list[list[int]] = []
     for place in map(int, np.argsort(x, kind="stable")):

@@ -1,4 +1,4 @@
-"""What shapers leave of the vibration where the frequency is another one than theirs, and what it costs in time."""
+"""Figures of the residual vibration of shapers for a wrong frequency, and of their cost in time."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -28,25 +28,25 @@ from tvist_shaping import Shaper, residual
 DESIGN, SPAN = 10.5, (6.0, 15.0)
 """Design frequency of the shapers of figure 4, and range of the UR5e's first mode with 5 kg [Hz]."""
 SHOWN_HZ = (5.5, 16.0)
-"""Frequencies on the axis of figure 4 [Hz]."""
+"""Range of the frequency axis in figure 4 [Hz]."""
 ERRORS = (0.0, 0.1, 0.2)
-"""Errors of the frequency for which settling is drawn [-]."""
+"""Frequency errors for which settling is drawn [-]."""
 FAMILIES = {
     "Zero vibration": ("zv", "mzv", "zvd", "zvdd", "zvddd"),
     "Extra-insensitive": ("ei", "ei_exact", "si", "ei2", "ei2_exact", "ei3", "ei3_exact"),
     "Negative impulses: short, but beyond the reference's limits": ("um_zv", "um_zvd"),
 }
-"""Panels and their shapers; those in none of them share a panel at the end."""
+"""Panels and their shapers; all others share a last panel."""
 SHOWN_SHARE = (0.4, 1.7)
 """Range of the axis: true divided by assumed frequency [-]."""
 HIGHEST = 25.0
 """Largest residual vibration on the axis [%]."""
 WIDEST = 1.6
-"""Largest width that is drawn; unlimited bands are drawn here [-]."""
+"""Largest band width on the axis; unlimited bands are drawn here [-]."""
 
 
 def figure_4() -> Figure:
-    """Residual vibration of ZV, ZVD and EI, undamped, over the true frequency."""
+    """Draw the residual vibration of ZV, ZVD and EI, undamped, over the true frequency."""
     figure, (panel,) = panels(1, 3.4)
     f, ends = np.linspace(*SHOWN_HZ, 1051), np.array(SPAN)
     worst = np.inf
@@ -80,10 +80,8 @@ def sensitivity_figure(shapers: Sequence[Shaper], zeta: float, errors: Floats) -
 
 
 def settling_against_delay_figure(shapers: Iterable[Shaper], f_d: float, zeta: float) -> Figure:
-    """Draw how soon a mode settles with each shaper against its delay, for errors of the frequency.
-
-    Shapers that do not support this damping are left out.
-    """
+    """Draw the settling time of a mode with each shaper against its delay, for frequency errors."""
+    # Shapers that do not support this damping are left out.
     shown = [shaper for shaper in shapers if zeta < shaper.zeta_max]
     delay = np.array([1e3 * shaper.impulses(f_d, zeta).duration for shaper in shown])
     times = np.array([[1e3 * settling_time(one, f_d, zeta, error) for one in shown] for error in ERRORS])
@@ -106,10 +104,8 @@ def settling_against_delay_figure(shapers: Iterable[Shaper], f_d: float, zeta: f
 
 
 def catalogue_figure(shapers: Iterable[Shaper], zeta: float = 0.0) -> Figure:
-    """Residual vibration of each shaper against the true frequency; the width of its band against its duration.
-
-    Shapers that do not support this damping, or do not shape, are left out.
-    """
+    """Draw each shaper's residual vibration over the true frequency, and its band width against its duration."""
+    # Shapers that do not support this damping, or do not shape, are left out.
     shown = {shaper.name: shaper for shaper in shapers if zeta < shaper.zeta_max and shaper.duration_periods}
     placed = {name for names in FAMILIES.values() for name in names}
     families = FAMILIES | {"Others": tuple(name for name in shown if name not in placed)}
@@ -143,7 +139,7 @@ def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
         exceeds = group[0].peak > 1.0
         panel.plot(*place, **(OF_UNSHAPED if exceeds else OF_SHAPED).points(4.5))
         words = ", ".join(shaper.name for shaper in group)
-        # Names stand where there is room: above what exceeds limits, below what is long, else beside.
+        # Put names where there is room: above shapers that exceed limits, below long ones, else beside.
         offset, ha, va = (6, 4 if words.endswith("_exact") and len(group) == 1 else 0), "left", "center"
         if exceeds:
             offset, ha, va = (4, 4), "right", "bottom"

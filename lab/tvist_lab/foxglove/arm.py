@@ -1,4 +1,4 @@
-"""The recorded arm as frames and bodies: where each link stands on its predecessor, and what is drawn on it."""
+"""The recorded arm as frames and bodies: the pose of each link on its predecessor, and its shape."""
 
 from dataclasses import dataclass
 
@@ -18,29 +18,28 @@ from tvist_protocol.errors import ProtocolError
 _, Y, Z = np.eye(3)
 BASE, PAYLOAD = "world", "payload"
 THIN = 0.04
-"""Radius of a link whose shape nobody knows, by the arm's reach [-]."""
+"""Radius of a link of unknown shape, relative to the arm's reach [-]."""
 
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm of n joints; the frame of a link is at its far end, that of the last link is the flange."""
+    """An arm of n joints; a link's frame is at its far end, the last one is the flange."""
 
     frames: tuple[str, ...]
-    """Names of the frames: the base, and each link's."""
+    """Names of the frames: the base, and one for each link."""
     turns: Rotation
-    """Rotation of each link's frame against its joint at angle 0, n of them."""
+    """Rotation of each link's frame relative to its joint at angle 0, n of them."""
     shifts: Floats
-    """Place of each link's frame in that of its joint, shape (n, 3) [m]."""
+    """Position of each link's frame in that of its joint, shape (n, 3) [m]."""
     bending: tuple[int, ...]
-    """Links that bend, each in its middle, about y and then z."""
+    """Links that bend in their middle, about y and then z."""
     bodies: tuple[Body, ...]
-    """Bodies to draw, each in the frame of its link, -1 for the base."""
+    """Bodies to draw, each in the frame of its link, or -1 for the base."""
 
     def steps(self, q: Floats, bends: Floats) -> tuple[Floats, Floats]:
-        """Return each link's frame in that of the link before.
+        """Return each link's position, shape (T, n, 3) [m], and quaternion x y z w in the frame of the link before.
 
-        `q` [rad] of the link side has shape (T, n), `bends` two angles for each link that bends. Returns places, shape
-        (T, n, 3) [m], and quaternions x y z w, shape (T, n, 4).
+        `q` [rad] of the link side has shape (T, n); `bends` has two angles for each bending link.
         """
         places, quaternions = [], []
         for joint, (angle, shift) in enumerate(zip(q.T, self.shifts, strict=True)):
@@ -61,7 +60,7 @@ def _about(axis: Floats, angles: Floats) -> Rotation:
 
 
 def arm_of(content: RecordingFile) -> Arm:
-    """Return the arm of a recording by its robot file, which servers record."""
+    """Return the arm of a recording from its robot file, which servers record."""
     if "description" not in (content.start or {}):
         raise RecordingError(
             f"{content.path} does not say what its robot looks like: record it with tvist serve --record"
@@ -93,7 +92,7 @@ def arm_of(content: RecordingFile) -> Arm:
 
 
 def _sticks(robot: RobotDescription, joints: Floats) -> tuple[Body, ...]:
-    """A thin body from each joint to the end of its link, for an arm from a URDF, whose shape nobody knows."""
+    """Return a thin body from each joint to the end of its link, for a URDF arm of unknown shape."""
     radius = THIN * float(np.linalg.norm(joints, axis=1).sum())
     return tuple(
         Body(name=name, link=link, start=(x, y, z), end=(0.0, 0.0, 0.0), radius=radius)

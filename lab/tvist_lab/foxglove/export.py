@@ -1,7 +1,4 @@
-"""A recording with what viewers need to draw its arm: the same messages, three channels more, and a layout beside it.
-
-The server records none of this: all of it follows from its messages, so no tick pays for it, and recordings stay small.
-"""
+"""Export a recording for viewers: the recorded messages, three channels computed from them, and a layout."""
 
 import json
 from collections.abc import Iterator
@@ -31,27 +28,27 @@ from tvist_protocol.recorded import END_METADATA, TICK_NS, topics
 from tvist_protocol.stream import State
 
 PICTURE_TICKS = 10
-"""Ticks between two messages about the frames: 50 a second show a vibration of 10 Hz, and viewers interpolate."""
+"""Ticks between two frames messages: 50 a second show a vibration of 10 Hz, and viewers interpolate."""
 DIGITS = 9
-"""Decimals of places [m] and quaternions, which shorten the file by a third."""
+"""Decimals of positions [m] and quaternions; rounding makes the file a third smaller."""
 LIGHT, DARK = (0.85, 0.87, 0.89), (0.36, 0.40, 0.44)
 """Colours of the arm's links, and of its base and payload: red, green, blue."""
 SCHEMAS = {"frames": "foxglove.FrameTransforms", "arm": "foxglove.SceneUpdate", "curves": "tvist.curves"}
-"""Schema of each channel, by the end of its topic. Viewers know those of Foxglove by name."""
+"""Schema of each channel, by the end of its topic; viewers know those of Foxglove by name."""
 
 _Entry = tuple[int, str, Schema | None, Any]
-"""Time [ns], topic, its schema, and the message: as it was recorded, or its content."""
+"""Time [ns], topic, schema, and the message: as recorded, or its content."""
 
 
 def export(content: RecordingFile, path: Path) -> list[str]:
-    """Write a recording with channels for viewers, and a layout for it, replacing both files.
+    """Write a recording with channels for viewers, and a layout, replacing both files; return notes on what is missing.
 
-    The channels are `frames` (`foxglove.FrameTransforms`, 50 a second), `arm` (`foxglove.SceneUpdate`, once) and
-    `curves` (every tick), each behind `tvist/<robot>/`. All else is as it was.
+    The channels are `frames` (`foxglove.FrameTransforms`, 50 a second), `arm` (`foxglove.SceneUpdate`, once)
+    and `curves` (every tick), each behind `tvist/<robot>/`.
     """
     arm, above = arm_of(content), topics(content.robot)[State].removesuffix("state")
     (stood, stiff), (drawn, lacking) = _stood(content, arm), _curves(content.recording)
-    # A viewer that has just opened the file shows what stands at its first time.
+    # A viewer first shows the messages at the file's first time, so the arm must be there.
     ticks = [
         int(content.recording["tick"][0]),
         *(one[0].tick for one in (content.journal, content.events) if one),
@@ -103,7 +100,7 @@ def _write(entries: Iterator[_Entry], stream: IO[bytes]) -> None:
 
 
 def _recorded(content: RecordingFile, above: str) -> Iterator[_Entry]:
-    """Yield what a recording holds, up to a damage, but the channels of an export."""
+    """Yield the records of a recording up to the first damage, without the channels of an earlier export."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, tuple[str, Schema | None]] = {}
     told = {END_METADATA}
@@ -159,10 +156,8 @@ def _entity(arm: Arm, body: Body) -> dict[str, Any]:
 
 
 def _stood(content: RecordingFile, arm: Arm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
-    """Return ticks, joint angles and bends of the first row of each ten ticks, and what is missing, in sentences.
-
-    They are true where the truth was recorded, else measured, without bent links.
-    """
+    """Return ticks, joint angles and bends of the first row in each ten ticks, and notes on what is missing."""
+    # Values are true if the truth was recorded, else measured, without bending.
     recording = content.recording
     rows = np.flatnonzero(np.diff(recording["tick"] // PICTURE_TICKS, prepend=-1.0))
     ticks, q = recording["tick"][rows], recording["actual_q"][rows]
@@ -205,10 +200,7 @@ def _transforms(
 
 
 def _curves(recording: Recording) -> tuple[Iterator[tuple[int, dict[str, float]]], list[str]]:
-    """Return |α| [m/s²], and the largest acceleration of a joint before and after the shaper [rad/s²], at every tick.
-
-    And what is missing in them, in sentences.
-    """
+    """Return |α| [m/s²] and the largest joint acceleration around the shaper [rad/s²] at every tick, and notes."""
     before, after = (np.abs(recording[f"{name}_qdd"]).max(axis=1) for name in ("unshaped", "target"))
     found, notes = {"after_shaper": after}, []
     if np.any(recording["shaper_delay"] > 0.0) and np.any(after) and np.array_equal(before, after):

@@ -11,25 +11,23 @@ from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats
 
 CONTRADICTION = 0.2
-"""A ring-down contradicts the others if this share of it is explained only by its own poles [-]."""
+"""Share of a ring-down explained only by its own poles from which it contradicts the others [-]."""
 SIGNIFICANT = 60.0
-"""Significance that is required for a contradiction, to exclude noise; see `OwnPoles.significance` [-]."""
+"""Significance required for a contradiction, to exclude noise; see `OwnPoles.significance` [-]."""
 SUSPECTS = 3
 """Number of ring-downs that are left out in turn."""
 GUILTY = 3
-"""If more than one ring-down in this number is wrong, the wrong ones cannot be determined."""
+"""If more than one in this number is wrong, the wrong ring-downs cannot be determined."""
 SINGLY = 14
 """Largest number of configurations that are left out one by one."""
 FOLDS = 10
-"""Number of parts of more of them."""
+"""Number of parts into which more configurations are divided."""
 
 
 def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
-    """Find ring-downs that no springs and drives can explain together with the others.
-
-    A wrong ring-down also spoils the fit of the others. So among the worst explained ones, the one whose omission
-    gives the best fit is left out, until the remaining ones agree.
-    """
+    """Find ring-downs that no springs and drives can explain together with the others."""
+    # A wrong ring-down also spoils the fit of the others. Among the worst explained ones, the one whose
+    # omission gives the best fit is therefore left out, until the rest agree.
     fit = fit_modal(arm, ringings)
     rest = list(range(len(ringings)))
     guilty: list[int] = []
@@ -55,8 +53,8 @@ def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
 def cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> tuple[list[LeftOut], Floats]:
     """Fit without each configuration in turn, or without each of `FOLDS` parts of many configurations.
 
-    Also return the covariance of the parameters' logarithms by the jackknife, shape (P, P), which sees what the model
-    leaves out as well as noise.
+    Also return the jackknife covariance of the parameters' logarithms, shape (P, P), which includes model
+    errors as well as noise.
     """
     places = {place: number for number, place in enumerate(dict.fromkeys(r.q.tobytes() for r in ringings))}
     folds = len(places) if len(places) <= SINGLY else FOLDS

@@ -1,4 +1,4 @@
-"""Ring-downs in, calibration out: springs and drives, polynomials where covered, and how far all of it goes."""
+"""Fit a calibration to ring-downs: springs and drives, polynomials where covered, and the accuracy of both."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -52,20 +52,20 @@ from tvist_shaping.estimators.drivetrain import Drivetrain
 TOLD = 3
 """Number of modes whose errors are reported."""
 MOST = 48
-"""Number of ring-downs that springs and drives are fitted to: more take longer and tell little more."""
+"""Number of ring-downs to which springs and drives are fitted; more take longer and add little."""
 WORKSPACE = 200
-"""Number of configurations in which the range of the modes is determined."""
+"""Number of configurations over which the range of the modes is determined."""
 MARGIN = 0.85
-"""Margin on the lowest frequency found over the workspace, and on the distance to the highest damping ratio [-]."""
+"""Margin on the lowest frequency over the workspace, and on the distance to the highest damping ratio [-]."""
 PLACES = 100
-"""Number of configurations of the workspace at which the calibration's accuracy is determined."""
+"""Number of configurations over which the calibration's accuracy is determined."""
 UNSEEN = 60
-"""Number of configurations at which it is compared with the truth."""
+"""Number of configurations at which a calibration is compared with the truth."""
 KNOWN = 5.0
-"""A configuration is known if the 95 % interval of the lowest f_d is within this of it [%]."""
+"""Largest half-width of the 95 % interval of the lowest f_d for a configuration to count as known [%]."""
 PROPOSED = 3
 CANDIDATES = 40
-"""Number of configurations among which moves are proposed."""
+"""Number of configurations from which proposed moves are chosen."""
 
 
 @dataclass(frozen=True)
@@ -78,20 +78,20 @@ class ModeErrors:
 
 @dataclass(frozen=True)
 class Found:
-    """A calibration from ring-downs, and how far it goes."""
+    """A calibration from ring-downs, and its accuracy."""
 
     calibration: Calibration
     stops: tuple[Stop, ...]
-    """All stops; those that contradict others have a reason, too."""
+    """All stops; those that were not used have a reason, also if they contradict others."""
     left: tuple[LeftOut, ...]
-    """The ring-downs that were fitted, and their modes by fits without them."""
+    """The fitted ring-downs, with their modes from fits without them."""
     forecast: Forecast
     known_percent: float
-    """Share of the workspace in which f_d of the lowest mode is known within `KNOWN`, with the heaviest payload [%]."""
+    """Share of the workspace in which the lowest f_d is known within `KNOWN` with the heaviest payload [%]."""
     least_known: tuple[Floats, Known]
-    """Configuration of the workspace at which it is known least, and the mode there."""
+    """Configuration of the workspace with the least known mode, and that mode."""
     proposals: tuple[Jog, ...]
-    """Jogs that would tell more."""
+    """Jogs that would add most information."""
     no_polynomial: str
     """Why the calibration has no polynomials; empty if it has."""
 
@@ -102,12 +102,12 @@ class Found:
 
     @property
     def modes(self) -> int:
-        """Number of modes that are reported: at most `TOLD`, fewer where fewer vibrate."""
+        """Number of reported modes: at most `TOLD`, fewer where fewer vibrate."""
         return min(TOLD, *(len(one.f_d) for one in self.left))
 
     @property
     def lowest_mode(self) -> tuple[Floats, Floats]:
-        """f_d [Hz] and ζ [-] by each ring-down that tells them accurately, and by fits without it, shapes (2, N)."""
+        """f_d [Hz] and ζ [-] in each ring-down that determines them, and from fits without it, shapes (2, N)."""
         sure = [one for one in self.left if 0 in one.own.certain]
         return (
             np.array([(one.own.f_d[0], one.own.zeta[0]) for one in sure]).reshape(-1, 2).T,
@@ -116,7 +116,7 @@ class Found:
 
     @property
     def amplitudes(self) -> list[float | None]:
-        """Median amplitude at which each reported mode was measured, that of |α| at the beginning [m/s²]."""
+        """Median initial |α| at which each reported mode was measured [m/s²]."""
         own = [[one.own.amplitude[k] for one in self.left if k in one.own.certain] for k in range(TOLD)]
         return [float(np.median(one)) if one else None for one in own]
 
@@ -124,18 +124,10 @@ class Found:
 def calibrate(
     description: RobotDescription, measured: Measured, *, name: str, command: str, progress: Progress
 ) -> Found:
-    """Fit springs and drives to all ring-downs that agree, and polynomials where they cover the workspace.
+    """Fit springs and drives to all ring-downs that agree, and polynomials if they cover the workspace.
 
-    Args:
-        description: The robot file, at whose springs and drives the search begins.
-        measured: Jogs, or logs.
-        name: Name of the calibration.
-        command: Command line that the user typed.
-        progress: Called before each step with what it does.
-
-    Raises:
-        IdentificationError: Too few stops can be used, or they contradict each other; the message says why.
-        RecordingError: A log cannot be used.
+    The search starts at the springs and drives of the robot file; `command` is the typed command line. Raises
+    IdentificationError if too few stops are usable or they disagree, RecordingError if a log is unusable.
     """
     stops, arm, ringings = agreeing(description, measured.logs, progress)
     progress("fitting springs and drives")
@@ -210,10 +202,8 @@ def calibrate(
 def agreeing(
     description: RobotDescription, logs: Sequence[Log], progress: Progress
 ) -> tuple[list[Stop], ArmModes, list[Ringing]]:
-    """Return all stops, the arm with their payloads, and at most `MOST` ring-downs, which do not contradict each other.
-
-    The ring-downs have the hysteresis of the gears that explains all of them best.
-    """
+    """Return all stops, the arm with their payloads, and at most `MOST` ring-downs that agree."""
+    # The ring-downs have the gear hysteresis that explains all of them best.
     check_logs(description, logs)
     progress("looking for stops")
     stops, payloads = stops_of(logs)
@@ -251,7 +241,7 @@ def check_logs(description: RobotDescription, logs: Sequence[Log]) -> None:
 
 
 def more_jogs(forecast: Forecast, last: Ringing) -> tuple[Jog, ...]:
-    """Propose jogs that would tell more than is known, from where the last ring-down was listened to."""
+    """Propose jogs that would add most information, starting from where the last ring-down was recorded."""
     arm = forecast.arm
     counts = [PROPOSED if number == last.payload else 0 for number in range(len(arm.payloads))]
     candidates = free_configurations(arm.description, (arm.payloads[last.payload],), CANDIDATES, 0)
@@ -261,7 +251,7 @@ def more_jogs(forecast: Forecast, last: Ringing) -> tuple[Jog, ...]:
 def _with_polynomials(
     calibration: Calibration, arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit
 ) -> tuple[Calibration, str]:
-    """Add polynomials for the payload with most ring-downs, if they are accurate; else say why not."""
+    """Add polynomials for the payload with most ring-downs if they are accurate; else return why not."""
     counted = Counter(r.payload for r in ringings)
     payload = max(counted, key=lambda number: (counted[number], arm.payloads[number].mass))
     try:
@@ -280,7 +270,7 @@ def _with_polynomials(
 
 
 def _errors(left: Sequence[LeftOut]) -> list[ModeErrors | None]:
-    """Errors of each mode, from configurations whose own ring-down is accurate enough."""
+    """Return the errors of each mode at configurations whose ring-down is accurate enough."""
     errors: list[ModeErrors | None] = []
     for mode in range(TOLD):
         pairs = [
@@ -303,7 +293,7 @@ def true_errors(
     seed: int,
     modes: int = TOLD,
 ) -> list[ModeErrors]:
-    """Errors against the modes of the robot file's arm, at configurations that are not those of the calibration."""
+    """Return the errors against the true modes of the robot file's arm, at configurations not used before."""
     pairs = []
     for payload in payloads:
         estimator = modal_estimator(calibration, description, payload, modes)
@@ -317,7 +307,7 @@ def true_errors(
 
 
 def mode_range(description: RobotDescription, drivetrain: Drivetrain) -> tuple[float, float]:
-    """Lowest f_d and highest ζ that a filter has to support up to the rated payload, with a margin."""
+    """Return the lowest f_d and highest ζ that a filter must support up to the rated payload, with a margin."""
     everywhere = identified(ranges(description)).spread(WORKSPACE, description.joints, 0)
     lowest, highest = np.inf, 0.0
     payloads = [paper_payload(description, mass) for mass in (0.0, description.limits.payload)]

@@ -1,8 +1,7 @@
-"""Choice of the few most informative jogs: greedy D-optimal design.
+"""Choose the few most informative jogs: greedy D-optimal design (Fedorov, 1972).
 
-The guessed arm is made to ring at many configurations, and each ring-down gives an information matrix of the
-parameters. Ring-downs are chosen one after the other such that the determinant of the sum becomes as large as
-possible, and so the volume of the remaining uncertainty as small as possible (Fedorov, 1972).
+The guessed arm is simulated at many configurations; each ring-down gives an information matrix of the
+parameters. Ring-downs are added one by one such that the determinant of the sum grows most.
 """
 
 from collections.abc import Sequence
@@ -22,14 +21,12 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.values import Payload
 
 LENGTH, SHARES = 0.06, (0.6, 0.6, 1.0)
-"""Length of a jog for the fastest joint [rad], and shares of the joints from the base on: all big joints move at once,
-so that every mode is excited.
-"""
+"""Length of a jog for the fastest joint [rad]; shares of the joints from the base, so that every mode is excited."""
 LIMITS = MotionLimits(velocity=2.6, acceleration=6.1, jerk=540.0)
-"""Limits of the quickest jog: quicker than a client's `move_j`, so that an arm that a servo moves softly rings, too."""
+"""Limits of the quickest jog: quicker than a client's `move_j`, so that an arm with a soft servo rings as well."""
 SKIPPED, SAMPLES = round(BEGINS / PERIOD), round(LONGEST / PERIOD)
 NOISE = 0.03
-"""Assumed noise, rms per axis [m/s^2]."""
+"""Assumed noise, rms per axis [m/s²]."""
 
 
 def jog_of(joints: int) -> Floats:
@@ -47,9 +44,9 @@ def free_configurations(
     seed: int,
     like: Floats | None = None,
 ) -> list[Floats]:
-    """Return configurations in which the arm is clear at both ends of a jog, with every payload.
+    """Return configurations that are free of collision at both ends of a jog, with every payload.
 
-    Base and outer wrist joints, on which the modes hardly depend, are as in the configuration `like`, or else zero.
+    Base and outer wrist joints, which hardly change the modes, are as in the configuration `like`, else zero.
     """
     joints = description.joints
     models = [CollisionModel(description, body(payload)) for payload in payloads]
@@ -70,10 +67,9 @@ def choose(
     counts: Sequence[int],
     known: tuple[Floats, Floats] | None = None,
 ) -> list[tuple[int, int]]:
-    """Choose ring-downs.
+    """Choose ring-downs: return indices of candidates and payloads, the most informative first.
 
-    Return indices of candidates and payloads, the most informative first, without repetition. What is known are the
-    logarithms of the parameters and their covariance; None stands for the guess.
+    `known` holds the logarithms of the parameters and their covariance; None means the guess.
     """
     at, covariance = (arm.guess, np.diag(arm.deviation**2)) if known is None else known
     knowledge = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
@@ -125,7 +121,7 @@ def predicted(arm: ArmModes, q: Floats, payload: int, logarithms: Floats | None 
 
 
 def _pushes(rows: Floats, rigid: Floats, jog: Floats) -> Floats:
-    """Torques of the drives on their motors during and after a jog, shape (ticks, n) [N m]."""
+    """Return the torques of the drives on their motors during and after a jog, shape (ticks, n) [N m]."""
     _, B, K_d, K_p, _ = rows
     motion = quickest_motion(JointLine(np.zeros_like(jog), jog), LIMITS, PERIOD)
     way = []

@@ -1,4 +1,4 @@
-"""What springs and drives that were fitted say of the modes at any configuration, and how sure that is."""
+"""Predict modes and their uncertainty at any configuration from fitted springs and drives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,16 +13,14 @@ from tvist_lab.recordings import Floats
 STEP = 1e-3
 """Step of a logarithm for finite differences [-]."""
 LEAST = (0.015, 0.06)
-"""Smallest assumed errors of f_d and ζ: joints that share a parameter differ, and neither friction nor gears are linear
-[-].
-"""
+"""Smallest assumed errors of f_d and ζ [-]: joints that share a parameter differ; friction and gears are nonlinear."""
 FEWEST = 6
-"""Number of modes of left-out ring-downs that are needed to judge the intervals."""
+"""Number of modes in left-out ring-downs needed to check the intervals."""
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A ring-down, and the modes at its configuration by a fit that did not see it."""
+    """A ring-down, and the modes at its configuration from a fit without it."""
 
     ringing: Ringing
     f_d: Floats
@@ -30,7 +28,7 @@ class LeftOut:
     zeta: Floats
     """Shape (k,) [-]."""
     own: OwnPoles
-    """The ring-down's own modes, the same ones."""
+    """The same modes fitted to the ring-down alone."""
 
 
 @dataclass(frozen=True)
@@ -54,22 +52,21 @@ class Known:
 
 @dataclass(frozen=True)
 class Forecast:
-    """Fitted springs and drives with all that is uncertain of them."""
+    """Fitted springs and drives with their uncertainty."""
 
     arm: ArmModes
     fit: ModalFit
     covariance: Floats
-    """Covariance of the parameters' logarithms that noise and what the model leaves out cause, shape (P, P)."""
+    """Covariance of the parameters' logarithms due to noise and model errors, shape (P, P)."""
     moved: Floats
-    """How far each mass that is wrong by its deviation moves these logarithms, shape (P, masses)."""
+    """Shift of these logarithms by the deviation of each mass, shape (P, masses)."""
     wider: tuple[float, float] = (1.0, 1.0)
-    """Factors of the errors of f_d and ζ, at least 1, from ring-downs that fits did not see [-]."""
+    """Factors on the errors of f_d and ζ, at least 1, found from ring-downs left out of fits [-]."""
 
     def at(self, q: Floats, payload: int, modes: int = 1) -> Known:
-        """Return the lowest modes at a configuration with one of the payloads.
-
-        An error of the masses moves the modes there and has moved the parameters, which mostly makes up for it.
-        """
+        """Return the lowest modes at a configuration with one of the payloads."""
+        # An error of the masses shifts the modes, but it also shifted the fitted parameters, which mostly
+        # compensates.
         arm, here = self.arm, self.fit.logarithms
         mass = arm.mass(q, payload)
         modes = min(modes, MODES)
@@ -88,7 +85,7 @@ class Forecast:
         return Known(*np.exp(found), *errors)
 
     def widened(self, left: Sequence[LeftOut]) -> "Forecast":
-        """Return the same with errors as large as those of fits at ring-downs that they did not see."""
+        """Return the same with errors as large as those found at ring-downs left out of fits."""
         squares: list[tuple[float, float]] = []
         for one in left:
             known = self.at(one.ringing.q, one.ringing.payload, MODES)

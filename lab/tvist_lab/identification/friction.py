@@ -1,12 +1,11 @@
-"""Identification of each joint's friction from its speed and torque in a slow motion there and back.
+"""Identify each joint's friction from speed and torque in a slow motion there and back.
 
-The way back is the way there reversed in time. Weight and inertia need the same torque on both, and friction the
-opposite one, so half the difference is friction alone, whatever the masses are:
+The way back is the way there reversed in time. Weight and inertia need the same torque on both, friction the
+opposite one; half the difference is friction alone, whatever the masses:
 
-    (τ_there(t) - τ_back(T - t)) / 2 = F(v),    F(v) = [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v
+    (τ_there(t) - τ_back(T - t)) / 2 = F(v),  F(v) = [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v
 
-(Stribeck's curve; Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994). At both ends of the way all
-joints pass slowly through the speeds near zero, where an arm decides how it comes to rest.
+(Stribeck curve; Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994.)
 """
 
 from collections.abc import Sequence
@@ -31,7 +30,7 @@ from tvist_protocol.calibration import ModalParameter
 LENGTH = 0.45
 """Length of the way, of every joint [rad]."""
 LIMITS = MotionLimits(velocity=0.3, acceleration=0.2, jerk=100.0)
-"""Limits of the motion: slow enough for many samples near standstill, quick enough to tell viscous friction."""
+"""Limits of the motion: slow enough for many samples near standstill, quick enough for viscous friction."""
 REST = 0.3
 """Rest before the way there and back [s]."""
 PLACES = 8
@@ -39,15 +38,15 @@ PLACES = 8
 BLOCK = 10
 """Number of ticks over which speeds and torques are averaged."""
 SETTLING = 2
-"""Number of blocks left out at both ends, where friction holds what the arm did before."""
+"""Number of blocks left out at both ends, where friction still holds the earlier state."""
 GROWTH = (0, 1, 4)
-"""Powers of the speed by which the noise grows: the gears' ripple shakes the arm the more, the faster it turns."""
+"""Powers of the speed with which the noise grows, since the gears' ripple grows with speed."""
 LEAST_NOISE = 0.003
-"""Smallest assumed noise, as a share of the joint's friction [-]."""
+"""Smallest assumed noise, relative to the joint's friction [-]."""
 ROUNDS = 4
-"""Number of fits, each with the noise that the one before has left."""
+"""Number of fits, each weighted with the residuals of the one before."""
 LEAST_BREAKAWAY = 1.0
-"""Friction is never lower at breakaway than in motion [-]."""
+"""Smallest ratio of friction at breakaway to that in motion [-]."""
 
 
 def unknown_friction(description: RobotDescription) -> tuple[tuple[Unknown, ...], ...]:
@@ -67,7 +66,7 @@ def unknown_friction(description: RobotDescription) -> tuple[tuple[Unknown, ...]
 async def identify_friction(
     robot: Robot, control: Arm, description: RobotDescription, places: Sequence[Floats]
 ) -> tuple[ModalParameter, ...]:
-    """Move all joints slowly there and back, and fit each one's friction."""
+    """Move all joints slowly there and back, and fit the friction of each."""
     recording = await _sweep(robot, control, places)
     speed, torque = there_and_back(recording)
     return tuple(
@@ -78,7 +77,7 @@ async def identify_friction(
 
 
 async def _sweep(robot: Robot, control: Arm, places: Sequence[Floats]) -> Recording:
-    """Record the way there and back, about the first place where it is free."""
+    """Record the way there and back around the first place where it is free."""
     period = 1.0 / (await robot.info()).rate_hz
     for middle in places[:PLACES]:
         for side in (0.5 * LENGTH, -0.5 * LENGTH):
@@ -103,7 +102,7 @@ async def _reached(control: Arm, q: Floats) -> bool:
 
 
 def there_and_back(recording: Recording) -> tuple[Floats, Floats]:
-    """Return speeds [rad/s] and friction torques [N m] of a way there and back, as means of blocks, shape (k, n)."""
+    """Return speeds [rad/s] and friction torques [N m] there and back, block means of shape (k, n)."""
     there, back = motions(recording)[-2:]
     length = min(there.shaped_stop - there.start, back.shaped_stop - back.start)
 
@@ -119,19 +118,16 @@ def there_and_back(recording: Recording) -> tuple[Floats, Floats]:
 
 
 def friction(logarithms: Floats, speed: Floats) -> Floats:
-    """F(v) for the logarithms of F_c, F_s/F_c, v_s, w and F_v, in the shape of v [N m]."""
+    """Return F(v) for the logarithms of F_c, F_s/F_c, v_s, w and F_v, in the shape of v [N m]."""
     coulomb, breakaway, stribeck, width, viscous = np.exp(logarithms)
     shape = 1.0 + (breakaway - 1.0) * np.exp(-((speed / stribeck) ** 2))
     return np.asarray(coulomb * shape * np.tanh(speed / width) + viscous * speed)
 
 
 def fit_friction(unknown: Sequence[Unknown], speed: Floats, torque: Floats) -> tuple[ModalParameter, ...]:
-    """Fit the friction of one joint.
-
-    The ripple of the gears makes the noise, which grows with speed, so that each block has its own weight. It is
-    correlated from block to block, which widens the intervals.
-    Speeds [rad/s] and torques [N m] have the shape (k,).
-    """
+    """Fit the friction of one joint to speeds [rad/s] and torques [N m] of shape (k,)."""
+    # Ripple of the gears makes noise that grows with speed, so each block has its own weight; it is
+    # correlated from block to block, which widens the intervals.
     guess = np.log([one.guess for one in unknown])
     deviation = np.array([one.deviation for one in unknown])
     low = np.full(len(guess), -np.inf)

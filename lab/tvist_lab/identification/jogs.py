@@ -1,8 +1,8 @@
-"""Jogs of a robot: a plan of those that tell most, with free ways to them, and the recordings of their ring-downs.
+"""Plan and make jogs: choose the most informative ones, find free ways to them, and record their ring-downs.
 
-A robot that takes positions alone follows with a servo's lag, so that its set-points still come to rest when ours have
-stopped: the lag is found first, from a turn of the last joint, which hardly bends. Its ring-downs then hold that motion
-with known poles.
+A robot that takes only positions follows with a servo's lag, so its set-points still move when the reference
+has stopped. A turn of the last joint, which hardly bends, is recorded first to find that lag; the fit of the
+ring-downs then includes it with known poles.
 """
 
 import asyncio
@@ -43,33 +43,33 @@ from tvist_protocol.values import Payload
 
 RING_DOWNS = 12
 LEAST = 4
-"""Number of ring-downs below which the model consists of little more than its guesses."""
+"""Smallest useful number of ring-downs; with fewer, the model would be mostly guesses."""
 FEW = 37
-"""Largest number of ring-downs that are chosen as the most informative; more are spread over the workspace."""
+"""Largest number of ring-downs chosen as the most informative; more are spread over the workspace."""
 CANDIDATES = 60
-"""Least number of configurations to choose from."""
+"""Smallest number of configurations to choose from."""
 SPARE = 3
 """Number of candidates for each jog, since the way to some is not free."""
 STEP = 0.03
-"""Angle of the fastest joint between two postures in which a way is checked [rad]."""
+"""Step of the fastest joint between postures at which a way is checked [rad]."""
 GENTLEST = 0.4
-"""Smallest quickness of a jog over the quickest one's [-]."""
+"""Smallest quickness of a jog relative to the quickest [-]."""
 FIRST = 0.55
-"""Quickness of the first jog over what its torques permit, since nobody knows how loud the arm rings [-]."""
+"""Quickness of the first jog relative to what its torques permit [-], since its vibration is still unknown."""
 LOUD, LATER = 0.15, 0.1
-"""Rms of the acceleration per axis to aim at, as after a program's motion [m/s^2], so much later than the stop [s]."""
+"""Rms acceleration per axis to aim at, as after a program's motion [m/s²], and the time after the stop [s]."""
 INEXACT, STICKING = 0.03, 0.2
-"""Share of a ring-down after a jog that no model explains [-], also of an arm whose motors stick."""
+"""Share of a ring-down that no model explains [-], normally and if motors stick."""
 STICKS = 1.5
-"""Friction at break-away over that in motion from which on a motor sticks [-]."""
+"""Ratio of friction at breakaway to that in motion from which a motor sticks [-]."""
 WAYS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 """Limits of the ways to the jogs."""
 GENTLE = 1.0
-"""Acceleration of the ways of a robot that takes positions alone [rad/s²]."""
+"""Acceleration on the ways of a robot that takes only positions [rad/s²]."""
 TURN, TURNS = 0.1, 2
-"""Angle by which its last joint turns there and back to show the lag [rad], and how often."""
+"""Angle by which its last joint turns there and back to find the lag [rad], and how often."""
 UNKNOWN = 0.15
-"""Time after the stop that a ring-down leaves out where the lag is not known [s]."""
+"""Time after the stop that is ignored if the lag is unknown [s]."""
 PAUSE, AFTER = 0.3, 0.6
 """Rest before a jog, and time recorded after it [s]."""
 
@@ -79,9 +79,8 @@ class Jog:
     """A short move after which the arm rings, and free ways to its start."""
 
     payload: int
-    """Index of the payload that the arm carries."""
     way: tuple[Floats, ...]
-    """Postures to go to one after the other, the last of which is the jog's start, each of shape (n,) [rad]."""
+    """Postures to pass one after the other, ending at the jog's start, each of shape (n,) [rad]."""
     q: Floats
     """End of the jog, where the arm rings, shape (n,) [rad]."""
     limits: MotionLimits
@@ -92,19 +91,17 @@ class JogPlan:
     """Moves of a robot, checked for collisions with itself and the floor."""
 
     arm: ArmModes
-    """The robot file's arm, with the payloads that it carries."""
+    """The robot file's arm with the carried payloads."""
     at: Floats
     """Present joint angles, shape (n,) [rad]."""
     jogs: tuple[Jog, ...]
-    """The jogs, one after the other."""
     ways: MotionLimits
     """Limits of all other moves."""
     seed: int
-    """Seed of the choice."""
     changed: bool
     """Whether the payload of a simulated arm changes between jogs."""
     turned: Floats | None
-    """Where the last joint of a robot that takes positions alone turns to, shape (n,) [rad]; None for others."""
+    """Target of the last joint's turn if the robot takes only positions, shape (n,) [rad]; else None."""
 
     @property
     def speed(self) -> float:
@@ -113,7 +110,7 @@ class JogPlan:
 
     @property
     def seconds(self) -> float:
-        """Time that it takes [s]."""
+        """Duration [s]."""
         found, at = (0.0 if self.turned is None else 2 * TURNS * (PAUSE + AFTER)), self.at
         for jog in self.jogs:
             for ends in pairwise([at, *jog.way]):
@@ -127,22 +124,20 @@ class JogPlan:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a source of ring-downs gives: jogs of a robot, or logs."""
+    """Data of jogs or logs for an identification."""
 
     logs: tuple[Log, ...]
-    """Recordings with stops."""
     friction: tuple[ModalParameter, ...] = ()
-    """Friction of the joints, if it was measured."""
     no_friction: str = "it is measured in a slow sweep of a served robot"
-    """Why it was not; empty if it was."""
+    """Why friction was not measured; empty if it was."""
     seed: int | None = None
-    """Seed of the choice of jogs; None if nothing was chosen."""
+    """Seed of the choice of jogs; None if there was none."""
     refused: int = 0
     """Number of jogs that the robot refused because of a collision."""
     servo: ServoResponse | None = None
-    """Lag with which a robot that takes positions alone follows; None if it follows in another way."""
+    """Lag of a robot that takes only positions; None if it follows in another way."""
     seconds: float = 0.0
-    """Time of the robot that it took [s]."""
+    """Robot time that the measurement took [s]."""
 
 
 async def plan_jogs(
@@ -154,18 +149,10 @@ async def plan_jogs(
     seed: int = 0,
     positions: bool = False,
 ) -> JogPlan:
-    """Choose the jogs that tell most, with free ways from where the arm stands.
+    """Choose the most informative jogs, with free ways from the present configuration.
 
-    Args:
-        robot: The robot, whose limits hold.
-        description: The robot file.
-        ring_downs: Number of jogs.
-        payloads: Payloads that a simulated arm carries one after the other; empty for the declared one.
-        seed: Seed of the candidates.
-        positions: Whether the robot takes positions alone.
-
-    Raises:
-        IdentificationError: There are too few ring-downs or free ways, or the file is another robot's.
+    `payloads` are those a simulated arm carries in turn; by default it is the declared one. `positions`: the robot
+    takes only positions. Raises IdentificationError if ring-downs or ways are too few or the file does not fit.
     """
     info, state = await robot.info(), await robot.state()
     if info.model != description.robot.model:
@@ -210,10 +197,9 @@ def plan_ways(
     counts: Sequence[int],
     known: tuple[Floats, Floats] | None = None,
 ) -> list[Jog]:
-    """Choose the jogs that would tell most, the most informative first with each payload, and find ways to them.
+    """Choose the most informative jogs for each payload and find ways to them; fewer if ways are not free.
 
-    Fewer than the counts are returned where the ways to others are not free. What is known are the logarithms of the
-    parameters and their covariance; None stands for the guess.
+    `known` holds the logarithms of the parameters and their covariance; None means the guess.
     """
     order = [(number, payload) for number in range(len(candidates)) for payload in range(len(counts))]
     if sum(counts) <= FEW:
@@ -246,17 +232,15 @@ def slower(limits: MotionLimits, quickness: float) -> MotionLimits:
 
 
 def _quickness(dynamics: InverseDynamics, start: Floats, end: Floats, torque: Floats) -> float:
-    """Return the largest share, up to 1, of a jog's quickness with which the arm rings within its torques.
-
-    A drive at its limit would spoil the ring-down.
-    """
+    """Return the largest quickness of a jog, up to 1, at which the arm rings within its torque limits."""
+    # A saturated drive would spoil the ring-down.
     line = JointLine(start, end)
     room = acceleration_on_way(dynamics, line, start, end - start, LIMITS.velocity, torque)
     return min(1.0, float(np.sqrt(room / (1.0 + REBOUND) / LIMITS.acceleration)))
 
 
 def is_free(collisions: CollisionModel, *postures: Floats) -> bool:
-    """Return whether the straight ways from posture to posture, in the space of the joints, are clear."""
+    """Whether the straight ways between postures, in joint space, are free of collision."""
     for before, after in pairwise(postures):
         steps = max(int(np.ceil(np.max(np.abs(after - before)) / STEP)), 1)
         if any(
@@ -267,16 +251,9 @@ def is_free(collisions: CollisionModel, *postures: Floats) -> bool:
 
 
 async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) -> Measured:
-    """Sweep slowly for friction, and make the jogs, each as gentle as makes the arm ring loudly enough.
-
-    A robot that takes positions alone turns its last joint instead, which tells its lag: its torques are a guess.
-
-    Args:
-        robot: The robot, on a network or in process.
-        control: The arm under control.
-        plan: The moves.
-        progress: Called before each step with what it does.
-    """
+    """Sweep slowly for friction, and make the jogs, each just strong enough for a clear ring-down."""
+    # A robot that takes only positions turns its last joint instead, to find its lag; its torques are
+    # unknown.
     info, began = await robot.info(), (await robot.state()).tick
     await control.set_shaper("none")
     found = Measured((), seed=plan.seed)
@@ -310,9 +287,10 @@ async def _lag(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) ->
 async def _jogs(
     robot: Robot, control: Arm, plan: JogPlan, info: Info, known: Measured, progress: Progress
 ) -> list[Log]:
-    """Return the recordings of those jogs that the robot did not refuse."""
+    """Return the recordings of all jogs that the robot did not refuse."""
     servo = known.servo
-    sticks = any(one.quantity == "breakaway" and one.value > STICKS for one in known.friction)
+    told = [one for one in known.friction if one.quantity == "breakaway" and one.status == "identified"]
+    sticks = any(one.value > STICKS for one in told)
     inexact = STICKING if sticks else INEXACT
     begins = BEGINS if plan.turned is None else UNKNOWN if servo is None else servo.delay
     logs, share, carried = list[Log](), FIRST, None
@@ -340,7 +318,7 @@ async def _jogged(robot: Robot, control: Arm, jog: Jog, ways: MotionLimits, shar
 
 
 async def _recorded(robot: Robot, control: Arm, q: Floats, limits: MotionLimits) -> Recording:
-    """Make one move after a rest, and record it with the ring-down after it."""
+    """Make one move after a rest; record it with its ring-down."""
     with collect(robot) as collected:
         await robot.advance(round(PAUSE / PERIOD))
         await control.move_j(q, **asdict(limits))
@@ -349,6 +327,6 @@ async def _recorded(robot: Robot, control: Arm, q: Floats, limits: MotionLimits)
 
 
 async def _carry(control: Arm, payload: Payload) -> None:
-    """Make a simulated arm carry a payload, and declare it."""
+    """Put a payload on a simulated arm, and declare it."""
     await control.reset(payload=payload)
     await control.set_payload(payload.mass, payload.com, payload.inertia)

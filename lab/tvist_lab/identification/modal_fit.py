@@ -1,16 +1,16 @@
-"""Estimation of springs and drives from a few ring-downs, by separable least squares.
+"""Estimate springs and drives from a few ring-downs, by separable least squares.
 
 Each ring-down is a sum of the lowest modes, whose poles depend on the parameters, with its own amplitudes:
 
-    α(t) = Σ_k Re(c_k e^(s_k(p) t)) + d e^(-rt) + g,    p the logarithms of the parameters
+    α(t) = Σ_k Re(c_k e^(s_k(p) t)) + d e^(-rt) + g,  p the logarithms of the parameters
 
-The vectors c, d, g enter linearly and are eliminated (variable projection; Golub and Pereyra, 1973), so modes need
-not be detected in a signal or matched with the model's. Parameters that the measurements do not determine stay near
-their guesses, which have a low weight.
+The vectors c, d, g enter linearly and are eliminated (variable projection; Golub and Pereyra, 1973), so modes
+need not be detected in a signal or matched with the model's. Weak priors hold parameters that the data do not
+determine near their guesses.
 
-Where gears have hysteresis, poles change with the amplitude A of the tool: a small loop of twist and torque consists
-of two parabolas (Rayleigh's law), so that the stiffness is lower by a share h A, and the damping ratio higher by
-2/(3π) of that. What is fitted then are the poles of small vibrations, with s(t) = s - (2/(3π) + j/2) h A(t) |s|.
+If gears have hysteresis, poles change with the tool's amplitude A: a small loop of twist and torque consists
+of two parabolas (Rayleigh's law), so stiffness falls by a share h A, and the damping ratio rises by 2/(3π) of
+that. The fitted poles are those of small vibrations, with s(t) = s - (2/(3π) + j/2) h A(t) |s|.
 """
 
 from collections.abc import Sequence
@@ -32,9 +32,9 @@ from tvist_shaping.estimators.poles import follow
 Complex = npt.NDArray[np.complex128]
 
 MODES = 4
-"""Number of modes in a ring-down; a robot arm's higher ones decay within a few ticks."""
+"""Number of modes in a ring-down; a robot arm's higher modes decay within a few ticks."""
 RAYLEIGH = 2.0 / (3.0 * np.pi) + 0.5j
-"""Increase of the damping ratio, and decrease of the frequency, over the share by which hysteresis softens [-]."""
+"""Change of damping ratio (real) and frequency (imaginary) per share by which hysteresis softens [-]."""
 SMOOTHED = 0.03
 """Width of the window in which the amplitude is determined [s]."""
 STEP = 1e-4
@@ -43,9 +43,9 @@ INSIDE = 1e-3
 """Distance of a starting point from the bounds of the search [-]."""
 EVALUATIONS = 60
 SOFTENINGS = (0.0, 50.0, 100.0, 200.0, 300.0)
-"""Softening by hysteresis that is tried [1/m]: 200 is 3 % for an amplitude of 1 m/s² at 13 Hz."""
+"""Softening by hysteresis to try [1/m]: 200 is 3 % for an amplitude of 1 m/s² at 13 Hz."""
 CERTAIN = (0.05, 0.2)
-"""Largest standard errors of a ring-down's own f_d and ζ for which a model is judged by them [-]."""
+"""Largest standard errors of a ring-down's own f_d and ζ with which it can judge a model [-]."""
 STARTS = 4
 """Number of starting points of the search; the first one is the guess."""
 SPREAD = 0.35
@@ -61,7 +61,7 @@ class ModalFit:
     covariance: Floats
     """Covariance of the logarithms, shape (P, P)."""
     residual_to_noise: Floats
-    """rms of the residual of each ring-down, divided by its noise, shape (N,) [-]."""
+    """rms of each ring-down's residual relative to its noise, shape (N,) [-]."""
     cost: float
     """Half the sum of squares, including that of the guess [-]."""
     drivetrain: Drivetrain
@@ -94,22 +94,22 @@ class _Signal:
         return np.column_stack([ringing.real, ringing.imag, self._always])
 
     def amplitudes(self, poles: Complex) -> Floats:
-        """Length of each mode's vector of amplitudes at the beginning [m/s^2]."""
+        """Return the initial length of each mode's vector of amplitudes [m/s²]."""
         found = np.linalg.lstsq(self._columns(poles), self.force)[0][: 2 * len(poles)]
         return np.asarray(np.sqrt(np.sum(found.reshape(2, len(poles), -1) ** 2, axis=(0, 2))))
 
     def left(self, poles: Complex) -> Floats:
-        """Residual of the signal for some poles, divided by its noise, flattened."""
+        """Return the residual of the signal for some poles, divided by its noise, flattened."""
         orthonormal, _ = np.linalg.qr(self._columns(poles))
         return np.asarray((self.force - orthonormal @ (orthonormal.T @ self.force)).ravel() / self.noise)
 
     def heavier(self, drivetrain: Drivetrain, masses: Sequence[Floats]) -> Floats:
-        """Difference that other mass matrices make to `left`, one column each, shape (samples, number)."""
+        """Return the change of `left` due to other mass matrices, one column each, shape (samples, number)."""
         here = self.left(drivetrain.poles(self.mass)[0][:MODES])
         return np.column_stack([self.left(drivetrain.poles(mass)[0][:MODES]) - here for mass in masses])
 
     def change(self, drivetrains: Sequence[Drivetrain], poles: Complex, shapes: Complex) -> Floats:
-        """Derivative of `left` with respect to each parameter, from a step in each, shape (samples, P)."""
+        """Return the derivative of `left` by each parameter, from a step in each, shape (samples, P)."""
         here = self.left(poles)
         columns = []
         for drivetrain in drivetrains:
@@ -122,7 +122,7 @@ class _Signal:
 
 
 def _amplitude(ringing: Ringing, time: Floats) -> Floats:
-    """Amplitude of the tool's acceleration, without the noise, shape (T,) [m/s^2]."""
+    """Return the amplitude of the tool's acceleration without the noise, shape (T,) [m/s²]."""
     swinging = np.sum((ringing.force - ringing.force.mean(axis=0)) ** 2, axis=1)
     width = SMOOTHED / float(np.median(np.diff(time)))
     power = gaussian_filter1d(swinging, width, mode="nearest") - 3.0 * ringing.noise**2
@@ -130,7 +130,7 @@ def _amplitude(ringing: Ringing, time: Floats) -> Floats:
 
 
 def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None = None) -> ModalFit:
-    """Estimate the parameters."""
+    """Estimate the parameters, starting from the guess or from `start`."""
     signals = [_Signal(arm, r) for r in ringings]
 
     def residual(logarithms: Floats) -> Floats:
@@ -174,11 +174,9 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
 
 
 def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
-    """Return the best fit from several starting points.
-
-    Parameters can compensate for each other, so that several sets explain the ring-downs equally well. All of these
-    sets contribute to the deviations, weighted by their likelihood: a parameter in which they differ is uncertain.
-    """
+    """Return the best fit from several starting points."""
+    # Parameters can compensate each other, so several sets may explain the ring-downs equally well. All of
+    # them add to the deviations, weighted by likelihood: a parameter in which they differ is uncertain.
     rng = np.random.default_rng(0)
     starts = [arm.guess, *(arm.guess + rng.normal(0.0, SPREAD, (STARTS - 1, len(arm.guess))))]
     fits = [fit_modal(arm, ringings, start) for start in starts]
@@ -190,17 +188,16 @@ def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
 
 
 def softened(arm: ArmModes, ringings: Sequence[Ringing]) -> list[Ringing]:
-    """Return ring-downs with the hysteresis of the gears that explains all of them best, if any does."""
+    """Return ring-downs with the gear hysteresis that explains all of them best."""
     fits = {share: fit_modal(arm, [replace(r, softening=share) for r in ringings]) for share in SOFTENINGS}
     best = min(fits, key=lambda share: fits[share].cost + 0.5 * (share / SOFTENINGS[-1]) ** 2)
     return [replace(r, softening=best) for r in ringings]
 
 
 def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floats:
-    """How far each mass that is wrong by its deviation moves the parameters' logarithms, shape (P, masses).
-
-    Masses are not fitted: they would be found no better than they are known. The motion is found to first order.
-    """
+    """Return the shift of the parameters' logarithms by the deviation of each mass, shape (P, masses)."""
+    # Masses are not fitted, since they are known better than a fit could find them. The shift is of first
+    # order.
     signals = [_Signal(arm, r) for r in ringings]
     changes = np.vstack([sensitivity(arm, signal, fit.logarithms) for signal in signals])
     heavier = np.vstack(
@@ -213,14 +210,14 @@ def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floa
 
 
 def sensitivity(arm: ArmModes, signal: _Signal, logarithms: Floats) -> Floats:
-    """Derivative of a ring-down's residual with respect to each parameter, shape (samples, P)."""
+    """Return the derivative of a ring-down's residual by each parameter, shape (samples, P)."""
     poles, shapes = (part[:MODES] for part in arm.drivetrain(logarithms).poles(signal.mass))
     steps = STEP * np.eye(len(logarithms))
     return signal.change([arm.drivetrain(logarithms + step) for step in steps], poles, shapes)
 
 
 def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
-    """Information of a ring-down about the parameters: the inverse of their covariance, shape (P, P)."""
+    """Return the information of a ring-down about the parameters: their inverse covariance, shape (P, P)."""
     signal = _Signal(arm, ringing)
     change = sensitivity(arm, signal, logarithms)
     return np.asarray(change.T @ change)
@@ -228,7 +225,7 @@ def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class OwnPoles:
-    """Modes of one ring-down, their accuracy, and how much worse other poles explain it."""
+    """Modes of one ring-down with their accuracy, and how much worse other poles explain it."""
 
     f_d: Floats
     """Damped frequencies, shape (k,) [Hz]."""
@@ -239,23 +236,21 @@ class OwnPoles:
     zeta_error: Floats
     """Standard deviation of the logarithm of ζ, shape (k,) [-]."""
     amplitude: Floats
-    """Largest |α| of each mode at the beginning, shape (k,) [m/s²]."""
+    """Largest initial |α| of each mode, shape (k,) [m/s²]."""
     significance: float
-    """Increase of the residual's sum of squares with the other poles, divided by the noise's variance; 8 by chance
-    [-].
-    """
+    """Increase of the residual's sum of squares with the other poles, over the noise's variance [-]; 8 by chance."""
     share: float
-    """rms of the part that only these poles explain, relative to that of the vibration without its noise [-]."""
+    """rms of the part that only these poles explain, relative to the vibration without its noise [-]."""
 
     @property
     def certain(self) -> list[int]:
-        """Indices of the modes that the ring-down itself tells accurately."""
+        """Indices of the modes that the ring-down alone determines accurately."""
         errors = zip(self.f_d_error, self.zeta_error, strict=True)
         return [k for k, (f_d, zeta) in enumerate(errors) if f_d < CERTAIN[0] and zeta < CERTAIN[1]]
 
 
 LOOSE = 0.5
-"""Standard deviation of the logarithms of f_d and ζ of a ring-down's own poles, about their starting values [-]."""
+"""Standard deviation of the logarithms of a ring-down's own f_d and ζ about their starting values [-]."""
 
 
 def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:

@@ -1,4 +1,4 @@
-"""What logs say of each motion that a twin repeats, and what the twin does in it."""
+"""Motions of logs for a twin to repeat, and the twin's response to them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,66 +19,65 @@ from tvist_plant.plant import PERIOD, Response
 from tvist_protocol.values import Payload
 
 AFTER = 0.5
-"""Time after a stop that is compared, if the arm rests so long [s]."""
+"""Time after a stop that is compared, if the arm rests that long [s]."""
 BEFORE = 0.1
 """Time before a stop from which the acceleration is compared [s]."""
 LATE = 0.01
 """Time after a stop from which the vibration counts as residual [s]."""
 LEAST_AFTER = 0.15
-"""Shortest rest after a stop that is compared [s]."""
+"""Shortest rest after a stop that can be compared [s]."""
 ANGLE = 3e-4
 """Accuracy of a simulated joint angle [rad]."""
 TORQUE = 0.01
-"""Accuracy of a simulated torque, over the joint's largest one [-]."""
+"""Accuracy of a simulated torque, relative to the joint's largest one [-]."""
 BLOCK = 10
 """Number of ticks over which angles and torques are averaged."""
 
 
 @dataclass(frozen=True)
 class Observed:
-    """A motion of a log in ticks of the twin, the first one being the first in which the reference may move."""
+    """A motion of a log in ticks of the twin; the reference may first move in tick 0."""
 
     log: str
     motion: int
     payload: int
-    """Index of the payload."""
     start: Floats
     """Joint angles at rest before it, shape (n,) [rad]."""
     reference: Floats
     """Reference, shape (T, n) [rad]."""
     late: int
-    """Ticks by which the arm follows later than a twin, of another controller."""
+    """Ticks by which another controller's arm follows later than a twin."""
     felt: tuple[Floats, Floats, float]
-    """Ticks, specific force near the stop, shapes (k,) and (k, 3), and its inaccuracy [m/s^2]."""
+    """Ticks (k,) and specific force (k, 3) near the stop, and the force's inaccuracy [m/s²]."""
     residual: slice
-    """Rows of these in which the vibration counts as residual."""
+    """Rows of `felt` in which the vibration counts as residual."""
     noise: float
-    """Noise of the accelerometer, rms per axis [m/s^2]."""
+    """Noise of the accelerometer, rms per axis [m/s²]."""
     angles: tuple[Floats, Floats]
-    """Ticks and measured angles, means of blocks, shapes (m,) and (m, n) [rad]; empty if they were not recorded."""
+    """Ticks (m,) and measured angles, block means (m, n) [rad]; empty if not recorded."""
     torques: tuple[Floats, Floats]
-    """Ticks and measured torques likewise, up to the stop: at rest, friction holds what came before [N m]."""
+    """Ticks and measured torques likewise [N m], up to the stop: at rest, friction hides the torque."""
     foreign: bool
     """Whether another controller moved the arm."""
 
     @property
     def ticks(self) -> int:
-        """Number of ticks that have to be simulated."""
+        """Number of ticks to simulate."""
         return int(self.felt[0][-1]) + 1
 
     def residual_of(self, force: Floats) -> float:
-        """Rms of what vibrates after the stop [m/s^2], of a specific force of shape (k, 3)."""
+        """Return the rms vibration after the stop [m/s²] in a specific force of shape (k, 3)."""
         rest = force[self.residual]
         return float(np.sqrt(np.mean(np.sum((rest - rest.mean(axis=0)) ** 2, axis=1))))
 
     @property
     def measured_residual(self) -> float:
-        """The measured one, without the share of the noise [m/s^2]."""
+        """Measured rms vibration after the stop, without the noise [m/s²]."""
         return float(np.sqrt(max(self.residual_of(self.felt[1]) ** 2 - 3.0 * self.noise**2, 0.0)))
 
 
 def observe(logs: Sequence[Log], payloads: Sequence[Payload]) -> tuple[list[Observed], list[Stop]]:
-    """Return the motions that a twin can repeat, and those that it cannot with the reason."""
+    """Return the motions that a twin can repeat, and the others with the reason."""
     found, others = [], []
     for log in logs:
         if "target_q" not in log.recording:
@@ -145,7 +144,7 @@ def _observed(log: Log, number: int, motion: MotionRows, payloads: Sequence[Payl
 
 
 def repeated(robot: RobotDescription, payload: Payload, motion: Observed) -> Response:
-    """Return what a served robot does in a motion, without ripple of its gears, whose phases nobody knows."""
+    """Return a served robot's response to a motion, without gear ripple, whose phases are unknown."""
     carried = body(payload)
     line = DrivenLine(robot, Unchanged(robot.joints), motion.start, carried)
     driven = line.drive(motion.start, motion.reference, motion.ticks)
@@ -154,7 +153,7 @@ def repeated(robot: RobotDescription, payload: Payload, motion: Observed) -> Res
 
 
 def felt_by(response: Response, motion: Observed, mounting: Floats) -> Floats:
-    """Specific force that the twin's accelerometer would show in the rows of `felt`, shape (k, 3) [m/s^2]."""
+    """Return the specific force that the twin's accelerometer would show in the rows of `felt`, shape (k, 3) [m/s²]."""
     ticks = np.maximum(motion.felt[0] - motion.late, 0.0)
     whole = np.arange(len(response.specific_force))
     force = np.column_stack([np.interp(ticks, whole, axis) for axis in response.specific_force.T])
@@ -162,12 +161,12 @@ def felt_by(response: Response, motion: Observed, mounting: Floats) -> Floats:
 
 
 def mounting_of(pairs: Sequence[tuple[Floats, Floats]]) -> Floats:
-    """Rotation from flange to accelerometer, from simulated and measured forces, shape (3, 3)."""
+    """Return the rotation from flange to accelerometer, from simulated and measured forces, shape (3, 3)."""
     return rotation(sum((measured.T @ simulated for simulated, measured in pairs), np.zeros((3, 3))))
 
 
 def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats) -> Floats:
-    """Difference of a twin's motion from the measured one, each part over its inaccuracy, flattened."""
+    """Return the twin's motion minus the measured one, each part over its inaccuracy, flattened."""
     _, force, inaccuracy = motion.felt
     parts = [((felt_by(response, motion, mounting) - force) / inaccuracy).ravel()]
     own = (response.measured.q, np.full(len(torque), ANGLE)), (response.measured.moment, TORQUE * torque)
@@ -186,6 +185,6 @@ def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats
 
 
 def _smooth(values: Floats) -> Floats:
-    """Moving means over a block, shape as given."""
+    """Return moving means over a block, in the shape given."""
     padded = np.pad(values, ((BLOCK // 2, BLOCK - BLOCK // 2), (0, 0)), mode="edge").cumsum(axis=0)
     return np.asarray((padded[BLOCK:] - padded[:-BLOCK]) / BLOCK)

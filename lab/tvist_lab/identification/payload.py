@@ -1,11 +1,11 @@
-"""Identification of the payload from the arm's own torques: at rest in several poses, and checked in a short motion.
+"""Identify the payload from the arm's torques at rest in several poses, and check it in a short motion.
 
 At rest, the motors balance gravity, which is linear in the payload's mass and first moment:
 
-    τ - g(q) = Y(q) (m, m c),    g of the bare arm
+    τ - g(q) = Y(q) (m, m c),  g of the bare arm
 
-Each pose is approached from both sides, so that friction acts in both directions. In motion, the same two quantities
-determine the torques beyond gravity; friction and rotors are estimated along with them.
+Each pose is approached from both sides, so that friction acts in both directions. In motion, the same
+quantities determine the torques beyond gravity; friction and rotors are estimated with them.
 """
 
 import math
@@ -44,13 +44,12 @@ SWING = 0.5
 BLOCK = 10
 """Number of ticks over which a motion's torques are averaged."""
 LEAST = 3
-"""Smallest number of poses."""
 LEAST_ERROR = 0.01
-"""Smallest assumed error of a torque, as a share of the joint's friction [-]."""
+"""Smallest assumed error of a torque, relative to the joint's friction [-]."""
 ROTOR = 3.0
 """Largest assumed inertia of a rotor [kg m^2]."""
 DISAGREEMENT = (0.3, 4.0)
-"""If masses at rest and in motion differ by more than this [kg] and by this many standard deviations, one is wrong."""
+"""Masses at rest and in motion that differ by more than this [kg] and these standard deviations contradict."""
 CERTAIN = 4.0
 """Number of standard deviations for the bounds of a mass [-]."""
 LIGHT = 0.1
@@ -72,9 +71,7 @@ class PayloadFound:
     mass_in_motion_deviation: float
     """Standard deviation of that mass [kg]."""
     declared: Payload
-    """Payload declared before."""
     poses: int
-    """Number of poses in which the arm rested."""
 
 
 async def identify_payload(
@@ -86,7 +83,7 @@ async def identify_payload(
     seed: int = 0,
     progress: Progress,
 ) -> PayloadFound:
-    """Identify the payload, as a client."""
+    """Identify the payload as a client; raise IdentificationError if the arm or its poses do not allow it."""
     info = await robot.info()
     _check(info, description, poses)
     arm = _Regressor(description)
@@ -120,7 +117,7 @@ async def identify_payload(
             f"at rest the arm seems to carry {mass:.2f} kg, in motion {in_motion:.2f} kg: it touches something, or the "
             "torques are not those of its motors"
         )
-    # A heavier payload could not be declared, so a mass that is indistinguishable from the rated one is set to it.
+    # A payload above the rating cannot be declared; a mass that is not significantly above is set to the rating.
     rated = info.limits.payload
     if rated < mass < rated + CERTAIN * float(deviations[0]):
         mass = rated
@@ -138,7 +135,7 @@ async def identify_payload(
 
 
 def _check(info: Info, description: RobotDescription, poses: int) -> None:
-    """Check before the arm moves that its torques can tell the payload."""
+    """Check, before the arm moves, that its torques can show the payload."""
     if info.model != description.robot.model:
         raise IdentificationError(
             f"the robot is a {info.model}, its description of a {description.robot.model}: name its file"
@@ -165,25 +162,24 @@ class _Regressor:
         self._width = description.drives.friction_width
 
     def static(self, q: Floats) -> Floats:
-        """Y(q), shape (n, 4)."""
+        """Return Y(q), shape (n, 4)."""
         return self.dynamic(q, np.zeros_like(q), np.zeros_like(q))
 
     def dynamic(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """Y(q, q̇, q̈) without the payload's inertia about the flange, shape (n, 4).
-
-        This inertia is equal for point masses 1 m to either side, so half their difference contains the moment alone.
-        """
+        """Return Y(q, q̇, q̈) without the payload's inertia about the flange, shape (n, 4)."""
+        # The payload's inertia is equal for point masses 1 m to either side, so half their difference contains the
+        # moment alone.
         none = self.torque(q, qd, qdd)
         mass, *sides = (np.array(pin.rnea(m, m.createData(), q, qd, qdd)) for m in self._models)
         halves = (0.5 * (there - back) for there, back in zip(sides[::2], sides[1::2], strict=True))
         return np.column_stack([mass - none, *halves])
 
     def torque(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """τ without payload, shape (n,) [N m]."""
+        """Return τ without payload, shape (n,) [N m]."""
         return np.array(pin.rnea(self._bare, self._data, q, qd, qdd))
 
     def choose(self, candidates: Sequence[Floats], count: int) -> list[Floats]:
-        """Choose the poses with most information about mass and centre together, the best first."""
+        """Choose the poses with most information about mass and centre of mass, the best first."""
         knowledge = np.diag([1e-2, 1.0, 1.0, 1.0])
         left = {number: self.static(q) / self._friction[:, None] for number, q in enumerate(candidates)}
         chosen: list[Floats] = []
@@ -200,9 +196,9 @@ class _Regressor:
         return _least_squares(rows * weight[:, None], torques * weight)
 
     def of_masses(self, rows: Floats, poses: Sequence[Floats]) -> Floats:
-        """Standard deviations of (m, m c) that wrong masses of the links cause, see `LINK_MASS`, shape (4,).
+        """Return standard deviations of (m, m c) due to link masses, see `LINK_MASS`, shape (4,).
 
-        The rows are Y of all k poses, shape (n k, 4).
+        `rows` are Y of all k poses, shape (n k, 4).
         """
         weight = np.tile(1.0 / self._friction, len(poses))
         solved = np.linalg.pinv(rows * weight[:, None])
@@ -213,10 +209,8 @@ class _Regressor:
         return np.asarray(np.sqrt(np.sum(np.square(moved), axis=0)))
 
     def move(self, recording: Recording) -> tuple[float, float]:
-        """Estimate the mass from a motion [kg], with its standard deviation.
-
-        The first moment and each joint's friction and rotor inertia are estimated along with it.
-        """
+        """Estimate the mass and its standard deviation from a motion [kg]."""
+        # The first moment and each joint's friction and rotor inertia are estimated as well.
         q, qd, qdd = (recording[f"target_{name}"] for name in ("q", "qd", "qdd"))
         moment = recording["actual_moment"]
         moving = np.flatnonzero(np.abs(qd).max(axis=1) > 1e-3)
@@ -241,7 +235,7 @@ class _Regressor:
 
 
 def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, Floats]:
-    """Return the solution and its standard deviations, from the residual."""
+    """Return the solution, and its standard deviations from the residual."""
     found, *_ = np.linalg.lstsq(matrix, right)
     freedom = max(len(right) - matrix.shape[1], 1)
     variance = max(float(np.sum((right - matrix @ found) ** 2)) / freedom, LEAST_ERROR**2)
@@ -249,12 +243,12 @@ def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, Floats]:
 
 
 def _torque(model: pin.Model, q: Floats) -> Floats:
-    """Torques that hold an arm, shape (n,) [N m]."""
+    """Return the torques that hold an arm, shape (n,) [N m]."""
     return np.array(pin.computeGeneralizedGravity(model, model.createData(), q))
 
 
 def _free(description: RobotDescription, declared: Payload, seed: int) -> list[Floats]:
-    """Return poses with varied wrists in which the arm is clear with any payload up to the rated one."""
+    """Return poses with varied wrists that are free of collision with any payload up to the rated one."""
     joints = description.joints
     models = [
         CollisionModel(description, body(payload))
@@ -276,7 +270,7 @@ def _free(description: RobotDescription, declared: Payload, seed: int) -> list[F
 
 
 async def _hold(robot: Robot, control: Arm, q: Floats, period: float) -> tuple[Floats, Floats]:
-    """Return angles and torques at rest in a pose, the means of approaches from both sides."""
+    """Return angles and torques at rest in a pose, averaged over approaches from both sides."""
     angles, torques = [], []
     for side in (-1.0, 1.0):
         await reach(control, q + side * ASIDE)
@@ -291,7 +285,7 @@ async def _hold(robot: Robot, control: Arm, q: Floats, period: float) -> tuple[F
 
 
 async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Recording:
-    """Move there and back on a straight line that is clear, and record the motion."""
+    """Move there and back on a collision-free straight line, and record the motion."""
     shares = (1.0, 0.5, 0.25, -0.25, -0.5)
     swing = np.zeros_like(q)
     swing[1:4] = SWING

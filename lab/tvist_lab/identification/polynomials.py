@@ -1,4 +1,4 @@
-"""The paper's two multivariate polynomials of the lowest mode (section 3.3), fitted to ring-downs with one payload."""
+"""Fit the paper's two polynomials of the lowest mode (section 3.3) to ring-downs with one payload."""
 
 import math
 from collections.abc import Sequence
@@ -14,15 +14,14 @@ from tvist_protocol.calibration import PolynomialModel, Spread
 from tvist_shaping import terms
 
 FOLDS = 10
-"""Number of parts that the measurements are divided into for cross-validation."""
 DEGREES = (4, 3, 2)
-"""Degree of the polynomials in one, two or three joints; the fewer joints, the more configurations for each term."""
+"""Degree of the polynomials in one, two or three joints; with fewer joints, each term has more data."""
 ROUGH = 10.0
-"""A polynomial is kept if it misses at most this in nine of ten ring-downs that it did not see [%]."""
+"""Largest error at nine of ten left-out ring-downs with which a polynomial is kept [%]."""
 
 
 class FitError(ValueError):
-    """The measurements are not sufficient for a model; the message says why."""
+    """The measurements do not suffice for a model; the message tells why."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +32,14 @@ class Fit:
     residual_f_d: Spread
     residual_zeta: Spread
     cross_validated_f_d: Spread
-    """Deviation of each measurement from a fit that did not include it."""
+    """Deviation of each measurement from a fit without it."""
     cross_validated_zeta: Spread
 
 
 def polynomials(arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit) -> Fit:
-    """Fit polynomials to the lowest mode of each ring-down, which springs and drives tell from the higher ones.
+    """Fit polynomials to the lowest mode of each ring-down, separated from higher modes by springs and drives.
 
-    Raises:
-        FitError: The ring-downs are too few, or cover too little of the workspace.
+    Raises FitError if the ring-downs are too few, or cover too little of the workspace.
     """
     changing = tuple(joint for joint in (1, 2, 3) if joint < arm.description.joints) or (0,)
     degree = DEGREES[len(changing) - 1]
@@ -60,7 +58,7 @@ def polynomials(arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit) -
 
 
 def _check_count(configurations: int, joints: tuple[int, ...], degree: int) -> None:
-    """Check that there are one and a half times as many configurations as coefficients."""
+    """Raise FitError if there are fewer than one and a half times as many configurations as coefficients."""
     size = terms(np.zeros((1, max(joints) + 1)), joints=joints, degree=degree).shape[1]
     needed = math.ceil(1.5 * size)
     if configurations < needed:
@@ -70,7 +68,7 @@ def _check_count(configurations: int, joints: tuple[int, ...], degree: int) -> N
 
 
 def fit_polynomials(q: Floats, f_d: Floats, zeta: Floats, *, joints: tuple[int, ...], degree: int) -> Fit:
-    """Fit the relative deviation of f_d [Hz] and ζ [-], each of shape (N,), at q, shape (N, n) [rad]."""
+    """Fit f_d [Hz] and ζ [-], each of shape (N,), at q, shape (N, n) [rad], by relative deviation."""
     design = terms(q, joints=joints, degree=degree)
     coefficients = [_solve(design, y) for y in (f_d, zeta)]
     fold = np.arange(len(design)) % FOLDS
@@ -97,11 +95,11 @@ def fit_polynomials(q: Floats, f_d: Floats, zeta: Floats, *, joints: tuple[int, 
 
 
 def spread(estimated: Floats, true: Floats) -> Spread:
-    """Median and 90th percentile of the relative deviation [%]."""
+    """Return median and 90th percentile of the relative deviation [%]."""
     median, p90 = np.percentile(100.0 * np.abs(estimated / true - 1.0), (50, 90))
     return Spread(median=float(median), p90=float(p90))
 
 
 def _solve(design: Floats, y: Floats) -> Floats:
-    """Return the coefficients of the least relative deviation."""
+    """Return the coefficients of least relative deviation."""
     return np.asarray(np.linalg.lstsq(design / y[:, None], np.ones_like(y))[0])

@@ -1,8 +1,4 @@
-"""Ring-downs after stops, from recordings of this controller and from logs of others: which can be used, and why not.
-
-A ring-down counts from where the arm is not driven any more until it moves again, if nothing shaped the motion and the
-vibration stands out of the noise.
-"""
+"""Find usable ring-downs after stops, in which the arm is not driven, nothing shaped, and vibration above noise."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -21,31 +17,31 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.values import Payload
 
 BEGINS = 7 * PERIOD
-"""Time after a stop that a ring-down leaves out, since the end of the deceleration ramp is not a ring-down [s]."""
+"""Time after a stop that is ignored, since the end of the deceleration ramp is no ring-down [s]."""
 LONGEST, SHORTEST = 0.4, 0.2
-"""Longest and shortest ring-down that is used [s]."""
+"""Longest and shortest ring-down used [s]."""
 SLOWEST = 0.01
-"""Longest time between samples that show an arm's vibration [s]."""
+"""Longest sampling period that shows an arm's vibration [s]."""
 LEAST_NOISE = 0.01
-"""Smallest assumed noise, since no model is more accurate than that [m/s^2]."""
+"""Smallest assumed noise, since no model is more accurate [m/s²]."""
 QUIET = 1.15
-"""A ring-down whose rms is less than this times its noise contains no information [-]."""
+"""Smallest rms of a ring-down over its noise to contain information [-]."""
 BEFORE = 0.15
-"""Time before a motion in which the noise is looked for [s]."""
+"""Time before a motion in which the noise is measured [s]."""
 INEXACT = 0.1
-"""Share of an everyday ring-down that no linear model explains, since friction and gears are not linear [-]."""
+"""Share of an everyday ring-down that no linear model explains [-], since friction and gears are nonlinear."""
 UNSHAPED = 1.5
 """Number of ticks by which an unshaped reference may seem longer than it is."""
 CONTRADICTS = "it contradicts the others"
-"""Reason of a stop whose ring-down no springs and drives explain together with the others'."""
+"""Reason for a ring-down that no springs and drives explain together with the others."""
 
 
 Progress = Callable[[str], None]
-"""Called before each step of an identification with what it does."""
+"""Receives a description before each step of an identification."""
 
 
 class IdentificationError(ClientError):
-    """The robot could not be identified; the message says what to do."""
+    """The robot could not be identified; the message tells what to do."""
 
 
 @dataclass(frozen=True)
@@ -55,53 +51,48 @@ class Ringing:
     q: Floats
     """Configuration, shape (n,) [rad]."""
     payload: int
-    """Index of the carried payload."""
     force: Floats
-    """Specific force, beginning shortly after the stop, shape (T, 3) [m/s^2]."""
+    """Specific force from shortly after the stop, shape (T, 3) [m/s²]."""
     noise: float
-    """Noise of the force at rest, rms per axis [m/s^2]."""
+    """Noise of the force at rest, rms per axis [m/s²]."""
     time: Floats
-    """Times of the samples from the first on, shape (T,) [s]."""
+    """Times of the samples after the first, shape (T,) [s]."""
     inexact: float = 0.0
-    """What a linear model may leave of it beside the noise, rms per axis [m/s^2]."""
+    """Residual of a linear model beyond the noise, rms per axis [m/s²]."""
     driven: tuple[complex, ...] = ()
     """Poles with which the set-point still comes to rest, one of each pair [1/s]; empty if it rests."""
     softening: float = 0.0
-    """Share by which the gears' hysteresis softens the springs, over the tool's amplitude [1/m]."""
+    """Share by which hysteresis softens the springs, per amplitude of the tool [1/m]."""
 
     @property
     def rms(self) -> float:
-        """Return the rms of the force without its mean, per axis [m/s^2]."""
+        """Rms of the force without its mean, per axis [m/s²]."""
         return self.rms_after(0.0)
 
     def rms_after(self, late: float) -> float:
-        """Return the same some time after the first sample [m/s^2]."""
+        """Return the rms from `late` after the first sample [m/s²]."""
         rest = self.force[self.time >= late]
         return float(np.sqrt(np.mean((rest - rest.mean(axis=0)) ** 2)))
 
 
 @dataclass(frozen=True)
 class Log:
-    """A recording of a robot, or a log of one, and how the ring-downs in it are to be read."""
+    """A recording of a robot or a log of another, with how to read its ring-downs."""
 
     name: str
-    """What people call it: the name of its file, or the number of a jog."""
+    """Name for users: that of the file, or the number of a jog."""
     recording: Recording
     payload: Payload | None = None
-    """What the arm carried; None for what the recording says."""
+    """The carried payload; None means as recorded."""
     begins: float = BEGINS
-    """Time after a stop that a ring-down leaves out [s]."""
+    """Time after a stop that a ring-down ignores [s]."""
     inexact: float = INEXACT
     """Share of a ring-down that no linear model explains [-]."""
     driven: tuple[complex, ...] = ()
     """Poles with which the set-point still comes to rest, one of each pair [1/s]."""
 
     def carried(self, row: int) -> Payload:
-        """Return what the arm carried, or was said to carry, in a row.
-
-        Raises:
-            RecordingError: Nobody says it.
-        """
+        """Return the given, recorded or declared payload at a row; raise RecordingError if it is unknown."""
         recording = self.recording
         if self.payload is not None:
             return self.payload
@@ -119,23 +110,20 @@ class Log:
 
 @dataclass(frozen=True)
 class Stop:
-    """A motion's stop, and the ring-down after it if it can be used."""
+    """A motion's stop, and the ring-down after it if it is usable."""
 
     log: str
-    """Name of the log."""
     motion: int
     """Number of the motion in the log, from 1."""
     ringing: Ringing | None
-    """The ring-down; None if it cannot be used."""
     reason: str = ""
-    """Why it cannot be used: words that stops of the same kind share."""
+    """Why it is not usable, worded alike for stops of the same kind."""
 
 
 def stops_of(logs: Sequence[Log]) -> tuple[list[Stop], tuple[Payload, ...]]:
-    """Return the stops of all motions, and the payloads that their ring-downs refer to.
+    """Return the stops of all motions, and the payloads to which the ring-downs refer by index.
 
-    Raises:
-        RecordingError: A log has no joint angles, or does not say what the arm carried.
+    Raises RecordingError if a log has no joint angles, or if its payload is unknown.
     """
     payloads: dict[Payload, int] = {}
     stops = []
@@ -147,12 +135,12 @@ def stops_of(logs: Sequence[Log]) -> tuple[list[Stop], tuple[Payload, ...]]:
 
 
 def unused(stops: Sequence[Stop]) -> dict[str, int]:
-    """Return each reason with the number of stops that were not used for it, the most frequent first."""
+    """Return the number of unused stops for each reason, the most frequent first."""
     return dict(Counter(stop.reason for stop in stops if stop.ringing is None).most_common())
 
 
 def objection(recording: Recording, motion: MotionRows) -> str:
-    """Return why the arm's acceleration after a motion says little of the arm; empty if it may say something."""
+    """Return why the acceleration after a motion is not informative; empty if it may be."""
     if SENSOR not in recording:
         return f"the log has no {SENSOR}"
     if recording.period > SLOWEST:
@@ -196,17 +184,15 @@ def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> Stop:
 
 
 def fresh(recording: Recording) -> NDArray[np.intp]:
-    """Indices of the rows with new measurements: a robot that sends fewer than it gets repeats the one before."""
+    """Return the rows with new measurements; a robot may repeat the last ones in between."""
     return np.flatnonzero(np.append(True, np.any(np.diff(recording[SENSOR], axis=0) != 0.0, axis=1)))
 
 
 def noise_of(recording: Recording, motion: MotionRows) -> float:
-    """Noise of the accelerometer, rms per axis [m/s^2].
-
-    It is the smaller of two measures: the spread before the motion, if the arm was at rest by then, and what remains of
-    the whole motion's third differences, which a vibration of a tenth of the sampling rate hardly enters. Rows that
-    repeat the one before say nothing of it.
-    """
+    """Return the noise of the accelerometer, rms per axis [m/s²]."""
+    # Take the smaller of two measures: the spread before the motion, if the arm was at rest, and the third
+    # differences of the whole motion, which hardly contain vibration at a tenth of the sampling rate.
+    # Repeated rows are ignored.
     first = int(np.searchsorted(recording.time, recording.time[motion.start] - BEFORE))
     before = _finite(recording[SENSOR][first : motion.start])
     seen = fresh(recording)

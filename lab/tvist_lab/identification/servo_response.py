@@ -1,4 +1,4 @@
-"""The lag with which a robot follows set-points: q̈ = k (p - q - T q̇), later by the time on the way."""
+"""Lag with which a robot follows set-points: q̈ = k (p - q - T q̇), plus a delay in transmission."""
 
 import math
 from collections.abc import Sequence
@@ -13,13 +13,13 @@ from tvist_lab.recordings import Floats, Recording
 from tvist_plant.plant import PERIOD
 
 GUESS = (0.008, 0.04, 1500.0)
-"""Delay [s], T [s] and k [1/s²] at which the search begins."""
+"""Delay [s], T [s] and k [1/s²] from which the search starts."""
 LATEST = 0.2
-"""Longest delay that is searched [s]."""
+"""Longest delay in the search [s]."""
 FOLLOWS = 0.02
-"""Largest rms distance of an arm that follows so, as a share of its way [-]."""
+"""Largest rms error of an arm that follows like this, relative to its way [-]."""
 SURE = 0.3
-"""Largest deviation of the logarithms of T and k of a lag that counts as known [-]."""
+"""Largest deviation of the logarithms of T and k with which a lag counts as known [-]."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class ServoResponse:
     """How a robot follows set-points."""
 
     delay: float
-    """Time from a set-point to the measured angle that it begins to move [s]."""
+    """Time from a set-point until the measured angle responds [s]."""
     lag: float
     """T [s]."""
     gain: float
@@ -43,10 +43,9 @@ class ServoResponse:
 
 
 def servo_response(moves: Sequence[Recording]) -> ServoResponse | None:
-    """Fit the lag to moves of a joint that hardly bends, such as the last one.
+    """Fit the lag to moves of a joint that hardly bends, such as the last one; None if no such servo fits.
 
-    The recordings are of our own robot, whose `target_q` are the set-points. Return None if the arm does not follow as
-    such a servo does.
+    In the recordings, `target_q` are the set-points.
     """
     parts = [_part(move) for move in moves]
     way = max(float(np.ptp(target)) for target, *_ in parts)
@@ -76,7 +75,7 @@ def servo_response(moves: Sequence[Recording]) -> ServoResponse | None:
 
 
 def followed_by(target: Floats, lag: float, gain: float) -> Floats:
-    """Angles of a servo that follows set-points, each of which is held for a period, shape (T,) [rad]."""
+    """Return the angles of a servo that follows set-points, each held for a period, shape (T,) [rad]."""
     system = np.array([[0.0, 1.0, 0.0], [-gain, -gain * lag, gain], [0.0, 0.0, 0.0]])
     move = expm(PERIOD * system)
     state, found = np.array([target[0], 0.0]), np.empty(len(target))
@@ -87,7 +86,7 @@ def followed_by(target: Floats, lag: float, gain: float) -> Floats:
 
 
 def _part(move: Recording) -> tuple[Floats, Floats, Floats]:
-    """Return the set-point of every tick, and ticks and angles of new measurements, of the joint that moves most."""
+    """Return, of the joint that moves most, the set-point of every tick, and ticks and angles of new measurements."""
     ticks, target = move["tick"] - move["tick"][0], move["target_q"]
     joint = int(np.argmax(np.ptp(target, axis=0)))
     seen = fresh(move)

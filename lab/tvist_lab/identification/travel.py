@@ -1,4 +1,4 @@
-"""Ways of an arm under a client's control to where it is measured."""
+"""Move an arm to where it is measured."""
 
 from collections.abc import Awaitable
 from typing import TypeVar
@@ -13,7 +13,7 @@ Result = TypeVar("Result")
 
 
 async def or_none(measuring: Awaitable[Result]) -> Result | None:
-    """Wait for a motion or a measurement; return None if the robot refuses it because of a collision."""
+    """Await a motion or measurement; return None if the robot refuses it because of a collision."""
     try:
         return await measuring
     except RefusedError as error:
@@ -23,11 +23,7 @@ async def or_none(measuring: Awaitable[Result]) -> Result | None:
 
 
 async def reach(arm: Arm, q: Floats) -> None:
-    """Move to a configuration; if there would be a collision on the straight line, via the upright arm.
-
-    Raises:
-        RefusedError: That way is not clear either; code `collision`.
-    """
+    """Move to a configuration, if a straight line collides via the upright arm; else raise RefusedError `collision`."""
     if await or_none(arm.move_j(q)) is None:
         upright = np.zeros_like(q)
         upright[[joint for joint in (1, 3) if joint < len(q)]] = -np.pi / 2

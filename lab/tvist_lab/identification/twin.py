@@ -1,9 +1,9 @@
-"""A twin: the robot file with which a simulated arm does what an arm did in logs.
+"""Fit a twin: the robot file with which a simulated arm repeats the motions of logs.
 
-Its springs and drives begin at those that the ring-downs tell. Then all parameters are fitted by simulating each motion
-of the logs again, as a served robot makes it, to the tool's acceleration around the stop, the joint angles and the
-torques (output error; Ljung, System Identification, 1999, ch. 7). Gauss and Newton's steps, with a prior that keeps
-what the logs do not tell at the robot file's values.
+Springs and drives start from values fitted to ring-downs. Then all parameters are fitted by simulating each
+motion of the logs again, like a served robot, and comparing the tool's acceleration around the stop, joint
+angles and torques (output error; Ljung, System Identification, 1999, ch. 7). Gauss-Newton steps have a prior
+that holds parameters without information in the logs at the robot file's values.
 """
 
 from collections.abc import Sequence
@@ -25,17 +25,17 @@ from tvist_protocol.calibration import ModalParameter
 from tvist_protocol.values import Payload
 
 STEP = 1e-3
-"""Step of a number for finite differences, over its deviation before the fit [-]."""
+"""Step for finite differences, relative to a number's deviation before the fit [-]."""
 ROUNDS = 5
-"""Largest number of times that derivatives are computed; the last ones are those at the end."""
+"""Largest number of computations of derivatives."""
 DAMPERS = (0.0, 0.3, 3.0)
-"""Weights of the step's length; each is used until it helps no more [-]."""
+"""Weights of the step's length, each used until it no longer helps [-]."""
 ENOUGH = 0.01
 """Relative decrease of the cost below which a step does not help [-]."""
 FEWEST = 4
-"""Number of motions below which the twin consists of little more than the robot file."""
+"""Smallest number of motions; with fewer, the twin would be little more than the robot file."""
 AUDIBLE = 1.5
-"""Smallest measured residual that a prediction is judged by, over the noise of three axes [-]."""
+"""Smallest measured residual with which a prediction is compared, relative to the noise of three axes [-]."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Prediction:
     log: str
     motion: int
     measured: float
-    """rms of the tool's acceleration from 10 ms to half a second after the stop [m/s^2]."""
+    """rms of the tool's acceleration from 10 ms to half a second after the stop [m/s²]."""
     twin: float
-    """The twin's [m/s^2]."""
+    """The same of the twin [m/s²]."""
 
     @property
     def error_percent(self) -> float:
@@ -65,19 +65,19 @@ class Twin:
     deviations: Floats
     """Their standard deviations, shape (P,)."""
     payload: int
-    """Index of the payload that the arm was said to carry at last."""
+    """Index of the payload that was declared last."""
     motions: int
     """Number of motions that were repeated."""
     others: tuple[Stop, ...]
-    """Motions that were not, with reasons."""
+    """Motions that were not repeated, with reasons."""
     predictions: tuple[Prediction, ...]
-    """Of motions that the fit has not seen."""
+    """Predictions of motions that the fit has not seen."""
     quiet: int
-    """Number of further ones that vibrate too little to be compared."""
+    """Number of further unseen motions that vibrate too little to compare."""
     checked: bool
-    """Whether these are from logs of their own; if not, each is left out of the fit in turn."""
+    """Whether these motions are from separate logs; else each is left out of the fit in turn."""
     late_ms: tuple[float, ...]
-    """Time by which the arm of each motion follows its target later than the twin, of another controller [ms]."""
+    """Time by which another controller's arm follows later than the twin, by motion [ms]."""
 
     @property
     def robot(self) -> RobotDescription:
@@ -86,17 +86,17 @@ class Twin:
 
     @property
     def told(self) -> list[bool]:
-        """Of each number, whether the logs tell it."""
+        """Whether the logs determine each number."""
         return [bool(told) for told in self.deviations < TOLD * self.parameters.deviation]
 
     def error_percent(self, share: float) -> float | None:
-        """Quantile of the errors of the predicted residual [%]; None if there is no prediction."""
+        """Return a quantile of the errors of the predicted residual [%]; None without predictions."""
         errors = [one.error_percent for one in self.predictions]
         return float(np.quantile(errors, share)) if errors else None
 
 
 class _Fit:
-    """Motions, and how far twins are from them."""
+    """Motions, and the deviation of twins from them."""
 
     def __init__(self, parameters: TwinParameters, seen: Sequence[Observed]) -> None:
         self.parameters, self.seen = parameters, tuple(seen)
@@ -104,7 +104,7 @@ class _Fit:
         self.mountings: dict[str, Floats] = {}
 
     def mount(self, values: Floats, motions: Sequence[Observed]) -> None:
-        """Find how the accelerometer of each log is mounted; that of this controller is in the flange's frame."""
+        """Find how the accelerometer of each log is mounted; ours is in the flange's frame."""
         for log in {motion.log for motion in motions}:
             own = [motion for motion in motions if motion.log == log]
             self.mountings[log] = np.eye(3)
@@ -123,7 +123,7 @@ class _Fit:
         return [self.apart(values, motion) for motion in self.seen]
 
     def slopes(self, values: Floats, left: Sequence[Floats]) -> list[Floats]:
-        """Derivatives of the differences of each motion, shape (samples, P)."""
+        """Return the derivatives of each motion's differences, shape (samples, P)."""
         found = [np.zeros((len(one), len(values))) for one in left]
         for number, entry in enumerate(self.parameters.entries):
             step = STEP * entry.deviation
@@ -141,10 +141,9 @@ class _Fit:
 def fit_twin(
     description: RobotDescription, logs: Sequence[Log], checks: Sequence[Log], progress: Progress
 ) -> Twin:
-    """Fit a robot file to logs with targets.
+    """Fit a robot file to logs with targets, and predict the motions of `checks`.
 
-    The fit does not see the checks and predicts their motions; if there is none, it predicts each motion of the others
-    by a fit without it.
+    Without `checks`, each motion is predicted by a fit without it.
     """
     check_logs(description, [*logs, *checks])
     stops, arm, ringings = agreeing(description, logs, progress)
@@ -168,7 +167,7 @@ def fit_twin(
     prior = np.diag(parameters.deviation**-2.0)
     whole = sum((slope.T @ slope for slope in slopes), np.zeros_like(prior)) / excess + prior
     progress("predicting motions that the fit has not seen")
-    # Without a motion, its pull on the parameters is gone: one step of Gauss and Newton.
+    # Approximate the fit without a motion by one Gauss-Newton step that removes its contribution.
     moved = [
         np.linalg.solve(whole - slope.T @ slope / excess, slope.T @ one / excess)
         for slope, one in zip(slopes, left, strict=True)
@@ -197,12 +196,12 @@ def fit_twin(
 
 
 def _carried(logs: Sequence[Log]) -> list[Payload]:
-    """Payloads of all motions of logs."""
+    """Return the payloads of all motions of logs."""
     return [log.carried(motion.shaped_stop) for log in logs for motion in motions(log.recording)]
 
 
 def _begin(parameters: TwinParameters, modal: Sequence[ModalParameter]) -> Floats:
-    """Return the numbers that give the springs and drives that ring-downs tell, shape (P,)."""
+    """Return the numbers that correspond to the springs and drives fitted to ring-downs, shape (P,)."""
     values = np.zeros(len(parameters.entries))
     drives, links = parameters.description.drives, parameters.description.link_flexibility
     for one in modal:
@@ -224,10 +223,8 @@ def _begin(parameters: TwinParameters, modal: Sequence[ModalParameter]) -> Float
 
 
 def _descend(fit: _Fit, values: Floats, progress: Progress) -> tuple[Floats, list[Floats], list[Floats]]:
-    """Fit the numbers; also return the differences of each motion, and their derivatives, shape (samples, P).
-
-    Derivatives take far longer than differences, so each set of them serves for several steps.
-    """
+    """Fit the numbers; also return the differences of each motion and their derivatives, shape (samples, P)."""
+    # Derivatives take far longer than differences, so each set of them serves for several steps.
     deviation = fit.parameters.deviation
     limit = FURTHEST * deviation
 

@@ -1,4 +1,4 @@
-"""The robot file of a twin as TOML: what it was made of and how well it predicts stands above, and in `provenance`."""
+"""Write the robot file of a twin as TOML, with its origin and accuracy in comments and `provenance`."""
 
 import json
 import re
@@ -21,7 +21,7 @@ def twin_file(twin: Twin, command: str) -> str:
 
 
 def said(twin: Twin) -> list[str]:
-    """Return what a twin is fitted to, how well it predicts, and what stayed as it was, in sentences."""
+    """Return as sentences what a twin was fitted to, how well it predicts, and what was kept."""
     whose = "logs that it has not seen" if twin.checked else "its logs, each left out of the fit in turn"
     lines = [f"Fitted to {twin.motions} motions; {len(twin.others)} others were left out."]
     median, p90 = twin.error_percent(0.5), twin.error_percent(0.9)
@@ -48,7 +48,7 @@ def said(twin: Twin) -> list[str]:
 
 
 def _kept(twin: Twin) -> list[str]:
-    """Names of the parameters that the logs do not tell, with the joints or links."""
+    """Return the names of parameters that the logs do not determine, with their joints or links."""
     links = twin.robot.link_flexibility.links
     places: dict[tuple[str, str], list[int]] = {}
     for entry, told in zip(twin.parameters.entries, twin.told, strict=True):
@@ -64,7 +64,7 @@ def _kept(twin: Twin) -> list[str]:
 
 
 def with_provenance(twin: Twin) -> RobotDescription:
-    """Return the robot file that says of each fitted key where it comes from."""
+    """Return the robot file with the origin of each fitted key."""
     known, provenance = (
         dict(zip(twin.parameters.entries, twin.told, strict=True)),
         dict(twin.robot.provenance),

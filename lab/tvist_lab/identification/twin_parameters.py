@@ -20,40 +20,37 @@ EACH = {
     "coulomb_friction": UNSURE,
     "rotor_inertia": ROTOR,
 }
-"""Standard deviations of the logarithms of what each drive has of its own, before the fit [-]."""
+"""Standard deviations before the fit of logarithms that each drive has separately [-]."""
 TOGETHER = {"gear_damping": UNSURE, "position_gain": SET, "integral_gain": 0.5, "friction_width": 0.5}
-"""The same of what all drives have more or less of together [-]."""
+"""Standard deviations before the fit of logarithms common to all drives [-]."""
 LINKS = {"stiffness": UNSURE, "damping_time": UNSURE}
-"""The same of the links that bend [-]."""
+"""Standard deviations before the fit of logarithms for bending links [-]."""
 MASS = 0.1
-"""Standard deviation of a carried mass from the declared one, over the rated payload [-]."""
+"""Standard deviation of a carried mass from the declared one, relative to the rated payload [-]."""
 CENTRE = 0.03
-"""Standard deviation of each coordinate of its centre [m]."""
+"""Standard deviation of each coordinate of its centre of mass [m]."""
 DIGITS = 9
-"""Number of significant digits of a fitted value."""
 TOLD = 0.5
-"""A parameter is fitted if the logs reduce its deviation below this share [-]."""
+"""A parameter counts as fitted if the logs reduce its deviation below this share [-]."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A number that is fitted: a factor of the robot file's value, or what is added to a payload's."""
+    """A fitted number: a factor on the robot file's value, or an addition to a payload's."""
 
     table: str
     """`drives`, `link_flexibility` or `payload`."""
     key: str
     places: tuple[int, ...]
-    """Joints or places in the list of links that share it; of a payload, its index and the coordinate."""
+    """Joints, or places in the list of links, that share it; for a payload, its index and the coordinate."""
     deviation: float
-    """Standard deviation before the fit, of the logarithm for factors."""
+    """Standard deviation before the fit; of the logarithm for factors."""
 
 
 class TwinParameters:
-    """The robot file as a function of the fitted numbers, all zero for the file as it is.
+    """The robot file as a function of the fitted numbers, which are all zero for the file as it is.
 
-    Args:
-        description: The robot file to start from.
-        payloads: Payloads that the arm was said to carry.
+    `payloads` are those that the arm was declared to carry.
     """
 
     def __init__(self, description: RobotDescription, payloads: Sequence[Payload]) -> None:
@@ -91,7 +88,7 @@ class TwinParameters:
         return next(found, None)
 
     def payload(self, values: Floats, number: int) -> Payload:
-        """Return what the arm carried when it was said to carry a payload."""
+        """Return the payload that the arm really carried when the one of this index was declared."""
         said = self.payloads[number]
         added = dict.fromkeys((("mass", 0), *(("com", axis) for axis in range(3))), 0.0)
         for entry, value in zip(self.entries, values, strict=True):
@@ -103,11 +100,9 @@ class TwinParameters:
         return Payload(mass=mass, com=(x, y, z), inertia=inertia)
 
     def robot(self, values: Floats, payload: int = 0) -> RobotDescription:
-        """Return the robot file, with the payload of that number.
-
-        The share of the wind-up that is fed forward is that of the original gears: a controller that knows the fitted
-        ones leads its drives by as much as the controller of the robot did.
-        """
+        """Return the robot file, with the payload of this index."""
+        # The wind-up feed-forward keeps its size for the original gears, so that a controller with the fitted
+        # gears leads its drives by as much as the robot's controller did.
         factors: dict[tuple[str, str], Floats] = {}
         size = max(self.description.joints, len(self.description.link_flexibility.links), 1)
         for entry, value in zip(self.entries, values, strict=True):

@@ -18,29 +18,27 @@ from tvist_protocol.values import Payload
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
 LARGE = 3
-"""Number of joints with large drives, counted from the base, of an arm of up to six; each has its own parameters."""
+"""Number of joints from the base, of up to six, with large drives; each has its own parameters."""
 TYPICAL_GAIN = (800.0, 300.0)
-"""Velocity gain of a large joint and of one of the wrist, over its torque, of an arm of about 5 kg payload [s/rad]."""
+"""Velocity gain over torque of a large and of a wrist joint, for an arm of about 5 kg payload [s/rad]."""
 UNSURE = 0.7
-"""Standard deviation of a guess's logarithm: within a factor of four with 95 % probability [-]."""
+"""Standard deviation of a guess's logarithm [-]: within a factor of four with 95 % probability."""
 SET = 0.2
-"""The same of a position gain in a robot file, which its maker has set and no joint scatters from [-]."""
+"""The same of a robot file's position gain, which the maker sets and which does not scatter [-]."""
 ROTOR = 0.2
-"""The same of the rotors' inertia, which is nearly proportional to the torque of a kind of drive [-]."""
+"""The same of rotor inertia, which is nearly proportional to torque for a kind of drive [-]."""
 LINK_MASS = 0.03
-"""Standard deviation of each link's mass from the description, relative [-]."""
+"""Relative standard deviation of each link's mass from the description [-]."""
 PAYLOAD_MASS = 0.04
 """Standard deviation of the payload's mass from the declared one, relative to the rated payload [-]."""
 SCATTER = 0.12
-"""Standard deviation by which each joint of a group that shares a parameter may differ from it, relative [-]."""
+"""Relative standard deviation of each joint of a group from the parameter that the group shares [-]."""
 NARROWER = 0.5
 """A parameter is identified if measurements reduce its deviation below this share of the guess's [-]."""
 FURTHEST = 3.0
-"""Number of deviations by which a parameter may differ from what a robot file says; beyond, it would stand for what the
-model lacks.
-"""
+"""Deviations by which a parameter may differ from the robot file; beyond, it would absorb model errors [-]."""
 STEEL = 7850.0
-"""Density for estimating a payload's size [kg/m^3]."""
+"""Density from which a payload's size is estimated [kg/m³]."""
 SURE = 1.959963984540054
 """Number of standard deviations that contain a normal variable with 95 % probability [-]."""
 
@@ -59,12 +57,12 @@ class Unknown:
 
 
 def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
-    """Return the parameters of an arm's linear model: one per large joint, and one for all joints of the wrist.
+    """Return the parameters of an arm's linear model: one per large joint, one for all joints of the wrist.
 
-    The guesses are the robot file's values, of which a shared parameter has the geometric mean over its joints, so that
-    what measurements do not tell stays as the file has it. The deviations are wide all the same, for springs and drives
-    of a file are often assumed. A gain that a file leaves at zero is guessed as for an arm of about 5 kg payload. The
-    rotors' inertia has nearly the same effect on the visible frequencies as more link inertia, so its guess is close.
+    Guesses are the robot file's values (geometric mean for a shared parameter), so that parameters without
+    information stay as in the file. Deviations are wide all the same, since values in a file are often
+    assumed. A gain of zero is guessed as for an arm of about 5 kg payload. Rotor inertia acts on the visible
+    frequencies like more link inertia, so its guess is close.
     """
     joints = range(description.joints)
     large = max(LARGE, description.joints - WRIST)
@@ -98,18 +96,13 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
 
 
 def _mean(values: Floats, typical: float = 1.0) -> float:
-    """Geometric mean of the positive values, or what is typical if there is none."""
+    """Return the geometric mean of the positive values, or `typical` if there is none."""
     positive = values[values > 0.0]
     return float(np.exp(np.mean(np.log(positive)))) if len(positive) else typical
 
 
 class ArmModes:
-    """Modes of an arm as functions of its unknown parameters, with each of several payloads.
-
-    Args:
-        description: The robot, at whose springs and drives the search begins.
-        payloads: Carried payloads.
-    """
+    """Modes of an arm as functions of its unknown parameters, with each of several payloads."""
 
     def __init__(self, description: RobotDescription, payloads: Sequence[Payload]) -> None:
         self.description = description
@@ -129,11 +122,11 @@ class ArmModes:
         return self._flexible[payload]
 
     def mass(self, q: Floats, payload: int) -> Floats:
-        """M(q), shape (L, L)."""
+        """Return M(q), shape (L, L)."""
         return self._masses[payload](q).copy()
 
     def heavier(self, q: Floats, payload: int) -> list[Floats]:
-        """M(q) with each link in turn, and at last the payload, heavier by a standard deviation, each (L, L)."""
+        """Return M(q) with each link, and last the payload, heavier by a standard deviation, each (L, L)."""
         models = (flexible_model(*one) for one in heavier(self.description, body(self.payloads[payload])))
         return [mass_matrix(model)(q).copy() for model in models]
 
@@ -142,14 +135,14 @@ class ArmModes:
         return drivetrain(self.parameters(logarithms), self.description, self._flexible[0])
 
     def parameters(self, logarithms: Floats, deviations: Floats | None = None) -> tuple[ModalParameter, ...]:
-        """Convert parameters, and standard deviations of their logarithms, to the form of a calibration."""
+        """Convert logarithms and their standard deviations to parameters of a calibration."""
         errors = np.zeros(len(logarithms)) if deviations is None else deviations
         values = np.exp(logarithms).tolist()
         return tuple(map(parameter, self.unknowns, values, errors.tolist()))
 
 
 def heavier(description: RobotDescription, carried: Body) -> list[tuple[RobotDescription, Body]]:
-    """Descriptions and payloads with one mass that is larger by a standard deviation."""
+    """Return descriptions and payloads with one mass each larger by a standard deviation."""
     links, found = description.links, []
     for link in range(description.joints):
         factor = np.ones(description.joints)
@@ -167,7 +160,7 @@ def heavier(description: RobotDescription, carried: Body) -> list[tuple[RobotDes
 
 
 def parameter(unknown: Unknown, value: float, deviation: float) -> ModalParameter:
-    """Convert a parameter's value [SI] and the standard deviation of its logarithm [-] to the form of a calibration."""
+    """Convert a value [SI] and the standard deviation of its logarithm [-] to a parameter of a calibration."""
     if len(unknown.joints) > 1:
         deviation = math.hypot(deviation, SCATTER)
     status: Status = "identified" if deviation < NARROWER * unknown.deviation else "not identifiable"
@@ -182,7 +175,7 @@ def parameter(unknown: Unknown, value: float, deviation: float) -> ModalParamete
 
 
 def ball(mass: float) -> tuple[float, float, float, float, float, float]:
-    """Inertia of a steel ball [kg m^2], since torques do not tell the payload's inertia from that of the rotors."""
+    """Return the inertia of a steel ball [kg m²], since torques cannot separate the payload's from the rotors'."""
     radius = (3.0 * mass / (4.0 * math.pi * STEEL)) ** (1.0 / 3.0)
     moment = 0.4 * mass * radius**2
     return (moment, 0.0, 0.0, moment, 0.0, moment)

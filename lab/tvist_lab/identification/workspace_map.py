@@ -1,4 +1,4 @@
-"""The first mode over the workspace: as a calibration tells it, and as the simulated arm has it."""
+"""Maps of the first mode over the workspace: according to a calibration, and of the simulated arm."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import Calibration
 
 QUANTITIES = {"f_d_hz": "f_d", "zeta": "zeta"}
-"""Keys of the maps, with the words in the names of their files."""
+"""Keys of the maps, with the words in their file names."""
 POINTS = 41
 """Number of angles of each joint."""
 
@@ -25,42 +25,30 @@ class WorkspaceMap:
     joints: tuple[int, int]
     """Indices of the joints along the grid's rows and columns."""
     names: tuple[str, str]
-    """Their names."""
     angles: tuple[Floats, Floats]
-    """Their angles [rad], shapes (R,) and (C,)."""
+    """Angles of these joints [rad], shapes (R,) and (C,)."""
     rest: tuple[float, ...]
-    """Configuration of the other joints; those of the grid are zero in it [rad]."""
+    """Configuration of the other joints [rad], with zero for those of the grid."""
     identified: dict[str, Floats]
-    """Key of `QUANTITIES` to what the calibration tells, shape (R, C)."""
+    """Values of the calibration by key of `QUANTITIES`, shape (R, C)."""
     true: dict[str, Floats]
-    """The same of the simulated arm."""
+    """The same for the simulated arm."""
     poses: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Named poses of the robot, by their angles along rows and columns [rad]; those on the map."""
+    """Named poses on the map, by their angles along rows and columns [rad]."""
 
     def error(self, key: str) -> Floats:
-        """Deviation of what is identified from what is true [%], shape (R, C)."""
+        """Return the deviation of the identified from the true values [%], shape (R, C)."""
         return np.asarray(100.0 * (self.identified[key] / self.true[key] - 1.0))
 
 
 def workspace_map(
     description: RobotDescription, calibration: Calibration, mass: float, points: int = POINTS
 ) -> WorkspaceMap | None:
-    """Compute f_d and ζ of the lowest mode on a grid over two joints.
+    """Compute f_d and ζ of the lowest mode on a grid over the first two joints that change the modes.
 
-    The grid is over the first two joints that change the modes: for a six-joint arm, shoulder and elbow. The other
-    joints are in the middle of the workspace. The payload is both carried and declared.
-
-    Args:
-        description: The robot.
-        calibration: Its calibration; a modal model is used if there is one, else the polynomials.
-        mass: Mass of the disc on the flange [kg].
-        points: Number of angles of each joint.
-
-    Returns:
-        The maps; None if the arm has one joint, or would touch itself or the floor at each place of the grid.
-
-    Raises:
-        EstimatorError: The calibration does not fit the arm.
+    The other joints are in the middle of the workspace; `mass` [kg] on the flange is carried and declared.
+    The modal model is preferred to polynomials. None if the arm has one joint or no free place. Raises
+    EstimatorError if the calibration does not fit the arm.
     """
     if description.joints < 2:
         return None

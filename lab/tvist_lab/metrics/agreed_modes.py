@@ -1,7 +1,7 @@
-"""Modes on which fits of a ring-down from several moments and with several numbers of modes agree.
+"""Find modes on which fits of a ring-down from several moments and with several numbers of modes agree.
 
-A real arm is still driven for a while after its target has stopped: its joints overshoot and swing back, and a single
-fit takes that for a mode. It also rings in several modes of like size, and f_d rises by some percent as they decay.
+A real arm is still driven for a while after its target has stopped: its joints overshoot and swing back, which a
+single fit takes for a mode. It also rings in several similar modes, and f_d rises by some percent as they decay.
 """
 
 import math
@@ -23,25 +23,25 @@ from tvist_lab.metrics.ring_down import (
 from tvist_lab.recordings import Floats
 
 STARTS = 5
-"""Number of moments at which a fit begins."""
+"""Number of moments at which a fit starts."""
 STEP = 0.04
-"""Longest time between them [s]; the vibration must be audible in all of them."""
+"""Longest time between these moments [s]; the vibration must be audible at all of them."""
 ORDERS = (1, 2, 3, 4)
-"""Numbers of modes that are tried."""
+"""Numbers of modes to try."""
 LONGEST = 0.6
 """Duration of a fit [s]; over a longer one, f_d rises too much."""
 AUDIBLE = 2.5
-"""Smallest amplitude of a mode where its fit begins, over the rms of what the fit leaves [-]."""
+"""Smallest amplitude of a mode at the start of its fit, over the rms of the residual [-]."""
 NEAR = 0.07
-"""Largest difference of f_d between two fits of the same mode, and smallest one of two modes [-]."""
+"""Largest difference of f_d between fits of one mode, and smallest one between two modes [-]."""
 FOUND_IN = 0.7
 """Smallest share of the fits that must have found a mode [-]."""
 MOST = 3
 """Largest number of modes that are returned."""
 FAINT = 0.1
-"""Smallest amplitude of a mode over that of the strongest [-]."""
+"""Smallest amplitude of a mode relative to the strongest [-]."""
 HEAVY = 0.1
-"""Damping ratio from which on a mode beside a lighter one may be a driven motion, or two modes taken for one [-]."""
+"""Damping ratio from which a mode beside a lighter one may be a driven motion, or two modes in one [-]."""
 BESIDE = 1.5
 """Largest ratio of the frequencies of two such modes [-]."""
 RISE = 0.03
@@ -51,24 +51,24 @@ FALL = 0.7
 LATE = 2.0 / 9.0
 """Share of such a change by which a fit with constant f_d and ζ errs [-].
 
-Let f_d go as e^(-σt), like the amplitude. Its mean, weighted by the square of the amplitude, has made 1/3 of the
-change. Least squares fit the phase, in which late times count more, and give the value after 5/9 of it.
+Let f_d change as e^(-σt), like the amplitude. Its mean, weighted by the squared amplitude, has made 1/3 of
+the change. Least squares fit the phase, in which late times count more, and give the value after 5/9 of it.
 """
 
 _Fit = tuple[list[Mode], float]
-"""Modes and rms of what they leave, each with time counted from the moment at which the fit begins."""
+"""Modes and rms of their residual; each mode's time counts from the start of its fit."""
 
 
 def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> RingDown:
-    """Fit damped sines from several moments on, and keep the modes that most of the fits have found.
+    """Fit damped sines from several moments, and keep the modes that most of the fits have found.
 
-    f_d and ζ are means over the fits, weighted by their variances. The interval is that of the best fit, widened by
-    what the others differ from the mean beyond their own noise (Hausman, Econometrica 46, 1978), and by what f_d and ζ
-    of a real arm change while it rings.
+    f_d and ζ are means over the fits, weighted by their variances. The interval is that of the best fit,
+    widened by the others' differences beyond their own noise (Hausman, Econometrica 46, 1978), and by the
+    change of f_d and ζ of a real arm while it rings.
 
-    `alpha` [m/s²] has shape (T, 3) and `time` after the stop [s] (T,); the arm is driven until `begin` [s], as far as
-    one knows. The mode is the strongest one midway between the moments at which the fits begin; amplitudes are
-    extrapolated to the stop. `ok` is false, with a `reason`, if the fits do not agree.
+    `alpha` [m/s²] has shape (T, 3), `time` after the stop [s] (T,); the arm is presumably driven until
+    `begin` [s]. The result is the strongest mode midway between the starts of the fits; amplitudes are
+    extrapolated to the stop. `ok` is false, with a `reason`, if the fits disagree.
     """
     first = int(np.searchsorted(time, begin - 1e-9))
     whole = Ring(alpha[first:], time[first:], period, (0.0,))
@@ -102,11 +102,9 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
 
 
 def _fits(ring: Ring) -> Iterator[_Fit]:
-    """Fit as many modes as pay, and one more.
-
-    A loud mode that changes while it decays would be fitted best as two at the same place, a heavy one for its
-    beginning and a light one for its end. So modes that are near each other are one.
-    """
+    """Yield the fit with as many modes as pay off, and the one with one more."""
+    # A loud mode that changes while it decays would be fitted best as two at the same place, one heavily
+    # damped for its start and one lightly for its end. Modes that are near each other are therefore merged.
     fits = []
     for f_d, zeta in _poles(ring):
         inside = (f_d > 3.05) & (f_d < 0.98 * ring.highest) & (np.abs(zeta) < 0.9 * DAMPING[1])
@@ -149,14 +147,14 @@ def _poles(ring: Ring) -> Iterator[tuple[Floats, Floats]]:
 
 
 def _audible(mode: Mode, rms: float, begin: float) -> float:
-    """Time from the first fit's beginning until a mode has decayed to what the fit leaves [s]."""
+    """Return the time from the first fit's start until a mode has decayed to the fit's residual [s]."""
     loud = mode.amplitude_at(begin) / max(rms, 1e-12)
     fall = math.log(mode.amplitude / mode.amplitude_at(1.0))
     return math.log(loud) / fall if loud > AUDIBLE else 0.0
 
 
 def _groups(heard: Sequence[Sequence[Mode]]) -> Iterator[list[Mode]]:
-    """Modes of different fits with about the same f_d, for those that enough fits have found."""
+    """Yield modes with about the same f_d in different fits, if enough fits have found them."""
     pool = [list(modes) for modes in heard if modes]
     least = max(FOUND_IN * len(pool), 3.0)
     while candidates := [mode for modes in pool for mode in modes]:
@@ -172,7 +170,7 @@ def _groups(heard: Sequence[Sequence[Mode]]) -> Iterator[list[Mode]]:
 
 
 def _mean(group: Sequence[Mode], fits: int, middle: float) -> Mode:
-    """Mean of a mode over its fits; its amplitude is the lower quartile, with nothing where a fit has not found it."""
+    """Return the mean mode of a group; its amplitude is the lower quartile, with 0 for fits that missed it."""
     f_d, f_d_error = _weighted([mode.f_d for mode in group], [mode.f_d_error for mode in group])
     zeta, zeta_error = _weighted([mode.zeta for mode in group], [mode.zeta_error for mode in group])
     f_d_error = math.hypot(f_d_error, LATE * RISE * f_d / CERTAIN)
@@ -183,7 +181,7 @@ def _mean(group: Sequence[Mode], fits: int, middle: float) -> Mode:
 
 
 def _weighted(values: Sequence[float], errors: Sequence[float]) -> tuple[float, float]:
-    """Mean weighted by variances, and its standard error."""
+    """Return the mean weighted by variances, and its standard error."""
     value, error = np.array(values), np.maximum(errors, 1e-9)
     mean = float(np.average(value, weights=error**-2.0))
     best = float(np.min(error))
@@ -192,7 +190,7 @@ def _weighted(values: Sequence[float], errors: Sequence[float]) -> tuple[float, 
 
 
 def _ordered(modes: Sequence[Mode], middle: float) -> list[Mode]:
-    """Return the modes that are loud and certain enough, the strongest first, but one that is suspect last."""
+    """Return the modes that are loud and certain enough, the strongest first, a suspect one last."""
     certain = [m for m in modes if m.f_d_error < 0.04 * m.f_d and m.zeta_error < max(0.5 * m.zeta, 0.01)]
     loudest = max((mode.amplitude for mode in certain), default=0.0)
     loud = [mode for mode in certain if mode.amplitude >= FAINT * loudest]
@@ -202,6 +200,6 @@ def _ordered(modes: Sequence[Mode], middle: float) -> list[Mode]:
 
 
 def lighter_beside(mode: Mode, modes: Sequence[Mode]) -> Mode | None:
-    """Return the mode near one with a damping ratio of 0.1 or more that has less than half of it, if there is one."""
+    """Return a mode near one with ζ ≥ 0.1 that has less than half its ζ; None if there is none."""
     near = (one for one in modes if max(one.f_d / mode.f_d, mode.f_d / one.f_d) < BESIDE)
     return next((one for one in near if one.zeta < 0.5 * mode.zeta), None) if mode.zeta >= HEAVY else None

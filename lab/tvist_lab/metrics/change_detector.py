@@ -1,4 +1,4 @@
-"""Whether something that is measured once a motion has changed, by a sequential test of its own past."""
+"""Sequential test whether a quantity measured once per motion has changed."""
 
 import math
 from dataclasses import dataclass
@@ -8,53 +8,45 @@ import numpy as np
 from tvist_lab.recordings import Floats
 
 WINDOWS = (2, 3, 5, 8)
-"""Numbers of latest measurements that are compared with those before; one alone may be an accident, and a small change
-shows after more of them.
-"""
+"""Numbers of latest measurements compared with earlier ones: one may be an outlier, small changes need more."""
 LEAST = 3
-"""Number of measurements that a comparison needs before these."""
+"""Number of earlier measurements that a comparison needs."""
 KEPT = 40
-"""Largest number of measurements that are kept."""
 SURE = 3.7
-"""Number of standard deviations beyond which a change is told, if the scatter is known well. Of normal measurements 1
-in 5,000 would be so far off; those of real motions have heavier tails.
-"""
+"""Standard deviations beyond which a change is reported if the scatter is known well: more than normal
+measurements need (1 in 5,000), since those of real motions have heavier tails."""
 SHOWN, CLEAR = 2.0, 2.5
-"""Numbers of standard errors: that messages name as the interval of a change, and that a change has at least."""
+"""Numbers of standard errors: for the interval in messages, and the least for a change."""
 FARTHEST = 3.5
-"""Number of its own deviations by which a measurement counts as far from those before, at most."""
+"""Largest distance from earlier measurements that counts, in a measurement's own deviations."""
 BELIEVED = 4.0
 """Number of measurements that the expected scatter is worth."""
 OUTLYING = 2.5
-"""Number of deviations beyond which a measurement loses weight in what was before."""
+"""Number of deviations beyond which an earlier measurement loses weight."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """A change of what is measured."""
+    """A change of the measured quantity."""
 
     before: float
-    """Mean before it."""
     after: float
-    """Mean since."""
     error: float
     """Standard error of the difference."""
     lasting: int
-    """Number of measurements since, the newest one included."""
+    """Number of measurements since the change, including the newest."""
 
 
 class ChangeDetector:
     """Compares the latest measurements of a quantity with all before, each with its own error.
 
-    The change-point model: neither the mean before nor the one since is known, and of all moments at which the change
-    may have been, the likeliest one counts (Hawkins, Qiu and Kang, Journal of Quality Technology 35, 2003). What
-    motions differ by beyond their errors is estimated from those before, together with what is expected, and
-    outliers have less weight (Huber, Annals of Mathematical Statistics 35, 1964). After a change has been told, the
-    measurements since are the new past.
+    Change-point model: neither mean is known, and the likeliest moment of the change counts (Hawkins, Qiu and
+    Kang, Journal of Quality Technology 35, 2003). Scatter between motions beyond the errors is estimated from
+    earlier measurements and the expectation; outliers have less weight (Huber, Annals of Mathematical
+    Statistics 35, 1964). After a reported change, the measurements since then are the new past.
 
-    `prior` is the standard deviation of the mean before, about 0, as far as it is known without any measurement;
-    `scatter` what is expected between motions beyond the errors of their measurements; `least` the smallest change that
-    is told.
+    `prior` is the standard deviation of the earlier mean about 0 without any measurement, `scatter` the
+    expected one between motions beyond measurement errors, `least` the smallest change to report.
     """
 
     def __init__(self, prior: float, scatter: float, least: float) -> None:
@@ -62,10 +54,7 @@ class ChangeDetector:
         self._kept: list[tuple[float, float]] = []
 
     def take(self, value: float, error: float) -> Change | None:
-        """Take a measurement.
-
-        `error` is the standard error of the value. Returns a change that has shown with this measurement.
-        """
+        """Take a measurement with its standard error; return the change that it reveals, if any."""
         self._kept = [*self._kept[1 - KEPT :], (value, error)]
         found, surest = None, 0.0
         for number in WINDOWS:
@@ -78,7 +67,7 @@ class ChangeDetector:
             farthest = FARTHEST * np.sqrt(own + variance)
             moved = float(np.average(np.clip(latest - mean, -farthest, farthest), weights=1.0 / own))
             error_of_it = float(np.sqrt(1.0 / np.sum(1.0 / own) + variance))
-            # Of few measurements the scatter is not known well, so that more of them are far off.
+            # With few measurements the scatter is uncertain, so require a larger change.
             sure = SURE * math.sqrt(1.0 + BELIEVED / (BELIEVED + past))
             if abs(moved) > max(max(sure, surest) * error_of_it, self._least):
                 off = (latest - mean) * np.sign(moved)
@@ -93,7 +82,7 @@ class ChangeDetector:
         return found
 
     def _past(self, measured: Floats) -> tuple[float, float, float]:
-        """Mean, scatter between motions, and variance of the mean, of measurements of shape (n, 2)."""
+        """Return mean, scatter between motions, and variance of the mean, of measurements of shape (n, 2)."""
         value, error = measured.T
         mean, scatter = float(np.median(value)), self._scatter
         for _ in range(3):

@@ -1,7 +1,4 @@
-"""From which motion of a recording on the arm was no longer the one of the motions before.
-
-Payload, gears and what rings after stops are followed, each against its own past.
-"""
+"""Find the motion of a recording from which the arm's payload, gears or modes are different."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -21,38 +18,36 @@ from tvist_plant.model import carries_weight, rigid_model
 from tvist_plant.plant import PERIOD
 
 NEEDED = ("target_q", "actual_q", "actual_moment", "target_moment", "actual_tool_accelerometer")
-"""Columns by which the arm of a recording is compared with itself."""
+"""Columns needed to compare the arm of a recording with itself."""
 SAME = 0.1
 """Largest difference of any joint between two poses that count as one [rad]."""
 SCATTER, LEAST = 0.015, 0.04
-"""Expected deviation of the logarithm of f_d after stops in one pose, and its least change that is told [-]."""
+"""Expected deviation of the logarithm of f_d after stops in one pose, and its smallest reported change [-]."""
 LISTENED = 150
-"""Ticks after a stop in which the tool is listened to."""
+"""Ticks after a stop in which the vibration is measured."""
 SHORTEST = 100
-"""Fewest of them, if the next motion begins sooner."""
+"""Smallest number of these ticks, if the next motion starts sooner."""
 SETTLED = 50
-"""Number of the last of these, in which the gears show how far they give way."""
+"""Number of the last of these ticks in which the gears' deflection is measured."""
 FRICTION = 0.2
-"""Standard deviation of the friction in a torque at rest, over the joint's Coulomb friction [-]."""
+"""Standard deviation of the friction in a torque at rest, relative to the joint's Coulomb friction [-]."""
 OFF = 1e-4
-"""Standard deviation of the angle at rest, as of the gear's error and of integrators that still move [rad]."""
+"""Standard deviation of the angle at rest, due to gear errors and integrators that still move [rad]."""
 VAGUE = 0.25
-"""Relative error from which on a gear's compliance is not known in a pose [-]."""
+"""Relative error from which a gear's compliance counts as unknown in a pose [-]."""
 HEAVY = 0.7
-"""Error of a motion's mass from which on it says nothing [kg]."""
+"""Error from which a motion's mass is ignored [kg]."""
 MASS, GEAR, MODES = (1.0, 0.15, 0.7), (0.4, 0.05, 0.15), (0.1, 0.02, 0.03)
-"""Arguments of the detectors: how well the mean is known before any measurement, expected scatter, least change that is
-told; in kg, and for logarithms.
-"""
+"""Arguments of the detectors: prior, expected scatter, smallest reported change; in kg, else of logarithms."""
 UNKNOWN = 0.4
-"""Share of the Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
+"""Share of Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
 
 
 def changes(measured: Measured) -> list[str]:
-    """Return what has changed about the arm, a sentence each, in the order of the motions.
+    """Return sentences on what has changed about the arm, in the order of the motions.
 
-    In a recording of this controller the arm is compared with its model, see `FitMonitor`. Of a log of another one the
-    masses are not known: there the strongest mode after each stop is compared with those before in the same pose.
+    In a recording of this controller, the arm is compared with its model, see `FitMonitor`. In a log of another robot,
+    masses are unknown: the strongest mode after each stop is compared with earlier ones in the same pose.
     """
     if not measured.motions:
         return []
@@ -70,7 +65,7 @@ def changes(measured: Measured) -> list[str]:
 
 @cache
 def _described(model: str) -> RobotDescription | None:
-    """Robot file of a model that comes with the package; None if there is none."""
+    """Return the robot file of a model that comes with the package; None if there is none."""
     return next((one for one in map(load, robots()) if one.robot.model == model), None)
 
 
@@ -116,13 +111,9 @@ def _by_pose(
 class FitMonitor:
     """Measures after each stop whether the arm has changed; see `ChangeDetector`.
 
-    Three quantities are followed from motion to motion, each against its own past, so that neither a torque constant
-    that is wrong nor springs that are not those of the robot file make a difference:
-
-    - the mass that the drives feel beyond the declared one;
-    - the logarithm of the angle by which each gear gives way under a torque at rest, between its motor and its link,
-      as far as the encoders are on the link side;
-    - the logarithm of the factor by which modes differ from those of the robot file, see `RingListener`.
+    Each quantity is compared with its own past, so that wrong torque constants or springs do not matter: the mass that
+    the drives feel beyond the declared one; the logarithm of each gear's deflection per torque at rest, if encoders
+    are on the link side; and the logarithm of the factor on the robot file's modes, see `RingListener`.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -141,11 +132,10 @@ class FitMonitor:
     def stop(
         self, target: Floats, q: Floats, moment: Floats, expected: Floats, alpha: Floats
     ) -> Iterator[str]:
-        """Measure after a stop, and compare.
+        """Measure after a stop, and yield a clause for each change; mostly none.
 
-        Of `target` [rad], shape (n,), and from the stop on `q` [rad], `moment` and `expected` (that of the feed-
-        forward) [N m], shape (T, n), and `alpha` (the accelerometer's readings) [m/s²], shape (T, 3). Yields what has
-        changed, a clause each; mostly nothing.
+        `target` [rad] has shape (n,). From the stop on, `q` [rad], `moment` and `expected` (from
+        feed-forward) [N m] have shape (T, n), `alpha` (of the accelerometer) [m/s²] (T, 3).
         """
         if self._weighs:
             excess, bound = self._felt(target, (moment - expected).mean(axis=0))
@@ -163,7 +153,7 @@ class FitMonitor:
             yield from _told(self._modes.take(u, error), _of_modes)
 
     def _felt(self, q: Floats, feedback: Floats) -> tuple[float, float]:
-        """Mass that explains what the drives' feedback adds at rest, and its bound from friction [kg]."""
+        """Return the mass that explains the drives' feedback at rest, and its bound from friction [kg]."""
         per_kg = _weight(self._loaded, q) - _weight(self._arm, q)
         weighted = per_kg / self._unsure**2
         square = float(weighted @ per_kg)
@@ -209,6 +199,6 @@ def _of_modes(change: Change) -> str:
 
 
 def _percent(logarithm: float, error: float) -> tuple[float, float]:
-    """Size of a change whose logarithm has this standard error, and its distance from its interval's nearer end [%]."""
+    """Return the size of a change given by its logarithm, and the distance to its interval's nearer end [%]."""
     nearer = math.copysign(abs(logarithm) - SHOWN * error, logarithm)
     return 100.0 * abs(math.expm1(logarithm)), 100.0 * abs(math.exp(logarithm) - math.exp(nearer))

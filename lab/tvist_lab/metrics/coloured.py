@@ -1,20 +1,19 @@
-"""Noise that is correlated in time, and by how much it makes estimates worse than white noise of the same size."""
+"""Effect of noise that is correlated in time on the accuracy of estimates."""
 
 import numpy as np
 
 from tvist_lab.recordings import Floats
 
 MOST = 0.97
-"""Largest correlation that is assumed: beyond it, a residual is a drift [-]."""
+"""Largest assumed correlation; beyond it, a residual is a drift [-]."""
 
 
 def widening(residual: Floats, fitted: int = 0) -> float:
-    """Factor of standard errors for a residual's colour, sqrt((1 + r)/(1 - r)), at least 1.
+    """Return the factor on standard errors for a coloured residual, sqrt((1 + r)/(1 - r)), at least 1.
 
-    r is the correlation of successive samples, as of a first-order autoregression, which has the same at all lags.
-
-    `residual` has shape (T,) or (T, axes), in the order of time. Each of the `fitted` slow functions of time takes (1 +
-    3 r)/T from the correlation that is found (Marriott and Pope, Biometrika 41, 1954, for the mean).
+    r is the correlation of successive samples, as of a first-order autoregression. `residual` has shape (T,)
+    or (T, axes), in the order of time. For each of the `fitted` slow functions of time, (1 + 3 r)/T is added
+    to the correlation found (Marriott and Pope, Biometrika 41, 1954, for the mean).
     """
     energy = float(np.sum(residual**2))
     if energy <= 0.0:

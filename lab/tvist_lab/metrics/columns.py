@@ -1,4 +1,4 @@
-"""The table of motions, the same on the terminal and on a page: its columns in words, and its cells."""
+"""The table of motions for terminal and page: columns with their meanings, and cells."""
 
 import re
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ COLUMNS = {
     "damping\nζ": "Damping ratio of that mode, with its 95 % interval.",
     "also\nf_d Hz": "Damped frequencies of up to two further modes, the stronger one first.",
 }
-"""Heads of the columns, with symbol and unit in a second line, to what they mean."""
+"""Meaning of each column, by its head with symbol and unit in a second line."""
 WORDS = {
     "start_s": "start", "stop_s": "stop", "delay_ms": "longer", "stabilisation_ms": "settling", "cycle_ms": "cycle",
     "overshoot_m": "overshoot", "residual_vibration_m_s2": "vibration", "still_after_ms": "at rest",
@@ -28,16 +28,13 @@ WORDS = {
     "f_d_hz": "frequency",
     "f_d_interval_hz": "frequency", "zeta": "damping", "zeta_interval": "damping", "servo_lag_ms": "lag of the servo",
 }  # fmt: skip
-"""Fields of a motion's figures in the words of the columns."""
+"""Names of a motion's figures in notes."""
 NAMED = 3
-"""Largest number of motions that a line names; of more it says how many they are."""
+"""Largest number of motions that a line names; if there are more, it counts them."""
 
 
 def motion_cells(results: Sequence[MotionResult], origin: float) -> list[tuple[str, ...]]:
-    """Return the rows of the table; an interval is a second line of its cell.
-
-    `origin` is the time of the log that is written as zero [s].
-    """
+    """Return the rows of the table, with intervals on a second line; `origin` is the log's time shown as zero [s]."""
     return [
         (
             str(place),
@@ -59,7 +56,7 @@ def motion_cells(results: Sequence[MotionResult], origin: float) -> list[tuple[s
 
 
 def number(value: float | None, digits: int, interval: tuple[float, float] | None = None) -> str:
-    """Return a number as text, with its interval in a second line; a dash if it was not measurable."""
+    """Format a number, with its interval on a second line; a dash if it was not measurable."""
     if value is None:
         return "–"
     text = f"{value:.{digits}f}"
@@ -67,15 +64,13 @@ def number(value: float | None, digits: int, interval: tuple[float, float] | Non
 
 
 def percent(change: float | None) -> str:
-    """Return a change as text with its sign; a dash if it is not known."""
+    """Format a change with its sign; a dash if it is not known."""
     return "–" if change is None else f"{round(change):+d} %"
 
 
 def grouped_notes(results: Sequence[MotionResult]) -> list[str]:
-    """Return one line for each kind of note, with the motions and figures it concerns.
-
-    Notes that differ in their numbers alone are of one kind; the first one stands for all.
-    """
+    """Return one line for each kind of note, with its motions and figures."""
+    # Notes that differ only in their numbers are of one kind; the first one represents all.
     kinds: dict[str, dict[str, set[int]]] = {}
     first: dict[str, str] = {}
     for index, result in enumerate(results, 1):

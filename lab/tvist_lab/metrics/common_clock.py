@@ -1,4 +1,4 @@
-"""Metrics on a common clock: all times count from the start of the reference before shaping."""
+"""Metrics with all times counted from the start of the reference before shaping."""
 
 from collections.abc import Callable
 
@@ -13,26 +13,24 @@ from tvist_lab.metrics.vibration import amplitude, band_pass, best_tool_accelera
 from tvist_lab.recordings import Floats, Recording
 
 STILL = 0.1
-"""An arm is still if |α| stays below this [m/s²]."""
+"""|α| below which an arm counts as at rest [m/s²]."""
 AFTER_STOP = 0.010
-"""Time after the stop at which `evaluate` begins to search for the peak [s], when the last ramp has passed."""
+"""Time after the stop from which `evaluate` searches for the peak, when the last ramp has passed [s]."""
 
 NOISE_PEAK = 5.0
-"""Largest |α| that noise reaches in some seconds, over its rms in one axis [-]."""
+"""Largest |α| of noise within some seconds, relative to its rms in one axis [-]."""
 NOISE_TAIL = 0.2
 """Time at the end of a rest in which the sensor shows its noise [s]."""
 RINGS = 0.5
-"""Share of a signal's energy that one mode explains if it is an arm that rings, and not noise [-]."""
+"""Share of a signal's energy explained by one mode from which it is vibration, not noise [-]."""
 
 Kinematics = Callable[[Floats], tuple[Floats, Floats]]
 """Converts joint angles, shape (n,) [rad], to the flange's position, shape (3,) [m], and rotation, shape (3, 3)."""
 
 
 def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[float, float]:
-    """Largest |α| and largest envelope after the stop of the reference before shaping plus the declared delay [m/s²].
-
-    In a log of another controller it is the arm's own stop that counts, and 10 ms more.
-    """
+    """Return the largest |α| and envelope after the unshaped stop plus the declared delay [m/s²]."""
+    # In a log of another controller, the arm's own stop plus 10 ms counts.
     _, alpha = felt(recording, motion, _after_declared_stop(recording, motion), smooth=True)
     if len(alpha) < 2:
         raise NotMeasurableError("nothing was recorded after the stop")
@@ -40,10 +38,8 @@ def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[floa
 
 
 def still_after(recording: Recording, motion: MotionRows, threshold: float = STILL) -> float:
-    """Last time at which |α| exceeds a threshold [m/s²], from the start of the reference before shaping [s].
-
-    The truth channel is used if there is one, otherwise the sensor below 60 Hz.
-    """
+    """Return the last time |α| exceeds a threshold [m/s²], from the start of the unshaped reference [s]."""
+    # Use the truth channel if there is one, otherwise the sensor below 60 Hz.
     time, alpha_xyz = felt(recording, motion, slice(motion.start, motion.end), smooth=True)
     alpha = amplitude(alpha_xyz)
     if recording.foreign and (noise := _noise(time, alpha_xyz)) * NOISE_PEAK > threshold:
@@ -66,34 +62,32 @@ def still_after(recording: Recording, motion: MotionRows, threshold: float = STI
 
 
 def peak_after_stop(recording: Recording, motion: MotionRows) -> float:
-    """Largest true |α| later than 10 ms after the shaped reference stops [m/s²], which `evaluate` uses."""
+    """Return the largest true |α| later than 10 ms after the shaped reference's stop [m/s²], for `evaluate`."""
     return peak_later_than(recording, motion, recording.time[motion.shaped_stop] + AFTER_STOP)
 
 
 def peak_later_than(recording: Recording, motion: MotionRows, moment: float) -> float:
-    """Largest true |α| later than a moment of the recording [m/s²]."""
+    """Return the largest true |α| later than a time of the recording [m/s²]."""
     rows = _later_than(recording, motion, moment)
     return float(np.max(amplitude(tool_acceleration(recording, truth=True, rows=rows))))
 
 
 def peak_acceleration(recording: Recording, motion: MotionRows) -> float:
-    """Largest |q̈*| of any joint during the motion [rad/s²]."""
+    """Return the largest |q̈*| of any joint during the motion [rad/s²]."""
     return float(np.max(np.abs(recording["target_qdd"][motion.start : motion.shaped_stop + 2])))
 
 
 def peak_velocity(recording: Recording, motion: MotionRows) -> float:
-    """Largest |q̇*| of any joint during the motion [rad/s]."""
+    """Return the largest |q̇*| of any joint during the motion [rad/s]."""
     return float(np.max(np.abs(recording["target_qd"][motion.start : motion.shaped_stop + 2])))
 
 
 def envelope(alpha: Floats, period: float) -> Floats:
-    """Envelope of a ring-down within 3 to 60 Hz [m/s²]: the norm of its three axes' analytic signals.
+    """Return the envelope of a ring-down within 3 to 60 Hz [m/s²]: the norm of its axes' analytic signals.
 
-    The ring-down is mirrored at both ends before filtering, so that the motion before it has no influence. The filter
-    needs several cycles: at ζ = 0.03 the peak is 90 to 100 % of the amplitude, at ζ = 0.34 it is 40 to 85 %,
-    depending on phase.
-
-    `alpha` [m/s²], shape (T, 3), begins at the moment of interest.
+    `alpha` [m/s²], shape (T, 3), is mirrored at both ends before filtering, to exclude the motion before it.
+    The filter needs several cycles: depending on phase, the peak is 90 to 100 % of the amplitude at ζ = 0.03,
+    40 to 85 % at ζ = 0.34.
     """
     rows = len(alpha)
     mirrored = np.concatenate([alpha[:0:-1], alpha, alpha[-2::-1]])
@@ -102,11 +96,10 @@ def envelope(alpha: Floats, period: float) -> Floats:
 
 
 def rigid_acceleration(recording: Recording, motion: MotionRows, kinematics: Kinematics) -> Floats:
-    """Acceleration a rigid arm's flange would have along the shaped reference, in its own frame [m/s²].
+    """Return the acceleration of a rigid arm's flange along the shaped reference, in its frame [m/s²].
 
-    It is the second central difference of the position at `target_q`.
-
-    One row for each from the motion's start to its shaped stop, shape (N, 3).
+    It is the second central difference of the position at `target_q`, for each row from the motion's start to
+    its shaped stop, shape (N, 3).
     """
     first, past = max(motion.start, 1), min(motion.shaped_stop + 1, len(recording) - 1)
     ticks = recording["tick"][first - 1 : past + 1]
@@ -120,23 +113,20 @@ def rigid_acceleration(recording: Recording, motion: MotionRows, kinematics: Kin
 
 
 def in_motion_rms(recording: Recording, motion: MotionRows, rigid: Floats) -> float:
-    """Vibration during the motion: rms of |α - α of the rigid arm| until the shaped reference stops [m/s²].
-
-    `rigid` is what `rigid_acceleration` returns.
-    """
+    """Return the rms of |α - `rigid`|, see `rigid_acceleration`, until the shaped reference stops [m/s²]."""
     first = max(motion.start, 1)
     alpha = best_tool_acceleration(recording)[first : first + len(rigid)]
     return float(np.sqrt(np.mean(np.sum((alpha - rigid) ** 2, axis=1))))
 
 
 def _noise(time: Floats, alpha: Floats) -> float:
-    """Largest rms of an axis at the end of the rest [m/s²]."""
+    """Return the largest rms of an axis at the end of the rest [m/s²]."""
     tail = alpha[time >= time[-1] - NOISE_TAIL] if len(time) else alpha
     return float(np.max(np.std(tail, axis=0))) if len(tail) else 0.0
 
 
 def _after_declared_stop(recording: Recording, motion: MotionRows) -> slice:
-    """Rows after the stop of the reference before shaping plus the delay that its shaper declares at that time."""
+    """Return the rows after the unshaped stop plus the delay that the shaper declares at that time."""
     if recording.foreign:
         return _later_than(recording, motion, recording.time[motion.arm_stop(recording)] + AFTER_STOP)
     delay = float(np.nan_to_num(recording["shaper_delay"][motion.reference_stop]))
@@ -145,7 +135,7 @@ def _after_declared_stop(recording: Recording, motion: MotionRows) -> slice:
 
 
 def _later_than(recording: Recording, motion: MotionRows, moment: float) -> slice:
-    """The motion's rows later than a given time."""
+    """Return the motion's rows later than a given time; raise NotMeasurableError if there is none."""
     first = int(np.searchsorted(recording.time, moment + 1e-9))
     if first >= motion.end:
         raise NotMeasurableError("nothing was recorded after the stop")

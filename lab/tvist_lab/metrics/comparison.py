@@ -1,4 +1,4 @@
-"""The same motions in two recordings, or in one without and with a shaper."""
+"""Find the same motions in two recordings, or in one without and with a shaper."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from tvist_lab.metrics.vibration import TRUTH
 from tvist_lab.recordings import Floats, Recording
 
 SAME = 0.02
-"""Largest difference of a joint angle, at the start and at the end, between motions that correspond [rad]."""
+"""Largest difference of a joint angle at start and end between motions that correspond [rad]."""
 COMPARED = IMPACTS | {"still_after": "still_after_ms", "peak": "peak_m_s2", "envelope": "envelope_m_s2"}
 """Names of the impacts, and the figures of a motion that they compare."""
 TICK_MS = 2.0
 """Shortest delay of a shaped reference [ms]: one tick."""
 SAME_DURATION = (0.02, 0.01)
-"""Largest difference of the duration between motions of the same speed: as a share of it [-], or in s."""
+"""Largest difference in duration between motions of the same speed: relative [-], or in s."""
 REFERENCE = "reference_q"
 
 
@@ -30,17 +30,17 @@ class ComparedMotion:
     """One motion that both recordings contain."""
 
     a: int
-    """Its number in the first recording, from 1."""
+    """Number in the first recording, from 1."""
     b: int
-    """Its number in the second."""
+    """Number in the second recording, from 1."""
     first: MotionResult
-    """Its figures in the first recording."""
+    """Figures in the first recording."""
     second: MotionResult
-    """Its figures in the second."""
+    """Figures in the second recording."""
 
     @property
     def impact_percent(self) -> Mapping[str, float | None]:
-        """Change from the first to the second recording [%]; None where one of them has no figure or the first is 0."""
+        """Change from the first to the second recording [%]; None if a figure is missing or the first is 0."""
         return {
             name: impact_percent(getattr(self.first, field), getattr(self.second, field))
             for name, field in COMPARED.items()
@@ -48,12 +48,12 @@ class ComparedMotion:
 
     @property
     def change(self) -> Change:
-        """Differences after the stop."""
+        """Change of the vibration after the stop."""
         both = self.first, self.second
         return Change(*(one.peak_m_s2 for one in both), *(one.still_after_ms for one in both))
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values, as `tvist log analyze A B` prints them."""
+        """Convert to plain values for `tvist log analyze A B`."""
         return {
             "number": {"a": self.a, "b": self.b},
             "a": self.first.as_dict(),
@@ -64,21 +64,18 @@ class ComparedMotion:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What two recordings have in common, and what only one of them has."""
+    """Motions that two recordings share, and those that only one of them has."""
 
     motions: tuple[ComparedMotion, ...]
     only_in_a: tuple[int, ...]
-    """Numbers of motions of the first recording, from 1, to which none of the second corresponds."""
+    """Numbers of motions, from 1, that only the first recording has."""
     only_in_b: tuple[int, ...]
-    """The same of the second recording."""
+    """Numbers of motions, from 1, that only the second recording has."""
 
 
 def compare(first: Measured, second: Measured) -> Comparison:
-    """Pair the motions of two recordings.
-
-    Motions correspond if they start and end at the same joint angles within 0.02 rad; they are paired in order, as
-    many as possible.
-    """
+    """Pair as many motions of two recordings as possible, in order."""
+    # Motions correspond if they start and end at the same joint angles within 0.02 rad.
     ways = [[Way.of(one.recording, motion) for motion in one.motions] for one in (first, second)]
     pairs = _pairs(*ways)
     compared = tuple(ComparedMotion(a + 1, b + 1, first.results[a], second.results[b]) for a, b in pairs)
@@ -89,14 +86,14 @@ def compare(first: Measured, second: Measured) -> Comparison:
 
 @dataclass(frozen=True)
 class Way:
-    """The two ends of a motion."""
+    """Joint angles at both ends of a motion."""
 
     start: Floats
     end: Floats
 
     @classmethod
     def of(cls, recording: Recording, motion: MotionRows, column: str = "") -> "Way":
-        """Return the ends of a motion by a column of joint angles; by default, those of the target."""
+        """Return the ends of a motion in a column of joint angles; by default, in the target."""
         q = recording[column or ("target_q" if "target_q" in recording else "actual_q")]
         return cls(q[motion.start], q[motion.arm_stop(recording)])
 
@@ -109,11 +106,11 @@ class Way:
 
 
 def _pairs(first: Sequence[Way], second: Sequence[Way]) -> list[tuple[int, int]]:
-    """Longest sequence of corresponding motions in the order of both recordings."""
+    """Return the longest sequence of corresponding motions in the order of both recordings."""
     same = np.array([[a.corresponds(b) for b in second] for a in first], dtype=bool).reshape(
         len(first), len(second)
     )
-    # longest[i, j]: number of pairs among the motions from i and from j on.
+    # longest[i, j]: most pairs among the motions from index i in the first and from j in the second.
     longest = np.zeros((len(first) + 1, len(second) + 1), dtype=int)
     for i in reversed(range(len(first))):
         for j in reversed(range(len(second))):
@@ -137,21 +134,20 @@ class Pair:
     """The same motion without and with a shaper."""
 
     unshaped: int
-    """Place of the motion among those of the recording, from 0."""
+    """Index of the motion in the recording."""
     shaped: int
     shaper: str
-    """Name of the shaper; empty if the recording does not say it."""
+    """Name of the shaper; empty if the recording does not name it."""
     name: str
-    """The motion, by the robot's poses where it starts and ends at some: `Q1 → Q3`; else the numbers of both."""
+    """Named poses at its ends, `Q1 → Q3`, else the numbers of both motions."""
     change: Change
 
 
 def pairs(measured: Measured) -> list[Pair]:
-    """Pair each unshaped motion with the same one by each shaper, in the order in which they were made.
-
-    Motions are the same if their references before shaping start and end at the same joint angles within 0.02 rad, and
-    take equally long within 2 %. Whether one was shaped is known from the recording's events, or else from its delay.
-    """
+    """Pair each unshaped motion with the same one by each shaper, in the order in which they were made."""
+    # Motions are the same if their references before shaping start and end at the same joint angles within
+    # 0.02 rad, and last equally long within 2 %. Events tell whether a motion was shaped, else its delay
+    # does.
     recording, found = measured.recording, measured.motions
     if REFERENCE not in recording:
         return []
@@ -176,7 +172,7 @@ def pairs(measured: Measured) -> list[Pair]:
 
 
 def _peak(measured: Measured, place: int) -> float | None:
-    """Largest |α| after a motion: by the truth if it was recorded, otherwise by the sensor [m/s²]."""
+    """Return the largest |α| after a motion, true if recorded, else from the sensor [m/s²]."""
     if TRUTH not in measured.recording:
         return measured.results[place].peak_m_s2
     try:
@@ -186,9 +182,9 @@ def _peak(measured: Measured, place: int) -> float | None:
 
 
 def shaper_of(recording: Recording, motion: MotionRows, delay: float | None) -> str | None:
-    """Return the name of the shaper of a motion, empty if it is not known; None if there was none.
+    """Return the name of a motion's shaper, empty if unknown; None if there was none.
 
-    `delay` is the time by which its target ends after its reference [ms]; None if the log has no such reference.
+    `delay` is the time by which the target ends after its reference [ms]; None if the log has no such reference.
     """
     tick = recording["tick"][motion.start] if "tick" in recording else np.inf
     told = [one.why for one in recording.events if one.kind == "shaper_changed" and one.tick <= tick + 1]

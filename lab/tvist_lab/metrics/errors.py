@@ -2,4 +2,4 @@
 
 
 class NotMeasurableError(ValueError):
-    """A metric cannot be computed from this recording; the message gives the reason for people."""
+    """A metric cannot be computed from this recording; the message gives the reason."""

@@ -1,4 +1,4 @@
-"""α of one motion, for recordings of this controller and for logs of others."""
+"""Tool acceleration α of one motion, for recordings of this controller and logs of others."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,19 +9,17 @@ from tvist_lab.metrics.vibration import SENSOR, best_tool_acceleration, low_pass
 from tvist_lab.recordings import Floats, Recording
 
 REST = (0.2, 1.0)
-"""Shortest and longest time at the end of a rest over which the sensor shows gravity [s]."""
+"""Shortest and longest time at the end of a rest from which gravity is found [s]."""
 
 
 def felt(
     recording: Recording, motion: MotionRows, rows: slice, *, smooth: bool = False
 ) -> tuple[Floats, Floats]:
-    """Acceleration of the tool without gravity in some rows of a motion.
+    """Return times, shape (T,) [s], and the tool's acceleration without gravity, shape (T, 3) [m/s²], in some rows.
 
-    In a log of another controller, gravity is what the sensor shows at the end of the rest, since nobody knows how
-    its tool is mounted; rows in which the sensor shows nothing are left out.
-
-    `smooth` takes the truth channel if there is one, or else the sensor below 60 Hz. Returns times, shape (T,) [s], and
-    α, shape (T, 3) [m/s²].
+    In a log of another controller, the tool's mounting is unknown, so gravity is the sensor's mean at the end
+    of the rest; rows without sensor values are left out. `smooth` uses the truth channel if there is one,
+    else the sensor below 60 Hz.
     """
     if not recording.foreign:
         if smooth:
@@ -41,7 +39,7 @@ def felt(
 
 
 def _gravity(recording: Recording, motion: MotionRows, shown: NDArray[np.bool_]) -> Floats:
-    """Mean of the sensor in the last half of a rest, at most a second [m/s²], shape (3,)."""
+    """Return the sensor's mean in the last half of a rest, at most a second [m/s²], shape (3,)."""
     end = float(recording.time[motion.end - 1])
     rest = end - float(recording.time[motion.arm_stop(recording)])
     if rest < 1.5 * REST[0]:

@@ -1,4 +1,4 @@
-"""Motions of an arm from its measured joint angles, for logs that lack the target."""
+"""Find motions in measured joint angles, for logs that lack the target."""
 
 import math
 
@@ -11,13 +11,13 @@ from tvist_lab.recordings import Floats, Recording
 SMOOTHED = 20.0
 """Cut-off frequency of the angles before they are differentiated [Hz]."""
 SLOW = 0.01
-"""A joint that is slower than this may be at rest [rad/s]."""
+"""Speed below which a joint may be at rest [rad/s]."""
 FAST = 2.0
-"""Smallest speed that a motion must reach, over the one that ends it [-]."""
+"""Smallest speed that a motion must reach, relative to the speed that ends it [-]."""
 SWING = 0.5
-"""Time before and after a fast motion in which the arm swings back from its overshoot [s]."""
+"""Time around a fast motion in which the arm swings back from its overshoot [s]."""
 SWUNG = 0.02
-"""Largest speed of a joint that swings back, over the fastest one within that time [-]."""
+"""Largest speed of a joint that swings back, relative to the fastest within that time [-]."""
 DRIVEN = 0.15
 """Longest time after a stop in which joints may still be driven [s]."""
 PAUSE = 0.1
@@ -25,18 +25,17 @@ PAUSE = 0.1
 SMALLEST = 0.005
 """Smallest displacement of a motion [rad]; less is vibration."""
 FEWEST = 16
-"""Smallest number of rows in which motions are looked for."""
+"""Smallest number of rows in which motions are sought."""
 TAPER = 0.03
 """Longest time for which a joint may have moved below `SLOW` before and after [s]."""
 
 
 def measured_spans(recording: Recording, name: str = "actual_q") -> list[tuple[int, int]]:
-    """First and last row of each motion of joint angles that are never quite at rest, in order.
+    """Return first and last row of each motion of joint angles that are never quite at rest, in order.
 
-    A joint moves while its speed exceeds 0.01 rad/s, or six times what the encoders' noise adds, or 2 % of the fastest
-    speed within half a second, so that swinging back belongs to no motion. Each motion must reach twice that speed.
-    Start and stop are then shifted outwards by the time in which a speed that changes steadily reaches this threshold,
-    at most 30 ms.
+    A joint moves while its speed exceeds 0.01 rad/s, six times the encoders' noise, and 2 % of the fastest speed
+    within half a second, which excludes swinging back. Each motion must reach twice that speed. Both ends are then
+    shifted outwards by the time in which a steadily changing speed reaches this threshold, at most 30 ms.
     """
     seen = np.flatnonzero(np.isfinite(recording[name]).all(axis=1))
     if len(seen) < FEWEST:
@@ -66,7 +65,7 @@ def measured_spans(recording: Recording, name: str = "actual_q") -> list[tuple[i
 
 
 def still_driven(recording: Recording, start: int, stop: int) -> float:
-    """Time after the row of a stop for which the measured joints are faster than 2 % of the motion's speed [s]."""
+    """Return the time after a stop in which measured joints are faster than 2 % of the motion's speed [s]."""
     past = int(np.searchsorted(recording.time, recording.time[stop] + DRIVEN + PAUSE))
     rows = slice(start, past)
     if (
@@ -83,7 +82,7 @@ def still_driven(recording: Recording, start: int, stop: int) -> float:
 
 
 def _onwards(q: Floats, velocity: Floats, first: int, last: int) -> Floats:
-    """Speed towards the end of a motion, negative where the arm swings back [rad/s]; of one to and fro, the speed."""
+    """Return the speed towards a motion's end [rad/s], negative while swinging back; to and fro, its magnitude."""
     joint = int(np.argmax(np.abs(q[last] - q[first])))
     way, travelled = q[last, joint] - q[first, joint], np.sum(np.abs(np.diff(q[first : last + 1, joint])))
     rates = velocity[first : last + 1]
@@ -93,7 +92,7 @@ def _onwards(q: Floats, velocity: Floats, first: int, last: int) -> Floats:
 
 
 def _noise_of_speed(q: Floats, period: float) -> float:
-    """Standard deviation of the speed that is differentiated from resting, smoothed encoders [rad/s]."""
+    """Return the standard deviation of the speed that is computed from resting, smoothed encoders [rad/s]."""
     second = np.diff(q, n=2, axis=0)
     noise = float(np.max(np.median(np.abs(second), axis=0))) / (0.6745 * math.sqrt(6.0))
     cut_off = min(SMOOTHED, 0.45 / period)
@@ -101,7 +100,7 @@ def _noise_of_speed(q: Floats, period: float) -> float:
 
 
 def _taper(time: Floats, speed: Floats, row: int, inwards: int) -> float:
-    """Time in which a speed that grows with the square of time reaches its value in a row [s]."""
+    """Return the time in which a speed that grows with the square of time reaches its value in a row [s]."""
     other = row + 3 * inwards
     if not 0 <= other < len(time):
         return 0.0

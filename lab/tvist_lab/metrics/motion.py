@@ -1,4 +1,4 @@
-"""Detection of motions in a recording."""
+"""Detect the motions in a recording."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,23 +14,23 @@ from tvist_lab.metrics.vibration import parts
 from tvist_lab.recordings import Floats, Recording
 
 MOVING = 1e-7
-"""A reference that changes by more than this from one tick to the next moves [rad]."""
+"""Change per tick above which a reference moves [rad]."""
 JUMP = 0.05
-"""A reference that changes by more than this in a tick was set elsewhere, for example by a reset [rad]; 25 rad/s."""
+"""Change per tick above which a reference was set elsewhere, for example by a reset [rad]; 25 rad/s."""
 TICK = 0.002
-"""Time in which that change counts as a jump [s]; more in a log with longer ticks."""
+"""Time in which that change counts as a jump [s]; longer if a log has longer ticks."""
 REST = 0.02
-"""A reference that rests for less than this, as in a reversal, is still in the same motion [s]."""
+"""Rests of a reference that are shorter, as at a reversal, belong to the motion [s]."""
 AT_REST = 1e-6
-"""A target speed below this is at rest, in a log of another controller [rad/s]."""
+"""Target speed below which another controller's arm is at rest [rad/s]."""
 MOSTLY = 0.98
-"""Share of rows in motion from which on a target's speed is never zero: it is measured [-]."""
+"""Share of moving rows from which a target's speed is never zero and so was measured [-]."""
 TINY = 5e-4
-"""Largest way of a joint that only trembles [rad]."""
+"""Largest displacement of a joint that only trembles [rad]."""
 EARLY = 0.05
-"""Time before a motion found in the measured angles that does not count as rest any more [s]."""
+"""Time before a motion found in measured angles that no longer counts as rest [s]."""
 DIFFERENTIATOR_TICKS = 1
-"""The published target of tick i is the shaped reference of tick i-1, since a central difference costs a tick."""
+"""The published target of tick i is the shaped reference of tick i-1, due to the central difference."""
 
 
 @dataclass(frozen=True)
@@ -42,17 +42,15 @@ class MotionRows:
     reference_stop: int
     """Last row in which the reference before shaping moves by more than 1e-7 rad."""
     shaped_stop: int
-    """Last row in which the published target, the shaped reference, moves by more than 1e-7 rad. In a log without a
-    target, the row in which the measured angles come to rest.
-    """
+    """Last row in which the published target moves by more than 1e-7 rad; without target, the row in which
+    the measured angles come to rest."""
     end: int
     """First row after this motion: the next one's start, or the end of the recording."""
     id: Any = None
     """Number of the motion, if events contain it."""
     stopped: bool = False
-    """Whether it was stopped before its target."""
     lag: float | None = None
-    """Time by which the arm follows its target, in a log of another controller [s]; None if that is not known."""
+    """Time by which the arm of another controller follows its target [s]; None if unknown."""
 
     def later(self, rows: int) -> "MotionRows":
         """Return the same motion in a recording with more rows before it."""
@@ -65,38 +63,35 @@ class MotionRows:
         )
 
     def arm_stop(self, recording: Recording) -> int:
-        """First row from which the arm is not driven any more, so that it only vibrates."""
+        """Return the first row from which the arm is no longer driven, but only vibrates."""
         if not self.lag:
             return self.shaped_stop
         stop = recording.time[self.shaped_stop] + self.lag
         return min(int(np.searchsorted(recording.time, stop - 1e-9)), self.end - 1)
 
     def duration(self, recording: Recording) -> float:
-        """Duration of the reference before shaping [s]."""
+        """Return the duration of the reference before shaping [s]."""
         return float(recording.time[self.reference_stop] - recording.time[self.start])
 
     def shaped_duration(self, recording: Recording) -> float:
-        """Duration of the shaped reference [s].
-
-        Since a shaper's first impulse has no delay, both references begin together; the tick between shaper and
-        publication does not belong to the shaper and is subtracted.
-        """
+        """Return the duration of the shaped reference [s]."""
+        # A shaper's first impulse has no delay, so both references start together; the tick between shaper
+        # and publication is subtracted.
         published = recording.time[self.shaped_stop] - recording.time[self.start]
         return float(published - DIFFERENTIATOR_TICKS * recording.period)
 
     def delay(self, recording: Recording) -> float:
-        """Δ of the paper: shaped minus unshaped duration of the reference [s], never below zero."""
+        """Return the paper's Δ: shaped minus unshaped duration of the reference [s], never below zero."""
         return max(self.shaped_duration(recording) - self.duration(recording), 0.0)
 
 
 def motions(recording: Recording) -> list[MotionRows]:
     """Find the motions of a recording, in order.
 
-    They are taken from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, otherwise
-    from the reference itself, and in a log without reference from the target's speed, the target or the measured
-    angles: many robots publish the measured angles as a target while they rest. Motions without any movement are left
-    out, and in logs of other controllers those of less than 5 mrad wherever noise could be taken for one. None goes on
-    across a long gap of the log.
+    They come from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, else from the
+    reference. In a log without reference they come from the target's speed, the target or the measured angles, since
+    many robots publish the measured angles as target while at rest. Motions without movement are left out, and in logs
+    of other controllers those below 5 mrad where noise might look like a motion. None spans a long gap of the log.
     """
     tick, (first, *others) = recording["tick"], parts(recording.time)
     if not others:
@@ -144,7 +139,7 @@ def _motions(recording: Recording) -> list[MotionRows]:
 
 
 def _driven(recording: Recording) -> NDArray[np.bool_] | None:
-    """Rows in which the target's speed is not zero, if another controller's log has it and it is zero at rest."""
+    """Return the rows in which the target's speed is not zero, if a foreign log has it and it is zero at rest."""
     if not recording.foreign or "reference_q" in recording or "target_qd" not in recording:
         return None
     moving = np.asarray((np.abs(recording["target_qd"]) > AT_REST).any(axis=1))
@@ -153,12 +148,12 @@ def _driven(recording: Recording) -> NDArray[np.bool_] | None:
 
 
 def _displacement(recording: Recording, first: int, past: int) -> float:
-    """Largest way of a joint in some rows of the target [rad]."""
+    """Return the largest displacement of a joint in some rows of the target [rad]."""
     return float(np.max(np.ptp(recording["target_q"][first - 1 : past], axis=0), initial=0.0))
 
 
 def _trembles(recording: Recording, spans: Sequence[tuple[int, int, Any, bool]]) -> bool:
-    """Return whether the target changes at rest as measured angles do: most of its motions are tiny."""
+    """Whether the target changes at rest like measured angles do: most of its motions are tiny."""
     tiny = [_displacement(recording, *span[:2]) < TINY for span in spans]
     return sum(tiny) > max(1, len(tiny) // 4)
 
@@ -169,20 +164,20 @@ def _measured_motions(recording: Recording, name: str) -> list[MotionRows]:
     for (first, last), following in zip_longest(spans, spans[1:]):
         end = len(recording)
         if following is not None:
-            # A start that is found late must not count as vibration of the motion before.
+            # A start that is detected late must not count as vibration of the earlier motion.
             end = int(np.searchsorted(recording.time, recording.time[following[0]] - EARLY))
         found.append(MotionRows(first, last, last, max(end, last + 1)))
     return found
 
 
 def _step_per_tick(recording: Recording, name: str) -> Floats:
-    """Movement per tick of the joint that moves most [rad], for each row, shape (T,); zero for the first."""
+    """Return the movement per tick of the joint that moves most [rad], shape (T,); zero for the first row."""
     step = np.max(np.abs(np.diff(recording[name], axis=0)), axis=1, initial=0.0)
     return np.concatenate([[0.0], step / np.diff(recording["tick"])])
 
 
 def _spans_of_events(recording: Recording) -> list[tuple[int, int, Any, bool]]:
-    """Rows in which each started motion's reference can move, its number, and whether it was stopped."""
+    """Return the rows in which each started motion's reference can move, its number, and whether it was stopped."""
     started = [event for event in recording.events if event.kind == "motion_started"]
     ended = {event.id: event for event in recording.events if event.kind in ("motion_done", "motion_stopped")}
     spans = []
@@ -198,7 +193,7 @@ def _spans_of_events(recording: Recording) -> list[tuple[int, int, Any, bool]]:
 
 
 def _spans_of_reference(recording: Recording, moving: NDArray[np.bool_]) -> list[tuple[int, int, Any, bool]]:
-    """Runs of rows in which the reference moves, joined across short rests."""
+    """Return runs of rows in which the reference moves, joined across short rests."""
     rows = np.flatnonzero(moving)
     if not rows.size:
         return []

@@ -13,7 +13,7 @@ from tvist_lab.metrics.vibration import amplitude
 from tvist_lab.recordings import Floats, Recording
 
 WINDOW = 0.3
-"""Time after the stop in which peaks are searched [s]."""
+"""Time after the stop in which peaks are sought [s]."""
 PROMINENCE = 0.1
 """Smallest prominence of a peak [m/s²]: three times the sensor's noise."""
 
@@ -23,11 +23,11 @@ class Residual:
     """RV as defined in the paper."""
 
     value: float
-    """RV: the fitted decay at the stop, or the largest |α| if it could not be fitted [m/s²]."""
+    """RV: the fitted decay at the stop, or the largest |α| if nothing could be fitted [m/s²]."""
     decay: float
     """Rate λ of the fitted exponential [1/s]; NaN if there is none."""
     stop: float
-    """Time t_b at which the shaped reference stops, or in a log the arm itself [s]."""
+    """Time t_b at which the shaped reference stops, or in a foreign log the arm itself [s]."""
     peak_times: Floats
     """Times of the peaks [s], shape (P,)."""
     peaks: Floats
@@ -36,18 +36,17 @@ class Residual:
     """False if there were fewer than two peaks, so that the value is the largest |α| in the window."""
 
     def curve(self, time: Floats) -> Floats:
-        """The fitted decay at given times [m/s²]; constant if nothing was fitted."""
+        """Return the fitted decay at given times [m/s²]; constant if nothing was fitted."""
         rate = self.decay if self.fitted else 0.0
         return np.asarray(self.value * np.exp(-rate * (time - self.stop)), dtype=np.float64)
 
 
 def residual(recording: Recording, motion: MotionRows) -> Residual:
-    """RV as in section 4.2 of the paper.
+    """Return RV as in section 4.2 of the paper.
 
-    Local maxima of |α| (from the sensor, without gravity) in the 0.3 s after the shaped reference stops, with a
-    prominence of at least 0.1 m/s², are fitted by RV·exp(-λ(t - t_b)), λ ≥ 0, with least squares on a linear scale.
-    Noise raises the later peaks and flattens the fit: small values have a floor of about 0.07 m/s² at 0.03 m/s² of
-    noise.
+    Local maxima of the sensor's |α| in the 0.3 s after the shaped reference stops, with a prominence of at
+    least 0.1 m/s², are fitted by RV·exp(-λ(t - t_b)), λ ≥ 0, with least squares on a linear scale. Noise
+    raises the later peaks and flattens the fit: at 0.03 m/s² of noise, RV has a floor of about 0.07 m/s².
     """
     window = _window(recording, motion, WINDOW)
     stop = float(recording.time[window][0])
@@ -62,7 +61,7 @@ def residual(recording: Recording, motion: MotionRows) -> Residual:
 
 
 def _exponential(t: Floats, y: Floats) -> tuple[float, float]:
-    """Value at t = 0 and rate of the decaying exponential closest to the points, on a linear scale."""
+    """Return value at t = 0 and rate of the decaying exponential closest to the points, on a linear scale."""
     slope, log_value = np.polyfit(t, np.log(y), 1)
     # A search that starts at its bound is slow to leave it.
     start = [float(np.exp(log_value)), max(-float(slope), 1.0)]
@@ -77,7 +76,7 @@ def _exponential(t: Floats, y: Floats) -> tuple[float, float]:
 
 
 def _window(recording: Recording, motion: MotionRows, length: float) -> slice:
-    """Rows of a given duration, beginning at the stop."""
+    """Return the rows of a given duration from the stop; raise NotMeasurableError if they were not recorded."""
     first = motion.arm_stop(recording)
     past = int(np.searchsorted(recording.time, recording.time[first] + length - 1e-9)) + 1
     if past > motion.end:

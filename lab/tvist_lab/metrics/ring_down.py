@@ -1,4 +1,4 @@
-"""(f_d, ζ) of the mode that vibrates after a stop, from the three axes of the tool's accelerometer."""
+"""Fit (f_d, ζ) of the modes that vibrate after a stop, from the three axes of the tool's accelerometer."""
 
 import math
 from dataclasses import dataclass, replace
@@ -11,25 +11,25 @@ from tvist_lab.metrics.coloured import widening
 from tvist_lab.recordings import Floats
 
 FREQUENCIES = (3.0, 45.0)
-"""Range of damped frequencies that are searched [Hz]; of slow samples, up to 0.45 of their rate."""
+"""Range of damped frequencies in the search [Hz]; for slow samples, up to 0.45 of their rate."""
 DAMPING = (0.002, 0.7)
-"""Range of damping ratios that are searched [-]."""
+"""Range of damping ratios in the search [-]."""
 SLOW_POLE = 17.5
 """Rate of the non-oscillatory tail that a position loop adds [1/s]."""
 SKIP = 0.006
-"""Time after the stop that is left out [s], since the end of the deceleration ramp is not a ring-down."""
+"""Time after the stop that is ignored [s], since the end of the deceleration ramp is no ring-down."""
 WINDOW = 0.5
 """Duration of the first fit [s]."""
 LEAST_R_SQUARED = 0.2
-"""Smallest share of the signal's energy that a fit must explain; a fit of pure noise explains a tenth [-]."""
+"""Smallest share of the signal's energy that a fit must explain [-]; a fit of pure noise explains a tenth."""
 WINDOWS = (0.2, 1.0)
 """Shortest and longest duration of the final fit [s]."""
 CERTAIN = 1.96
 """Half-width of a 95 % interval over its standard error [-]."""
 SIGNIFICANT = 36.0
-"""Gain of n ln SSE that noise reaches by chance in less than one fit of a hundred, at 100 to 500 Hz [-]."""
+"""Gain of n ln SSE that noise exceeds in less than one fit of a hundred, at 100 to 500 Hz [-]."""
 CORRELATED = 0.02
-"""Time over which the residual of a fit may be correlated, as of an unmodelled mode [s]."""
+"""Time over which the residual of a fit may be correlated, for example by an unmodelled mode [s]."""
 COLOURS = 4
 """Order of the autoregression that describes the spectrum of a residual."""
 
@@ -51,16 +51,16 @@ class Mode:
 
     @property
     def f_d_interval(self) -> tuple[float, float]:
-        """Interval that contains the true f_d with a probability of 95 % [Hz]."""
+        """95 % interval of f_d [Hz]."""
         return _interval(self.f_d, self.f_d_error)
 
     @property
     def zeta_interval(self) -> tuple[float, float]:
-        """Interval that contains the true ζ with a probability of 95 % [-]."""
+        """95 % interval of ζ [-]."""
         return _interval(self.zeta, self.zeta_error)
 
     def amplitude_at(self, time: float) -> float:
-        """Largest |α| of the mode some time after the stop [m/s²]."""
+        """Return the largest |α| of the mode some time after the stop [m/s²]."""
         return self.amplitude * math.exp(-decay_rate(self.f_d, self.zeta) * time)
 
 
@@ -73,13 +73,11 @@ class RingDown(Mode):
     r_squared: float
     """Share of the signal's energy that the fit explains [-]."""
     window: float
-    """Duration that was fitted [s]."""
+    """Duration of the fit [s]."""
     modes: int
-    """Number of modes that were fitted together."""
     ok: bool
-    """Whether the mode is measurable."""
     reason: str = ""
-    """Why it is not measurable, for people."""
+    """Why it is not measurable."""
     found: tuple[Mode, ...] = ()
     """All modes, the strongest at the stop first."""
 
@@ -99,27 +97,26 @@ def fit_ring_down(
 ) -> RingDown:
     """Fit damped sines to a ring-down by vector nonlinear least squares.
 
-        α(t) = Σ_k e^(-σ_k t) (c_k cos ω_k t + s_k sin ω_k t) + Σ_l e^(-p_l t) d_l,    σ = ω ζ/√(1-ζ²)
+        α(t) = Σ_k e^(-σ_k t) (c_k cos ω_k t + s_k sin ω_k t) + Σ_l e^(-p_l t) d_l,  σ = ω ζ/√(1-ζ²)
 
     with vectors c, s, d of three axes. They enter linearly and are eliminated (variable projection; Golub and
-    Pereyra, 1973); f_d and ζ are searched from the best points of a grid, so that no initial guess is needed. The fit
-    is done twice: over 0.5 s, and then over the time in which the mode found in this way decays into the noise.
+    Pereyra, 1973); f_d and ζ are searched from the best points of a grid, so no initial guess is needed. The
+    first fit is over 0.5 s, the second over the time in which the mode found decays into the noise.
 
     Args:
-        alpha: Acceleration of the tool without gravity, beginning at the stop, shape (T, 3) [m/s²].
+        alpha: Acceleration of the tool without gravity, starting at the stop, shape (T, 3) [m/s²].
         period: Time between samples [s].
         time: Times of the samples after the stop, shape (T,) [s]; None if none is missing.
         modes: Largest number of modes; another mode is kept only if it explains more than noise would.
         slow_poles: Rates of the non-oscillatory tails to include [1/s].
-        offset: Whether to include a constant, as of gravity that is not known exactly.
-        skip: Time after the stop that is left out [s].
+        offset: Whether to include a constant, for example if gravity is not known exactly.
+        skip: Time after the stop that is ignored [s].
         window: Duration of the fit [s]; None to choose it automatically.
         share: Select the lowest mode with at least this share of the largest amplitude [-]; 1 for the strongest.
-        evidence: Smallest n ln(SSE before/SSE after) by which another mode must lower the sum of squares [-]; None for
-            the Bayesian information criterion, which wants more of it, the more samples there are.
+        evidence: Smallest n ln(SSE before/SSE after) for another mode [-]; None for the Bayesian information
+            criterion, which grows with the number of samples.
 
-    Returns:
-        The selected mode. `ok` is false, with a `reason`, if no mode is measurable.
+    Returns: The selected mode. `ok` is false, with a `reason`, if no mode is measurable.
     """
     first = round(skip / period)
     if time is None:
@@ -169,7 +166,7 @@ class Ring:
         )
 
     def basis(self, parameters: Floats) -> Floats:
-        """Columns of the linear part for (f_d, ζ) of each mode, shape (T, 2 modes + slow poles)."""
+        """Return the columns of the linear part for (f_d, ζ) of each mode, shape (T, 2 modes + slow poles)."""
         columns = []
         for f_d, zeta in parameters.reshape(-1, 2):
             decay = np.exp(-decay_rate(f_d, zeta) * self.time)
@@ -178,15 +175,13 @@ class Ring:
         return np.column_stack(columns + self._slow)
 
     def unexplained(self, parameters: Floats) -> Floats:
-        """Residual of the signal's projection on the basis, flattened."""
+        """Return the residual of the signal's projection on the basis, flattened."""
         orthonormal, _ = np.linalg.qr(self.basis(parameters))
         return np.asarray((self.alpha - orthonormal @ (orthonormal.T @ self.alpha)).ravel())
 
     def fit(self, modes: int) -> RingDown:
-        """Fit one mode, then further ones as long as they improve the fit and are allowed.
-
-        A further mode must lie within the range that is searched: at its end it stands for something else.
-        """
+        """Fit one mode, then further ones while they improve the fit."""
+        # A further mode must lie inside the search range: at its end it would represent something else.
         parameters = self._add_mode(np.empty(0))
         for _ in range(1, modes):
             more = self._add_mode(parameters)
@@ -207,7 +202,7 @@ class Ring:
         return min(fits, key=lambda fit: fit[0])[1]
 
     def refine(self, start: Floats) -> tuple[float, Floats]:
-        """Half the sum of squares that is left, and (f_d, ζ) of each mode, searched from a starting point."""
+        """Return half the remaining sum of squares, and (f_d, ζ) of each mode, searched from a starting point."""
         count = start.size // 2
         lower = np.tile([FREQUENCIES[0], DAMPING[0]], count)
         upper = np.tile([self.highest, DAMPING[1]], count)
@@ -218,7 +213,7 @@ class Ring:
         return float(fit.cost), np.asarray(fit.x)
 
     def _jacobian(self, parameters: Floats) -> Floats:
-        """Derivatives of the residual (Kaufman, BIT 15, 1975), shape (3 T, P)."""
+        """Return the derivatives of the residual (Kaufman, BIT 15, 1975), shape (3 T, P)."""
         basis = self.basis(parameters)
         orthonormal, triangle = np.linalg.qr(basis)
         weights = np.linalg.lstsq(triangle, orthonormal.T @ self.alpha)[0]
@@ -237,17 +232,17 @@ class Ring:
         return np.column_stack(columns)
 
     def _pays(self, fewer: Floats, more: Floats) -> bool:
-        """Return whether another mode explains more than noise would."""
+        """Whether another mode explains more than noise would."""
         samples = self.alpha.size
         added = 2 + 2 * self.alpha.shape[1]
         before, after = (float(np.sum(self.unexplained(p) ** 2)) + 1e-300 for p in (fewer, more))
         wanted = added * math.log(samples) if self.evidence is None else self.evidence
-        # What is left of coloured noise looks like a mode where its spectrum is high.
+        # Coloured noise looks like a mode at the frequency where its spectrum is high.
         noise = float(self._coloured(self.unexplained(more), more[-2:-1])[0])
         return bool(samples * math.log(before / after) > wanted * noise)
 
     def modes_at(self, parameters: Floats) -> tuple[list[Mode], Floats]:
-        """Modes with their amplitudes and standard errors, and what they leave of the signal, shape (T, 3)."""
+        """Return modes with amplitudes and standard errors, and the residual of the signal, shape (T, 3)."""
         weights, *_ = np.linalg.lstsq(self.basis(parameters), self.alpha)
         left = self.unexplained(parameters)
         errors = self._standard_errors(parameters, left, weights.size).reshape(-1, 2)
@@ -261,7 +256,7 @@ class Ring:
         return modes, left.reshape(self.alpha.shape)
 
     def _judge(self, parameters: Floats) -> RingDown:
-        """Return the selected mode, its standard errors, and whether they are small enough."""
+        """Return the selected mode with its standard errors, `ok` if they are small enough."""
         modes, left = self.modes_at(parameters)
         loudest = max(mode.amplitude for mode in modes)
         mode = min((m for m in modes if m.amplitude >= self.share * loudest), key=lambda m: m.f_d)
@@ -279,12 +274,12 @@ class Ring:
         return replace(fit, ok=not reason, reason=reason)
 
     def _standard_errors(self, parameters: Floats, left: Floats, linear: int) -> Floats:
-        """Return the standard errors of each mode's f_d and ζ, from the Jacobian without the amplitudes' share.
+        """Return the standard errors of each mode's f_d and ζ, from the Jacobian without amplitudes.
 
-        A residual that is correlated in time, as of a filtered sensor or a mode that was not fitted, has a larger error
-        than white noise. The largest one counts of what the residual's spectrum says at each mode's frequency, of
-        what the correlation of successive samples does, and of what that over many lags does (Newey and West,
-        Econometrica 55, 1987, Bartlett's weights).
+        A residual that is correlated in time, due to a filtered sensor or an unfitted mode, causes larger
+        errors than white noise. The largest of three estimates counts: from the residual's spectrum at each
+        mode's frequency, from the correlation of successive samples, and from that over many lags (Newey and
+        West, Econometrica 55, 1987, Bartlett's weights).
         """
         jacobian = self._jacobian(parameters)
         freedom = max(left.size - parameters.size - linear, 1)
@@ -298,7 +293,7 @@ class Ring:
         return np.asarray(np.sqrt(np.maximum(white, correlated)))
 
     def colour(self, left: Floats, frequencies: Floats) -> Floats:
-        """Power of a residual at some frequencies over that of white noise, at least 1, by autoregression."""
+        """Return a residual's power at some frequencies over that of white noise, at least 1 (autoregression)."""
         left = left.reshape(self.alpha.shape)
         if len(left) < 8 * COLOURS or not np.sum(left * left) > 0.0:
             return np.ones(len(frequencies))
@@ -309,12 +304,12 @@ class Ring:
         return np.asarray(np.maximum(innovation / np.abs(1.0 - turns @ filtered) ** 2, 1.0))
 
     def _coloured(self, left: Floats, frequencies: Floats) -> Floats:
-        """The same, and at least what the correlation of successive samples says, which no missing mode hides."""
+        """Return the same, at least the value from successive samples, which no missing mode hides."""
         slow = widening(left.reshape(self.alpha.shape)) ** 2
         return np.maximum(self.colour(left, frequencies), slow)
 
     def _score_covariance(self, jacobian: Floats, left: Floats) -> Floats:
-        """Covariance of the residual's share in the direction of each parameter, shape (P, P)."""
+        """Return the covariance of the residual's part in the direction of each parameter, shape (P, P)."""
         axes = self.alpha.shape[1]
         scores = (jacobian * left[:, None]).reshape(-1, axes, jacobian.shape[1]).sum(axis=1)
         total = scores.T @ scores
@@ -326,7 +321,7 @@ class Ring:
 
 
 def decay_rate(f_d: float, zeta: float) -> float:
-    """Decay rate of a mode [1/s]."""
+    """Return the decay rate of a mode [1/s]."""
     return float(2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta * zeta))
 
 
@@ -335,7 +330,7 @@ def _interval(value: float, error: float) -> tuple[float, float]:
 
 
 def _objection(fit: RingDown, highest: float) -> str:
-    """Return why a fit must not be used; empty if it may."""
+    """Return why a fit must not be used; empty if it may be used."""
     if fit.amplitude < 3.0 * fit.rms:
         return (
             f"the vibration of {fit.amplitude:.3f} m/s² does not stand out of {fit.rms:.3f} m/s² rms of noise"
@@ -353,6 +348,6 @@ def _objection(fit: RingDown, highest: float) -> str:
 
 
 def not_measurable(reason: str) -> RingDown:
-    """Return a ring-down of which nothing may be used, and why."""
+    """Return a ring-down without usable values, and the reason."""
     nan = math.nan
     return RingDown(nan, nan, nan, nan, nan, nan, nan, nan, 0, ok=False, reason=reason)

@@ -1,4 +1,4 @@
-"""How far the modes that ring after a stop are from those that a model of the arm has there."""
+"""Compare the modes that ring after a stop with those of an arm's model."""
 
 import math
 from collections.abc import Iterable
@@ -16,34 +16,34 @@ from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 
 MODES = 4
-"""Number of modes that may ring, the lowest ones."""
+"""Number of modes that may ring, from the lowest."""
 HIGHEST = 100.0
-"""Largest frequency of one that is looked for [Hz]."""
+"""Largest frequency of a mode [Hz]."""
 SLOW_POLE = 17.5
 """Rate of the non-oscillatory tail that a position loop adds [1/s]."""
 SKIP = 3
-"""Ticks after the stop that are left out, since the end of the deceleration is no ring-down."""
+"""Ticks after the stop that are ignored, since the end of the deceleration is no ring-down."""
 SCALES = np.linspace(-0.4, 0.3, 29)
-"""Logarithms of the factors of all frequencies that are tried."""
+"""Logarithms of the common frequency factors to try."""
 BASES = np.geomspace(1e6, 3e4, 20)
-"""Stiffnesses that the arm's base may have [N m/rad]; from the first one on it is rigid."""
+"""Stiffnesses to try for the arm's base [N m/rad]; with the first one it is practically rigid."""
 COLOUR = 3.0
-"""Number of samples that count as one, since what the modes leave is correlated in time."""
+"""Number of samples that count as one, since the residual is correlated in time."""
 EXPECTED = 0.07
-"""Standard deviation of the logarithm of the factor before anything was heard."""
+"""Standard deviation of the factor's logarithm before any measurement."""
 UNLIKE, ELSEWHERE = 0.05, 0.1
-"""Standard deviation of the factor from pose to pose, and share of the stops that ring in something else."""
+"""Standard deviation of the factor between poses, and share of stops that ring in something else."""
 VAGUE = 0.1
-"""Standard error from which on a stop says nothing of the factor: it did not ring."""
+"""Standard error from which a stop is ignored because it did not ring."""
 FIRST = 8
-"""Number of stops by which the stiffness of the base is found."""
+"""Number of stops from which the stiffness of the base is found."""
 
 
 def unexplained(alpha: Floats, f_d: Floats, zeta: Floats) -> Floats:
-    """Return what modes, a constant and a slow tail leave of a ring-down, for each factor in `SCALES` [m²/s⁴].
+    """Return the energy of a ring-down without modes, constant and slow tail, for each factor in `SCALES` [m²/s⁴].
 
-    `alpha` [m/s²], shape (T, 3), begins `SKIP` ticks after the stop; `f_d` [Hz], before it is scaled, and `zeta` have
-    shape (k,).
+    `alpha` [m/s²], shape (T, 3), starts `SKIP` ticks after the stop; `f_d` [Hz], before scaling, and `zeta`
+    have shape (k,).
     """
     time, left = PERIOD * np.arange(len(alpha)), np.empty(len(SCALES))
     common = [np.ones_like(time), np.exp(-SLOW_POLE * time)]
@@ -57,12 +57,12 @@ def unexplained(alpha: Floats, f_d: Floats, zeta: Floats) -> Floats:
 
 
 class RingListener:
-    """Finds by which factor all modes after a stop are higher or lower than those of a model, f_d = e^u f_model(q).
+    """Finds the factor between all modes after a stop and those of a model, f_d = e^u f_model(q).
 
-    The amplitudes of the modes enter linearly and are eliminated (variable projection; Golub and Pereyra, 1973), so
-    that each u has a sum of squares and, by that, a likelihood: a stop that hardly rings says little, and says so.
-    Nobody knows how stiffly an arm is mounted. The model therefore stands on a base that yields, whose stiffness is
-    found once, as the likeliest one for the first `FIRST` stops.
+    The amplitudes of the modes enter linearly and are eliminated (variable projection; Golub and Pereyra,
+    1973), so each u has a sum of squares and hence a likelihood, which is flat if a stop hardly rings. The
+    stiffness of the arm's mounting is unknown; the model stands on a flexible base whose stiffness is found
+    once, as the likeliest for the first `FIRST` stops.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -76,11 +76,10 @@ class RingListener:
         self._base: int | None = None
 
     def study(self, alpha: Floats, q: Floats) -> list[tuple[float, float]]:
-        """Compare a ring-down with the modes in a pose.
+        """Return u and its standard error [-] from a ring-down in a pose; none if it did not ring.
 
-        `alpha` [m/s²], shape (T, 3), are readings from the stop on, with gravity; `q` [rad] has shape (n,). Returns u
-        and its standard error [-]: none if the stop did not ring, or the base is yet to be found; of all stops so far
-        with the one by which it is found.
+        `alpha` [m/s²], shape (T, 3), are readings from the stop on, with gravity; `q` [rad] has shape (n,).
+        Until the base is found, nothing is returned; then the results of all earlier stops are included.
         """
         alpha = alpha[SKIP:]
         if not np.isfinite(alpha).all():  # as of a log in which the accelerometer has a gap
@@ -105,21 +104,21 @@ class RingListener:
 
 
 def _certain(likelihoods: Iterable[Floats]) -> list[tuple[float, float]]:
-    """Mean and standard deviation of u for each logarithm of a likelihood that is not vague."""
+    """Return mean and standard deviation of u for each log-likelihood that is not vague."""
     found = []
     for likely in likelihoods:
         weights = np.exp(likely - likely.max())
         mean = float(np.average(SCALES, weights=weights))
         spread = float(np.average((SCALES - mean) ** 2, weights=weights))
         error = math.sqrt(spread + (SCALES[1] - SCALES[0]) ** 2 / 12.0)
-        # A maximum at an end belongs to something else that rings, or to one mode taken for another.
+        # A maximum at an end means that something else rings, or that modes were confused.
         if error < VAGUE and 0 < np.argmax(likely) < len(SCALES) - 1:
             found.append((mean, error))
     return found
 
 
 def _blurred(likely: Floats) -> Floats:
-    """Logarithm of the likelihood of a stop, shape (bases, scales), if poses differ and some stops tell nothing."""
+    """Return a stop's log-likelihood, shape (bases, scales): poses differ and some stops are uninformative."""
     spread = np.exp(-0.5 * ((SCALES[:, np.newaxis] - SCALES) / UNLIKE) ** 2)
     near = np.exp(likely) @ (spread / spread.sum(axis=0))
     anything = np.exp(likely).mean(axis=1).max()
@@ -127,7 +126,7 @@ def _blurred(likely: Floats) -> Floats:
 
 
 def _of_file(description: RobotDescription, joints: Integers, size: int) -> Floats:
-    """Rows of a `Drivetrain` with the springs and drives of a robot file."""
+    """Return the rows of a `Drivetrain` with the springs and drives of a robot file."""
     drives, links = description.drives, description.link_flexibility
     rows = np.zeros((5, size))
     rows[:, joints] = [
@@ -140,7 +139,7 @@ def _of_file(description: RobotDescription, joints: Integers, size: int) -> Floa
 
 
 def _standing(rows: Floats, base: float) -> Drivetrain:
-    """Springs and drives of an arm on a base that yields about two axes."""
+    """Return springs and drives of an arm on a base that yields about two axes."""
     foot = np.zeros((5, 2))
     foot[0], foot[4] = base, base * YieldingBase().damping_time
     return Drivetrain(*(tuple(row.tolist()) for row in np.hstack([foot, rows])))

@@ -1,4 +1,4 @@
-"""Modes in the log of an accelerometer alone, from the ring-downs and the sweep of frequencies that it shows."""
+"""Find modes in the log of an accelerometer alone, from ring-downs and frequency sweeps."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,21 +14,21 @@ from tvist_lab.metrics.vibration import SENSOR, parts
 from tvist_lab.recordings import Floats, Recording
 
 LEVEL = 0.05
-"""Time over which the level of a vibration is taken [s]."""
+"""Time over which the level of a vibration is averaged [s]."""
 LOUD = 4.0
-"""Level over that of the quiet tenth of a log from which on something vibrates [-]."""
+"""Level relative to that of the quietest tenth of a log from which something vibrates [-]."""
 ONSET = 0.25
-"""Longest time from the beginning of a vibration to its largest value, of a ring-down [s]."""
+"""Longest time from the start of a vibration to its peak in a ring-down [s]."""
 SWEEP, BLOCK = 3.0, 0.5
-"""Shortest sweep, and its parts of which each has a frequency [s]."""
+"""Shortest sweep, and duration of its parts, each with one frequency [s]."""
 RISING = 0.8
 """Smallest rank correlation of these frequencies with time [-]."""
 EDGE = 1.1
-"""Frequency of a mode over the lowest one of a sweep, and of the highest one over it, at least [-]."""
+"""Smallest ratio of a mode to the lowest frequency of a sweep, and of the highest frequency to the mode [-]."""
 EXPLAINED = 0.8
-"""Smallest share of the energy that damped sines explain [-]; a robot's motion is explained worse."""
+"""Smallest share of the energy that damped sines must explain [-]; they explain less of a robot's motion."""
 SCALED = 15.0
-"""Frequency in the middle of the range of the fit to which the strongest one is scaled [Hz]."""
+"""Frequency in the middle of the fit's range to which the strongest one is scaled [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -36,21 +36,20 @@ class FreeVibration:
     """The strongest mode of one ring-down or sweep."""
 
     kind: str
-    """`ring-down` or `sweep`."""
     start_s: float
-    """Time at which it begins [s]."""
+    """Time at which it starts [s]."""
     f_d_hz: float
     """Damped frequency [Hz]."""
     zeta: float
     """Damping ratio [-]."""
     f_d_interval_hz: tuple[float, float] | None = None
-    """Interval that contains the true frequency with a probability of 95 % [Hz]; None for a sweep."""
+    """95 % interval of the frequency [Hz]; None for a sweep."""
     zeta_interval: tuple[float, float] | None = None
-    """The same for the damping ratio [-]."""
+    """95 % interval of the damping ratio [-]; None for a sweep."""
 
 
 def free_vibrations(recording: Recording) -> list[FreeVibration]:
-    """Measure the ring-downs and sweeps of a log of an accelerometer, in order."""
+    """Measure the ring-downs and sweeps in an accelerometer's log, in order."""
     found = []
     for rows in parts(recording.time):
         seen = np.isfinite(recording[SENSOR][rows]).all(axis=1)
@@ -85,7 +84,7 @@ def _measured(time: Floats, alpha: Floats, period: float) -> FreeVibration | Non
     if abs(float(spearmanr(range(count), frequencies).statistic)) < RISING:
         return None
     inside = (EDGE * min(frequencies), max(frequencies) / EDGE)
-    # The autocorrelation of what a flat spectrum excites decays as the free vibration does.
+    # If the excitation has a flat spectrum, the autocorrelation decays like the free vibration.
     decay = np.column_stack([correlate(axis, axis, "full", "fft")[len(axis) - 1 :] for axis in alpha.T])
     decay = decay[: len(decay) // 4]
     found = _fitted("sweep", float(time[0]), decay, period * np.arange(len(decay), dtype=np.float64), period)
@@ -93,7 +92,7 @@ def _measured(time: Floats, alpha: Floats, period: float) -> FreeVibration | Non
 
 
 def _fitted(kind: str, start: float, alpha: Floats, late: Floats, period: float) -> FreeVibration | None:
-    """Fit a mode of any frequency: time is scaled so that the strongest one lies in the range of the fit."""
+    """Fit a mode of any frequency; time is scaled so that the strongest one lies in the range of the fit."""
     scale = max(_strongest(alpha, period), FREQUENCIES[0]) / SCALED
     fit = fit_ring_down(alpha, scale * period, modes=2, time=scale * late, offset=True)
     if not fit.ok or fit.r_squared < EXPLAINED:
@@ -107,7 +106,6 @@ def _fitted(kind: str, start: float, alpha: Floats, late: Floats, period: float)
 
 
 def _strongest(alpha: Floats, period: float) -> float:
-    """Frequency at which an acceleration has the most energy [Hz]."""
     size = 4 * len(alpha)
     power = np.sum(np.abs(np.fft.rfft(alpha - alpha.mean(axis=0), size, axis=0)) ** 2, axis=1)
     return float(np.fft.rfftfreq(size, period)[np.argmax(power)])

@@ -1,4 +1,4 @@
-"""Time by which an arm follows its target."""
+"""Measure the time by which an arm follows its target."""
 
 import numpy as np
 
@@ -6,29 +6,25 @@ from tvist_lab.metrics.vibration import SENSOR, low_pass_at
 from tvist_lab.recordings import Floats, Recording
 
 LONGEST = 0.2
-"""Longest lag that is searched [s]."""
+"""Longest lag in the search [s]."""
 FOLLOWS = 0.05
-"""Largest variance of the distance that is left, over that of the target, for an arm that follows it [-]."""
+"""Largest remaining variance of the distance, relative to the target's, if the arm follows it [-]."""
 LONGEST_FELT = 0.08
-"""Longest lag that is searched in the accelerometer [s]."""
+"""Longest lag in the search with the accelerometer [s]."""
 FINE = 0.002
 """Longest step of that search [s]."""
 SMOOTHED = 40.0
 """Cut-off frequency of the target before it is differentiated twice [Hz]."""
 EXPLAINED = 0.5
-"""Largest share of what the accelerometer shows that may be left unexplained [-]."""
+"""Largest share of the accelerometer signal that may remain unexplained [-]."""
 FEWEST = 8
-"""Smallest number of samples of a motion."""
 
 
 def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
-    """Time by which `actual_q` follows `target_q` in one motion [s], never below zero.
+    """Return the time by which `actual_q` follows `target_q` in a motion [s], never below zero; None if it does not.
 
-    It is the shift of the target with the least squared distance from the measured angles, to a tenth of a sample.
-    Without measured angles it is the shift with which the target's accelerations explain the tool's best. None if there
-    is neither, or the arm does not follow the target with any lag.
-
-    `start` and `stop` are the rows in which the target starts and stops.
+    It is the shift of the target from row `start` to `stop` with least squared distance to the measured angles, to a
+    tenth of a sample; without them, the shift with which the target's accelerations best explain the tool's.
     """
     if "target_q" not in recording:
         return None
@@ -56,7 +52,7 @@ def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
 
 
 def _felt_lag(recording: Recording, start: int, stop: int) -> float | None:
-    """Lag [s] with which the target's accelerations explain what the tool's accelerometer shows, or None."""
+    """Return the lag with which the target's accelerations explain the tool's accelerometer [s]; None if none does."""
     if SENSOR not in recording:
         return None
     time, period = recording.time, recording.period
@@ -70,7 +66,7 @@ def _felt_lag(recording: Recording, start: int, stop: int) -> float | None:
     velocity = np.gradient(moved, own, axis=0)
     acceleration = np.gradient(velocity, own, axis=0)
     felt = recording[SENSOR][shown]
-    # Gravity turns slowly in the frame of the tool.
+    # Slow terms stand for gravity, which turns slowly in the tool's frame.
     slow = np.vander((time[shown] - own[0]) / (own[-1] - own[0]), 4)
     felt = felt - slow @ np.linalg.lstsq(slow, felt)[0]
 
@@ -86,5 +82,5 @@ def _felt_lag(recording: Recording, start: int, stop: int) -> float | None:
 
 
 def _distance(time: Floats, target: Floats, actual: Floats, lag: float) -> float:
-    """Variance of the arm's distance from a target delayed by a lag; a constant distance does not count [rad²]."""
+    """Return the variance of the arm's distance from a delayed target [rad²]; a constant distance does not count."""
     return float(np.var(actual - np.interp(time - lag, time, target)))

@@ -16,7 +16,7 @@ TAIL = 0.2
 
 @dataclass(frozen=True)
 class Settling:
-    """Settling of a motion. Times count from the start of the reference before shaping."""
+    """Settling of a motion; times count from the start of the reference before shaping."""
 
     attained: Floats
     """Attained position of the tool [m], shape (3,)."""
@@ -31,17 +31,16 @@ class Settling:
 
 
 def attained_position(recording: Recording, motion: MotionRows) -> Floats:
-    """Mean position of the tool over the last 0.2 s before the next motion [m], shape (3,).
+    """Return the tool's mean position over the last 0.2 s before the next motion [m], shape (3,).
 
-    The tool's position is the forward kinematics of the joint angles, as in the paper, so it does not include the
-    bending of the links.
+    As in the paper, it is the forward kinematics of the joint angles, without the bending of links.
     """
     rows = _tail(recording, motion)
     return np.asarray(np.mean(recording["actual_TCP_pose"][rows, :3], axis=0), dtype=np.float64)
 
 
 def distance(recording: Recording, motion: MotionRows) -> Floats:
-    """E: distance of the tool from its attained position [m], for the rows from the motion's start to its end."""
+    """Return E, the distance of the tool from its attained position [m], for all rows of the motion."""
     position = recording["actual_TCP_pose"][motion.start : motion.end, :3]
     if not np.isfinite(position).all():
         raise NotMeasurableError("actual_TCP_pose is empty in some rows")
@@ -51,10 +50,10 @@ def distance(recording: Recording, motion: MotionRows) -> Floats:
 
 
 def settling(recording: Recording, motion: MotionRows, band: float = REPEATABILITY) -> Settling:
-    """t_enter, t_stb, t_cycle and e_os as in section 4.2 of the paper; crossings are interpolated between ticks.
+    """Return t_enter, t_stb, t_cycle and e_os as in section 4.2 of the paper, interpolated between ticks.
 
-    The motion should be followed by at least a second of rest, since integrators creep. `band` is the half-width of the
-    band [m].
+    At least a second of rest should follow the motion, since integrators creep. `band` is the half-width of
+    the band [m].
     """
     E = distance(recording, motion)
     time = recording.time[motion.start : motion.end] - recording.time[motion.start]
@@ -79,13 +78,13 @@ def settling(recording: Recording, motion: MotionRows, band: float = REPEATABILI
 
 
 def _crossing(time: Floats, E: Floats, row: int, band: float) -> float:
-    """Time at which E crosses the band between a row and the next."""
+    """Return the time at which E crosses the band between a row and the next."""
     share = (E[row] - band) / (E[row] - E[row + 1])
     return float(time[row] + share * (time[row + 1] - time[row]))
 
 
 def _tail(recording: Recording, motion: MotionRows) -> slice:
-    """Rows whose mean is the attained position."""
+    """Return the rows whose mean is the attained position; raise NotMeasurableError if the rest was too short."""
     first = int(np.searchsorted(recording.time, recording.time[motion.end - 1] - TAIL + 1e-9))
     if first <= motion.shaped_stop:
         raise NotMeasurableError(f"the tool was recorded at rest for less than {TAIL} s")

@@ -29,17 +29,17 @@ IMPACTS = {
 """Impacts listed in the paper, and their columns."""
 
 SKIP_OF_MEASURED = 0.03
-"""Time after a stop found in the measured angles that is left out of the ring-down [s]: it may be too early."""
+"""Time after a stop found in measured angles that the ring-down ignores [s]: the stop may be too early."""
 
 Row: TypeAlias = dict[str, float | None]
 Table: TypeAlias = dict[str, dict[str, Row]]
-"""Motion to `unshaped`, `shaped` and `impact_percent`, in the structure of `table_2` in the paper's data."""
+"""`unshaped`, `shaped` and `impact_percent` of each motion, structured like `table_2` in the paper's data."""
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class MotionResult:
-    """Metrics of one motion; None is not measurable, with the reason in `notes`."""
+    """Metrics of one motion; None if not measurable, with the reason in `notes`."""
 
     start_s: float
     """Time at which the reference starts [s]."""
@@ -58,31 +58,29 @@ class MotionResult:
     still_after_ms: float | None = None
     """Last time at which |α| exceeds 0.1 m/s², from the start of the reference [ms]."""
     peak_m_s2: float | None = None
-    """Largest |α| after the reference's stop plus the delay that the shaper declares, in a log after the arm's own
-    stop [m/s²].
-    """
+    """Largest |α| after the unshaped stop plus the declared delay, in a foreign log after the arm's own stop [m/s²]."""
     envelope_m_s2: float | None = None
-    """Largest envelope of α within 3 to 60 Hz after the same moment [m/s²]."""
+    """Largest envelope of α within 3 to 60 Hz after the same time [m/s²]."""
     peak_acceleration_rad_s2: float | None = None
     """Largest |q̈*| of any joint during the motion [rad/s²]."""
     f_d_hz: float | None = None
-    """Damped frequency of the ring-down after the stop [Hz]; of several modes, the one that is strongest then."""
+    """Damped frequency of the ring-down [Hz]; if there are several modes, of the strongest after the stop."""
     f_d_interval_hz: tuple[float, float] | None = None
-    """Interval that contains the true frequency with a probability of 95 % [Hz]."""
+    """95 % interval of the frequency [Hz]."""
     zeta: float | None = None
     """Damping ratio of the same mode [-]."""
     zeta_interval: tuple[float, float] | None = None
-    """Interval that contains the true damping ratio with a probability of 95 % [-]."""
+    """95 % interval of the damping ratio [-]."""
     modes: Sequence[Mapping[str, Any]] = ()
-    """Up to three modes, the strongest first: `f_d_hz` and its `interval`, `zeta` and `zeta_interval`, and `amplitude`,
-    the largest |α| at the stop [m/s²]."""
+    """Up to three modes, the strongest first: `f_d_hz` with `interval`, `zeta` with `zeta_interval`, and
+    `amplitude`, the largest |α| at the stop [m/s²]."""
     servo_lag_ms: float | None = None
     """Time by which the measured angles follow the target [ms]."""
     notes: Mapping[str, str] = field(default_factory=dict)
-    """Field to a note about its value."""
+    """Note about a field's value, by the field's name."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert the result to plain values, as `tvist log analyze` prints them."""
+        """Convert the result to plain values for `tvist log analyze`."""
         return {**asdict(self), "notes": dict(self.notes)}
 
 
@@ -177,7 +175,7 @@ def _mode(mode: Mode) -> dict[str, Any]:
 
 
 def _suspicion(mode: Mode, modes: Sequence[Mode]) -> str:
-    """Return a note about a mode's damping, if it has too much of it beside a lighter mode."""
+    """Return a note if a mode has suspiciously more damping than a lighter one near it."""
     if (near := lighter_beside(mode, modes)) is None:
         return ""
     return (
@@ -187,10 +185,7 @@ def _suspicion(mode: Mode, modes: Sequence[Mode]) -> str:
 
 
 def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
-    """Fit the modes that vibrate after the stop.
-
-    It is the strongest one at the stop.
-    """
+    """Fit the modes that vibrate after the stop; the result is the strongest one."""
     first = motion.arm_stop(recording)
     time, alpha = felt(recording, motion, slice(first, motion.end))
     late = time - recording.time[first]
@@ -204,11 +199,9 @@ def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
 
 
 def table_2(runs: Mapping[str, Runs]) -> Table:
-    """Means over the runs and the impact of shaping, in percent: 100 (mean shaped / mean unshaped - 1).
-
-    A mean leaves out runs in which the metric was not measurable, and is None if that holds for all of them; an impact
-    is None if one of its means is missing or it is not defined.
-    """
+    """Return means over the runs, and the impact of shaping, 100 (mean shaped / mean unshaped - 1) [%]."""
+    # Runs in which a metric was not measurable are left out of its mean; values that are not defined are
+    # None.
     table: Table = {}
     for name, repeated in runs.items():
         unshaped, shaped = _means(repeated.unshaped), _means(repeated.shaped)
@@ -218,7 +211,7 @@ def table_2(runs: Mapping[str, Runs]) -> Table:
 
 
 def table_notes(runs: Mapping[str, Runs]) -> list[str]:
-    """Return the notes about the means in the table, each with the number of runs it applies to."""
+    """Return the notes about the means in the table, each with the number of runs to which it applies."""
     found = []
     for name, repeated in runs.items():
         for kind, results in (("unshaped", repeated.unshaped), ("shaped", repeated.shaped)):
@@ -232,7 +225,6 @@ def table_notes(runs: Mapping[str, Runs]) -> list[str]:
 
 
 def _means(results: Sequence[MotionResult]) -> Row:
-    """Mean of each column over the runs in which it was measurable."""
     row: Row = {}
     for column in COLUMNS:
         values = [value for result in results if (value := getattr(result, column)) is not None]
@@ -241,7 +233,7 @@ def _means(results: Sequence[MotionResult]) -> Row:
 
 
 def impact_percent(unshaped: float | None, shaped: float | None) -> float | None:
-    """Change from the first to the second value in percent of the first; None where it is not defined."""
+    """Return the change from the first to the second value [%]; None where it is not defined."""
     if unshaped is None or shaped is None or unshaped == 0.0:
         return None
     return 100.0 * (shaped / unshaped - 1.0)
@@ -249,12 +241,11 @@ def impact_percent(unshaped: float | None, shaped: float | None) -> float | None
 
 @dataclass(frozen=True)
 class Measured:
-    """A recording whose motions are found and measured, each once."""
+    """A recording with its motions and their metrics."""
 
     recording: Recording
     motions: Sequence[MotionRows]
     results: Sequence[MotionResult]
-    """Figures of each motion."""
 
     @classmethod
     def of(cls, recording: Recording) -> "Measured":

@@ -20,28 +20,16 @@ TRUE_POSE = "truth_flange_pose"
 
 
 FILLED = 10
-"""A part of a log is filled to at most so many times its rows, so that a sparse one cannot take the memory."""
+"""Largest factor by which filling gaps may extend a part of a log, to bound the memory."""
 ALL = slice(None)
-"""All rows of a recording."""
 
 
 def tool_acceleration(recording: Recording, *, truth: bool = False, rows: slice = ALL) -> Floats:
-    """Acceleration of the flange in its own frame, α [m/s²].
+    """Return the acceleration α of the flange in its own frame, shape (T, 3) [m/s²].
 
-    The sensor measures the specific force; at rest this is the reaction to gravity, which follows from the
-    orientation of the tool.
-
-    Args:
-        recording: Recording with the sensor's column and `actual_TCP_pose`.
-        truth: Whether to use the truth channel, free of noise, with the flexible arm's orientation if recorded.
-        rows: The rows that are wanted.
-
-    Returns:
-        Acceleration, shape (T, 3).
-
-    Raises:
-        RecordingError: The column is missing.
-        NotMeasurableError: The channel has gaps in these rows.
+    The sensor measures the specific force; at rest, this is the reaction to gravity, which follows from
+    `actual_TCP_pose`. `truth` selects the noise-free truth channel, with the flexible arm's orientation if
+    recorded. Raises RecordingError if a column is missing, NotMeasurableError if it has gaps in these rows.
     """
     name = TRUTH if truth else SENSOR
     force = recording[name][rows]
@@ -52,18 +40,16 @@ def tool_acceleration(recording: Recording, *, truth: bool = False, rows: slice 
 
 
 def best_tool_acceleration(recording: Recording, rows: slice = ALL) -> Floats:
-    """α from the truth channel if it was recorded, else from the sensor below 60 Hz [m/s²], shape (T, 3).
-
-    White noise of 0.03 m/s² per axis alone exceeds 0.1 m/s² in one tick of a hundred, so the last time above a
-    threshold could not be determined from the raw sensor.
-    """
+    """Return α from the truth channel if recorded, else from the sensor below 60 Hz [m/s²], shape (T, 3)."""
+    # White noise of 0.03 m/s² per axis alone exceeds 0.1 m/s² in one tick of a hundred, so the raw sensor
+    # cannot show the last time above a threshold.
     if TRUTH in recording:
         return tool_acceleration(recording, truth=True, rows=rows)
     return low_pass(tool_acceleration(recording), recording.period)[rows]
 
 
 def amplitude(alpha: Floats) -> Floats:
-    """|α| [m/s²], shape (T,)."""
+    """Return |α| [m/s²], shape (T,)."""
     return np.asarray(np.linalg.norm(alpha, axis=1), dtype=np.float64)
 
 
@@ -74,11 +60,10 @@ def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
 
 
 def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
-    """Low-pass filter samples of which some are missing: these are interpolated before, and left out after.
+    """Low-pass filter samples of which some are missing; they are interpolated first, and left out of the result.
 
-    What stands before and after a long gap is filtered apart: to fill a day would take the memory.
-
-    `time` [s] has shape (T,), `signal` (T, k); `period` [s] is that where none is missing, `cut_off` in Hz.
+    Parts separated by a long gap are filtered separately to bound the memory. `time` [s] has shape (T,),
+    `signal` (T, k); `period` [s] is that without gaps, `cut_off` in Hz.
     """
     filtered = np.array(signal)
     for rows in parts(time):
@@ -93,7 +78,7 @@ def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BA
 
 
 def parts(time: Floats) -> list[slice]:
-    """Rows between the long gaps of increasing times."""
+    """Return the rows between the long gaps of increasing times."""
     ends = [0, *(np.flatnonzero(np.diff(time) > LONG_GAP) + 1).tolist(), len(time)]
     return [slice(first, past) for first, past in pairwise(ends)]
 
@@ -106,7 +91,7 @@ def band_pass(signal: Floats, period: float, band: tuple[float, float] = BAND) -
 
 @lru_cache(maxsize=16)
 def _designed(order: int, ends: float | tuple[float, float], kind: str, rate: float) -> Floats:
-    """Return the sections of a Butterworth filter; to design one takes as long as to filter a motion with it."""
+    """Return the sections of a Butterworth filter; cached, since the design takes as long as filtering a motion."""
     return np.asarray(butter(order, ends, kind, fs=rate, output="sos"))
 
 

@@ -1,1 +1,1 @@
-"""Runs of robot programs: how they ended, what they said, and how much the tool shook after each stop."""
+"""Runs of robot programs: how they ended, their messages, and the vibration after each stop."""

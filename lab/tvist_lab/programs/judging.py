@@ -1,4 +1,4 @@
-"""What runs are judged by: limits, what they are to leave behind, and an earlier run in lockstep."""
+"""Judge runs by limits, by expected positions of bodies, and by an earlier run in lockstep."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +18,7 @@ from tvist_plant.user_file import UserFileError, read_text
 
 
 def broken(limits: Limits, watch: ProgramWatch) -> Iterator[Shortcoming]:
-    """Say of each limit that a run broke where and when, and of the shake after each stop that broke it."""
+    """Yield where and when a run broke each limit, and each stop with too much vibration."""
     if limits.max_seconds is not None and watch.seconds > limits.max_seconds:
         yield _more(limits, "max_seconds", f"it ran for {watch.seconds:.3f} s", None)
     if limits.max_shake is not None:
@@ -30,7 +30,7 @@ def broken(limits: Limits, watch: ProgramWatch) -> Iterator[Shortcoming]:
 
 
 def missed(limits: Limits, plant: Plant) -> list[Shortcoming]:
-    """Say which bodies are not where they are expected."""
+    """Return the bodies that are not where they are expected."""
     said = (_missed(text, plant) for text in limits.expect or ())
     return [Shortcoming("expect", f"{text} (--expect)") for text in said if text is not None]
 
@@ -61,7 +61,7 @@ def _more(limits: Limits, name: str, what: str, line: int | None) -> Shortcoming
 
 
 def _missed(text: str, plant: Plant) -> str | None:
-    """Say why a body is not in an area; None if it is."""
+    """Return why a body is not in an area; None if it is."""
     expected = EXPECTED.fullmatch(text)
     assert expected is not None
     body, name = expected["body"].strip(), expected["area"].strip()
@@ -87,7 +87,7 @@ def _se3(pose: Sequence[float] | Floats) -> pin.SE3:
 
 
 def is_inside(area: Shape, at: Floats) -> bool:
-    """Return whether an area contains a point, which is in its frame."""
+    """Whether an area contains a point, given in its frame."""
     size = np.array(area.size)
     match area.kind:
         case "box":
@@ -107,24 +107,20 @@ def is_inside(area: Shape, at: Floats) -> bool:
 Run = Mapping[str, Any]
 """What --json prints of a program."""
 ROUNDING = {"_s": 0.5 * PERIOD, "seconds": 0.5 * PERIOD}
-"""Differences of times that count as none, by the end of the key [s]."""
+"""Differences of times that are ignored, by the end of the key [s]."""
 SHARES = {"_m_s2": 1e-3, "_rad_s": 1e-4, "_m_s": 1e-4}
-"""The same of accelerations and speeds, as shares of one more than the earlier value: what another processor may make
-different in the same run."""
+"""Relative differences of accelerations and speeds that are ignored, since another processor rounds differently."""
 OF_MOVES = ("seconds", "stopped", "rested_s", "peak_after_stop_m_s2")
-"""Keys of a move that are compared."""
 
 
 class BaselineError(ValueError):
-    """A file is no baseline of these programs; the message says why."""
+    """A file is no baseline of these programs; the message tells why."""
 
 
 def read_baseline(path: Path, files: Sequence[str]) -> Mapping[str, Run]:
-    """Read what `tvist run --lockstep --json` printed of exactly these programs, by their names.
+    """Read the `tvist run --lockstep --json` output of exactly these programs, by program name.
 
-    Raises:
-        BaselineError: It has something else, or other programs.
-        OSError: It cannot be read.
+    Raises BaselineError if the content is something else, OSError if the file cannot be read.
     """
     try:
         content = msgspec.json.decode(read_text(path, "baseline"))
@@ -149,7 +145,7 @@ def read_baseline(path: Path, files: Sequence[str]) -> Mapping[str, Run]:
 
 
 def changes(before: Run, now: Run) -> Iterator[Shortcoming]:
-    """Say what is different from a program's run in the baseline beyond rounding."""
+    """Yield the differences beyond rounding from a program's run in the baseline."""
     old, new = _points(before), _points(now)
     lines = {f"move {number}": move["line"] for number, move in enumerate(now.get("moves", ()), 1)}
     for name in old:

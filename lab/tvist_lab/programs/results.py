@@ -1,4 +1,4 @@
-"""What is known of a run when it is over: a sentence for people, plain values for programs, XML for CI systems."""
+"""Results of a run as text, as plain values for --json, and as JUnit XML."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,28 +11,27 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.errors import harmless
 
 MEASURES = ("seconds", "largest_peak_after_stop_m_s2")
-"""Keys of --json that become properties of a program in JUnit's XML under their own names."""
+"""Keys of --json that become properties of a program in JUnit XML under their own names."""
 
 
 @dataclass(frozen=True)
 class Shortcoming:
-    """Something for which a run counts as failed."""
+    """A reason for which a run counts as failed."""
 
     kind: str
-    """How the run ended, the limit that it broke such as `max_shake`, `expect`, `baseline`, or `recording`."""
+    """How the run ended, a limit such as `max_shake`, `expect`, `baseline`, or `recording`."""
     text: str
-    """A sentence."""
     line: int | None = None
-    """Line of the program that it belongs to; None if it belongs to none."""
+    """Line of the program to which it belongs, if any."""
 
 
 def largest_peak(watch: ProgramWatch) -> float | None:
-    """Largest acceleration of the tool after a stop [m/s²]; None if it never stopped, or the arm cannot tell."""
+    """Return the largest tool acceleration after a stop [m/s²]; None without a stop or a measurement."""
     return max((move.peak for move in watch.moves if move.peak is not None), default=None)
 
 
 def summary(watch: ProgramWatch) -> str:
-    """Say in a sentence how long a program ran, how often it moved, and how much the tool shook."""
+    """Summarize how long a program ran, how often it moved, and how much the tool vibrated."""
     said = f"{watch.name} ran for {watch.seconds:.3f} s of robot time"
     if watch.moves:
         said += f" and made {counted(len(watch.moves), 'move')}"
@@ -41,7 +40,7 @@ def summary(watch: ProgramWatch) -> str:
 
 
 def as_dict(watch: ProgramWatch) -> dict[str, Any]:
-    """Return everything that is known of a run, as plain values."""
+    """Return all results of a run as plain values."""
     error = watch.error
     return {
         "program": watch.name,
@@ -65,7 +64,7 @@ def as_dict(watch: ProgramWatch) -> dict[str, Any]:
 
 
 def _in_world(watch: ProgramWatch) -> dict[str, Any]:
-    """The largest force of contact, and where the bodies of the arm's world are; nothing without one."""
+    """Return the largest contact force and the positions of bodies; empty without a world."""
     things = watch.plant.things()
     if things is None:
         return {}
@@ -78,7 +77,7 @@ def _in_world(watch: ProgramWatch) -> dict[str, Any]:
 
 
 def seconds(ticks: int) -> float:
-    """Time of a tick, as `timestamp` in `state` gives it, or of a number of ticks [s]."""
+    """Return the time of a tick, as in `timestamp` of `state`, or of a number of ticks [s]."""
     return round(ticks * PERIOD, 6)  # 0.002 is no binary number
 
 
@@ -109,11 +108,9 @@ def _fastest(fastest: Fastest, unit: str) -> dict[str, Any]:
 
 
 def junit(results: Sequence[Mapping[str, Any]]) -> bytes:
-    """Return what --json prints of programs as JUnit's XML: a test suite with a case for each.
-
-    A case's time is the robot's. Its properties are what was measured, its failure has a sentence for each thing that
-    failed, `system-out` has the program's messages and `system-err` the warnings.
-    """
+    """Convert what --json prints of programs to JUnit XML: a test suite with a case for each."""
+    # A case has the robot's time, measurements as properties, a sentence for each failure, the program's
+    # messages in `system-out` and warnings in `system-err`.
     failed = sum(not result["ok"] for result in results)
     counts = {
         "tests": str(len(results)),
@@ -161,7 +158,7 @@ def _measures(result: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _placed(file: str, line: int | None, text: str) -> str:
-    """A text in the form that editors and CI systems make a link of."""
+    """Format a text with its position, as a link for editors and CI systems."""
     return _readable(f"{file}:{line}: {text}" if line else text)
 
 

@@ -1,4 +1,4 @@
-"""Runs of a program on a robot whose time has not begun, so that equal programs run alike to the last bit."""
+"""Run a program on a robot from tick 0, so that equal programs run alike to the last bit."""
 
 import asyncio
 import re
@@ -25,21 +25,18 @@ from tvist_server.recording.recorder import Recorder
 from tvist_server.server import Server
 
 CLIENT: Final = "tvist run"
-"""Name under which a run has control."""
 LEASE: Final = 3600.0
-"""Time without renewal after which it loses control [s]."""
+"""Time without renewal after which a run loses control [s]."""
 HERE: Final = "127.0.0.1"
-"""Address of this machine's own clients."""
 ATTEND_TICKS, ATTEND_S = 50, 0.05
-"""Ticks in lockstep, or time in real time [s], between two calls of what tells people about the run."""
+"""Ticks in lockstep, or time in real time [s], between two calls of `attend`."""
 LEAST, MOST = -(2**31), 2**31 - 1
-"""Range of an integer register."""
 _INPUT = re.compile(r"(?P<name>digital_input|input_(?P<kind>bit|int|double)_register)_(?P<number>\d{1,3})")
 _BITS = {"0": False, "false": False, "off": False, "1": True, "true": True, "on": True}
 
 
 class InputError(ValueError):
-    """An input is not given as NAME=VALUE; the message says what is wrong."""
+    """An input is not given as NAME=VALUE; the message tells what is wrong."""
 
 
 def run_in_lockstep(
@@ -54,14 +51,10 @@ def run_in_lockstep(
 ) -> ProgramWatch:
     """Run a program in this process without network until it has ended and the arm is at rest.
 
-    Its states equal those of a run in real time, to the last bit. `inputs` are NAME=VALUE; `timeout` is robot time [s];
-    `attend` is called when the program has said something, and now and then; `on_record_error` from another thread.
-
-    Raises:
-        InputError: An input is wrong.
-        RefusedError: The robot refuses the program.
-        RecorderError: The recording cannot be written.
-        StartError: The setup is invalid, or its plant cannot be made or gives the tick.
+    Its states equal those of a run in real time, to the last bit. `inputs` are NAME=VALUE; `timeout` is robot
+    time [s]; `attend` is called after new messages and regularly; `on_record_error` is called from another
+    thread. Raises InputError for a wrong input, RefusedError if the robot refuses the program, RecorderError
+    if the recording cannot be written, StartError if the setup is invalid or its plant unsuitable.
     """
     try:
         controller = Controller(setup)
@@ -98,16 +91,10 @@ def run_in_lockstep(
 
 
 class ProgramServer:
-    """A robot served in real time that begins with a program, and ends with it.
+    """A robot served in real time that starts with a program, and ends with it.
 
-    Its arguments are those of `run_in_lockstep`, beside the shutdown by signals and what `Server` prepares.
-
-    Raises:
-        StartError: The configuration is invalid.
-        RecorderError: The recording cannot be written.
-        GatewayError: The server cannot listen on an endpoint.
-        InputError: An input is wrong.
-        RefusedError: The robot refuses the program.
+    Arguments are those of `run_in_lockstep`, the shutdown by signals, and the preparation of `Server`. Raises
+    StartError, RecorderError, InputError or RefusedError likewise, and GatewayError if the server cannot listen.
     """
 
     watch: ProgramWatch
@@ -130,7 +117,7 @@ class ProgramServer:
         self.server = Server(config, observe, prepare=prepare)
         (self._robot,) = self.server.robots
         try:
-            # Clients of UR's interfaces on this machine have a hand in the program, as beside one of their own.
+            # Local clients of UR's interfaces share control of the program, as if one of them had started it.
             client = f"ur-{HERE}" if config.ur else CLIENT
             self._token = _start(self._robot.request, text, inputs, client)
             self.server.share_control(HERE, self._token)
@@ -141,7 +128,7 @@ class ProgramServer:
     async def run(self, ready: Callable[[], None], attend: Callable[[ProgramWatch], None]) -> None:
         """Serve until the program has ended and the arm is at rest, or a signal comes.
 
-        `ready` is called once the robot ticks and answers clients, `attend` now and then.
+        `ready` is called once the robot ticks and answers clients, `attend` regularly.
         """
         loop = asyncio.get_running_loop()
         serving = asyncio.ensure_future(self.server.run(ready, self._ending))
@@ -151,7 +138,7 @@ class ProgramServer:
             attend(self.watch)
             if loop.time() - renewed > LEASE / 10.0:
                 renewed = loop.time()
-                # If control is lost, the program ends with it, whatever the reply is.
+                # The reply does not matter: if control is lost, the program ends anyway.
                 self._robot.reception.command(KeepAlive(token=self._token), lambda _: None)
         await serving
         if self.server.failure is not None:

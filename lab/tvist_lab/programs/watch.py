@@ -1,4 +1,4 @@
-"""Observation of one program, tick by tick, in the controller's thread."""
+"""Observe one program, tick by tick, in the controller's thread."""
 
 import math
 from collections import deque
@@ -16,15 +16,15 @@ from tvist_plant.tool_acceleration import tool_acceleration
 from tvist_protocol.stream import Event, State
 
 AFTER_STOP = 5
-"""Ticks after a stop (10 ms) at which the search for the peak begins, when the last ramp has passed."""
+"""Ticks after a stop (10 ms) from which the peak is sought, when the last ramp has passed."""
 SEEN = 50
-"""Ticks of rest (0.1 s) that show the vibration after a stop; if it rests for less, the rest is computed ahead."""
+"""Ticks of rest (0.1 s) in which the vibration is measured; after a shorter rest, it is predicted."""
 WINDOW = 150
-"""Ticks after a stop (0.3 s) in which the peak is searched, as for the paper's residual vibration."""
+"""Ticks after a stop (0.3 s) in which the peak is sought, as for the paper's residual vibration."""
 KEPT = 5000
-"""Most states of the arm that a run in real time keeps for `Move.peak`, 50 MB; later stops with no rest have none."""
+"""Most arm states (50 MB) that a real-time run keeps for `Move.peak`; later stops without rest have none."""
 LINGER = 2500
-"""Most ticks (5 s) for which an arm that has not come to rest is watched after the end of its program."""
+"""Most ticks (5 s) for which a moving arm is observed after the end of its program."""
 
 Reason = Literal[
     "finished",
@@ -37,22 +37,19 @@ Reason = Literal[
     "server_failure",
     "signal",
 ]
-"""How a run ended."""
 
 
 @dataclass
 class Said:
-    """Something that the program, or the robot, has said to people."""
+    """A message of the program or the robot."""
 
     tick: int
     kind: Literal["text", "popup", "warning"]
     text: str
     line: int = 0
-    """Line that the program carried out then; 0 if none."""
+    """Line that was being executed; 0 if none."""
     title: str | None = None
-    """Title of a popup."""
     level: Literal["message", "warning", "error"] | None = None
-    """How serious a popup is."""
 
 
 @dataclass
@@ -62,28 +59,28 @@ class Move:
     id: int
     started: int
     line: int = 0
-    """Line of the program that began it; 0 if no line did."""
+    """Line of the program that started it; 0 if none."""
     ended: int | None = None
-    """Tick of its end; None if it had not ended when the run did."""
+    """Tick of its end; None if the run ended first."""
     stopped: str | None = None
     """Why it was stopped before its target; None if it was not."""
     rests: int | None = None
-    """Tick at which the shaped reference came to rest after it; None if it did not before the next motion."""
+    """Tick at which the shaped reference came to rest; None if not before the next motion."""
     followed: int | None = None
-    """Tick at which the next motion began; None if none did."""
+    """Tick at which the next motion started; None if none did."""
     rested: int = 0
-    """Ticks for which the reference rested after it, as far as the vibration is looked at."""
+    """Ticks of rest after it, as far as the vibration is measured."""
     peak_so_far: float | None = None
-    """Largest acceleration of the tool seen so far; None if none was seen [m/s²]."""
+    """Largest tool acceleration measured until now [m/s²]; None if none was."""
     held: Callable[[int], Response] | None = None
-    """What the arm would have done at rest; None if it need not be asked, since it was seen."""
+    """Predicts the arm at rest; None if the vibration was measured instead."""
 
     @cached_property
     def peak(self) -> float | None:
-        """Largest acceleration of the tool from 10 ms until 0.3 s after the stop, without gravity [m/s²].
+        """Largest tool acceleration without gravity from 10 ms until 0.3 s after the stop [m/s²].
 
-        Where the next motion began within 0.1 s, it is what the tool would have done at rest. None if the arm cannot
-        tell, or if there was no rest. To be asked when the next motion has begun, since it is computed once.
+        If the next motion started within 0.1 s, it is a prediction for an arm at rest. None without rest or
+        measurement. Ask only after the next motion has started, since it is computed once.
         """
         if self.held is None:
             return self.peak_so_far if self.rested >= SEEN else None
@@ -98,20 +95,20 @@ class Move:
 
 @dataclass(frozen=True)
 class Fastest:
-    """The largest speed or force of a run, and when and where it was."""
+    """The largest speed or force of a run, with its time and place."""
 
     speed: float = 0.0
     """Measured speed [rad/s, or m/s], or the force [N]."""
     tick: int = 0
     line: int = 0
-    """Line that the program carried out then; 0 if none."""
+    """Line that was being executed; 0 if none."""
     joint: str | None = None
     """Name of the joint; None for the tool."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A place in the program's text, and what is wrong there."""
+    """A position in the program's text, and what is wrong there."""
 
     line: int
     column: int
@@ -121,14 +118,14 @@ class Place:
 class ProgramWatch(Sink):
     """Observes a program from its start until it has ended and the arm is at rest.
 
-    The tool's acceleration is the simulation's true one, free of the sensor's noise; other arms have none.
+    The tool's acceleration is the simulation's true one, without sensor noise; arms that are not simulated have none.
 
     Args:
-        controller: The robot; the program is the first one that it starts.
-        close_popup: Has the popup closed for which the program waits, before the next tick.
+        controller: The robot; the first program that it starts is observed.
+        close_popup: Has the popup closed, before the next tick, for which the program waits.
         on_over: Called once, when the run is over.
-        timeout: Robot time after which the run ends although the program goes on [s]; None: never.
-        alone: Whether there is nobody who could resume a paused program, so that the run ends with a pause.
+        timeout: Robot time after which the run ends in any case [s].
+        alone: Whether nobody could resume a paused program, so that the run ends with a pause.
     """
 
     def __init__(
@@ -143,60 +140,55 @@ class ProgramWatch(Sink):
         self._controller, self._close_popup, self._on_over = controller, close_popup, on_over
         self._alone, self._timeout = alone, timeout
         self.tick = 0
-        """Present tick."""
         self.name = ""
-        """Name of the program."""
         self.reason: Reason | None = None
         """How the run ended; None while it goes on."""
         self.why: str | None = None
-        """Why it did not end by itself, as a sentence."""
+        """Why the program did not end by itself, as a sentence."""
         self.error: Place | None = None
-        """Where an error has ended the program."""
+        """Position of the error that ended the program."""
         self.said: list[Said] = []
-        """Everything that was said."""
         self.news: deque[Said] = deque()
-        """What was said, for another thread to take."""
+        """New messages, for another thread to take."""
         self.moves: list[Move] = []
-        """Motions of the program."""
         self.fastest_joint, self.fastest_tool = Fastest(), Fastest()
         """Largest speeds of a joint and of the tool centre point, as measured."""
         self.hardest = Fastest()
-        """Largest force with which the arm's world touched it; 0 without a world."""
+        """Largest force with which the world touched the arm; 0 without a world."""
         self.over = False
         """Whether there is nothing more to observe."""
         self._names = controller.cycle.description.robot.joints
         self._ended = 0
         self._kept = 0
-        """States of the arm that are kept for later."""
+        """Number of arm states that are kept."""
         self._placeless: list[Move | Said] = []
-        """What came in this tick, and whose line is not known yet."""
+        """Messages and moves of this tick, whose line is not known yet."""
         self._rest = 0
         """Ticks for which the shaped reference has rested after the last move."""
         self.plant = plant = controller.cycle.plant
-        """The arm."""
         self._in_world = plant.things() is not None
         self._truthful = plant.truth() is not None
         self._foreseeing = plant.can(Plant.held)
 
     @property
     def seconds(self) -> float:
-        """Robot time from the start of the program, which is the first tick, until its end or until now [s]."""
+        """Robot time from the start of the program, the first tick, until its end or until now [s]."""
         return ((self._ended or self.tick + 1) - 1) * PERIOD
 
     @property
     def line(self) -> int:
-        """Line that the program carries out; 0 if it has ended."""
+        """Line that is being executed; 0 if the program has ended."""
         return self._controller.programs.present_line
 
     def end(self, reason: Reason, why: str | None) -> None:
-        """Note how the run has ended; what is noted first counts."""
+        """Note how the run ended; only the first call counts."""
         if self.reason is None:
             self.reason, self.why, self._ended = reason, why, self.tick + 1
 
     # ------------------------------------------------------------------ messages of the controller
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         match event.kind:
             case "program_started" if not self.name:
                 self.name = event.program or ""
@@ -219,7 +211,7 @@ class ProgramWatch(Sink):
                 self._note_end(event)
 
     def state(self, state: State) -> None:
-        """Take a tick's state, which its events precede."""
+        """Process a tick's state, which comes after its events."""
         self.tick = state.tick
         while self._placeless:  # a program's line is known between its turns
             self._placeless.pop().line = self.line
@@ -240,7 +232,7 @@ class ProgramWatch(Sink):
             self._on_over()
 
     def _watch_rest(self, move: Move, *, at_rest: bool) -> None:
-        """Measure how the tool vibrates while the reference rests."""
+        """Measure the tool's vibration while the reference rests."""
         if not at_rest or move.ended is None:
             self._rest = 0
         elif self._rest <= WINDOW:
@@ -274,7 +266,7 @@ class ProgramWatch(Sink):
         self._rest = 0
 
     def _note_next(self, move: Move, tick: int) -> None:
-        """Note when the next move began; what the arm would have done else takes too long to compute in real time."""
+        """Note the start of the next move; in real time, the prediction of the arm at rest is computed later."""
         move.followed = tick
         if move.held is None:
             return
@@ -299,11 +291,9 @@ class ProgramWatch(Sink):
 
 
 def acceleration(specific_force: Floats, rotation: Floats) -> Floats:
-    """Magnitudes of the tool's acceleration without gravity, shape (...) [m/s²].
+    """Return magnitudes of the tool's acceleration without gravity, shape (...) [m/s²].
 
-    Args:
-        specific_force: Specific force in the flange frame, shape (..., 3) [m/s²].
-        rotation: Orientation of the flange, shape (..., 3, 3).
+    `specific_force` in the flange frame has shape (..., 3) [m/s²], `rotation` of the flange (..., 3, 3).
     """
     up = rotation[..., 2, :]  # the world's z axis, in the frame of the flange
     return np.asarray(np.linalg.norm(tool_acceleration(specific_force, up), axis=-1))

@@ -1,4 +1,4 @@
-"""Recordings in memory and in files: data in and out."""
+"""Recordings in memory and in files."""
 
 from tvist_lab.recordings.read import read
 from tvist_lab.recordings.recording import (

@@ -1,4 +1,4 @@
-"""What every recording from a file must hold, checked once where it enters: names, numbers, shapes, times."""
+"""Check recordings from files once, on reading: names, numbers, shapes, times."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -13,49 +13,49 @@ from tvist_protocol.errors import quoted
 TIME = "timestamp"
 """Name of the column of times, as in RTDE [s]."""
 ACCELEROMETER, GYROSCOPE = "actual_tool_accelerometer", "actual_tool_gyroscope"
-"""Names of what a sensor at the tool measures; RTDE has the first alone."""
+"""Names of the signals of a sensor at the tool; RTDE has only the first."""
 WIDTHS = {
     "actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, ACCELEROMETER: 3, GYROSCOPE: 3,
 }  # fmt: skip
-"""Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
+"""Number of entries that a vector needs to be usable; joint angles have one per joint."""
 ANGLES = ("reference_q", "unshaped_q", "target_q", "actual_q")
-"""Vectors that must have an entry for each joint."""
+"""Vectors with one entry per joint."""
 SHAPES = {name: (width,) for name, width in WIDTHS.items()}
 LARGEST = {TIME: 1e10, "tick": 2.0**53}
-"""Largest times [s] and ticks; as many seconds after 1970 are three centuries, and a float holds no more ticks."""
+"""Largest times [s] and ticks: three centuries after 1970, and the range of exact integers in a float."""
 MEASURED = re.compile(
     r"(actual|target|shaped|reference|unshaped|motor|truth)_(motor_)?(q|qd|qdd|moment|current|(TCP|tool|flange)_\w+)(_\d+)?"
     r"|(estimated|flange|payload|shaper|speed_scaling|truth_\w*(deflection|poses))\w*"
 )
-"""Names of columns with radians, metres, seconds and such."""
+"""Names of columns in SI units."""
 MOST = 1e6
 """Largest number in such a column; more is damage."""
 LONG_GAP = 1.0
-"""Time without rows on both sides of which a log is two [s]; shorter ones are filled with straight lines."""
+"""Longest gap between rows that is filled with straight lines [s]; a longer one splits the log."""
 Places = tuple[str, Floats]
-"""Where rows stand in a file: what is counted, such as "line", and the number of each row, shape (T,)."""
+"""Position of rows in a file: what is counted, such as "line", and the number of each row, shape (T,)."""
 PERIODS = (1e-4, 0.1)
-"""Shortest and longest time between rows [s]; anything else is no time in seconds, or shows no vibration."""
+"""Shortest and longest time between rows [s]; others are not in seconds, or too slow for vibration."""
 
 
 class LogError(RecordingError):
-    """A file is no log that can be measured; the message names the file and, where there is one, the line."""
+    """A file is no measurable log; the message names the file and, if there is one, the line."""
 
 
 def is_measured(name: str) -> bool:
-    """Return whether a column of a table is an entry of a vector that a robot measures or wants."""
+    """Whether a column of a table is an entry of a vector of measured or desired values."""
     return name[-1:].isdigit() and MEASURED.fullmatch(name) is not None
 
 
 def check_names(where: object, names: Sequence[str]) -> None:
-    """Refuse a name that cannot be shown, as of a damaged file."""
+    """Refuse a name that cannot be printed, as in a damaged file."""
     for name in names:
         if not is_name(name):
             raise LogError(f"{where}: {quoted(name)} is no column's name: it must be short and printable")
 
 
 def check_numbers(path: Path, columns: Mapping[str, Floats], places: Places) -> None:
-    """Refuse a number that no robot has; NaN is missing."""
+    """Refuse a number that no robot has; NaN means missing."""
     for name, values in columns.items():
         most = LARGEST.get(name, MOST if MEASURED.fullmatch(name) else np.inf)
         if len(strange := np.argwhere(np.abs(values) > most)):
@@ -76,10 +76,7 @@ def check_period(path: Path, period: float) -> None:
 
 
 def check_recording(path: Path, recording: Recording, places: Places | None = None) -> None:
-    """Refuse a recording, whoever made it, with which the laboratory could not compute.
-
-    `places` says where its rows stand in the file; by default, their ticks.
-    """
+    """Refuse a recording that cannot be analysed; `places` tells where its rows are in the file [their ticks]."""
     info, columns, tick, time = recording.info, recording.columns, recording["tick"], recording.time
     check_names(path, [*columns, *([] if info is None else [info.name, info.model, info.version])])
     joints = max((columns[name].shape[1:] for name in ANGLES if name in columns), default=())
@@ -95,6 +92,6 @@ def check_recording(path: Path, recording: Recording, places: Places | None = No
     periods = step / np.diff(tick)
     if (back := np.flatnonzero(step <= 0.0)).size:
         raise LogError(f"{path}, tick {tick[back[0] + 1]:.0f}: {TIME} does not go on")
-    # The clock of another controller may go on beside its ticks.
+    # The clock of another controller may not be in step with its ticks.
     for period in (np.median(periods), recording.period, *([] if recording.foreign else [np.max(periods)])):
         check_period(path, float(period))

@@ -1,4 +1,4 @@
-"""Names and units of a log's columns: RTDE's from those that a user gives, a vendor's program writes, or UR's do."""
+"""Names and units of a log's columns: convert those of users, vendors and UR to RTDE's."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -18,21 +18,19 @@ SHORT = {
     "gyroscope": GYROSCOPE,
     "pose": "actual_TCP_pose",
 }
-"""Short names of the columns that matter, and RTDE's."""
+"""RTDE's names of the most important columns, by short name."""
 AXES = {"x": 0, "y": 1, "z": 2}
-"""Letters that may stand where a vector's column has its number."""
+"""Letters that may replace the number in the name of a vector's column."""
 SI = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180.0, "m/s2": 1.0, "mm/s2": 1e-3,
     "g": 9.80665, "mg": 9.80665e-3, "rad/s": 1.0, "deg/s": np.pi / 180.0,
 }  # fmt: skip
-"""Units and their sizes in SI."""
 WIDEST = 7.0
-"""Largest angle that the middle one of an arm's joints reaches [rad]; more is in degrees."""
+"""Largest angle that the middle one of an arm's joints reaches [rad]; more must be degrees."""
 GRAVITY_IN_G = (0.8, 1.2)
-"""Range of the length of an accelerometer's vector in units of gravity, at the median."""
+"""Range of the median length of an accelerometer's vector in units of gravity."""
 
 TIMES = (TIME, "time", "t")
-"""Names of the column of times."""
 REALTIME = {
     "q_target": "target_q",
     "qd_target": "target_qd",
@@ -44,7 +42,7 @@ REALTIME = {
     "TCP_speed_actual": "actual_TCP_speed",
     "tool_accelerometer": "actual_tool_accelerometer",
 }
-"""Names of UR's real-time interface, and RTDE's for the same."""
+"""RTDE's names for those of UR's real-time interface."""
 VENDORS = {
     # franka::logToCSV, github.com/frankaemika/libfranka, src/log.cpp
     "Franka's libfranka": "q=state.q[{}]:rad,target_q=state.q_d[{}]:rad,qd=state.dq[{}],target_qd=state.dq_d[{}]",
@@ -66,10 +64,11 @@ VENDORS = {
     "Doosan's RobotStateRt (brackets)": "time=time_stamp,q=actual_joint_position[{}]:deg,"
     "qd=actual_joint_velocity[{}]:deg/s,target_q=target_joint_position[{}]:deg,target_qd=target_joint_velocity[{}]:deg/s",
 }
-"""Columns of each program, as `_given` takes them; joint angles or an accelerometer tell it.
+"""Columns of each program, in the form of `_given`; joint angles or an accelerometer identify it.
 
-Only names that the source of a program which writes them shows are listed: xArm, Fanuc and others document what their
-controllers send, but no file with a header."""
+Only names found in the source of a program that writes them are listed: xArm, Fanuc and others document what
+their controllers send, but no file with a header.
+"""
 
 _SPAN = re.compile(r"(\d{1,6})(?:-(\d{1,6}))?", re.ASCII)
 
@@ -77,7 +76,7 @@ _SPAN = re.compile(r"(\d{1,6})(?:-(\d{1,6}))?", re.ASCII)
 def rtde_names(
     path: Path, header: Sequence[str], columns: str | None
 ) -> tuple[list[str], dict[str, str], tuple[str, ...]]:
-    """RTDE's names of a header's columns, empty for others; units as far as they are known; and whose names they are.
+    """Return RTDE's names of a header's columns (empty for others), known units, and a note naming the vendor.
 
     Without `columns`, those of `VENDORS` and `REALTIME` are recognised; other names stay.
     """
@@ -93,7 +92,7 @@ def rtde_names(
 
 
 def found_columns(names: Sequence[str], but: int | None = None) -> str:
-    """Return the names of a file's columns, but one, as the part of a sentence."""
+    """List the names of a file's columns for an error message, without the column at index `but`."""
     there = [name for place, name in enumerate(names) if name and place != but]
     return f"its columns are {', '.join(there[:24])}{', …' if len(there) > 24 else ''}"
 
@@ -106,7 +105,7 @@ def _own_name(name: str, names: Sequence[str]) -> str:
 
 
 def _vendor_of(header: Sequence[str]) -> tuple[str, str] | None:
-    """Whose names a header has, and the map of those columns that are there; None for others."""
+    """Return a header's vendor, and the map of its columns that exist; None if unknown."""
     for vendor, columns in VENDORS.items():
         items = columns.split(",")
         patterns = (item.partition("=")[2].partition(":")[0] for item in items)
@@ -121,11 +120,9 @@ def _vendor_of(header: Sequence[str]) -> tuple[str, str] | None:
 
 
 def _given(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Names and units by a text such as `time=t:ms,q=joint_{}:deg,accelerometer=a{}:g`, or `time=1,q=2-7`.
-
-    A short name or one of RTDE's is followed by the header's name with `{}` for the number or the letter x, y, z of
-    an entry, or a position counted from 1; and after a colon by the unit if it is not SI.
-    """
+    """Parse names and units from a text such as `time=t:ms,q=joint_{}:deg,accelerometer=a{}:g`, or `time=1,q=2-7`."""
+    # A short name or RTDE's is followed by the header's name, with `{}` for the number or letter x, y, z of
+    # an entry, or by a position counted from 1, and by a colon and the unit if it is not SI.
     names, units = [""] * len(header), dict[str, str]()
     for item in columns.split(","):
         key, _, value = (part.strip() for part in item.partition("="))
@@ -145,13 +142,13 @@ def _given(path: Path, columns: str, header: Sequence[str]) -> tuple[list[str], 
 
 
 def _entry_of(pattern: str) -> re.Pattern[str]:
-    """What matches the names of one column, or of the entries of a vector."""
+    """Return the pattern for the names of one column, or of the entries of a vector."""
     before, braces, after = pattern.partition("{}")
     return re.compile(re.escape(before) + (r"(\d{1,6}|[xyz])" if braces else "") + re.escape(after))
 
 
 def _places(path: Path, key: str, pattern: str, header: Sequence[str]) -> list[int]:
-    """Places of one column, or of the entries of a vector in their order."""
+    """Return the indices of one column, or of the entries of a vector in their order."""
     entry, braces = _entry_of(pattern), "{}" in pattern
     hits = [(at, found) for at, name in enumerate(header) if (found := entry.fullmatch(name))]
     if not hits and (span := _SPAN.fullmatch(pattern)):
@@ -168,11 +165,9 @@ def _places(path: Path, key: str, pattern: str, header: Sequence[str]) -> list[i
 
 
 def in_si(names: Sequence[str], values: Floats, given: Mapping[str, str]) -> tuple[Floats, tuple[str, ...]]:
-    """Numbers in SI, and notes about the units that were found in the numbers and not given.
-
-    A time whose step can only be in ms, µs or ns, joint angles beyond 7 in most joints (degrees), and an accelerometer
-    that shows about 1 at rest (g) are converted.
-    """
+    """Convert numbers to SI; return notes about units that were inferred from the numbers."""
+    # Infer: times in ms, µs or ns, from their step; joint angles in degrees, if most joints exceed 7;
+    # and an accelerometer in g, if it reads about 1 at rest.
     places: dict[str, list[int]] = {}
     for at, name in enumerate(names):
         places.setdefault(re.sub(r"_\d+$", "", name), []).append(at)

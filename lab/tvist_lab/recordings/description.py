@@ -1,4 +1,4 @@
-"""What files say of their columns: unit and meaning; in an exported file, also events, info and notes, as JSON."""
+"""Unit and meaning of columns, and the JSON description in exported files, which also holds events, info and notes."""
 
 import json
 import re
@@ -22,9 +22,8 @@ from tvist_protocol.stream import Event, State, Truth
 
 _UNIT = re.compile(r"\s*\[([^\]]*)\]")
 KEY = "tvist"
-"""Name of the description in a file that has named parts."""
+"""Name of the description in a file with named parts."""
 FORMAT = 1
-"""Version of the description."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +33,8 @@ class ColumnMeaning:
     meaning: str
     """A phrase; empty for an unknown column."""
     units: tuple[str, ...] = ()
-    """Its unit, or one unit for each half of a vector of six (SI); "-" for a ratio; empty without a unit."""
+    """Its SI unit, or one for each half of a vector of six; "-" for a ratio; empty without a unit."""
     whole: bool = False
-    """Whether its values are whole numbers."""
 
     def unit(self) -> str:
         """Return the unit or units as text, such as `m, rad` for a pose."""
@@ -51,7 +49,7 @@ class ColumnMeaning:
 
 @cache
 def meaning_of(column: str) -> ColumnMeaning:
-    """Describe a column of a recording: a field of `state`, `truth` (with its prefix) or `io`, or RTDE's variable."""
+    """Describe a column: a field of `state`, of `truth` (with its prefix) or of `io`, or RTDE's variable."""
     if column == GYROSCOPE:
         return ColumnMeaning("Angular velocity of the tool, in the axes of its sensor", ("rad/s",))
     if column.startswith(TRUTH_PREFIX):
@@ -84,34 +82,29 @@ def _described(text: str, whole: bool) -> ColumnMeaning:
 
 
 class ColumnDescription(msgspec.Struct, frozen=True):
-    """One column."""
+    """Description of one column."""
 
     width: Annotated[int, msgspec.Meta(ge=0, le=100_000)] | None
     """Number of entries in a row; null for a number."""
     unit: str
-    """Unit or units (SI)."""
     meaning: str
-    """What it is."""
 
 
 class Description(msgspec.Struct, frozen=True):
     """A recording without its arrays."""
 
     format: int
-    """Version of the description."""
     columns: dict[str, ColumnDescription]
-    """Columns in their order."""
     events: list[Event] = []
     """Events in the order of their ticks."""
     info: Info | None = None
-    """Description of the robot."""
     notes: list[str] = []
-    """What was left out when the recording was read."""
+    """Notes on what was left out when the recording was read."""
     foreign: bool = False
     """Whether another controller was recorded."""
 
     def recording(self, names: Sequence[str], values: Floats) -> Recording | None:
-        """Return the recording of a table, shape (T, columns); None if the description is of other columns."""
+        """Return the recording of a table, shape (T, columns); None if it has other columns than described."""
         places, columns = {name: at for at, name in enumerate(names)}, dict[str, Floats]()
         for name, about in self.columns.items():
             flat = [name] if about.width is None else [f"{name}_{index}" for index in range(about.width)]
@@ -125,7 +118,7 @@ class Description(msgspec.Struct, frozen=True):
 
 
 def ordered(recording: Recording) -> dict[str, Floats]:
-    """Return the columns with `timestamp` first, where there is one."""
+    """Return the columns with `timestamp` first, if there is one."""
     columns = dict(recording.columns)
     first = {"timestamp": columns.pop("timestamp")} if "timestamp" in columns else {}
     return first | columns
@@ -146,12 +139,12 @@ def describe(recording: Recording) -> bytes:
 
 
 def sidecar(path: Path) -> Path:
-    """Return the file beside a CSV that describes it, as the W3C's "CSV on the Web" names it."""
+    """Return the file that describes a CSV, named as in the W3C's "CSV on the Web"."""
     return path.with_name(f"{path.name}-metadata.json")
 
 
 def beside(path: Path) -> Description | None:
-    """Return the description beside a CSV, if there is one."""
+    """Read the description beside a CSV, if there is one."""
     try:
         check_is_file(sidecar(path), "description")
         (note, *_) = parse_json(sidecar(path).read_bytes())["notes"]
@@ -161,7 +154,7 @@ def beside(path: Path) -> Description | None:
 
 
 def described(text: bytes) -> Description | None:
-    """Read a description from JSON; None if it is none, or of a later version."""
+    """Read a description from JSON; None if it is invalid, or of a later version."""
     try:
         found = checked(parse_json(text), Description)
     except ProtocolError:

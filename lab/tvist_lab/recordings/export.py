@@ -1,4 +1,4 @@
-"""Recordings as CSV and Parquet, in full precision."""
+"""Write recordings as CSV and Parquet, in full precision."""
 
 import io
 import json
@@ -16,9 +16,9 @@ from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.whole_file import whole_file
 
 FOXGLOVE = "foxglove"
-"""Format of `tvist_lab.foxglove`, which takes recordings of a robot alone."""
+"""Format of `tvist_lab.foxglove`, only for recordings of a robot."""
 EXACT = 2.0**53
-"""Whole numbers up to this one are the same as an integer and as a float."""
+"""Whole numbers below this are exact as integer and as float."""
 
 _SYSTEM = re.compile(r"IO error: (.*) \(os error")
 
@@ -28,18 +28,17 @@ class ExportError(RecordingError):
 
 
 def written_by(path: Path, kind: str) -> list[Path]:
-    """Return the files that an export to `path` writes: in Foxglove's format also a layout."""
+    """Return the files that an export to `path` writes; Foxglove's format includes a layout."""
     if kind == FOXGLOVE:
         return [path, path.with_name(f"{path.name.removesuffix('.mcap')}-layout.json")]
     return [path, sidecar(path)] if kind == "csv" else [path]
 
 
 def export(recording: Recording, path: Path, kind: str) -> None:
-    """Write a recording to a file, replacing it.
+    """Write a recording to a file and replace it if it exists; raise ExportError if that fails.
 
-    Scalars are columns of their own names, and vectors are columns NAME_0, NAME_1, …, as UR's record.py names them.
-    `timestamp` comes first. Units, events and info stand in the metadata of Parquet, and in a file beside a CSV, as
-    JSON.
+    Scalars keep their names; vectors become columns NAME_0, NAME_1, …, like those of UR's record.py. `timestamp` comes
+    first. Units, events and info are JSON, in the metadata of Parquet or in a file beside a CSV.
     """
     try:
         with whole_file(path) as stream:
@@ -52,7 +51,7 @@ def export(recording: Recording, path: Path, kind: str) -> None:
 
 
 def flat(recording: Recording) -> pl.DataFrame:
-    """Return one column for each entry of a vector, named NAME_i; whole numbers are integers, null instead of NaN."""
+    """Return one column NAME_i per entry of a vector; whole numbers become integers, NaN becomes null."""
     columns: list[pl.Series] = []
     for name, values in ordered(recording).items():
         whole = meaning_of(name).whole and _exact(values)
@@ -67,7 +66,7 @@ def _entries(name: str, values: Floats) -> list[tuple[str, Floats]]:
 
 
 def _exact(values: Floats) -> bool:
-    """Return whether all values are the same as integers; -0.0 is not."""
+    """Whether all values can be stored as integers; -0.0 cannot."""
     known = values[~np.isnan(values)]
     return bool(
         np.all((known == np.trunc(known)) & (np.abs(known) < EXACT) & ~((known == 0.0) & np.signbit(known)))
@@ -85,7 +84,7 @@ def _write_parquet(recording: Recording, stream: IO[bytes]) -> None:
 
 
 def _csv_on_the_web(recording: Recording, path: Path) -> bytes:
-    """Describe a CSV as the W3C's "CSV on the Web" does; the rest is a note."""
+    """Describe a CSV as in the W3C's "CSV on the Web"; further content is a note."""
     columns = []
     for name, values in ordered(recording).items():
         found = meaning_of(name)
@@ -119,4 +118,4 @@ FORMATS: dict[str, Callable[[Recording, IO[bytes]], None]] = {
     "csv": _write_csv,
     "parquet": _write_parquet,
 }
-"""Formats, each with the function that writes it; a file's ending is the format's name."""
+"""Function that writes each format; a file's ending is the format's name."""

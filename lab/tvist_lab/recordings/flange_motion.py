@@ -1,4 +1,4 @@
-"""What a sensor at the flange would feel of logged joint angles: rotation and specific force, in the flange's axes."""
+"""Compute the rotation and specific force that a sensor at the flange would measure, from logged joint angles."""
 
 from dataclasses import dataclass
 
@@ -10,17 +10,17 @@ from tvist_lab.recordings.recording import Floats, RecordingError
 from tvist_plant.description import RobotDescription
 
 RATE = 100.0
-"""Rows of what is compared per second: some ten times what is left after smoothing [Hz]."""
+"""Rate of the compared rows [Hz], some ten times the bandwidth after smoothing."""
 SMOOTHING = {False: 0.02, True: 0.06}
-"""Standard deviation of the smoothing of rotation and of force [s]: joint angles hardly show how an arm rings, which is
-most of its force at 10 Hz, while a gyroscope's bias wanders slowly."""
+"""Standard deviation of the smoothing of rotation and force [s]: joint angles hardly show vibration, which
+dominates the force at 10 Hz, while a gyroscope's bias wanders slowly."""
 GRAVITY = np.array([0.0, 0.0, 9.80665])
 AT_REST = 0.2
-"""Share of a log in which the arm is taken to rest [-]."""
+"""Share of a log in which the arm is assumed to rest [-]."""
 SPARSE = 10.0
-"""Time of a log over that of its rows from which on it is mostly gaps [-]."""
+"""Duration of a log relative to that of its rows from which it is mostly gaps [-]."""
 HELD = 0.05
-"""Longest time for which a log repeats angles between two measurements [s]; for longer, the arm rests."""
+"""Longest time for which a log repeats angles between two measurements [s]; if longer, the arm rests."""
 
 
 @dataclass(frozen=True)
@@ -28,17 +28,17 @@ class Felt:
     """A vector over time, in axes that move with it."""
 
     time: Floats
-    """Equally spaced by 1/`RATE`, on the clock of whoever saw it, shape (T,) [s]."""
+    """Times on its own clock, spaced by 1/`RATE`, shape (T,) [s]."""
     vector: Floats
     """Angular velocity [rad/s] or specific force [m/s²], smoothed, shape (T, 3)."""
     lever: Floats
-    """What a unit of distance along x, y, z from the flange would add, shape (T, 3, k); k is 0 for a rotation."""
+    """Change per unit of distance along x, y, z from the flange, shape (T, 3, k); k is 0 for a rotation."""
     known: Floats
     """1 where there were rows, 0 in a gap, shape (T,)."""
 
     @property
     def change(self) -> Floats:
-        """How much more happens than at rest, whatever the axes: |ω|, or |df/dt| of a force, shape (T,)."""
+        """Activity beyond that at rest, in any axes: |ω|, or |df/dt| of a force, shape (T,)."""
         force = self.lever.shape[2]
         felt = np.linalg.norm(np.gradient(self.vector, 1.0 / RATE, axis=0) if force else self.vector, axis=1)
         more: Floats = np.maximum(felt - np.quantile(felt, AT_REST), 0.0)
@@ -46,21 +46,16 @@ class Felt:
 
 
 def by_sensor(time: Floats, vector: Floats, *, force: bool) -> Felt:
-    """Return what a sensor has measured, in its own axes.
-
-    `vector` is an angular velocity [rad/s] or a specific force [m/s²], shape (T, 3).
-    """
+    """Resample a sensor's angular velocity [rad/s] or specific force [m/s²], shape (T, 3), in its own axes."""
     grid, values, known = _resampled(time, vector)
     return _smoothed(grid, values, known, np.zeros((len(grid), 3, 3 if force else 0)))
 
 
 def at_flange(robot: RobotDescription, time: Floats, q: Floats, *, force: bool) -> Felt:
-    """Return what a sensor at the flange feels, by forward kinematics.
+    """Return what a sensor at the flange would measure, by forward kinematics.
 
-    ω = Rᵀ J_ω q̇, and f = Rᵀ (p̈ + g z) with the base standing upright. A sensor at r from the flange feels
-    f + α x r + ω x (ω x r).
-
-    `time` [s] has shape (T,), `q` [rad] shape (T, n); for the rotation only the directions of the joints count.
+    ω = Rᵀ J_ω q̇, and f = Rᵀ (p̈ + g z) with an upright base. A sensor at r from the flange measures f + α x r + ω x
+    (ω x r). `time` [s] has shape (T,), `q` [rad] (T, n); for the rotation only the directions of the joints matter.
     """
     grid, angles, known = _resampled(*_measured(time, q))
     step = grid[1] - grid[0]
@@ -77,7 +72,7 @@ def at_flange(robot: RobotDescription, time: Floats, q: Floats, *, force: bool) 
 
 
 def _measured(time: Floats, q: Floats) -> tuple[Floats, Floats]:
-    """Rows without those that repeat the angles before, as of a log that is faster than its robot: they are late."""
+    """Drop rows that repeat the angles before, as in a log faster than its robot, since they are late."""
     moves = np.append([True], np.any(np.diff(q, axis=0) != 0.0, axis=1))
     next_move = np.append(time[moves], [np.inf])[np.cumsum(moves)]
     last_move = time[moves][np.cumsum(moves) - 1]
@@ -86,7 +81,7 @@ def _measured(time: Floats, q: Floats) -> tuple[Floats, Floats]:
 
 
 def _resampled(time: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
-    """Rows at `RATE` or a multiple of it: their times, values by straight lines, and 0 in a gap of the log."""
+    """Resample rows at `RATE` or a multiple: return times, interpolated values, and 1, or 0 in a gap of the log."""
     seen = np.isfinite(values).all(axis=1)
     time, values = time[seen], values[seen]
     if len(time) < 2 or not 1.0 < time[-1] - time[0] < SPARSE * len(time) * float(np.median(np.diff(time))):
@@ -102,7 +97,7 @@ def _resampled(time: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _smoothed(grid: Floats, values: Floats, known: Floats, lever: Floats) -> Felt:
-    """Smooth equally spaced rows and thin them out to `RATE`."""
+    """Smooth equally spaced rows and reduce them to `RATE`."""
     every = round(1.0 / (RATE * (grid[1] - grid[0])))
     width = SMOOTHING[bool(lever.shape[2])] * RATE * every
     smooth, arms = (gaussian_filter1d(one, width, axis=0)[::every] for one in (values, lever))
@@ -110,5 +105,5 @@ def _smoothed(grid: Floats, values: Floats, known: Floats, lever: Floats) -> Fel
 
 
 def _crossing(vector: Floats) -> Floats:
-    """Matrices [v]x, shape (T, 3, 3)."""
+    """Return matrices [v]x, shape (T, 3, 3)."""
     return np.stack([np.cross(vector, axis) for axis in np.eye(3)], axis=2)

@@ -1,4 +1,4 @@
-"""A robot's log and that of a sensor at its tool, from two devices, as one recording on the robot's clock."""
+"""Join the logs of a robot and of a sensor at its tool into one recording on the robot's clock."""
 
 from pathlib import Path
 
@@ -15,44 +15,43 @@ from tvist_plant.description import DescriptionError, RobotDescription, load, ro
 from tvist_plant.user_file import UserFileError
 
 CORRELATED = 0.9
-"""Smallest correlation of what both felt [-]."""
+"""Smallest correlation between both signals [-]."""
 AS_WELL = 0.3
-"""A second fit that explains at least this share of the motion makes a join ambiguous, if it fits as well [-]."""
+"""Share of the motion that a second fit must explain to make a join ambiguous [-]."""
 ALIKE = 3.0
-"""Share that a second fit leaves unexplained, over that of the best, up to which it fits as well [-]."""
+"""Largest unexplained share of a second fit, relative to the best, to make a join ambiguous [-]."""
 NOISE = 2e-3
-"""Share that noise leaves unexplained of any fit [-]."""
+"""Share of any fit that noise leaves unexplained [-]."""
 OFFSET, DRIFT = 2.5e-3, 2e-4
-"""Widest half intervals of the offset [s] and of the drift [-]."""
+"""Largest half intervals of the offset [s] and of the drift [-]."""
 MOVED = {
     False: (0.3, "the flange turns by {:.2g} rad in all"),
     True: (3.0, "its force changes by {:.2g} m/s² in all"),
 }
-"""Least motion of a log, and how it is said: by rotation, and by force."""
+"""Smallest motion of a log and its description, for rotation (False) and force (True)."""
 SIZES = (0.8, 1.25)
-"""Range of what the joints' motion may be over the sensor's [-]."""
+"""Range of the ratio of the joints' motion to the sensor's [-]."""
 DEFAULT = "ur5e"
 REMEDY = (
     "record both at once for 20 s or more, the sensor fixed to the tool: fast motions of several joints, others at the "
     "end than at the beginning, and 5 s of rest before and after them"
 )
-"""What makes a join possible."""
+"""Advice that makes a join possible."""
 
 
 class JoinError(RecordingError):
-    """Two logs cannot be joined, or it could not be trusted; the message says what to record instead."""
+    """Two logs cannot be joined reliably; the message tells what to record instead."""
 
 
 def joined(
     recording: Recording, imu: Path, imu_columns: str | None = None, robot: str | None = None
 ) -> Recording:
-    """Put a sensor's rows on the robot's clock and interpolate the robot's columns there.
+    """Put a sensor's rows on the robot's clock, and interpolate the robot's columns there.
 
-    Offset and drift are those with which the gyroscope, or without one the accelerometer, agrees best with the forward
-    kinematics of the logged joint angles.
-
-    `imu` is a file that `read` reads, with `imu_columns` for its names; `robot` a name or file, by default that of the
-    recording, or a UR5e. The rows are the sensor's within the robot's time; notes say how the clocks differ.
+    Offset and drift are those with which the gyroscope, or else the accelerometer, agrees best with the
+    forward kinematics of the joint angles. `robot` is a name or file, by default that of the recording, or a
+    UR5e. Rows are the sensor's within the robot's time; notes describe the clocks. Raises JoinError if the
+    result would be unreliable.
     """
     sensor = read(imu, imu_columns, SENSOR)
     arm, assumed = _robot(recording, robot)
@@ -91,7 +90,7 @@ def joined(
 
 
 def _robot(recording: Recording, robot: str | None) -> tuple[RobotDescription, list[str]]:
-    """The robot whose kinematics count, and a note if nobody has named it."""
+    """Return the robot for the kinematics, and a note if nobody named it."""
     assumed = []
     if robot is None and recording.info is not None:
         robot = str(recording.info.model).lower()
@@ -107,7 +106,7 @@ def _robot(recording: Recording, robot: str | None) -> tuple[RobotDescription, l
 
 
 def _told(imu: Path, felt: Felt, sensor: Recording, *, force: bool) -> tuple[Clocks, float]:
-    """How the clocks differ, and the unit of the gyroscope in SI."""
+    """Return the relation of the clocks, and the gyroscope's unit in SI."""
     least, moved = MOVED[force]
     if (amount := float(felt.change.sum()) / RATE) < least:
         raise JoinError(f"{imu} cannot be joined: {moved.format(amount)}, which is too little: {REMEDY}")
@@ -151,7 +150,7 @@ def _said(imu: Path, clocks: Clocks, *, force: bool) -> str:
 
 
 def _between(time: Floats, column: Floats, at: Floats) -> Floats:
-    """A column at other times: whole numbers, such as modes, hold; others follow straight lines."""
+    """Return a column at other times; whole numbers such as modes are held, others interpolated."""
     known = column[np.isfinite(column)]
     if np.array_equal(known, np.round(known)):
         return column[np.searchsorted(time, at, side="right") - 1]

@@ -1,4 +1,4 @@
-"""Reader of recordings of one robot: an MCAP file or several segments, complete or truncated."""
+"""Read the recording of one robot: an MCAP file or several segments, complete or truncated."""
 
 import os
 from collections import Counter
@@ -27,9 +27,9 @@ BLOCK = 8192
 """Number of messages decoded together; some 12 MB."""
 
 _TABLES: dict[str, type[State | Truth | Io]] = {tag(kind): kind for kind in (State, Truth, Io)}
-"""Kinds that become columns."""
+"""Kinds of messages that become columns."""
 _OBJECTS: dict[str, type[Event | Entry]] = {tag(kind): kind for kind in (Event, Entry)}
-"""Kinds of which there are few."""
+"""Kinds of messages that are few and become objects."""
 Published = State | Truth | Event | Io
 """A message that the robot published."""
 _Kind = TypeVar("_Kind", State, Truth, Io)
@@ -44,33 +44,30 @@ class RecordingFile:
     """Content of a recording."""
 
     path: Path
-    """The file, folder or pattern that names it."""
+    """File, folder or pattern that names the recording."""
     files: tuple[Path, ...]
-    """Its files in order."""
     robot: str
-    """Name of the robot."""
     info: Info | None
-    """Description of the robot when the recording began; None in a file of another program."""
+    """Description of the robot when the recording started; None in a file of another program."""
     start: dict[str, Any] | None
-    """How the robot's server was started; None in a file of another program."""
+    """Start options of the robot's server; None in a file of another program."""
     behaviour: int
     """Number of the robot's behaviour, see `tvist_protocol.recorded.THIS_BEHAVIOUR`."""
     counts: Mapping[str, int]
     """Number of messages `state`, `truth` and `io`; at least one state."""
     events: tuple[Event, ...]
-    """Recorded events."""
     journal: tuple[Entry, ...]
     """Inputs of the controller."""
     recording: Recording
-    """States, truth and events as columns, with inputs and outputs where they were recorded."""
+    """States, truth and events as columns, with inputs and outputs if they were recorded."""
     from_tick: int | None
-    """First tick of a recording that has forgotten those before; None if it began with the robot's first tick."""
+    """First tick of a recording without the earlier ones; None if it started with the robot's first tick."""
     complete: bool
-    """Whether the file was closed properly, and read to its end."""
+    """Whether the file was closed properly and read to its end."""
     dropped: Mapping[str, int] | None
-    """Number of messages that the recorder dropped, by kind; None if the file does not contain it."""
+    """Number of messages that the recorder dropped, by kind; None if unknown."""
     note: str | None
-    """A sentence if something is missing."""
+    """Note if something is missing."""
 
     @cached_property
     def states(self) -> tuple[State, ...]:
@@ -88,13 +85,13 @@ class RecordingFile:
         return tuple(self.messages(Io))
 
     def messages(self, kind: type[_Kind]) -> Iterator[_Kind]:
-        """Read messages of a kind again, one after the other."""
+        """Read messages of a kind again, one by one."""
         for message in self._again((kind,), kind):
             assert isinstance(message, kind)
             yield message
 
     def published(self) -> Iterator[Published]:
-        """Read all that the robot published again, in its order, up to the last state."""
+        """Read all that the robot published again, in order, up to the last state."""
         return self._again((State, Truth, Event, Io), State)
 
     def _again(self, kinds: Sequence[type[Published]], counted: type[Published]) -> Iterator[Published]:
@@ -109,15 +106,11 @@ class RecordingFile:
 
 
 def read(path: str | os.PathLike[str]) -> RecordingFile:
-    """Read a recording. A truncated or damaged file is read up to the damage, which `note` reports.
+    """Read a recording; a truncated or damaged file is read up to the damage, with a `note`.
 
-    Args:
-        path: A file, or a folder or pattern that names the segments of one recording.
-
-    Raises:
-        RecordingFileError: The file cannot be opened, is not an MCAP file, or contains no state or the states of
-            several robots.
-        RecordingError: A folder or pattern names no recording, or several.
+    `path` may be a folder or pattern that names the segments of one recording. Raises RecordingFileError if a
+    file cannot be read, is no MCAP file, or does not hold the states of exactly one robot; RecordingError if
+    a folder or pattern does not name exactly one recording.
     """
     path = Path(path)
     content = _Content(path, files_of(path))
@@ -133,14 +126,14 @@ def read(path: str | os.PathLike[str]) -> RecordingFile:
 
 
 def read_checked(path: str | os.PathLike[str]) -> RecordingFile:
-    """Read a recording as `read` does, and check it as logs of other controllers are checked."""
+    """Read a recording like `read`, and check it like logs of other controllers."""
     content = read(path)
     check_recording(content.path, content.recording)
     return content
 
 
 def _again(files: Sequence[Path], kinds: Sequence[type[Published]]) -> Iterator[Published]:
-    """Read messages of some kinds up to the end or a damage of the files."""
+    """Read messages of some kinds up to the end or damage of the files."""
     readers: dict[str, JsonReader[Published]] = {tag(kind): JsonReader(kind) for kind in kinds}
     channels: dict[int, JsonReader[Published]] = {}
     try:
@@ -161,13 +154,13 @@ def _again(files: Sequence[Path], kinds: Sequence[type[Published]]) -> Iterator[
 
 @dataclass
 class _Content:
-    """Content read so far."""
+    """The content that has been read."""
 
     path: Path
     files: tuple[Path, ...]
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     ends: list[dict[str, str]] = field(default_factory=list)
-    """What each closed file says at its end."""
+    """Metadata at the end of each closed file."""
     tables: dict[str, JsonColumns] = field(
         default_factory=lambda: {name: JsonColumns(kind) for name, kind in _TABLES.items()}
     )
@@ -178,7 +171,6 @@ class _Content:
     robot: str | None = None
     damage: str | None = None
     channels: dict[int, str] = field(default_factory=dict)
-    """Kind of the messages of each channel."""
     waiting: list[tuple[str, bytes]] = field(default_factory=list)
     """Messages that are not yet decoded, in order."""
 
@@ -250,7 +242,6 @@ class _Content:
                     raise self._error(f"has format {content.get('format')}; {FORMAT} can be read")
 
     def _decode(self) -> None:
-        """Decode the waiting messages."""
         waiting, self.waiting = self.waiting, []
         try:
             self._keep(waiting)

@@ -1,4 +1,4 @@
-"""Records of an MCAP file in order, complete or truncated, and of a recording that consists of several."""
+"""Read the records of MCAP files in order, complete or truncated."""
 
 import re
 import struct
@@ -23,35 +23,33 @@ from tvist_lab.recordings.recording import RecordingError
 from tvist_protocol.recorded import segment_name, segment_of
 
 MAGIC = b"\x89MCAP0\r\n"
-"""First bytes of every MCAP file."""
 RECORD_LIMIT = 2**28
-"""Longest accepted record, and unpacked chunk [bytes], so that a damaged length cannot exhaust the memory."""
+"""Longest accepted record and unpacked chunk [bytes], so that a damaged length cannot exhaust the memory."""
 DENSEST, LEAST = 500, 1 << 16
-"""A chunk may unpack to so many times its size, and so many bytes more; a robot at rest reaches 90. It may hold as many
-records as it has bytes, and some more: else a small file takes minutes, and the memory."""
+"""Largest ratio of a chunk's content to its size, and additional bytes; a robot at rest reaches 90. A chunk
+may hold about as many records as bytes: otherwise a small file could take minutes and all memory."""
 CUT = (EndOfFile, struct.error)
 """Exceptions for a file that ends too early."""
 DAMAGE = (*CUT, McapError, ZstdError, ValueError, OverflowError, MemoryError)
 """Exceptions for a damaged record: a wrong checksum is a ValueError, and a length may exceed the memory."""
 
 _RECORD = struct.Struct("<BQ")
-"""Beginning of a record: its kind, and its length."""
+"""Start of a record: its kind and length."""
 _MESSAGE = struct.Struct("<HIQQ")
-"""Beginning of a message: its channel, number and two times."""
+"""Start of a message: its channel, number and two times."""
 TOPIC = re.compile(r"tvist/(?P<robot>[^/]+)/(?P<kind>\w+)")
-"""Topic of a robot's channel."""
 WILD = "*?["
-"""Characters that make a pattern of a name."""
+"""Characters that make a name a pattern."""
 
 
 class _Records(StreamReader):
-    """Reads all records but indexes, which take as long as the messages and are of no use to who reads them all."""
+    """Reads all records except indexes, which take as long as messages and are useless for reading everything."""
 
     def _read_record(self, opcode: int, length: int) -> McapRecord | None:
         if opcode in (Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX):
             self._stream.read(length)
             return None
-        # The lengths of its parts then end with the record, whatever they claim.
+        # Read the record from a buffer, so that damaged lengths inside it cannot exceed the record.
         whole, self._stream = self._stream, ReadDataStream(BytesIO(self._stream.read(length)))
         try:
             return super()._read_record(opcode, length)
@@ -71,7 +69,7 @@ def records(stream: IO[bytes]) -> Iterator[McapRecord]:
 
 
 def _records_of(chunk: Chunk) -> list[McapRecord]:
-    """Messages, channels and schemas of a chunk; several times faster than the library's own function."""
+    """Return messages, channels and schemas of a chunk; several times faster than the library's function."""
     data = _unpacked(chunk)
     found: list[McapRecord] = []
     place, length, most = 0, len(data), 100 + len(chunk.data)
@@ -93,7 +91,7 @@ def _records_of(chunk: Chunk) -> list[McapRecord]:
 
 
 def _unpacked(chunk: Chunk) -> bytes:
-    """Content of a chunk, of which never more is unpacked than it claims to have."""
+    """Unpack a chunk, but never more than the size it claims."""
     size, data = chunk.uncompressed_size, chunk.data
     if size > min(RECORD_LIMIT, LEAST + DENSEST * len(data)):
         raise ValueError(f"a chunk of {len(data)} bytes claims {size}")
@@ -114,9 +112,8 @@ def _unpacked(chunk: Chunk) -> bytes:
 def files_of(path: Path) -> tuple[Path, ...]:
     """Return the files of the recording that a path names, in order.
 
-    A path is a file, a folder, a pattern such as `run-2-part*.mcap`, or, if there is no such file, the name of a
-    recording with segments, for those of its latest run. Files of several recordings, or of none, and a missing segment
-    are refused.
+    A path is a file, a folder, a pattern such as `run-2-part*.mcap`, or the name of a recording with segments, for
+    those of its latest run. Raises RecordingError if it names none or several recordings, or a segment is missing.
     """
     if path.is_dir():
         found = list(path.glob("*.mcap"))
@@ -146,14 +143,14 @@ def files_of(path: Path) -> tuple[Path, ...]:
 
 
 def _run_of(file: Path) -> str:
-    """Name what a file belongs to, with a pattern if it is a segment."""
+    """Return the name of a file's recording, as a pattern if it is a segment."""
     segment = segment_of(file.name)
     return file.name if segment is None else segment_name(*segment[:2], None)
 
 
 @contextmanager
 def opened(files: Sequence[Path]) -> Iterator[Sequence[IO[bytes]]]:
-    """Open the files of a recording together: the oldest, which may be deleted meanwhile, is then read to its end."""
+    """Open the files of a recording together, so that the oldest can be read even if it is deleted meanwhile."""
     with ExitStack() as stack:
         streams = []
         for file in files:
@@ -166,7 +163,7 @@ def opened(files: Sequence[Path]) -> Iterator[Sequence[IO[bytes]]]:
 
 
 def all_records(streams: Sequence[IO[bytes]]) -> Iterator[McapRecord]:
-    """Yield the records of files one after the other; a damage is raised when all have been read."""
+    """Yield the records of all files in order; damage is raised only at the end."""
     damage = None
     for stream in streams:
         try:

@@ -1,4 +1,4 @@
-"""Columns of a recording from messages; recorded ones are decoded in blocks: no object is made for each message."""
+"""Convert messages to columns; recorded ones are decoded in blocks, without an object for each message."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from types import UnionType
@@ -15,20 +15,20 @@ from tvist_protocol.modes import RobotMode
 from tvist_protocol.recorded import JsonReader
 
 Block = Mapping[str, Floats]
-"""Fields of consecutive messages by name, shape (T,) or (T, k); NaN where one was null or shorter than in others."""
+"""Fields of consecutive messages by name, shape (T,) or (T, k); NaN where null or shorter than in others."""
 
 REGISTERS = "_register"
-"""End of the names of banks of registers."""
+"""Suffix of the names of register banks."""
 OF_OUR_LINE = ("reference", "unshaped", "estimated", "shaper", "motor_", "setpoint")
-"""Beginnings of the names of columns that say nothing of a robot that was only watched."""
+"""Prefixes of columns that are meaningless for a robot that was only watched."""
 UNSHAPED = "unshaped_"
-"""Prefix of fields that have the target's values where they are null."""
+"""Prefix of fields that take the target's values where they are null."""
 SCALARS: dict[Any, type[pl.DataType]] = {int: pl.Int64, float: pl.Float64, bool: pl.Boolean}
 """Types of numbers in a table."""
 
 
 class JsonColumns:
-    """Decodes recorded messages of one kind to columns, one for each field that is a number or a list of numbers."""
+    """Decodes recorded messages of one kind to columns, one per field with a number or a list of numbers."""
 
     def __init__(self, kind: type[msgspec.Struct]) -> None:
         self._kind = kind
@@ -53,12 +53,12 @@ class JsonColumns:
         self._blocks.append(block)
 
     def all(self) -> dict[str, Floats]:
-        """Return all messages as one block, once: column by column, since both forms of all take twice the memory."""
+        """Return all messages as one block, only once; column by column, which halves the memory."""
         blocks, self._blocks = self._blocks, []
         return {name: _joined([block.pop(name) for block in blocks]) for name in self._fields}
 
     def _at_once(self, messages: Sequence[bytes]) -> dict[str, Floats] | None:
-        """Decode messages as a table; None if only reading one by one can tell what they hold."""
+        """Decode messages as a table; None if they must be read one by one."""
         try:
             table = pl.read_ndjson(b"\n".join(messages), schema={"type": pl.String, **self._types})
         except pl.exceptions.PolarsError:
@@ -81,7 +81,7 @@ class JsonColumns:
 
 
 def _type(annotation: Any) -> pl.DataType | type[pl.DataType] | None:
-    """Type of a field in a table, such as Int64 for `int | None`; None if it holds no numbers."""
+    """Return a field's type in a table, such as Int64 for `int | None`; None if it holds no numbers."""
     if get_origin(annotation) is UnionType:
         (annotation,) = (choice for choice in get_args(annotation) if choice is not type(None))
     if get_origin(annotation) is list:
@@ -108,7 +108,7 @@ def _of_series(column: pl.Series) -> Floats:
 
 
 def block_of(messages: Sequence[Any], names: Iterable[str]) -> dict[str, Floats]:
-    """Return the fields of some names of messages, or of other objects that have them as attributes."""
+    """Return the named fields of messages, or attributes of other objects."""
     block = {}
     for name in names:
         values = [getattr(message, name) for message in messages]
@@ -131,7 +131,7 @@ def _of_values(values: list[Any]) -> Floats:
 
 
 def _joined(parts: list[Floats]) -> Floats:
-    """Values of several blocks; rows that are shorter than others end with NaN."""
+    """Join the values of several blocks; rows shorter than others end with NaN."""
     width = max((part.shape[1] for part in parts if part.ndim == 2), default=None)
     if width is None or all(part.shape[1:] == (width,) for part in parts):
         return np.concatenate(parts)
@@ -146,18 +146,10 @@ def _joined(parts: list[Floats]) -> Floats:
 def recording_of_messages(
     states: Sequence[Any], events: Iterable[Any] = (), truths: Sequence[Any] = (), info: Any = None
 ) -> Recording:
-    """Make a recording of messages, in any order; see `recording_of_blocks`.
+    """Make a recording from messages in any order; see `recording_of_blocks`.
 
-    A tick without truth has NaN in the truth columns.
-
-    Args:
-        states: Objects with the fields of `STATE_COLUMNS` as attributes.
-        events: Objects with the attribute `tick`.
-        truths: Objects with `tick` and other fields as attributes; each field becomes a column `truth_<field>`.
-        info: Stored unchanged.
-
-    Raises:
-        RecordingError: There is no state.
+    `states` have the fields `STATE_COLUMNS` as attributes, `events` a `tick`; each numeric field of `truths`
+    becomes a column `truth_<field>`, NaN at ticks without truth. Raises RecordingError if there is no state.
     """
     if not states:
         raise RecordingError("a recording needs at least one state")
@@ -166,7 +158,7 @@ def recording_of_messages(
 
 
 def _numeric(message: Any) -> list[str]:
-    """Names of a message's fields that are no text, from a msgspec struct or a plain object."""
+    """Return the names of a message's fields that are no text; it may be a msgspec struct or a plain object."""
     names = getattr(message, "__struct_fields__", None) or vars(message)
     return [name for name in names if not isinstance(getattr(message, name), str)]
 
@@ -174,10 +166,8 @@ def _numeric(message: Any) -> list[str]:
 def recording_of_blocks(
     states: Block, truths: Block | None, io: Block | None, events: Iterable[Any], info: Any
 ) -> Recording:
-    """Make a recording of all messages of each kind; a repeated tick counts once, with its last message.
-
-    Values of inputs and outputs hold until their next message.
-    """
+    """Make a recording from all messages of each kind; a repeated tick counts once, with its last message."""
+    # Inputs and outputs keep their values until their next message.
     rows = _rows(states["tick"])
     columns = {name: _at(states[name], rows) for name in STATE_COLUMNS}
     if truths is not None:
@@ -192,17 +182,16 @@ def recording_of_blocks(
     in_order = tuple(sorted(events, key=lambda event: int(event.tick)))
     if getattr(info, "watched", None) is None:
         return Recording(columns, in_order, info)
-    # A lost connection repeats the last measurements, and what our line would do is nothing that the robot did.
+    # While disconnected, measurements only repeat; our line's columns do not describe a watched robot.
     there = columns["robot_mode"] != RobotMode.DISCONNECTED
     kept = {name: column[there] for name, column in columns.items() if not name.startswith(OF_OUR_LINE)}
     return Recording(kept, in_order, info, foreign=True)
 
 
 def _held(io: Block, ticks: Floats) -> dict[str, Floats]:
-    """Values of inputs and outputs at each tick, NaN before the first message; without banks of registers that stay 0.
-
-    The force at the tool is left out: it is measured once a second and does not hold until the next message.
-    """
+    """Return inputs and outputs at each tick, NaN before the first message; without register banks that stay 0."""
+    # The force at the tool is left out: it is measured once a second and does not hold until the next
+    # message.
     rows = _rows(io["tick"])
     place = np.searchsorted(io["tick"][rows], ticks, side="right") - 1
     return {
@@ -213,7 +202,7 @@ def _held(io: Block, ticks: Floats) -> dict[str, Floats]:
 
 
 def _rows(ticks: Floats) -> NDArray[np.intp]:
-    """Indices of the last message of each tick, by increasing tick."""
+    """Return the index of each tick's last message, by increasing tick."""
     order = np.argsort(ticks, kind="stable")
     last: NDArray[np.bool_] = np.append(np.diff(ticks[order]) != 0.0, [True])
     return order[last]

@@ -1,4 +1,4 @@
-"""Content of a log that may be compressed by gzip."""
+"""Read the content of a log that may be compressed with gzip."""
 
 import zlib
 from pathlib import Path
@@ -6,15 +6,14 @@ from pathlib import Path
 from tvist_lab.recordings.checks import LogError
 
 GZIP = b"\x1f\x8b"
-"""First bytes of a file that gzip wrote."""
 DENSEST = 100
-"""Largest size of the content over that of its file; logs reach 30, a file made to fill the memory 1000."""
+"""Largest ratio of the content to the size of its file; logs reach 30, a malicious file 1000."""
 LEAST = 1 << 20
 """Size of the content that any file may have [bytes]."""
 
 
 def content(path: Path) -> bytes:
-    """Return what a file holds, decompressed; of a file that was cut off, the part that is there."""
+    """Return a file's content, decompressed; of a truncated file, the available part."""
     data = path.read_bytes()
     if not data.startswith(GZIP):
         return data

@@ -1,4 +1,4 @@
-"""Read a file of any known format; its content decides which."""
+"""Read a file of any known format, which is recognised by its content."""
 
 import os
 from importlib import import_module
@@ -13,28 +13,20 @@ from tvist_lab.recordings.table import BINARY, READERS, ROBOT, TEXT, Needs, Read
 from tvist_plant.user_file import UserFileError, check_is_file
 
 SHOWN = 4096
-"""Number of first bytes by which text is told from packets."""
+"""Number of first bytes that distinguish text from packets."""
 
 
 def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs = ROBOT) -> Recording:
-    """Read a recording of this controller, or a log of another one.
+    """Read a recording of this controller, or a log of another one; `notes` tell what was left out.
 
-    Recordings: MCAP, and what `tvist log export` writes (CSV, Parquet). Logs: CSV, Parquet and npz with RTDE's names or
-    others, dumps of UR's port 30003, rosbag2 in MCAP (a file, or its folder). CSV and dumps may be compressed by gzip.
+    Recordings are MCAP files (or a folder or pattern such as `run-2-part*.mcap` with segments) and the files
+    of `tvist log export` (CSV, Parquet). Logs are CSV, Parquet and npz with RTDE's or other names, dumps of
+    UR's port 30003, and rosbag2 in MCAP. CSV and dumps may be compressed with gzip.
 
-    Args:
-        path: The file; or a folder, or a pattern such as `run-2-part*.mcap`, with the segments of one recording.
-        columns: How a CSV, or a table of another program, names what is needed, as in `time=t:ms,q=joint_{}:deg`: a
-            short name (time, q, qd, accelerometer, gyroscope, pose) or one of RTDE's, the column's name with `{}` for
-            the number or letter of an entry, or a position as in `q=2-7`, and its unit if it is not SI.
-        needs: What a log must have.
-
-    Returns:
-        Named columns in SI units; `notes` say what was left out.
-
-    Raises:
-        RecordingError: The file cannot be opened or is none of these; the message names the file, and where possible
-            the line.
+    `columns` maps names, as in `time=t:ms,q=joint_{}:deg`: a short name (time, q, qd, accelerometer,
+    gyroscope, pose) or RTDE's; the column's name, with `{}` for the number or letter of an entry, or a
+    position as in `q=2-7`; and its unit if not SI. `needs` are the columns that a log must have. Raises
+    RecordingError, with the file and if possible the line, if the file cannot be used.
     """
     path = Path(path)
     for module in iter_modules(formats.__path__, f"{formats.__name__}."):

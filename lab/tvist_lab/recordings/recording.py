@@ -1,4 +1,4 @@
-"""Recordings in memory: a robot's messages as one array per column, ready for metrics."""
+"""Recordings in memory: a robot's messages as one array per column."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,11 +15,11 @@ from tvist_protocol.stream import State
 Floats = NDArray[np.float64]
 
 STATE_COLUMNS = State.__struct_fields__
-"""Fields of a `state`, each of which becomes a column of the same name."""
+"""Fields of `state`, each of which becomes a column of the same name."""
 TRUTH_PREFIX = "truth_"
-"""Prefix of the column names of fields of `truth`."""
+"""Prefix for the column names of fields of `truth`."""
 EPOCH = 1e8
-"""Times beyond this are no robot's uptime, but seconds since 1970 [s]."""
+"""Times beyond this are seconds since 1970, not a robot's uptime [s]."""
 
 
 class RecordingError(ValueError):
@@ -41,25 +41,22 @@ class MissingColumnError(RecordingError):
 class Recording:
     """States of one robot at increasing ticks, with the events between them.
 
-    Ticks may be missing, since a slow reader loses states; the time of a row is `time`, never its index times the
-    period.
+    Ticks may be missing, since a slow reader loses states; the time of a row is `time`, never its index times
+    the period.
     """
 
     columns: Mapping[str, Floats]
-    """Name to values, shape (T,) or (T, k), in the units of the messages (SI, rad); NaN if a field was null or
-    shorter than in other rows. Columns `unshaped_*` have the target's values where their fields were null. Columns
-    `truth_*` contain what a real robot cannot measure.
-    """
+    """Values by name, shape (T,) or (T, k), in SI units; NaN if a field was null or shorter than in other
+    rows. Null fields of `unshaped_*` take the target's values. Columns `truth_*` hold what a real robot
+    cannot measure."""
     events: tuple[Any, ...] = ()
     """Events in the order of their ticks; each has `tick`, `kind`, `id`, `code`, `why`."""
     info: Any = None
-    """The robot's `info` message, if there is one."""
     notes: tuple[str, ...] = ()
-    """What was repaired or left out when a file was read, in sentences for people."""
+    """Notes on what was repaired or left out when a file was read."""
     foreign: bool = False
-    """Whether another controller was recorded: columns may be missing, `actual_TCP_pose` may be that of a tool which
-    is rotated against the flange, and the arm may follow its target late.
-    """
+    """Whether another controller was recorded: columns may be missing, `actual_TCP_pose` may be that of a
+    tool rotated against the flange, and the arm may follow its target late."""
 
     def __post_init__(self) -> None:
         lengths = {name: len(column) for name, column in self.columns.items()}
@@ -81,7 +78,6 @@ class Recording:
         return name in self.columns
 
     def __getitem__(self, name: str) -> Floats:
-        """Return the values of a column, shape (T,) or (T, k)."""
         try:
             return self.columns[name]
         except KeyError:
@@ -97,7 +93,7 @@ class Recording:
 
     @property
     def origin(self) -> float:
-        """Time from which tables count [s]: the first row's if rows have the time of day, else 0."""
+        """Time at which tables start [s]: the first row's if rows have the time of day, else 0."""
         first = float(self.time[0]) if len(self.time) else 0.0
         return first if first > EPOCH else 0.0
 
@@ -116,12 +112,12 @@ class Recording:
 
     @property
     def missing_ticks(self) -> int:
-        """Number of ticks between the first and the last row that have no row."""
+        """Number of ticks without a row between the first and the last row."""
         tick = self["tick"]
         return int(tick[-1] - tick[0]) + 1 - len(self) if len(self) else 0
 
     def between(self, first_tick: int, last_tick: int) -> "Recording":
-        """Return the rows and events in a range of ticks, both ends included."""
+        """Return the rows and events in a range of ticks, including both ends."""
         tick = self["tick"]
         first, past = np.searchsorted(tick, [first_tick, last_tick + 1])
         if past <= first:
@@ -135,5 +131,5 @@ class Recording:
         return replace(self, notes=(*self.notes, *notes))
 
     def index(self, tick: int) -> int:
-        """Index of the first row at or after a tick; the length of the recording if there is none."""
+        """Return the index of the first row at or after a tick, or the length of the recording."""
         return int(np.searchsorted(self["tick"], tick))

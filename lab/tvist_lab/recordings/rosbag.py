@@ -1,4 +1,4 @@
-"""rosbag2 recordings in MCAP: joint states, an accelerometer, and a controller's target, by message type."""
+"""Read rosbag2 recordings in MCAP: joint states, an accelerometer and a controller's target, by message type."""
 
 import io
 import re
@@ -25,12 +25,12 @@ JOINTS, ACCELEROMETER, TARGET, POSE = "JointState", "Imu", "JointTrajectoryContr
 READ = {f"{package}/msg/{name}": name for package, name in (
     ("sensor_msgs", JOINTS), ("sensor_msgs", ACCELEROMETER), ("control_msgs", TARGET), ("geometry_msgs", POSE),
 )}  # fmt: skip
-"""Types of messages that are read, and their short names."""
+"""Message types that are read, and their short names."""
 ORDER = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 """Joints of a UR robot from base to tool; ROS lists them in any order."""
 
 MOST_JOINTS = 100
-"""Largest number of joints of a message; a robot with a gripper has some ten."""
+"""Largest accepted number of joints in a message; a robot with a gripper has some ten."""
 
 
 @dataclass
@@ -46,7 +46,7 @@ class _Topic:
     unstamped: int = 0
 
     def at(self, times: Floats) -> Iterator[tuple[str, Floats]]:
-        """Yield each column at some times; NaN outside of its own."""
+        """Yield each column at some times; NaN outside its own range."""
         for name, rows in sorted(self.columns.items()):
             if len(rows) == len(times) and self.times == times.tolist():
                 yield name, np.array([values for _, values in rows])
@@ -58,11 +58,9 @@ class _Topic:
 
 
 def read_rosbag(path: Path) -> Table:
-    """Read a rosbag2 recording: `JointState`, `Imu`, `JointTrajectoryControllerState` and the TCP's `PoseStamped`.
-
-    Of each type the topic with the most messages counts. Times are those of the headers. The rows are those of the
-    accelerometer; joint angles between two messages are interpolated.
-    """
+    """Read a rosbag2 recording: `JointState`, `Imu`, `JointTrajectoryControllerState` and the TCP's `PoseStamped`."""
+    # Of each type, the topic with the most messages is used. Times are from the headers; rows are those of
+    # the accelerometer, with interpolated joint angles.
     topics, damage = _topics(path)
     notes = [damage] if damage else []
     chosen: dict[str, _Topic] = {}
@@ -93,7 +91,7 @@ def read_rosbag(path: Path) -> Table:
 
 
 def has_ros(path: Path) -> bool:
-    """Return whether an MCAP file has messages of ROS 2, whatever their types."""
+    """Whether an MCAP file contains ROS 2 messages of any type."""
     try:
         with path.open("rb") as stream:
             return any(
@@ -104,7 +102,7 @@ def has_ros(path: Path) -> bool:
 
 
 def _topics(path: Path) -> tuple[dict[str, _Topic], str | None]:
-    """Messages by topic, and what is wrong with the file."""
+    """Return messages by topic, and what is wrong with the file."""
     schemas: dict[int, Schema] = {}
     by_channel: dict[int, _Topic] = {}
     topics: dict[str, _Topic] = {}
@@ -169,7 +167,6 @@ def _take(path: Path, topic: _Topic, record: Message) -> None:
 
 
 def _row(topic: _Topic, message: Any) -> dict[str, list[float]]:
-    """Numbers of a message by column."""
     match topic.kind:
         case "JointState":
             found = {"actual_q": message.position, "actual_qd": message.velocity}
@@ -193,7 +190,7 @@ def _xyz(vector: Any) -> list[float]:
 
 
 def _joints(topic: _Topic, names: list[str], columns: dict[str, Any]) -> dict[str, list[float]]:
-    """Values in the order of the joints, of columns that have one for each joint."""
+    """Sort values of columns with one entry per joint in the order of the joints."""
     if len(names) > MOST_JOINTS:
         raise ValueError(f"{len(names)} joints, at most {MOST_JOINTS} are read")
     topic.joints = topic.joints or tuple(sorted(names, key=_place))
@@ -209,7 +206,7 @@ def _joints(topic: _Topic, names: list[str], columns: dict[str, Any]) -> dict[st
 
 
 def _place(name: str) -> tuple[int, list[int | str]]:
-    """Sort key of a joint: a UR robot's from base to tool, others by the numbers in their names."""
+    """Return a joint's sort key: UR robots from base to tool, others by the numbers in their names."""
     known = [place for place, joint in enumerate(ORDER) if joint in name]
     digits = re.findall(r"\d{1,9}", name)
     return (known[0] if known else len(ORDER), [*map(int, digits), name] if not known else [])

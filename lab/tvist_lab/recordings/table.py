@@ -1,4 +1,4 @@
-"""Numbers of a log as they stand in its file, and the recording that they make: one place for names, units and gaps."""
+"""Convert a log's numbers as stored in its file to a recording: names, units, gaps."""
 
 import re
 from collections import Counter
@@ -19,29 +19,29 @@ from tvist_lab.words import counted
 from tvist_plant.user_file import is_name
 
 OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
-"""Columns that only recordings of this controller have, all together."""
+"""Columns that together identify a recording of this controller."""
 STRANGE = "is no log that tvist reads"
-"""First words of the error for a file of another format."""
+"""Start of the error message for a file of another format."""
 LONG_GAP = 0.02
-"""Shortest time without rows that a note reports [s]."""
+"""Shortest gap between rows that a note reports [s]."""
 SWAPPED = 3
-"""Largest number of rows by which one may stand too late or too early in a file to be put in its place."""
+"""Largest number of rows by which a misplaced row may be moved to its place."""
 SHOWN = 6
-"""Largest number of missing entries of a vector that a note names."""
+"""Largest number of a vector's missing entries that a note names."""
 
 _INDEXED = re.compile(r"(?P<name>.*\D)_(?P<index>\d{1,6})", re.ASCII)
 
 
 @dataclass(frozen=True)
 class Needs:
-    """What a log must have beside its times."""
+    """What a log must have besides its times."""
 
     columns: tuple[str, ...]
-    """Vectors, of which one must be there."""
+    """Vectors of which at least one must exist."""
     option: str
-    """How to name columns that have other names."""
+    """Option that gives the names of columns."""
     positions: str
-    """How to say where they are in a file without a header."""
+    """Option that gives their positions in a file without a header."""
 
 
 ROBOT = Needs(("target_q", "actual_q"), "--columns time=…,q=joint_{}", "--columns time=1,q=2-7")
@@ -53,39 +53,38 @@ SENSOR = Needs(
 
 @dataclass(frozen=True)
 class Table:
-    """Numbers of a log as they stand in its file."""
+    """Numbers of a log as stored in its file."""
 
     path: Path
     names: Sequence[str]
-    """Names of the columns; those of a vector end in `_0`, `_1`, …; none if the file has no header."""
+    """Column names; those of a vector end in `_0`, `_1`, …; empty if the file has no header."""
     values: Floats
     """Shape (T, columns); NaN for an empty cell."""
     lines: Floats
-    """Number of the line, row or packet in which each row stands, shape (T,)."""
+    """Number of the line, row or packet of each row, shape (T,)."""
     unit: str = "row"
     """What `lines` counts, for messages."""
     header: int = 0
-    """Number of the line with the names; 0 if they stand in no line."""
+    """Number of the line with the names; 0 if there is none."""
     notes: tuple[str, ...] = ()
-    """What the reader of the file left out."""
+    """Notes on what the reader of the file left out."""
     texts: Mapping[int, str] = field(default_factory=dict)
-    """Place of each column with text, to what is wrong with it if it is needed."""
+    """Columns with text, by index, and the problem if they are needed."""
     rtde: bool = False
-    """Whether the format has RTDE's names and SI units, whatever the numbers look like."""
+    """Whether the format has RTDE's names and SI units by definition."""
     there: str = ""
-    """What the file has instead of columns, for a message about what it lacks."""
+    """What the file has instead of columns, for an error message."""
     description: Description | None = None
-    """What `tvist log export` wrote about it."""
 
 
 Reader = Callable[[Path], Table | Recording]
 READERS: dict[str | bytes, Reader] = {}
-"""Readers by the endings and first bytes of their files, `BINARY` and `TEXT` for others."""
+"""Readers by file ending or first bytes, or `BINARY` and `TEXT` for other files."""
 BINARY, TEXT = "binary", "text"
 
 
 def reader(*kinds: str | bytes) -> Callable[[Reader], Reader]:
-    """Register what reads the files with some endings or first bytes; modules in `formats` are found by themselves."""
+    """Register a reader of files with some endings or first bytes; `read` imports the modules in `formats`."""
 
     def register(read: Reader) -> Reader:
         READERS.update(dict.fromkeys(kinds, read))
@@ -95,10 +94,10 @@ def reader(*kinds: str | bytes) -> Callable[[Reader], Reader]:
 
 
 def to_recording(table: Table, columns: str | None = None, needs: Needs = ROBOT) -> Recording:
-    """Name the columns, convert them to SI, join those of each vector, and check and number the rows.
+    """Name the columns, convert them to SI, join vectors, and check and number the rows.
 
-    Rows that repeat the time of the row before them, or have no time, are left out, and neighbours that were swapped
-    are sorted by their time; notes count them.
+    Rows that repeat the time before, or have none, are left out, and swapped neighbours are sorted by time;
+    notes count them. Raises LogError if the log lacks what `needs` lists.
     """
     if (exported := _exported(table)) is not None:
         return exported
@@ -126,7 +125,7 @@ def to_recording(table: Table, columns: str | None = None, needs: Needs = ROBOT)
 
 
 def _exported(table: Table) -> Recording | None:
-    """What a description says that belongs to the table; None if there is none, or of other columns or rows."""
+    """Return the described recording if the description fits the table, else None."""
     if table.description is None:
         return None
     try:
@@ -140,7 +139,7 @@ def _exported(table: Table) -> Recording | None:
 
 
 def _named(table: Table, columns: str | None, needs: Needs) -> tuple[list[str], Floats, list[str]]:
-    """Names by RTDE, empty for columns that do not count; values in SI; and notes."""
+    """Return RTDE's names (empty for ignored columns), values in SI, and notes."""
     if not table.names and columns is None:
         first = table.lines[0] if len(table.lines) else 1.0
         raise LogError(
@@ -170,7 +169,7 @@ def _named(table: Table, columns: str | None, needs: Needs) -> tuple[list[str], 
 
 
 def _check_header(table: Table, header: Sequence[str], names: Sequence[str], needs: Needs) -> None:
-    """Refuse names none of which is one of a robot's log, as of some other text mostly, or that cannot be shown."""
+    """Refuse a header without any name of a robot's log, or with names that cannot be printed."""
     line, there = "it", f"{table.path}"
     if table.header:
         line, there = f"its line {table.header}", f"{table.path}, line {table.header}"
@@ -201,7 +200,7 @@ def _remedy(table: Table, needs: Needs) -> str:
 
 
 def _vectors(names: Sequence[str], values: Floats) -> tuple[dict[str, Floats], list[str]]:
-    """Columns by name, vectors joined; a vector with missing entries is left out, joint angles keep what is there."""
+    """Join vectors; those with missing entries are dropped, but joint angles keep what exists. Also return notes."""
     places: dict[str, dict[int, int]] = {}
     columns: dict[str, Floats] = {}
     for place, name in enumerate(names):
@@ -229,7 +228,7 @@ def _vectors(names: Sequence[str], values: Floats) -> tuple[dict[str, Floats], l
 
 
 def _increasing(table: Table, time: Floats) -> tuple[NDArray[np.intp], list[str]]:
-    """Indices of the rows that count, and notes about the others."""
+    """Return the indices of usable rows, and notes about the others."""
     notes = []
     timed = np.flatnonzero(np.isfinite(time))
     if len(timed) < len(time):
@@ -284,7 +283,7 @@ def ticks_of(time: Floats) -> tuple[Floats, list[str]]:
 
 
 def _shaped(columns: Mapping[str, Floats]) -> dict[str, Floats]:
-    """In RTDE of this controller, `shaped_q` is the target that the arm gets and `target_q` the one before shaping."""
+    """Rename columns of our RTDE, where `shaped_q` is the target and `target_q` the reference before shaping."""
     renamed = dict(columns)
     if "shaped_q" in renamed and "target_q" in renamed:
         renamed["reference_q"] = renamed["target_q"]

@@ -1,8 +1,8 @@
-"""Offset and drift between the clocks of two devices, by what both felt of the same motion.
+"""Find offset and drift between the clocks of two devices that measured the same motion.
 
-The axes of the two may be turned against each other in any way. A motion is first looked for by how much happens,
-which no rotation changes, at any offset and at drifts of up to 2 %; then offset, drift, rotation (at first by Wahba's
-problem, with a singular value decomposition: Markley 1988), bias and lever are fitted together to the vectors.
+The axes of both may be rotated in any way. The motion is first located by its activity, which no rotation
+changes, at any offset and at drifts of up to 2 %; then offset, drift, rotation (first by Wahba's problem with
+a singular value decomposition: Markley 1988), bias and lever are fitted together to the vectors.
 """
 
 from collections.abc import Iterator
@@ -18,28 +18,28 @@ from tvist_lab.recordings.flange_motion import RATE, Felt
 from tvist_lab.recordings.recording import Floats
 
 DRIFT = 0.02
-"""Largest drift that is looked for [-]."""
+"""Largest drift in the search [-]."""
 COARSE = 5
-"""One of so many rows counts in the search."""
+"""Reduction of rows for the search: one of this number is used."""
 BLURRED = 0.2
 """Time by which a drift may be wrong between the ends of a log in the search [s]."""
 TRIED = 24
-"""Number of places that are fitted."""
+"""Number of candidates that are fitted."""
 APART = 0.25
-"""Offsets that differ by more are different ones, and a step of a fit is at most half of it [s]."""
+"""Difference from which offsets are distinct [s]; the step of a fit is at most half of it."""
 BLOCK = 0.5
-"""Time after which what a fit leaves counts as new [s]."""
+"""Time after which residuals of a fit count as independent [s]."""
 FAR = 2.0
-"""What is left beyond so many times the median counts less (Huber 1964)."""
+"""Residuals beyond this multiple of the median have less weight (Huber 1964)."""
 RANK = 1e-9
-"""Share of the largest eigenvalue below which parameters cannot be told apart [-]."""
+"""Share of the largest eigenvalue below which parameters cannot be separated [-]."""
 MOVING = 1e-3
-"""Least weight of a block, over the largest, that tells of the clocks [-]."""
+"""Smallest weight of a block, relative to the largest, to contain information about the clocks [-]."""
 ITERATIONS = 15
 CONVERGED = 1e-5
-"""Change of the offset, anywhere in a log, with which a fit ends [s]."""
+"""Change of the offset anywhere in a log at which a fit ends [s]."""
 TURN, BIAS, LEVER = slice(2, 5), slice(5, 8), slice(8, None)
-"""Places among the parameters of a fit, after offset and drift."""
+"""Positions among the parameters of a fit, after offset and drift."""
 
 
 @dataclass(frozen=True)
@@ -47,33 +47,33 @@ class Clocks:
     """The other clock shows `other + (1 + drift) (t - middle)` when the first one shows t."""
 
     middle: float
-    """Middle of what both felt, on the first clock [s]."""
+    """Middle of the common time, on the first clock [s]."""
     other: float
-    """The other clock then [s]."""
+    """Time of the other clock then [s]."""
     drift: float
-    """By how much the other clock runs faster [-]."""
+    """Relative speed of the other clock, minus 1 [-]."""
     half: tuple[float, float]
-    """Half of the 95 % interval of the offset, at the end where it is wider [s], and of the drift [-]."""
+    """Half of the 95 % interval of the offset, at its wider end [s], and of the drift [-]."""
     correlation: float
-    """Of the vectors, once turned [-]."""
+    """Correlation of the vectors after rotation [-]."""
     scale: float
-    """Size of the first vector over that of the other [-]."""
+    """Size of the first vector relative to the other [-]."""
     explained: float
     """Energy of the first vector's changes that the other explains [its unit squared times s]."""
     span: tuple[float, float]
-    """First and last time of what both felt, on the first clock [s]."""
+    """First and last common time, on the first clock [s]."""
 
     def first(self, other: Floats) -> Floats:
         """Return times of the first clock for those of the other one."""
         return self.middle + (other - self.other) / (1.0 + self.drift)
 
     def offset(self, time: float) -> float:
-        """By how much the other clock shows more than the first one, at a time of the first [s]."""
+        """Return how far the other clock is ahead, at a time of the first [s]."""
         return self.other - self.middle + self.drift * (time - self.middle)
 
 
 def fits(first: Felt, other: Felt) -> list[Clocks]:
-    """Return the ways in which what two devices felt fits together, the one that explains most first."""
+    """Return the possible alignments of two signals, that which explains most first."""
     found: list[Clocks] = []
     for start, drift in _places(first, other):
         clocks = _fitted(first, other, start, drift)
@@ -85,7 +85,7 @@ def fits(first: Felt, other: Felt) -> list[Clocks]:
 
 
 def _places(first: Felt, other: Felt) -> Iterator[tuple[float, float]]:
-    """The other clock at the first row, and its drift, where much happens in both at once."""
+    """Yield the other clock at the first row, and its drift, where both signals are active at once."""
     length, rows = first.time[-1] - first.time[0], COARSE / RATE
     moved, moved_there = first.change[::COARSE], other.change
     count = int(np.ceil(DRIFT * length / BLURRED))
@@ -105,8 +105,8 @@ def _places(first: Felt, other: Felt) -> Iterator[tuple[float, float]]:
 
 
 def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | None:
-    """Fit everything from a place on, by Gauss and Newton; None if that leads out of what both felt."""
-    # The first one's change counts: joint angles neither ring nor have much noise.
+    """Fit everything from a starting point by Gauss-Newton; None if that leaves the common time."""
+    # Use the derivative of the first signal: joint angles have little ringing and noise.
     rate = np.gradient(first.vector, 1.0 / RATE, axis=0)
     t, rotation, weight = first.time - first.time[0], None, np.ones(len(first.time))
     for _ in range(ITERATIONS):
@@ -148,22 +148,20 @@ def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | No
 
 
 def _turns(u: Floats) -> Floats:
-    """Change of vectors with a small rotation about each axis, shape (T, 3, 3)."""
+    """Return the change of vectors with a small rotation about each axis, shape (T, 3, 3)."""
     return np.stack([np.cross(axis, u) for axis in np.eye(3)], axis=2)
 
 
 def _solved(X: Floats, y: Floats, weight: Floats) -> tuple[Floats, Floats]:
-    """Weighted least squares: parameters, and what is left, shape (T, 3).
-
-    Where all turns about one axis, the rotation about that axis shows in nothing and stays.
-    """
+    """Solve weighted least squares; return parameters, and residuals of shape (T, 3)."""
+    # If everything turns about one axis, the rotation about it is not observable and stays.
     G, g = (np.einsum("tik,t,ti...->k...", X, weight, one, optimize=True) for one in (X, y))
     p: Floats = _inverse(G, G) @ g
     return p, y - X @ p
 
 
 def _inverse(G: Floats, whole: Floats) -> Floats:
-    """Pseudo-inverse of one matrix or several, parameters scaled by the diagonal of `whole`."""
+    """Return the pseudo-inverse of one or several matrices, with parameters scaled by the diagonal of `whole`."""
     size = np.sqrt(np.maximum(np.diag(whole), 1e-24))
     scale = np.outer(size, size)
     inverse: Floats = np.linalg.pinv(G / scale, RANK, hermitian=True) / scale
@@ -171,10 +169,10 @@ def _inverse(G: Floats, whole: Floats) -> Floats:
 
 
 def _intervals(X: Floats, left: Floats, weight: Floats, since: Floats) -> tuple[float, float]:
-    """Half of the 95 % intervals of the offset, at the end where it is wider, and of the drift.
+    """Return half the 95 % intervals of the offset, at its wider end, and of the drift.
 
-    What is left is correlated in time, and few fast motions weigh most: the fit is repeated, to first order, without
-    each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the blocks with motion).
+    Residuals are correlated in time, and few fast motions have most weight: the fit is repeated, to first order,
+    without each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the blocks with motion).
     """
     first = np.unique(np.searchsorted(since, np.arange(since[0], since[-1], BLOCK)))
     pulls = np.add.reduceat(np.einsum("tik,t,ti->tk", X, weight, left), first)

@@ -1,4 +1,4 @@
-"""Reports: one self-contained web page each, with a verdict in a sentence, tables, figures and provenance."""
+"""Reports: self-contained web pages with a verdict, tables, figures and provenance."""
 
 from tvist_lab.report.of_advice import advice_page
 from tvist_lab.report.of_recordings import recordings_page

@@ -1,4 +1,4 @@
-"""The page of an advice, made to be posted."""
+"""The web page of an advice."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,6 @@ WORST = "The tool's acceleration after the stop that rings most: recorded, and p
 COSTS = (
     "Each shaper that keeps the arm's limits: what it leaves of the vibration, against the time that it adds."
 )
-"""What the figures show."""
 SHOWN = 16
 """Number of shapers in the table."""
 WORDS = {
@@ -31,7 +30,7 @@ WORDS = {
 
 
 def modes_rows(advice: Advice) -> list[tuple[str, ...]]:
-    """Rows of the table of modes; intervals are second lines."""
+    """Return the rows of the table of modes, with intervals on second lines."""
     return [
         (f"{one.f_d:.2f}\n({one.f_d_interval[0]:.2f}–{one.f_d_interval[1]:.2f})",
          f"{one.zeta:.3f}\n({one.zeta_interval[0]:.3f}–{one.zeta_interval[1]:.3f})",
@@ -41,7 +40,7 @@ def modes_rows(advice: Advice) -> list[tuple[str, ...]]:
 
 
 def option_rows(advice: Advice) -> list[tuple[str, ...]]:
-    """Rows of the table of shapers, the recommended one first, then as soon as they are still."""
+    """Return the rows of the table of shapers, the recommended one first, then by settling time."""
     best = [] if advice.best is None else [advice.best]
     shown = [*best, *(one for one in advice.options if one is not advice.best)][:SHOWN]
     return [
@@ -54,7 +53,7 @@ def option_rows(advice: Advice) -> list[tuple[str, ...]]:
 
 @house_style()
 def advice_page(advice: Advice, logs: Sequence[Measured], paths: Sequence[Path], typed: str) -> Page:
-    """Build the page."""
+    """Build the page of an advice; `typed` is the command for its provenance."""
     said, lines = verdict(advice, logs), command(advice, logs)
     sections = []
     if advice.best is not None:

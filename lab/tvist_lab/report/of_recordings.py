@@ -1,4 +1,4 @@
-"""The report of one recording, or of several with the same motions."""
+"""The web page of one recording, or of several with the same motions."""
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,16 +35,16 @@ CHANGES = {
     "vibration\nRV": "residual_vibration", "peak": "peak", "at rest": "still_after", "settling\nt_stb": "stabilisation",
     "cycle\nt_cycle": "cycle", "overshoot\ne_os": "overshoot",
 }  # fmt: skip
-"""Columns of the table of what differs between two files, and the changes that they show."""
+"""Columns of the table that compares two files, and the changes that they show."""
 OF_PAIRS = {
     "without": "Largest acceleration of the tool after the unshaped motion, later than 10 ms after its stop.",
     "with": "The same after the shaped motion.",
     "less": "By how much it is less.",
 }
-"""What these columns mean, as far as the table of motions does not say it."""
+"""Meaning of columns that the table of motions does not explain."""
 WITHOUT = "without a shaper"
 PICTURES = 6
-"""Largest number of motions that are drawn."""
+"""Largest number of motions in the figures."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ class _File:
 def recordings_page(
     paths: Sequence[Path], command: str, recordings: Sequence[Recording] | None = None
 ) -> Page:
-    """Build the report of recordings or logs; the first one is what the others are compared with.
+    """Build the report of recordings or logs; the others are compared with the first.
 
-    The first is what the others are compared with; `command` is for the provenance.
+    `command` is for the provenance.
     """
     files = _files(paths, recordings)
     base, *others = files
@@ -108,7 +108,7 @@ def _files(paths: Sequence[Path], recordings: Sequence[Recording] | None = None)
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """Names of the files; with their folders where two are equal."""
+    """Return the names of the files, with their folders if two are equal."""
     names = [path.name or str(path) for path in paths]
     return [str(path) if names.count(name) > 1 else name for path, name in zip(paths, names, strict=True)]
 
@@ -119,7 +119,7 @@ def _table(file: _File) -> PageTable:
 
 
 def _pairs(file: _File) -> PageTable:
-    """The table of what shaping changed about each motion."""
+    """Return the table of the changes by shaping for each motion."""
     rows = [
         (
             f"{one.name}\n{one.unshaped + 1} and {one.shaped + 1}",
@@ -146,7 +146,7 @@ def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
 
 
 def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[Shown]:
-    """What is drawn together: of one file, what was made without and with shapers; of several, what corresponds."""
+    """Choose the curves of each panel: with and without shapers in one file, or corresponding motions of several."""
     base, *others = files
     recording, found = base.measured.recording, base.measured.motions
     shown = []
@@ -171,7 +171,7 @@ def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[S
 
 
 def _pictures(files: Sequence[_File], panels: Sequence[Shown]) -> Iterator[Picture]:
-    """One picture of the first motions, all to one scale, and one for each file of how its loudest motion rings."""
+    """Yield one picture of the first motions, on one scale, and one of each file's loudest ring-down."""
     plain = [file.name for file in files if shaping_of(file.measured.results, file.name).shaped is False]
     unshaped = [WITHOUT, *map(literal, plain)]
     with suppress(NotMeasurableError):
@@ -196,7 +196,7 @@ def _pictures(files: Sequence[_File], panels: Sequence[Shown]) -> Iterator[Pictu
 
 
 def _missing(files: Sequence[_File], panels: Sequence[Shown]) -> list[str]:
-    """What could not be measured or is not drawn, each with its reason."""
+    """Return what could not be measured or drawn, with the reasons."""
     items = [f"{file.name}, {note}" for file in files for note in grouped_notes(file.measured.results)]
     if len(panels) > PICTURES:
         items.append(f"{files[0].name}: only the first {PICTURES} of {len(panels)} motions are drawn")

@@ -1,4 +1,4 @@
-"""The report of a study: its verdict, its tables and figures, and what the words in them mean."""
+"""The web page of a study: verdict, tables, figures and explanations."""
 
 from tvist_lab.figures import study_figure
 from tvist_lab.report.page import Page, PageTable, Section, picture
@@ -7,7 +7,7 @@ from tvist_lab.study.study import Figures, Result
 from tvist_lab.words import MANY, counted
 
 LISTED = 200
-"""Largest number of motions that are listed one by one."""
+"""Largest number of motions that are listed."""
 
 
 def study_figures(result: Result) -> Figures:
@@ -21,13 +21,7 @@ def study_figures(result: Result) -> Figures:
 
 
 def study_page(result: Result, figures: Figures, command: str) -> Page:
-    """Build the report of a study.
-
-    Args:
-        result: The study that was run.
-        figures: Its figures.
-        command: The command that makes the report, for its provenance.
-    """
+    """Build the report of a study; `command` is for the provenance."""
     values, tables = result.values, result.study.tables_of(result)
     words = {word: said for table in tables for word, said in meanings(table.columns).items()}
     drawn = [picture(figure, caption) for figure, caption in figures.values()]

@@ -1,4 +1,4 @@
-"""A self-contained web page: text, tables and pictures in one file that loads nothing."""
+"""Self-contained web pages: text, tables and pictures in one file that loads nothing."""
 
 import base64
 import io
@@ -19,7 +19,7 @@ DPI = 138
 class PageTable:
     """A table; the first column is text, the others are numbers as text.
 
-    The second line of a head or of a cell is small: a symbol, a unit, an interval.
+    The second line of a head or cell is small, for a symbol, a unit or an interval.
     """
 
     columns: Sequence[str]
@@ -29,29 +29,27 @@ class PageTable:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture in the page itself."""
+    """A picture inside the page."""
 
     source: str
     """A `data:` address."""
     caption: str
-    """What it shows, also for those who cannot see it."""
+    """Description, also for those who cannot see the picture."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with what belongs to it, in this order."""
+    """A heading and its content, in this order."""
 
     heading: str
     text: Sequence[str] = ()
-    """Paragraphs."""
     tables: Sequence[PageTable] = ()
     pictures: Sequence[Picture] = ()
     points: Sequence[str] = ()
-    """Items of a list."""
     facts: Mapping[str, str] = field(default_factory=dict)
-    """Words and what they mean or are."""
+    """Terms with their meanings or values."""
     explains: bool = False
-    """Whether the facts are what words in the heads of tables mean, which then lead to them."""
+    """Whether the facts explain words in table heads, which then link to them."""
 
 
 @dataclass(frozen=True)
@@ -65,14 +63,14 @@ class Page:
 
 
 def picture(figure: Figure, caption: str) -> Picture:
-    """Put a figure into the page as PNG."""
+    """Embed a figure as PNG."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
     return Picture("data:image/png;base64," + base64.b64encode(stream.getvalue()).decode(), caption)
 
 
 def render(page: Page) -> str:
-    """Return the page as HTML. Equal pages give equal text; there is no date in it."""
+    """Render a page as HTML; equal pages give equal text, without a date."""
     environment = Environment(
         loader=PackageLoader("tvist_lab.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
@@ -87,10 +85,10 @@ def render(page: Page) -> str:
 
 
 def _symbols(words: str) -> Markup:
-    """Words of which the index of a symbol is below the line: f_d, t_stb."""
+    """Set the index of symbols such as f_d and t_stb as subscript."""
     return Markup(re.sub(r"\b([a-zA-Z])_([a-z]+)\b", r"\1<sub>\2</sub>", str(escape(words))))  # noqa: S704  escaped
 
 
 def _word(head: str, words: Sequence[str]) -> str:
-    """The longest word with which a head begins; empty if there is none."""
+    """Return the longest word with which a head starts; empty if there is none."""
     return max((word for word in words if head.startswith(word)), key=len, default="")

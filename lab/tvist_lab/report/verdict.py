@@ -1,4 +1,4 @@
-"""What recordings show about shaping, in sentences; what a file is called does not count."""
+"""Summarize in sentences what recordings show about shaping, independent of their file names."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,18 +10,18 @@ from tvist_lab.metrics.comparison import TICK_MS
 from tvist_lab.words import counted, either, sample, spread
 
 NOTICEABLE = 0.15
-"""Vibration that stands out of the sensor's noise [m/s²]."""
+"""Vibration that exceeds the sensor's noise [m/s²]."""
 CLEAR = 15.0
 """Smallest change that counts as a difference [%]; equal runs differ by noise."""
 LISTED = 6
-"""Largest number of pairs that are named one by one."""
+"""Largest number of pairs that are listed."""
 LESS, EARLIER = ("less", "more"), ("earlier", "later")
 """Words for positive and negative changes."""
 
 
 @dataclass(frozen=True)
 class Shaping:
-    """Whether the reference of a recording was shaped, as far as it shows."""
+    """Whether the reference of a recording was shaped, if known."""
 
     shaped: bool | None
     """None if the recording has no reference before shaping."""
@@ -47,7 +47,7 @@ def shaping_of(results: Sequence[MotionResult], name: str) -> Shaping:
 
 
 def verdict_on_one(results: Sequence[MotionResult], name: str) -> list[str]:
-    """How much the tool vibrates after the stops of one recording, and whether it was shaped."""
+    """Return how much the tool vibrates after the stops of one recording, and whether it was shaped."""
     if not results:
         return [f"{name} contains no motion."]
     peaks = [result.peak_m_s2 for result in results if result.peak_m_s2 is not None]
@@ -72,7 +72,7 @@ def verdict_on_one(results: Sequence[MotionResult], name: str) -> list[str]:
 
 
 def verdict_on_pairs(pairs: Sequence[Pair], results: Sequence[MotionResult], name: str) -> list[str]:
-    """What each shaper of one recording changed, the one that leaves least first, in the words of `tvist demo`."""
+    """Return what each shaper of one recording changed, the best first, in the words of `tvist demo`."""
     of_shaper = [list(group) for _, group in groupby(sorted(pairs, key=_shaper), _shaper)]
     of_shaper.sort(key=lambda group: -median(one.change.less_percent or 0.0 for one in group))
     said = [sentence for group in of_shaper for sentence in _on_shaper(group, results, name)]

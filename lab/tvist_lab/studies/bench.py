@@ -1,4 +1,4 @@
-"""`tvist study bench`: all shapers on fifteen arms, with the same moves and payloads, and round corners."""
+"""`tvist study bench`: all shapers on fifteen arms with the same moves and payloads, and around corners."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -29,13 +29,11 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.variants import HEAVIER, Variant, rubbed
 
 STICKS = "ur5e_stiction"
-"""The robot file of the arms whose motors stick; with its own calibration it is all that their controller
-knows."""
+"""Robot file of the arms with sticking motors; with its own calibration, it is all that their controller knows."""
 STICKING = (
     Variant("stiction", "motors that stick near standstill, as the controller knows"),
     Variant("more_stiction", "motors that stick more than the controller knows", partial(rubbed, HEAVIER)),
 )
-"""These arms."""
 PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
 """Errors of the declared mass [-]."""
 CORNERS = 5
@@ -43,7 +41,7 @@ CORNERS = 5
 KEPT = 1.003
 """Largest ratio of a peak to its limit that counts as within the limit [-]."""
 ONCE = pl.col("arm") == pl.col("arm").first()
-"""Rows of the first arm, since the reference is the same on all."""
+"""Selects the rows of the first arm, since the reference is the same for all."""
 
 
 def _time(of: float, called: str) -> pl.Expr:
@@ -79,8 +77,8 @@ MORE = (
 
 
 def study(asked: Asked) -> Study:
-    """Return the study: methods by move by payload error; if quick, one error in turn for each move."""
-    # What comes with the package is inspected by its tests.
+    """Return the study: methods, moves and payload errors; if quick, one error in turn for each move."""
+    # Only the user's own shapers are inspected here; tests cover those of the package.
     theirs = [
         one
         for one in asked.methods
@@ -113,7 +111,7 @@ def study(asked: Asked) -> Study:
 
 
 def _beside_waiting(rows: pl.DataFrame) -> pl.DataFrame:
-    """Put what waiting leaves of the same move on the same arm into each row."""
+    """Add to each row the results of waiting with the same move on the same arm."""
 
     def waited(name: str) -> pl.Expr:
         of = pl.col(name).filter(pl.col("shaper") == UNSHAPED).first()
@@ -128,11 +126,9 @@ def _beside_waiting(rows: pl.DataFrame) -> pl.DataFrame:
 
 
 def _cases(asked: Asked, methods: Sequence[Method], arms: Sequence[Variant]) -> list[Case]:
-    """Return the cases of one controller.
-
-    The friction that a calibration has is fed forward to all methods of a case, so that methods without a
-    calibration have cases of their own.
-    """
+    """Return the cases of one controller."""
+    # If the calibration contains friction, it is fed forward to all methods of a case; methods without a
+    # calibration therefore have separate cases.
     parts = [tuple(one for one in methods if hasattr(one, "recipe") is has) for has in (True, False)]
     return [
         Case(
@@ -147,12 +143,12 @@ def _cases(asked: Asked, methods: Sequence[Method], arms: Sequence[Variant]) -> 
 
 
 def ranked(values: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the entries that have a place."""
+    """Return the entries that have a rank."""
     return [one for one in values["summary"] if one["ranked"]]
 
 
 def _rank(result: Result, asked: Asked, faults: Mapping[str, str]) -> None:
-    """Order the summary by the time until still; those that cannot be ranked come last."""
+    """Order the summary by settling time; those that cannot be ranked come last."""
     values, labels = result.values, {one.name: one for one in asked.methods}
     values["methods"] = [
         {"name": one.name, "label": one.label, "told_target": one.told_target} for one in labels.values()
@@ -202,13 +198,13 @@ def _rank(result: Result, asked: Asked, faults: Mapping[str, str]) -> None:
 
 
 def _place(entry: Mapping[str, Any]) -> tuple[float, float]:
-    """Key of the order: settling, then residual; a method that never settles comes last."""
+    """Return the sort key: settling, then residual; a method that never settles comes last."""
     still = entry["time_until_still_ms_median"]
     return (math.inf if still is None else still, entry["residual_m_s2_median"])
 
 
 def _beats(other: Mapping[str, Any], entry: Mapping[str, Any]) -> bool:
-    """Return whether another method is better in settling or residual, and worse in neither."""
+    """Whether another method is better in settling or residual, and worse in neither."""
     ours, theirs = _place(entry), _place(other)
     return theirs != ours and theirs[0] <= ours[0] and theirs[1] <= ours[1]
 
@@ -240,9 +236,9 @@ def _draw(result: Result) -> Figures:
 
 
 def bend(method: Method, description: RobotDescription, moves: Sequence[Move]) -> float | None:
-    """Return a method's largest deviation from paths that go round a corner to another start [mrad].
+    """Return a method's largest deviation from paths around a corner to another start [mrad].
 
-    Methods that plan motions have none, and neither have those that cannot shape the paths.
+    None for methods that plan motions, or cannot shape the paths.
     """
     found = []
     for first, second in zip(moves[:CORNERS], [*moves[1:], moves[0]], strict=False):
@@ -255,7 +251,7 @@ def bend(method: Method, description: RobotDescription, moves: Sequence[Move]) -
 
 
 def path_error(path: Floats, q: Floats) -> float:
-    """Largest distance of points from a path in joint space, regardless of time [rad]."""
+    """Return the largest distance of points from a path in joint space, regardless of time [rad]."""
     start, way = path[:-1], np.diff(path, axis=0)
     moving = np.linalg.norm(way, axis=1) > 0.0
     start, way = start[moving], way[moving]

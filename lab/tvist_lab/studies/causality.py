@@ -1,4 +1,4 @@
-"""Whether a shaper knows the future or remembers an earlier run, determined before it moves anything."""
+"""Detect, before any motion, whether a shaper uses the future or remembers an earlier run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,14 +14,14 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 
 PLACES = (0.15, 0.5, 0.8)
-"""Positions after which the references differ, as shares of the motion [-]."""
+"""Positions from which the references differ, as shares of the motion [-]."""
 ELSEWHERE = 1.0
 """Acceleration with which the other reference deviates [rad/s²]."""
 TWICE = "gives another output when the same reference is run again: it keeps something, or draws by chance"
 
 
 def inspect(method: Method, description: RobotDescription, moves: Sequence[Move]) -> str | None:
-    """Return why a method cannot be ranked, determined without any motion; None if no reason was found."""
+    """Return why a method cannot be ranked, found without any motion; None if there is no reason."""
     for move in moves[:2]:
         try:
             check_causal(method, Task(description, move, Case(description, move).point_to_point()))
@@ -31,11 +31,10 @@ def inspect(method: Method, description: RobotDescription, moves: Sequence[Move]
 
 
 def check_causal(method: Method, task: Task) -> None:
-    """Run a shaper on a reference, on others with the same beginning, and again on the first one.
+    """Run a shaper on a reference, on others with the same start, and on the first again.
 
-    A shaper that remembers a reference, or reads it where it is stored, gives different outputs for a
-    different future. A method that is given the target of a move in advance gets the same target with every
-    reference: it may know where the move was to end, but no more of the way there than other methods.
+    Raises ShaperFaultError if outputs depend on the future, or on earlier runs. A method that gets a move's target in
+    advance gets the same one with every reference: it may know the end, but no more of the way than others.
     """
     if not isinstance(method, Stepping):
         return  # it plans the motion, whose end it may know

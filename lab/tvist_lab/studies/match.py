@@ -1,9 +1,9 @@
-"""`tvist study match`: two shapers on the same moves and plants, and whether their differences show anything.
+"""`tvist study match`: compare two shapers on the same moves and plants, and test the difference.
 
-Each move is made by both on each plant, so its difference does not depend on how hard the move is. The interval of the
-median difference is exact for any distribution: its ends are the differences between which a sign test at 5 % rejects
-no median. That of the 5th percentiles' difference is a percentile bootstrap over pairs, which is too narrow for so few
-moves in the tail: it is shown, and no verdict hangs on it.
+Both make each move on each plant, so the difference does not depend on how hard a move is. The interval of
+the median difference is exact for any distribution: its ends are where a sign test at 5 % starts to reject.
+The interval of the 5th percentiles' difference is a percentile bootstrap over pairs, too narrow with so few
+moves in the tail; it is shown but not used for a verdict.
 """
 
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ def study(asked: Asked) -> Study:
 
 
 def _paired(rows: pl.DataFrame, names: Sequence[str]) -> pl.DataFrame:
-    """Put what both made of a move side by side, in the row of the first."""
+    """Put the results of both for a move side by side, in the row of the first."""
     columns = {
         f"{word}_{short}": pl.col(measure).filter(pl.col("shaper") == name).first().over("arm", "move")
         for name, word in zip(names, ("first", "second"), strict=True)
@@ -89,14 +89,14 @@ def _exact(differences: Floats) -> list[float] | None:
 
 
 def exact_interval(differences: Floats) -> list[float]:
-    """Interval that contains the median of a distribution with at least 95 % probability, whatever that is like."""
+    """Return the interval that contains a distribution's median with at least 95 % probability, whatever its form."""
     ordered = np.sort(differences)
     outside = int(binom.ppf(0.025, len(ordered), 0.5))  # P(fewer lie below the median) is less than 2.5 %
     return [float(ordered[outside - 1]), float(ordered[len(ordered) - outside])]
 
 
 def verdict(differences: Floats, first: str, second: str) -> str:
-    """Return what the exact interval of the median difference, first minus second, shows."""
+    """Return the verdict of the exact interval of the median difference, first minus second."""
     found = _exact(differences)
     if found is None:
         return TOO_FEW

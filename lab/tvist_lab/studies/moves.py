@@ -1,4 +1,4 @@
-"""`tvist study moves`: any moves by shapers and baselines, each beside the same move unshaped."""
+"""`tvist study moves`: any moves by shapers and baselines, each compared with the unshaped move."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ from tvist_lab.study.work import MEASURED, record
 from tvist_lab.words import MANY, either, sample, spread
 
 COUNTED = pl.col("reduction_percent").is_not_null()
-"""Whether a row has enough vibration for a percentage."""
+"""Selects rows with enough vibration for a percentage."""
 LESS = "Reduction of the largest acceleration of the tool, later than 10 ms after the reference stops."
 WAITED = "The same against an unshaped arm that waits as long as the shaper is late."
 STILL = "Last time |α| exceeds 0.1 m/s², from the stop of the unshaped reference."
@@ -48,14 +48,13 @@ FEW = (
     Column("delay\nlongest ms", highest("delay_ms"), 0, meaning="Time by which shaping lengthens a move."),
     Column("still\nlatest ms", highest("still_after_unshaped_stop_ms"), 0, meaning=STILL), DRIVEN,
 )  # fmt: skip
-"""Of fewer moves than a median needs."""
+"""Columns if there are fewer moves than a median needs."""
 EACH = (
     Column("move", "move"), Column("payload\nkg", "payload_kg", 2), Column("unshaped\nm/s²", "unshaped_peak_m_s2", 3),
     Column("shaped\nm/s²", "shaped_peak_m_s2", 3), Column("less\n%", "reduction_percent", 1),
     Column("delay\nms", "delay_ms", 0), Column("still\nms", "still_after_unshaped_stop_ms", 0),
     Column("largest q̈\nof its limit", "peak_acceleration_ratio", 3),
 )  # fmt: skip
-"""Of the moves one by one."""
 SUMMED = (
     COUNTED.sum().alias("counted"), sure("reduction_percent", 5, "p5"),
     *(share("shaped_peak_m_s2", of, name, among=COUNTED) for name, of in (("p95", 0.95), ("max", 1.0))),
@@ -64,7 +63,7 @@ SUMMED = (
     *(of("quiet_after_unshaped_stop_ms") for of in (p90, highest)), p5("less_than_waiting_percent"),
     ((pl.col("status") == MEASURED) & pl.col("shaped_still_after_ms").is_null()).sum().alias("never_still"),
 )  # fmt: skip
-"""What else --json has."""
+"""Further values for --json."""
 
 
 def study(asked: Asked) -> Study:
@@ -91,7 +90,7 @@ def study(asked: Asked) -> Study:
 
 
 def rows_of_first(result: Result) -> list[dict[str, Any]]:
-    """Return the rows of the first shaper on the first arm that were measured."""
+    """Return the measured rows of the first shaper on the first arm."""
     first = result.values["summary"][0]["shaper"], next(iter(result.values["arms"]))
     mine = (pl.col("shaper") == first[0]) & (pl.col("arm") == first[1]) & (pl.col("status") == MEASURED)
     return result.rows.filter(mine).to_dicts()
@@ -165,7 +164,7 @@ def _draw(result: Result) -> Figures:
 
 
 def example(moves: Sequence[Mapping[str, Any]]) -> int:
-    """Place of the move that is drawn: the middle one by unshaped vibration, of those that count if any do."""
+    """Return the index of the move to draw: the median by unshaped vibration, of those that count if any do."""
     counted = [place for place, move in enumerate(moves) if move["reduction_percent"] is not None]
     counted = counted or list(range(len(moves)))
     return sorted(counted, key=lambda place: float(moves[place]["unshaped_peak_m_s2"]))[len(counted) // 2]

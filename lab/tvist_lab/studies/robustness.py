@@ -1,4 +1,4 @@
-"""`tvist study robustness`: shapers on arms other than calibrated, or that carry more or less than declared."""
+"""`tvist study robustness`: shapers on arms that differ from the calibration or the declared payload."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,22 +18,21 @@ ERRORS: dict[str, tuple[float, ...]] = {
     "stiffness": (-0.3, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.3),
     "payload": (-0.2, -0.1, 0.0, 0.1, 0.2),
 }
-"""Relative errors [-]: by which all springs of the arm are stiffer than calibrated, and by which the declared mass
-exceeds the carried one.
-"""
+"""Relative errors [-]: how much stiffer all springs are than calibrated, and how much the declared mass
+exceeds the carried one."""
 PLANT = "plant"
-"""Kind of what is wrong with a plant that has a name."""
+"""Kind of error of a named plant."""
 LESS = Column("median", median("reduction_percent"), 1)
 WORST = Column("p5", p5("reduction_percent", LEAST), 1)
 BOTH = Column("median / p5", lambda one: f"{LESS.text(one)} / {WORST.text(one)}")
 DELAY = Column("delay ms", median("delay_ms"), 0)
 BEYOND = 100.0 * (1.0 - pl.col("shaped_peak_m_s2") / pl.col("waited_peak_m_s2"))
-"""Reduction beyond what waiting alone is enough for."""
+"""Reduction compared with waiting."""
 WAITED = pl.col("reduction_percent").is_not_null() & (pl.col("waited_peak_m_s2") >= QUIET)
 
 
 def study(asked: Asked) -> Study:
-    """Return the study: errors of the payload by moves, each by all shapers on all arms with that error."""
+    """Return the study: payload errors and moves, each by all shapers on all arms with that error."""
     wrong = errors(asked.arms)
     arms: dict[float, dict[str, Variant]] = {}
     for kind in wrong.values():
@@ -73,7 +72,7 @@ def study(asked: Asked) -> Study:
 
 
 def errors(named: Sequence[Variant] = ()) -> dict[str, dict[str, tuple[Variant, float]]]:
-    """Return the columns of each kind of table by their titles: the arm, and the error of the declared mass [-]."""
+    """Return the columns of each kind of table by title: the arm, and the error of the declared mass [-]."""
     plants = [*map(variant, PERTURBED), *named]
     return {
         "stiffness": {f"{100.0 * one:+.0f} %": (with_springs(1.0 + one), 0.0) for one in ERRORS["stiffness"]},
@@ -83,7 +82,7 @@ def errors(named: Sequence[Variant] = ()) -> dict[str, dict[str, tuple[Variant, 
 
 
 def cells(values: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
-    """Return the entries of each kind of table, by shaper in the order of the summary, with the title of the column."""
+    """Return the entries of each kind of table, by shaper in the order of the summary, with the column's title."""
     found = {(one["shaper"], one["arm"], one["payload_error"]): one for one in values["cells"]}
     delays = {one["shaper"]: one["delay_ms_median"] for one in values["summary"]}
     known = {arm for one in errors().values() for arm, _ in one.values()}

@@ -1,8 +1,7 @@
-"""A sweep by the axes of a TOML file: every shaper, payload, error and robot, with the same random moves.
+"""A sweep over the axes of a TOML file: shapers, payloads, errors and robots, with the same random moves.
 
-A position determines everything that its case needs, seeds included, so that no result depends on the order
-of cases, on who does them, or on those done before. All shapers share the unshaped motion of a case, which
-is simulated once.
+The index of a case determines all its content, including seeds, so results do not depend on order, worker or
+earlier cases. All shapers share the unshaped motion of a case, which is simulated once.
 """
 
 import math
@@ -35,26 +34,25 @@ from tvist_protocol.values import Mass
 MOST_ROWS = 1_000_000
 """Largest number of rows of a sweep, which are held in memory at its end."""
 UNIFORM = "uniform"
-"""The payload that is drawn for each move, up to the arm's rating."""
+"""Payload that is drawn for each move, up to the arm's rating."""
 
 Disturbance = Literal["friction", "gear", "noise"]
 Name = Annotated[str, Meta(min_length=1, max_length=4096)]
 
 
 class SpecError(UserFileError):
-    """A sweep cannot be run as its file says; the message names the file, and the key or the line."""
+    """A sweep's file is invalid; the message names the file, and the key or line."""
 
 
 class Mistakes(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What the controller has wrong, as one value of the axis `errors`."""
+    """Errors of the controller's knowledge, as one value of the axis `errors`."""
 
     payload: Annotated[float, Meta(ge=-100, le=900)] = 0.0
-    """By how much the declared mass exceeds the carried one [%]."""
+    """How much the declared mass exceeds the carried one [%]."""
     stiffness: Annotated[float, Meta(ge=0, le=90)] = 0.0
-    """By how much each gear, link and velocity loop is stiffer or softer, at random, than the controller
-    knows [%]."""
+    """How much each gear, link and velocity loop is stiffer or softer, at random, than the controller knows [%]."""
     frequency: Annotated[float, Meta(ge=-90, le=900)] = 0.0
-    """By how much the controller overestimates every frequency [%]."""
+    """How much the controller overestimates every frequency [%]."""
 
 
 class NamedRobot(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -72,12 +70,10 @@ class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     shapers: Annotated[tuple[Name, ...], Meta(min_length=1)]
     """Names of shapers, or FILE.py:NAME."""
     moves: Annotated[int, Meta(ge=1, le=100_000)]
-    """Number of random moves of each robot."""
     payloads: Annotated[tuple[Mass | Name, ...], Meta(min_length=1)]
-    """Masses of the disc on the flange [kg], or "uniform" for one drawn for each move up to the arm's
-    rating."""
+    """Masses of the disc on the flange [kg], or "uniform" for one drawn for each move up to the arm's rating."""
     errors: Annotated[tuple[Mistakes, ...], Meta(min_length=1)] = (Mistakes(),)
-    """What the controller has wrong."""
+    """Errors of the controller's knowledge."""
     robots: Annotated[tuple[Name | NamedRobot, ...], Meta(min_length=1)] = ("ur5e",)
     """Names of robots, paths of robot files, or maps of robot and calibration."""
     seed: Annotated[int, Meta(ge=0, lt=2**62)] = 0
@@ -85,7 +81,6 @@ class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     modes: Annotated[int, Meta(ge=1, le=6)] = 1
     """Number of modes that each shaper of the catalogue suppresses."""
     limits: Literal["gentle", "industrial"] = "gentle"
-    """Limits of the moves."""
     stroke: tuple[Annotated[float, Meta(ge=0.001, le=1)], Annotated[float, Meta(ge=0.001, le=1)]] = (0.3, 1.0)
     """Smallest and largest length of a move, as a share of the way between two configurations [-]."""
     wrists: bool = False
@@ -93,7 +88,6 @@ class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     streams: bool = False
     """Whether to follow streams of set-points that are stopped, instead of making moves."""
     disturbances: tuple[Disturbance, ...] = ("friction", "gear", "noise")
-    """Disturbances of the arms."""
 
     @property
     def rows(self) -> int:
@@ -103,7 +97,7 @@ class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 def read_spec(path: Path) -> Spec:
-    """Read and check a sweep's file."""
+    """Read and check a sweep's file; raise SpecError if it is invalid."""
     text = read_text(path, "sweep")
     try:
         spec = checked(read_toml(path, "sweep"), Spec)
@@ -137,7 +131,7 @@ def _check_different(path: Path, text: str, axis: str, values: tuple[object, ...
 
 
 def _line(text: str, where: str) -> str:
-    """Return ", line N" for a key at the top of the file that is easy to find; empty otherwise."""
+    """Return ", line N" for a key at the top level if it can be found, else nothing."""
     key = re.escape(re.split(r"[.\[]", where, maxsplit=1)[0])
     found = [
         number
@@ -149,24 +143,23 @@ def _line(text: str, where: str) -> str:
 
 @dataclass(frozen=True)
 class SweptRobot:
-    """A robot with what its shapers are made of."""
+    """A robot with the recipes of its shapers."""
 
     name: str
-    """Name of the robot in the sweep's file."""
     description: RobotDescription
-    """The arm, with the disturbances of the sweep, and the controller's model of it."""
+    """The arm with the sweep's disturbances, which is also the controller's model of it."""
     recipes: tuple[Recipe, ...]
     """Recipe of each shaper of the sweep, without errors."""
 
 
 AXES = ("robot", "payload", "payload_error_percent", "stiffness_error_percent", "frequency_error_percent")
-"""Columns that together distinguish the settings."""
+"""Columns that together identify a setting."""
 DRAWN = 100
 """Largest number of settings in a figure."""
 
 
 class Axes(Sequence[Case]):
-    """All cases of a sweep, each made when it is asked for."""
+    """All cases of a sweep, each created on access."""
 
     def __init__(self, spec: Spec, robots: Sequence[SweptRobot]) -> None:
         self.spec, self.robots = spec, tuple(robots)
@@ -235,7 +228,7 @@ def _digest(content: object) -> str:
 
 
 def _drawn(spec: Spec, description: RobotDescription) -> list[Move]:
-    """Draw moves that do not depend on the axis of payloads: those of `tvist study moves` with this seed."""
+    """Draw moves independent of the payload axis: those of `tvist study moves` with this seed."""
     masses = (0.0, description.limits.payload)
     drawn = draw_moves(description, spec.moves, spec.seed, masses, wrists=spec.wrists, stroke=spec.stroke)
     return drawn.moves

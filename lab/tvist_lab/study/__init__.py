@@ -1,1 +1,1 @@
-"""Studies as tables: cases by methods, a row of figures for each motion, on any executor, resumed where they ended."""
+"""Studies as tables: cases by methods, a row per motion, on any executor, resumable."""

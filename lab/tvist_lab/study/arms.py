@@ -1,4 +1,4 @@
-"""The arms of studies: those of `tvist_plant.variants`, and the same ones in MuJoCo."""
+"""The arms of studies: those of `tvist_plant.variants`, and the same in MuJoCo."""
 
 from dataclasses import dataclass
 
@@ -19,9 +19,9 @@ __all__ = [
 ]
 
 PERTURBED = ("stribeck", "hysteresis", "torsion", "base", "backlash", "combined")
-"""Names of the plants by which robustness is judged, besides wrong springs and payloads."""
+"""Plants for judging robustness, besides wrong springs and payloads."""
 JUDGED = ("calibrated", *PERTURBED, "springs-30", "springs+30")
-"""Names of the plants on which two methods are compared."""
+"""Plants on which two methods are compared."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a study that comes with the package is made of: a robot, moves and shapers, as they were asked for."""
+"""The content of a requested study: a robot, moves and shapers."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,14 +20,14 @@ class Asked:
     """A robot, moves and shapers, all checked."""
 
     description: RobotDescription
-    """The arm, and the controller's model of it."""
+    """The arm, which is also the controller's model of it."""
     moves: Sequence[Move]
     methods: Sequence[Method]
-    """Those that the study always has, the shapers that were named, the baselines."""
+    """The methods that the study always has, then the named shapers, then the baselines."""
     named: int = 0
-    """Number of the former."""
+    """Number of methods before the baselines."""
     arms: Sequence[Variant] = ()
-    """The plants that were named."""
+    """The named plants."""
     seed: int = 0
     """Seed of gear errors and deviations."""
     limits: MotionLimits = PAPER
@@ -38,12 +38,11 @@ class Asked:
     quick: bool = False
     """Whether a few motions are enough."""
     facts: Mapping[str, Any] = field(default_factory=dict)
-    """What --json prints of all this."""
+    """Description of all this for --json."""
     notes: Sequence[str] = ()
-    """What a reader has to know of the moves."""
+    """Notes on the moves for the reader."""
     on: "Callable[[str], Asked | None]" = lambda _: None
-    """Returns the same for another robot that comes with the package; None if another one than the default
-    was asked for."""
+    """Returns the same for another robot that comes with the package; None if the user chose a robot."""
 
     def feasible(self) -> list[Move]:
         """Return the moves for which the drives are strong enough."""
@@ -54,7 +53,7 @@ class Asked:
         ]
 
     def cases(self, moves: Sequence[Move], arms: Sequence[Variant]) -> list[Case]:
-        """Return a case for each move, with its number, on some arms."""
+        """Return a numbered case for each move, on some arms."""
         if not moves:
             raise StudyError("the drives are too weak for all of these moves at these limits")
         return [
@@ -72,14 +71,12 @@ class Preset:
 
     study: Callable[[Asked], Study]
     always: tuple[str, ...] = ()
-    """Methods that come first, whatever is named."""
     shapers: tuple[str, ...] = ()
-    """Shapers that are made unless others are named."""
+    """Default shapers."""
     menu: Menu | None = None
     """Menu of the baselines; None if there are none."""
     options: frozenset[str] = frozenset()
-    """Options that it has, besides those of all presets."""
+    """Options that it has besides those of all presets."""
     modal: bool = True
     """Whether each calibration needs a modal model."""
     least: int = 1
-    """Least number of moves."""

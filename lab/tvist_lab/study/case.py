@@ -1,4 +1,4 @@
-"""A case of a study: an arm, what it does, and what its controller has wrong."""
+"""A case of a study: an arm, its task, and the errors of its controller's knowledge."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ LIMITS = {"gentle": PAPER, "industrial": MotionLimits(velocity=3.0, acceleration
 
 
 def arm_seed(seed: int, place: int) -> int:
-    """Return the seed of gear errors for the move at a place, so that each move has its own."""
+    """Return the seed of gear errors for the move at a place, different for each move."""
     return (1_000_003 * seed + place) % 2**63
 
 
@@ -36,7 +36,6 @@ class Case:
     seed: int = 0
     """Seed of gear errors, and of the arm's deviations."""
     arms: tuple[Variant, ...] = (AS_DESCRIBED,)
-    """The arms that make it."""
     limits: MotionLimits = PAPER
     """Limits of every joint."""
     payload_error: float = 0.0
@@ -44,9 +43,9 @@ class Case:
     stream: bool = False
     """Whether to follow a stream from the move's start that is stopped somewhere, instead of making the move."""
     methods: tuple[Method, ...] = ()
-    """What makes it; empty for the methods of its study."""
+    """Methods for this case; empty for those of its study."""
     axes: Mapping[str, Any] = field(default_factory=dict)
-    """What distinguishes it from the other cases of its study: cells of its rows, by the names of their columns."""
+    """Cells of its rows by column name, which distinguish it from the other cases of its study."""
 
     @property
     def declared(self) -> Move:
@@ -67,7 +66,7 @@ class Case:
         return point_to_point(np.array(self.move.start), np.array(self.move.target), self.limits)
 
     def reference(self) -> Floats:
-        """Return what is to be followed: the move or the stream, shape (T, n) [rad]."""
+        """Return the reference to follow, of the move or the stream, shape (T, n) [rad]."""
         if not self.stream:
             return self.point_to_point()
         return stopped_stream(self.description, np.array(self.move.start), self.seed, self.limits)

@@ -1,4 +1,4 @@
-"""The methods of the studies, made for an arm."""
+"""Create the methods of studies for an arm."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -22,7 +22,7 @@ MOST_DECLARED = 1.1
 def made(
     row: Row, recipe: Recipe, description: RobotDescription, masses: tuple[float, float] | None = None
 ) -> Method:
-    """Return a method of the catalogue."""
+    """Create a method of the catalogue."""
     return _MAKERS[row.kind](row, recipe, description, masses or (0.0, description.limits.payload))
 
 
@@ -34,7 +34,7 @@ def _for_workspace(
 
 
 def _held(row: Row, recipe: Recipe, description: RobotDescription, _: tuple[float, float]) -> Method:
-    # The longest mean delay over the workspace, for all masses that are declared.
+    # Use the longest mean delay over the workspace, for all declared masses.
     most = MOST_DECLARED * description.limits.payload
     delay = longest_mean_delay(recipe, description, (0.0, most), row.modes)
     return ConstantMeanDelay(recipe, delay, row.modes, row.name, row.label)
@@ -72,19 +72,11 @@ def some(
     modes: int = 1,
     frequency_error: float = 0.0,
 ) -> tuple[Method, ...]:
-    """Return methods of the catalogue by their names, or from files.
+    """Return methods by name, or from files: paths with a class that has `step`, or loaded shapers.
 
-    Args:
-        wanted: Names; paths of files with a class that has `step`; or loaded shapers.
-        description: The robot.
-        calibration: Source of the estimates.
-        masses: Smallest and largest payload of the study [kg]; None for all that the arm is rated for.
-        modes: Number of modes that shapers of the library suppress.
-        frequency_error: Share by which every frequency is too high [-].
-
-    Raises:
-        StudyError: There is no method of a name; the message lists all and the most similar one.
-        DesignError: A name has a parameter that no filter has.
+    `calibration` provides the estimates; `masses` are the smallest and largest payload [kg], by default 0 and the
+    rating; `modes` is the number that shapers of the library suppress; `frequency_error` the share by which every
+    frequency is too high [-]. Raises StudyError if a name is unknown, DesignError if it has an unknown parameter.
     """
     recipe = Recipe("zv", calibration, frequency_error, modes)
     found: dict[str, Method] = {}
@@ -115,6 +107,6 @@ def baselines(
     masses: tuple[float, float],
     frequency_error: float = 0.0,
 ) -> tuple[Method, ...]:
-    """Return what a shaper is compared with; fixed ones are designed for the workspace and these payloads [kg]."""
+    """Return the baselines for a shaper; fixed ones are designed for the workspace and these payloads [kg]."""
     chosen = [one.name for one in rows("baselines") if calibration.modal is not None or one.modes == 1]
     return some(chosen, description, calibration, masses, frequency_error=frequency_error)

@@ -1,4 +1,4 @@
-"""The columns of tables, on a terminal, on a page and in Markdown alike; and what studies compute for them."""
+"""Columns of tables, alike on a terminal, on a page and in Markdown, and the values that studies compute for them."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ import polars as pl
 from tvist_lab.recordings import Floats
 
 Entry = Mapping[str, Any]
-"""Values by name: a line of a table, before it is written."""
+"""Values by name: a line of a table before formatting."""
 
 
 @dataclass(frozen=True)
@@ -17,19 +17,19 @@ class Column:
     """A column of a table."""
 
     title: str
-    """Its heading; a second line is small on a web page."""
+    """Heading; a second line is small on a web page."""
     of: str | pl.Expr | Callable[[Entry], Any]
-    """Where its value is in an entry, such as "delay_ms" or "less.p5"; what finds it there; or what
-    computes it of a group of rows, under the name by which it is in the entry then. """
+    """Where an entry holds the value, such as "delay_ms" or "less.p5"; a function of the entry; or an
+    expression that computes it for a group of rows and is stored in the entry under its output name."""
     digits: int | None = None
     """Number of decimals; None for text."""
     unit: str = ""
-    """What follows the number."""
+    """Suffix of the number."""
     meaning: str = ""
-    """What the first line of the heading means."""
+    """Meaning of the heading's first line."""
 
     def text(self, entry: Entry) -> str:
-        """Return a cell; a dash stands for what was not measurable."""
+        """Return a cell; a dash means not measurable."""
         value: Any = entry
         if isinstance(self.of, pl.Expr):
             value = entry[self.of.meta.output_name()]
@@ -47,13 +47,13 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """Entries, and the columns to show of them."""
+    """Entries, and the columns to show."""
 
     title: str
     entries: Sequence[Entry]
     columns: Sequence[Column]
     listing: bool = False
-    """Whether it lists single motions, of which there may be too many to show."""
+    """Whether it lists single motions, which may be too many to show."""
 
 
 def titles(columns: Iterable[Column]) -> tuple[str, ...]:
@@ -67,7 +67,7 @@ def cells(entries: Iterable[Entry], columns: Sequence[Column]) -> list[tuple[str
 
 
 def meanings(columns: Iterable[Column]) -> dict[str, str]:
-    """Return what the words of headings mean."""
+    """Return the meanings of words in headings."""
     return {column.title.partition("\n")[0]: column.meaning for column in columns if column.meaning}
 
 
@@ -79,7 +79,7 @@ def across(
     first: Sequence[Column] = (),
     best: bool = False,
 ) -> Table:
-    """Return a table with a line for each value of one name, and a column for each value of another."""
+    """Return a table with a line for each value of `line`, and a column for each value of `key`."""
     lines: dict[Any, dict[str, Entry]] = {}
     for entry in entries:
         lines.setdefault(entry[line], {})[str(entry[key])] = entry
@@ -108,53 +108,44 @@ def share(
     how: Literal["linear", "higher"] = "linear",
     among: pl.Expr | None = None,
 ) -> pl.Expr:
-    """Return what computes a percentile of a measure, over the rows that have it.
+    """Return an expression for the percentile `of` (a share) of a measure, over the rows that have it.
 
-    Args:
-        name: The measure.
-        of: The percentile, as a share [-].
-        called: Its name, which is put behind that of the measure.
-        least: Number of rows below which there is none.
-        how: What lies between two values.
-        among: Which rows count; None for all.
+    `called` is its suffix; fewer than `least` rows give null; `how` interpolates; `among` selects rows.
     """
     column = pl.col(name) if among is None else pl.col(name).filter(among)
     return pl.when(column.count() >= least).then(column.quantile(of, how)).alias(f"{name}_{called}")
 
 
 def median(name: str) -> pl.Expr:
-    """Return what computes a median."""
+    """Return an expression for the median."""
     return share(name, 0.5, "median")
 
 
 def p5(name: str, least: int = 0) -> pl.Expr:
-    """Return what computes a 5th percentile of so many rows at least."""
+    """Return an expression for the 5th percentile, null for fewer than `least` rows."""
     return share(name, 0.05, "p5", least)
 
 
 def p90(name: str) -> pl.Expr:
-    """Return what computes a 90th percentile."""
+    """Return an expression for the 90th percentile."""
     return share(name, 0.9, "p90")
 
 
 def lowest(name: str) -> pl.Expr:
-    """Return what computes the smallest value."""
+    """Return an expression for the smallest value."""
     return pl.col(name).min().alias(f"{name}_min")
 
 
 def highest(name: str) -> pl.Expr:
-    """Return what computes the largest value."""
+    """Return an expression for the largest value."""
     return pl.col(name).max().alias(f"{name}_max")
 
 
 def of_group(function: Callable[..., Any], columns: Sequence[pl.Expr], kind: Any, called: str) -> pl.Expr:
-    """Return what calls a function with the values of columns in a group of rows, without those that are null.
+    """Return an expression that calls a function with a group's values of columns, without null rows.
 
-    Args:
-        function: Returns a value, or None, from an array for each column, of equal length.
-        columns: The columns.
-        kind: Type of the value.
-        called: Name of the value.
+    The function gets one array per column, of equal length, and returns a value of type `kind`, or None;
+    `called` names it.
     """
 
     def call(series: Sequence[pl.Series]) -> pl.Series:

@@ -1,4 +1,4 @@
-"""Run what is missing of a study, and keep it as it comes."""
+"""Run what is missing of a study, and keep rows as they come."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -16,12 +16,12 @@ from tvist_lab.study.study import Study
 from tvist_lab.study.work import FAILED, Job, Row, failed, measure_each, why
 
 PART = 32
-"""Number of jobs in a part: at most as many are lost when the program is killed."""
+"""Number of jobs in a part, and the most that are lost if the program is killed."""
 FEW = 16
 """Largest number of motions that do not justify another process."""
 
 Progress = Callable[[int], AbstractContextManager[Callable[[int], None]]]
-"""Given the number of jobs to run, counts those that are done."""
+"""Takes the number of jobs to run; counts finished ones."""
 
 
 @dataclass
@@ -29,11 +29,10 @@ class Ran:
     """A study that was run."""
 
     rows: pl.DataFrame
-    """All rows."""
     resumed: int
     """Number of jobs that were done before."""
     tasks: int
-    """Number of the others."""
+    """Number of jobs that were run now."""
 
 
 def run(
@@ -42,17 +41,10 @@ def run(
     executor: Callable[[], AbstractContextManager[Executor]] | None = None,
     progress: Progress = lambda _: nullcontext(lambda _: None),
 ) -> Ran:
-    """Run the jobs that are missing or failed, and write all rows.
+    """Run missing and failed jobs, and write all rows to `folder`, if given.
 
-    Args:
-        study: The study.
-        folder: Folder to keep the rows in; None keeps none.
-        executor: Starts what runs the jobs; None for processes of this machine, if there is enough to do.
-        progress: Counts the jobs.
-
-    Raises:
-        StoreError: The folder holds something else, is in use, or cannot be written.
-        OSError: The executor cannot run.
+    `executor` starts what runs the jobs, by default processes of this machine if there are enough jobs. Raises
+    StoreError if the folder is in use, unwritable, or of another study; OSError if the executor cannot run.
     """
     jobs = study.jobs
     with ExitStack() as stack:
@@ -95,7 +87,7 @@ def _run(
 
 
 class Missing(Sequence[Job]):
-    """Jobs of a study by their places among those to run."""
+    """Jobs that are still to be run, with their indices in the study."""
 
     def __init__(self, jobs: Sequence[Job], places: Sequence[int]) -> None:
         self._jobs, self.places = jobs, places

@@ -23,11 +23,11 @@ from tvist_protocol.values import Payload
 from tvist_shaping.estimators.base import Estimator
 
 MODES = 4
-"""Number of modes that a shaper from a file is given."""
+"""Number of modes that a shaper from a file receives."""
 
 
 class CandidateError(ValueError):
-    """A file contains no shaper; the message says why."""
+    """A file contains no shaper; the message tells why."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class TickInfo:
     robot: str
     """Model of the arm."""
     f_d: Floats
-    """Damped frequencies of the lowest modes, as estimated at the last shaped reference [Hz], shape (4,)."""
+    """Damped frequencies of the lowest modes, estimated at the last shaped reference [Hz], shape (4,)."""
     zeta: Floats
     """Damping ratios of the same modes [-], shape (4,)."""
 
@@ -56,7 +56,6 @@ class FromFile(Stepping):
 
     path: str
     recipe: Recipe
-    """Source of the estimates that it gets."""
     name: str
     label: str
 
@@ -96,7 +95,7 @@ class Foreign:
 
     @property
     def delay(self) -> float | None:
-        """The delay that it declares; None if it declares none."""
+        """The declared delay [s]; None if there is none."""
         try:
             declared = getattr(self._made, "delay", None)
         except Exception as error:
@@ -137,10 +136,8 @@ _loaded: dict[Path, Callable[[], Any]] = {}
 def load_shaper(path: Path) -> Callable[[], Any]:
     """Return a function that creates the file's shaper: its class with `step`, or one that returns its module.
 
-    The file is run once in each process, so the state of its module persists from motion to motion.
-
-    Raises:
-        CandidateError: The file cannot be read or run, or contains no shaper or several.
+    The file is run once in each process, so its module's state persists from motion to motion. Raises
+    CandidateError if the file cannot be run, or does not contain exactly one shaper.
     """
     file = path.resolve()
     if file not in _loaded:
@@ -149,7 +146,7 @@ def load_shaper(path: Path) -> Callable[[], Any]:
 
 
 def run_file(path: Path, kind: str, wrong: type[ValueError]) -> ModuleType:
-    """Run a Python file of the user's, and return its module."""
+    """Run a user's Python file, and return its module; raise an error of type `wrong` if that fails."""
     name = f"tvist_{kind}_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path.resolve())
     if spec is None or spec.loader is None:

@@ -1,4 +1,4 @@
-"""Seeds that are reserved for evaluation, how many moves a figure needs, and bootstrap intervals."""
+"""Seeds reserved for evaluation, numbers of moves, and bootstrap intervals."""
 
 from collections.abc import Callable
 from types import MappingProxyType
@@ -10,9 +10,8 @@ from tvist_lab.recordings import Floats
 from tvist_lab.study.columns import of_group
 
 TUNING = range(100)
-"""Seeds of moves and arms that a shaper may be tuned on; no published table uses one. On which of them the shapers were
-tuned that are older than this rule (2026-11-26) was not written down.
-"""
+"""Seeds of moves and arms on which shapers may be tuned; no published table uses them. For shapers older than
+this rule (2026-11-26), the seeds are not known."""
 JUDGING = MappingProxyType(
     {
         "elastic": 20261127,
@@ -23,15 +22,15 @@ JUDGING = MappingProxyType(
 )
 """Seeds of published tables: nothing is tuned on them."""
 MOVES = 60
-"""Number of moves for each cell of a published table, and by default."""
+"""Number of moves for each cell of a published table, and the default."""
 LEAST = 20
-"""Least number of moves for a 5th percentile, which of fewer is hardly more than the worst move, and for a verdict."""
+"""Smallest number of moves for a verdict and for a 5th percentile, which is otherwise little more than the
+worst move."""
 RESAMPLED = 2000
-"""Number of bootstrap samples for an interval."""
 
 
 def said(seed: int) -> str:
-    """Return what a page says of its seed."""
+    """Return a page's statement about its seed."""
     tuned = f"seeds {TUNING.start} to {TUNING.stop - 1}"
     if seed in TUNING:
         return f"Seed {seed} is one of those that shapers may be tuned on, {tuned}: these moves are not held out."
@@ -39,16 +38,14 @@ def said(seed: int) -> str:
 
 
 def interval(values: Floats, percentile: float) -> list[float] | None:
-    """95 % bootstrap interval of a percentile; None if there are no values."""
+    """Return the 95 % bootstrap interval of a percentile; None if there are no values."""
     return bootstrap(values, lambda drawn: np.percentile(drawn, percentile, axis=1))
 
 
 def bootstrap(values: Floats, statistic: Callable[[Floats], Floats]) -> list[float] | None:
-    """95 % interval of a statistic by resampling rows (percentile bootstrap); None if there are none.
+    """Return the 95 % interval of a statistic by resampling rows (percentile bootstrap); None if there are none.
 
-    Args:
-        values: Numbers, or rows that belong together, shape (T, ...).
-        statistic: Returns the statistic of each sample, shape (S,), from samples of shape (S, T, ...).
+    `values` has shape (T, ...); `statistic` maps samples of shape (S, T, ...) to values of shape (S,).
     """
     if not values.size:
         return None
@@ -59,7 +56,7 @@ def bootstrap(values: Floats, statistic: Callable[[Floats], Floats]) -> list[flo
 
 
 def sure(name: str, percentile: float, called: str, least: int = 0) -> pl.Expr:
-    """Return what computes the 95 % bootstrap interval of a percentile of a measure, of so many rows at least."""
+    """Return an expression for the 95 % bootstrap interval of a percentile, null for fewer than `least` rows."""
 
     def of(values: Floats) -> list[float] | None:
         return interval(values, percentile) if len(values) >= least else None

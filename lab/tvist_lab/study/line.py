@@ -1,6 +1,6 @@
 """The control line without a server: a reference, its shaping, and the response of an arm.
 
-A shaper sees only the reference, so its output can be computed first and then be applied to any number of arms. The
+A shaper sees only the reference, so its output is computed first and then applied to any number of arms. The
 result equals that of the tick-by-tick line to the last bit.
 """
 
@@ -26,7 +26,7 @@ from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
 
 PAPER = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
-"""The paper's limits, which are also the defaults of `move_j`."""
+"""The paper's limits, also the defaults of `move_j`."""
 REST = 0.7
 """Time simulated after the end of the shaped reference [s]."""
 
@@ -35,7 +35,7 @@ RESTING = 4
 
 
 class Unchanged(TvistFilter):
-    """Returns its input, for trajectories that are shaped already."""
+    """Returns its input, for trajectories that are already shaped."""
 
     def __init__(self, joints: int) -> None:
         super().__init__(shaper("none"), Fixed([10.0], [0.1]), joints=joints)
@@ -46,12 +46,12 @@ class Unchanged(TvistFilter):
 
 
 def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
-    """Reference of a double S, from the first sample that may move to the one at the target, shape (T, n) [rad]."""
+    """Return a double S from the first sample that may move to the one at the target, shape (T, n) [rad]."""
     return samples_of(quickest_motion(JointLine(start, target), limits, PERIOD))
 
 
 def samples_of(trajectory: Trajectory) -> Floats:
-    """Samples of a trajectory from the first that may move to the last, shape (T, n) [rad]."""
+    """Return the samples of a trajectory from the first that may move to the last, shape (T, n) [rad]."""
     samples = []
     while not trajectory.finished:
         samples.append(trajectory.next())
@@ -59,11 +59,7 @@ def samples_of(trajectory: Trajectory) -> Floats:
 
 
 def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
-    """A curved path: two double S, of which the second begins when a quarter of the first's time is left.
-
-    Returns:
-        Samples, shape (T, n) [rad]. While both move, velocity and acceleration are sums.
-    """
+    """Return a curved path of two double S, the second starting in the first's last quarter, shape (T, n) [rad]."""
     first, second = point_to_point(start, corner, limits), point_to_point(corner, target, limits)
     joined = (3 * len(first)) // 4
     length = max(joined + len(second), len(first))
@@ -76,17 +72,7 @@ def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: Motion
 
 
 def lengthened(start: Floats, target: Floats, ticks: int, limits: MotionLimits = PAPER) -> Floats:
-    """Reference of a double S with reduced jerk that takes as long as another motion; it uses no shaper and no model.
-
-    Args:
-        start: Joint angles at the start, shape (n,) [rad].
-        target: Joint angles at the end, shape (n,) [rad].
-        ticks: Requested duration.
-        limits: Limits of the motion.
-
-    Returns:
-        Samples, shape (T, n) [rad]; T differs from the request by at most a tick.
-    """
+    """Return a double S with less jerk that lasts `ticks`, to one tick, without shaper or model, shape (T, n) [rad]."""
     low, high = np.log(1e-2 * limits.jerk), np.log(limits.jerk)
     for _ in range(30):  # the duration increases as the jerk decreases
         middle = 0.5 * (low + high)
@@ -101,13 +87,9 @@ def lengthened(start: Floats, target: Floats, ticks: int, limits: MotionLimits =
 
 
 class ControlLine:
-    """The control line from shaped reference to drives, without a shaper, of one controller.
+    """The control line of one controller from shaped reference to drives, without a shaper.
 
-    Args:
-        description: The controller's model of the arm.
-        start: Joint angles at which the arm rests, shape (n,) [rad].
-        declared: Declared payload.
-        law: Identified friction of the joints, which the drives are fed forward; None if it is not known.
+    The arm rests at `start`, shape (n,) [rad]; `law` is the identified friction to feed forward, if known.
     """
 
     def __init__(
@@ -124,14 +106,11 @@ class ControlLine:
         elastic: ElasticFeedForward | None = None,
         law: Floats | None = None,
     ) -> "Following":
-        """Return what any arm's drives get while they follow a shaped reference from rest, and rest for a while.
+        """Return the drives' commands, for any arm, to follow a shaped reference from rest and then rest.
 
-        Args:
-            reference: The unshaped reference, which everything is compared with, shape (T, n) [rad].
-            shaped: The reference that the arm follows, shape (T', n) [rad].
-            delay: Delay that the shaper declares [s].
-            elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
-            law: Friction that the drives are fed forward in this motion; None for that of the line.
+        `reference`, unshaped, (T, n) [rad] is what results are compared with, `shaped` (T', n) [rad] what the
+        arm follows; `delay` [s] is declared by the shaper. `elastic` is a feed-forward instead of the paper's
+        controller's, `law` a friction instead of the line's.
         """
         ticks = RESTING + max(len(shaped), len(reference)) + round(REST / PERIOD)
         driven = self._line.drive(self._start, shaped, ticks, RESTING, elastic, law)
@@ -139,14 +118,7 @@ class ControlLine:
 
 
 class Following:
-    """A shaped reference, and what the drives of any arm get while they follow it.
-
-    Args:
-        start: Joint angles at which the arm rests, shape (n,) [rad].
-        reference: The unshaped reference, shape (T, n) [rad].
-        driven: What the drives get.
-        delay: Delay that the shaper declares [s].
-    """
+    """A shaped reference, and the drives' commands to follow it; see `ControlLine.follow`."""
 
     def __init__(self, start: Floats, reference: Floats, driven: Driven, delay: float) -> None:
         ticks, n = len(driven.targets), len(start)
@@ -165,18 +137,10 @@ class Following:
         }  # fmt: skip
 
     def simulate(self, plant: SimulatedArm, seed: int) -> Recording:
-        """Let a plant follow the reference.
+        """Let a plant follow the reference, with a seed for sensor noise and gear errors.
 
-        Args:
-            plant: The plant.
-            seed: Seed of sensor noise and gear errors.
-
-        Returns:
-            Columns for the metrics on a common clock, from a tick before the motion on. Targets are those that the
-            drives receive, so that ticks in which a feed-forward differentiates count as delay.
-
-        Raises:
-            ValueError: The plant does not provide the truth.
+        The recording starts one tick before the motion. Targets are those that the drives receive, so that ticks of a
+        differentiating feed-forward count as delay. Raises ValueError if the plant does not provide the truth.
         """
         response = respond(plant, self._driven, seed)
         pose = np.zeros((len(response.specific_force), 6))

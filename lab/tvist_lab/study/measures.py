@@ -1,4 +1,4 @@
-"""What is measured of a motion: the columns of a study's rows, each with its unit, its meaning and how it is found."""
+"""Measures of a motion: the columns of a study's rows, with unit, meaning and computation."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -31,13 +31,13 @@ from tvist_plant.model import FLANGE, rigid_model
 from tvist_plant.plant import PERIOD
 
 WORTH = 0.2
-"""Unshaped peak [m/s²] below which a move has no vibration to reduce, so that it is listed but not in percentages."""
+"""Unshaped peak [m/s²] below which a move is listed, but not counted in percentages."""
 QUIET = 0.02
-"""A lower threshold of the acceleration below which an arm is still [m/s²]."""
+"""A lower threshold for an arm at rest [m/s²]."""
 
 
 class Motion:
-    """A motion that an arm made, beside the same one unshaped."""
+    """A motion of an arm, with the same motion unshaped."""
 
     def __init__(
         self,
@@ -52,12 +52,12 @@ class Motion:
 
     @cached_property
     def unshaped(self) -> "Motion":
-        """The unshaped motion, which this one may be."""
+        """The unshaped motion, which may be this one."""
         return self._unshaped()
 
     @cached_property
     def rows(self) -> MotionRows:
-        """Where it is in its recording."""
+        """Rows of the motion in its recording."""
         return motions(self.recording)[0] if self._like is None else self._like.rows
 
     @cached_property
@@ -86,18 +86,18 @@ class Motion:
 
     @cached_property
     def duration(self) -> float:
-        """Duration of the shaped reference, as the drives get it [s]."""
+        """Duration of the shaped reference as the drives receive it [s]."""
         return self.rows.shaped_duration(self.recording)
 
     def still(self, threshold: float = STILL) -> float | None:
-        """Time until still, from the start of the unshaped reference [s]; None if not still when the recording ends."""
+        """Return the settling time from the start of the unshaped reference [s]; None if it does not settle in time."""
         try:
             return still_after(self.recording, self.rows, threshold)
         except NotMeasurableError:
             return None
 
     def residual(self) -> float:
-        """Largest envelope of α within 3 to 60 Hz after the stop of the reference plus the declared delay [m/s²]."""
+        """Return the largest envelope of α within 3 to 60 Hz after the unshaped stop plus the declared delay [m/s²]."""
         # The published target is one tick late.
         declared = self.recording["shaper_delay"][self.rows.reference_stop]
         after = self.rows.reference_stop + 1 + math.ceil(declared / self.recording.period - 1e-6)
@@ -105,7 +105,7 @@ class Motion:
         return float(ringing.max())
 
     def in_motion(self) -> float:
-        """Rms of α relative to the rigid arm [m/s²]."""
+        """Return the rms of α relative to the rigid arm [m/s²]."""
         return in_motion_rms(self.recording, self.rows, self.rigid)
 
 
@@ -115,14 +115,14 @@ class Measure:
 
     name: str
     unit: str
-    """Its unit; "–" for a ratio."""
+    """Unit; "–" for a ratio."""
     meaning: str
     of: Callable[[Motion], float | None]
-    """Measures a motion; None if that is not measurable, or of no account."""
+    """Measures a motion; None if not measurable or irrelevant."""
 
 
 def _late(at: float | None, motion: Motion) -> float | None:
-    """Time after the stop of the unshaped reference, since the lengths of moves differ [ms]."""
+    """Return the time after the unshaped reference's stop, since the lengths of moves differ [ms]."""
     return None if at is None else round(1e3 * (at - motion.unshaped.duration), 6)
 
 
@@ -226,14 +226,13 @@ _ALL = (
     ),
 )  # fmt: skip
 MEASURES: Mapping[str, Measure] = MappingProxyType({one.name: one for one in _ALL})
-"""All measures by name."""
 
 OF_PEAKS = (
     "unshaped_peak_m_s2", "shaped_peak_m_s2", "reduction_percent", "less_than_waiting_percent", "delay_ms",
     "unshaped_duration_ms", "unshaped_still_after_ms", "shaped_still_after_ms", "peak_acceleration_ratio",
     "peak_velocity_ratio",
 )  # fmt: skip
-"""What `evaluate` and a sweep measure of each motion."""
+"""Measures that `evaluate` and sweeps use."""
 
 
 def measured(motion: Motion, names: Iterable[str]) -> dict[str, float | None]:

@@ -1,7 +1,4 @@
-"""All methods of the studies by name, one row each, and the menus that show it; what makes them is in `catalogue`.
-
-A shaper of the shaping library needs no row: without one, it stands in all menus of shapers.
-"""
+"""All methods of studies and the menus that show them; a library shaper without a row is in all shaper menus."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -9,15 +6,13 @@ from typing import Literal
 from tvist_shaping.named import BUILT_IN
 
 Menu = Literal["bench", "robustness", "baselines", "lesson"]
-"""Where a method is made unless others are named: bench; robustness; moves, beside the shaper;
-and where the notebooks offer it.
-"""
+"""Where a method is a default: bench, robustness, baselines of moves, or the lessons in notebooks."""
 Kind = Literal[
     "filter", "for target", "for payload", "for workspace", "held", "longer", "as long as", "jerk of a period",
     "shaped alone",
 ]  # fmt: skip
 UNSHAPED = "none"
-"""Name of waiting on the bench, where it goes through the same line as the others."""
+"""Name of waiting on the bench, where it passes through the same line as the others."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +22,11 @@ class Row:
     name: str
     """Name in JSON and on the command line."""
     label: str
-    """Name for people."""
+    """Name for display."""
     menus: tuple[Menu, ...] = ()
-    """Menus that show it."""
     kind: Kind = "filter"
     of: str = ""
-    """The shaper that it is made of, or the method that it is as long as; empty if it is of its name."""
+    """Shaper from which it is made, or method whose duration it has; empty for its own name."""
     modes: int = 1
     """Number of modes; more than one needs a modal calibration."""
 
@@ -75,15 +69,15 @@ ROWS = (
     Row("elastic-auto", "auto, smoothing, elastic feed-forward", ("bench", "robustness")),
     Row("product", "constant mean delay, product of three ZV", ("bench",), "held", modes=3),
     Row(UNSHAPED, "waiting, unshaped"),
-    # These are variants of the shapers above, which no menu needs beside them.
+    # Variants of the shapers above, which need no place in a menu.
     *(Row(name, f"TVIST-{name.upper()}, lowest mode")
       for name in ("um_zv", "um_zvd", "ei_exact", "si", "zvdd", "ei2_exact", "zvddd", "ei3_exact")),
 )  # fmt: skip
-"""All methods, in the order in which tables have them."""
+"""All methods in the order of tables."""
 
 
 def rows(menu: Menu | None = None) -> list[Row]:
-    """Return the rows of a menu, or all; those of shapers that have none come last."""
+    """Return the rows of a menu, or all; shapers without a row come last."""
     known = {row.name for row in ROWS}
     more = [
         Row(name, f"TVIST-{name.upper()}, lowest mode", SHOWN)
@@ -94,7 +88,7 @@ def rows(menu: Menu | None = None) -> list[Row]:
 
 
 def row(name: str) -> Row:
-    """Return a method's row; a filter whose name has a parameter, as `elastic-20`, needs none of its own."""
+    """Return a method's row; a filter name with a parameter, such as `elastic-20`, needs none of its own."""
     known = next((one for one in rows() if one.name == name), None)
     if known is None:
         BUILT_IN.check(name)
@@ -103,5 +97,5 @@ def row(name: str) -> Row:
 
 
 def names(menu: Menu) -> tuple[str, ...]:
-    """Return the names of a menu."""
+    """Return the names of the methods in a menu."""
     return tuple(row.name for row in rows(menu))

@@ -1,4 +1,4 @@
-"""Methods: what shapes, plans or replaces a motion, each with a name in JSON and a label for people."""
+"""Methods: what shapes, plans or replaces a motion, each with a name in JSON and a label for display."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -23,37 +23,34 @@ from tvist_shaping.steady import ProductDesign, SteadyFilter
 
 @dataclass(frozen=True)
 class Task:
-    """A reference to be shaped, with all that a controller knows of it."""
+    """A reference to shape, with the controller's knowledge of it."""
 
     description: RobotDescription
     """The controller's model of the arm."""
     move: Move
-    """The move; its mass is the declared one."""
+    """The move, with the declared mass."""
     reference: Floats
     """Reference, shape (T, n) [rad]."""
     limits: MotionLimits = PAPER
-    """Limits of the motion."""
     as_served: bool = False
-    """Whether to do as a robot does: plan moves for the filter, and take what comes. Otherwise the filter gets the
-    reference itself, and is watched for tails.
-    """
+    """Whether to plan moves for the filter and accept the result, as a robot does; otherwise the filter gets
+    the reference itself, and is checked for tails."""
     stream: bool = False
-    """Whether the reference is a stream, whose end is not known."""
+    """Whether the reference is a stream with unknown end."""
     ticks: int | None = None
-    """Duration of the motion that this one is compared with; None if there is none."""
+    """Duration of the motion to compare with, if any."""
 
 
 class Method(ABC):
     """A way to make a motion; it can be sent to another process."""
 
     name: str
-    """Name in JSON."""
     label: str
-    """Name for people."""
+    """Name for display."""
 
     @property
     def told_target(self) -> bool:
-        """Whether it is given the end of a motion before the motion begins, and therefore cannot shape a stream."""
+        """Whether it needs a motion's end in advance, and therefore cannot shape a stream."""
         return False
 
     @property
@@ -67,7 +64,7 @@ class Method(ABC):
 
 
 class Waiting(Method):
-    """The unshaped motion: all that it takes is time."""
+    """The unshaped motion, as a robot makes that only waits."""
 
     name, label = "waiting", "waiting, unshaped"
 
@@ -89,19 +86,19 @@ class Stepping(Method):
         return self.driven(found, task)
 
     def driven(self, found: Shaped, task: Task) -> Shaped:  # noqa: ARG002  most do without
-        """Return a shaped reference with the feed-forward that the drives need for it."""
+        """Return a shaped reference with the feed-forward that it needs."""
         return found
 
 
 @dataclass(frozen=True)
 class Named(Stepping):
-    """A filter by name, created as the server creates it."""
+    """A filter by name, created as on the server."""
 
     recipe: Recipe
     name: str
     label: str = ""
     alone: bool = False
-    """Whether the drives do without the elastic feed-forward that the filter is made for."""
+    """Whether to omit the elastic feed-forward for which the filter is made."""
 
     @property
     def told_target(self) -> bool:
@@ -113,14 +110,14 @@ class Named(Stepping):
         return _from_rest(self.recipe.make(task.description, task.move.mass), task)
 
     def driven(self, found: Shaped, task: Task) -> Shaped:
-        """Add what the filter needs, and the friction that is fed forward with it."""
+        """Add the feed-forward that the filter needs, and the friction fed forward with it."""
         description = task.description
         tvist = self.recipe.make(description, task.move.mass)
         elastic = None if self.alone else self.recipe.elastic(description, tvist)
         return replace(found, elastic=elastic, law=self.recipe.friction(description, tvist))
 
     def shaped(self, task: Task) -> Shaped:
-        """Shape the reference, or a motion that is planned for the filter as a robot plans it."""
+        """Shape the reference, or a motion planned for the filter as by a robot."""
         if task.stream or not task.as_served:
             return super().shaped(task)
         tvist, own = own_move(self.recipe, task.description, task.move, task.limits)
@@ -129,16 +126,14 @@ class Named(Stepping):
 
 @dataclass(frozen=True)
 class Constant(Stepping):
-    """A shaper of the catalogue with constant modes: those of the move's target, or some for a whole range."""
+    """A shaper of the catalogue with constant modes: those of the move's target, or of a whole range."""
 
     recipe: Recipe
-    """Source of the estimates."""
     name: str
     label: str
     shaper: str
-    """Shaper of the catalogue."""
     modes: int = 1
-    """Number of lowest modes at the move's target, each of which gets a shaper."""
+    """Number of lowest modes at the move's target, each with its own shaper."""
     f_d: float | None = None
     """Design frequency [Hz]; None for the estimate."""
     zeta: float | None = None
@@ -162,7 +157,7 @@ class Constant(Stepping):
             f_d, zeta = (values.tolist() for values in modes)
         else:
             f_d, zeta = [designed[0]], [designed[1]]
-        # Sufficient even if the estimate is too low.
+        # Make the buffer long enough even if the estimated frequency is too low.
         longest = max(1.0, 1.01 * sum(made.duration_periods / f for f in f_d))
         return _from_rest(
             TvistFilter(made, Fixed(f_d, zeta), joints=description.joints, max_delay=longest), task
@@ -171,14 +166,12 @@ class Constant(Stepping):
 
 @dataclass(frozen=True)
 class ConstantMeanDelay(Stepping):
-    """The modes' zero-vibration shapers in series, delayed to a constant mean delay."""
+    """The modes' ZV shapers in series, delayed to a constant mean delay."""
 
     recipe: Recipe
-    """Source of the estimates."""
     mean_delay: float
     """The constant mean delay [s]."""
     modes: int
-    """Number of modes."""
     name: str
     label: str
 
@@ -200,18 +193,18 @@ class Planned(Method):
 
     @property
     def shapes(self) -> bool:
-        """False: a stream or a curved path is no motion that it could plan."""
+        """False: it cannot plan a stream or a curved path."""
         return False
 
 
 @dataclass(frozen=True)
 class Longer(Planned):
-    """A double S with less jerk that takes as long as another motion, and uses no model."""
+    """A double S with less jerk that takes as long as another motion, without a model."""
 
     name: str
     label: str
     like: Method | None = None
-    """The method whose motion it is as long as; None for the one that the task is compared with."""
+    """Method whose duration it has; None for the motion that the task is compared with."""
 
     def shaped(self, task: Task) -> Shaped:
         """Return a double S with less jerk."""
@@ -228,10 +221,9 @@ class Longer(Planned):
 
 @dataclass(frozen=True)
 class PeriodOfJerk(Planned):
-    """A double S whose jerk lasts a period of the lowest mode at the target, which then is not excited."""
+    """A double S whose jerk lasts a period of the lowest mode at the target, which is then not excited."""
 
     recipe: Recipe
-    """Source of the estimate."""
     name: str
     label: str
 
@@ -245,7 +237,7 @@ class PeriodOfJerk(Planned):
 
 
 def _from_rest(tvist: Filter, task: Task) -> Running:
-    """Return a filter at rest at the start of a move, which is given the target as the robot does it."""
+    """Return a filter at rest at the start of a move, given the target as by a robot."""
     tvist.reset(np.array(task.move.start))
     tvist.aim(None if task.stream else np.array(task.move.target))
     return Running(tvist)

@@ -23,7 +23,7 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Angle, Mass
 
 LEAST = 1e-4
-"""A move in which no joint turns by more than this counts as going nowhere [rad]."""
+"""Rotation of the fastest joint below which a move counts as going nowhere [rad]."""
 STROKE = (0.3, 1.0)
 """Length of a random move, as a share of the way to an independent configuration [-]."""
 TRIES = 1000
@@ -31,7 +31,6 @@ TRIES = 1000
 RETARGETED = (0.2, 0.8)
 """Shortest and longest time after which a stream turns to another target [s]."""
 TURNS = 4
-"""Number of targets of a stream."""
 WITH_WRISTS = Region(low=(*WORKSPACE.low, -np.pi, -np.pi), high=(*WORKSPACE.high, np.pi, np.pi))
 """The workspace with any angles of the wrist's two outer joints."""
 
@@ -58,14 +57,14 @@ class _Entry(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
     start: tuple[Angle, ...]
     target: tuple[Angle, ...]
     payload: Mass | None = None
-    """Payload of this move; None for the one given on the command line [kg]."""
+    """Payload of this move [kg]; None for the one on the command line."""
 
 
 Entries = Annotated[tuple[_Entry, ...], Meta(min_length=1)]
 
 
 def read_moves(path: Path, description: RobotDescription, masses: Callable[[], float]) -> list[Move]:
-    """Read and check a file of moves; `masses` gives the payload of the next move that has none [kg]."""
+    """Read and check a file of moves; `masses` gives the payload of each move without one [kg]."""
     try:
         entries = checked(parse_json(read_bytes(path, "moves")), Entries)
     except OSError as error:
@@ -92,7 +91,7 @@ def write_moves(path: Path, moves: Sequence[Move]) -> None:
 
 @dataclass(frozen=True)
 class Drawn:
-    """Random moves, and the number of draws they took."""
+    """Random moves, and the number of draws that they took."""
 
     moves: list[Move]
     draws: int
@@ -113,19 +112,11 @@ def draw_moves(
     stroke: tuple[float, float] = STROKE,
     progress: Callable[[], None] = lambda: None,
 ) -> Drawn:
-    """Draw random moves between configurations of the workspace, free of collisions from start to target.
+    """Draw random moves in the workspace, free of collision from start to target.
 
-    Args:
-        description: The robot.
-        count: Number of moves.
-        seed: Seed of all random numbers.
-        masses: Smallest and largest carried mass, uniformly distributed between them [kg].
-        wrists: Whether to turn the two outer joints of the wrist, too; otherwise they stay at zero.
-        stroke: Smallest and largest length, as a share of the way to an independent configuration [-].
-        progress: Called after each move found.
-
-    Raises:
-        MovesError: Hardly any draw is free of collision, or the arm has no wrist to turn.
+    `masses` are the smallest and largest carried mass [kg]; `stroke` the smallest and largest length, as a share of
+    the way to an independent configuration [-]; with `wrists`, the two outer wrist joints turn as well; `progress` is
+    called after each move. Raises MovesError if hardly any draw is free, or the arm has no wrist.
     """
     if wrists and description.joints <= len(WORKSPACE.low):
         raise MovesError(
@@ -151,7 +142,7 @@ def draw_moves(
 def stopped_stream(
     description: RobotDescription, start: Floats, seed: int, limits: MotionLimits = PAPER
 ) -> Floats:
-    """Draw a stream that uses its limits fully, and is brought to rest before its last target, shape (T, n) [rad]."""
+    """Draw a stream that uses its limits fully and is stopped before its last target, shape (T, n) [rad]."""
     joints, random = len(start), np.random.default_rng([seed, 71])
     region = workspace(ranges(description))
     used = min(len(region.low), joints)
@@ -183,7 +174,7 @@ def stopped_stream(
 
 
 def is_free(collision: CollisionModel, move: Move) -> bool:
-    """Return whether the arm stays clear of itself and the floor on the straight line in joint space."""
+    """Whether the straight line in joint space is free of collision with arm and floor."""
     start, target = np.array(move.start), np.array(move.target)
     if collision.meeting(start) or collision.meeting(target):
         return False
@@ -191,7 +182,7 @@ def is_free(collision: CollisionModel, move: Move) -> bool:
 
 
 def meeting(collision: CollisionModel, move: Move) -> str | None:
-    """Return which bodies meet on a move, in words; None if none do."""
+    """Return which bodies meet on a move, as text; None if none do."""
     start, target = np.array(move.start), np.array(move.target)
     found = collision.on_way(JointLine(start, target).whole)
     if found is None:
@@ -219,7 +210,6 @@ def _draws(
     masses: tuple[float, float],
     stroke: tuple[float, float],
 ) -> Iterator[Move]:
-    """Yield candidates without end."""
     used = min(len(region.low), joints)
     low, high = (np.array(side)[:used] for side in (region.low, region.high))
     while True:
@@ -247,7 +237,7 @@ def _check(number: int, move: Move, description: RobotDescription) -> None:
 
 
 def _in_words(why: str) -> str:
-    """Return a sentence with the position counted from 1: `[2].start[1]` is move 3, start, joint 2."""
+    """Convert the position in an error to words: `[2].start[1]` is move 3, start, joint 2."""
     words = re.sub(r"^\[(\d+)\]\.?", lambda found: f"move {int(found[1]) + 1}, ", why)
     words = re.sub(
         r"^(move \d+, \w+)\[(\d+)\]", lambda found: f"{found[1]}, joint {int(found[2]) + 1}", words

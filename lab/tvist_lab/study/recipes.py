@@ -1,4 +1,4 @@
-"""What the server makes of a calibration, optionally with a wrong frequency: filters, moves, shapers for all poses."""
+"""Create filters, moves and fixed shapers from a calibration as the server does, optionally with a wrong frequency."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -34,15 +34,15 @@ from tvist_shaping.named import Registry
 from tvist_shaping.taps import mean_delay
 
 CONFIGURATIONS = 150
-"""Number of configurations in which the range of the lowest mode is determined."""
+"""Number of configurations over which the range of the lowest mode is determined."""
 SEARCHED = 2000
-"""Number of configurations searched for the longest mean delay. A delay above it would exceed the motion's limits."""
+"""Number of configurations searched for the longest mean delay; a longer one would exceed the motion's limits."""
 
 Range = tuple[float, float]
 
 
 class RecipeError(ValueError):
-    """There is no such filter for this arm; the message says why."""
+    """There is no such filter for this arm; the message tells why."""
 
 
 class FrequencyError(Estimator):
@@ -74,21 +74,21 @@ class FrequencyError(Estimator):
 
 @dataclass(frozen=True)
 class Recipe:
-    """Ingredients of a filter; they can be sent to another process, which a filter cannot."""
+    """Ingredients of a filter; unlike a filter, they can be sent to another process."""
 
     shaper: str
     """Name of a filter, as in `set_shaper`."""
     calibration: Calibration | None
-    """Calibration of the arm; its modal model is used if there is one, else its polynomials."""
+    """Calibration of the arm; its modal model is preferred to its polynomials."""
     frequency_error: float = 0.0
     """Share by which every frequency is too high [-]."""
     modes: int = 1
     """Number of modes that a shaper of the catalogue suppresses; more than one requires a modal calibration."""
     own: tuple[OwnShaper, ...] = ()
-    """Shapers from files, available by name beside those that come with the package."""
+    """Shapers from files, available by name besides those of the package."""
 
     def make(self, description: RobotDescription, mass: float) -> Filter:
-        """Create the filter for a declared payload that is the paper's disc with another mass."""
+        """Create the filter for the paper's disc with this declared mass [kg]."""
         known = Registry(own.shaper for own in self.own)
         modes = wanted_modes(self.shaper, self.modes, "shaper", known)
         if self.shaper == "none":
@@ -97,7 +97,7 @@ class Recipe:
         return choose_filter(self.shaper, estimator, description.joints, known=known)
 
     def elastic(self, description: RobotDescription, tvist: Filter) -> ElasticFeedForward | None:
-        """Create the elastic feed-forward that the filter needs; None if it does without."""
+        """Create the elastic feed-forward that the filter needs, if any."""
         if self.calibration is None:
             return None
         try:
@@ -106,7 +106,7 @@ class Recipe:
             raise RecipeError(f"shaper {self.shaper}: {error}") from error
 
     def friction(self, description: RobotDescription, tvist: Filter | None = None) -> Floats | None:
-        """Return the friction that the drives are fed forward with a filter or unshaped, see `known_friction`."""
+        """Return the friction fed forward with a filter or unshaped, see `known_friction`."""
         try:
             return known_friction(tvist, description, self.calibration)
         except EstimatorError as error:
@@ -143,13 +143,13 @@ def own_move(
 
 
 def robust(name: str, recipe: Recipe, description: RobotDescription, masses: Range) -> Range:
-    """Design frequency [Hz] and damping ratio [-] of a fixed shaper for the lowest mode's range over the workspace."""
+    """Return design frequency [Hz] and damping ratio of a fixed shaper for the lowest mode over the workspace."""
     f_d, zeta = workspace_range(recipe, description, masses)
     return robust_over(name, f_d, (zeta[0], min(zeta[1], 0.999 * shaper(name).zeta_max)))
 
 
 def workspace_range(recipe: Recipe, description: RobotDescription, masses: Range) -> tuple[Range, Range]:
-    """Smallest and largest damped frequency [Hz] and damping ratio [-] of the lowest mode, as estimated."""
+    """Return the range of estimated damped frequency [Hz] and damping ratio [-] of the lowest mode."""
     found = [
         (f_d[0], zeta[0]) for f_d, zeta in _over_workspace(recipe, description, masses, 1, CONFIGURATIONS)
     ]
@@ -167,7 +167,7 @@ def longest_mean_delay(recipe: Recipe, description: RobotDescription, masses: Ra
 def _over_workspace(
     recipe: Recipe, description: RobotDescription, masses: Range, modes: int, count: int
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Damped frequencies [Hz] and damping ratios [-] of the lowest modes, with the smallest and the largest payload."""
+    """Yield damped frequencies [Hz] and damping ratios [-] of the lowest modes, with smallest and largest payload."""
     region = workspace(ranges(description))
     for mass in sorted(set(masses)):
         estimator = recipe.estimator(description, mass, modes)

@@ -1,4 +1,4 @@
-"""A shaper applied to one reference until it ends, with checks for hidden motion."""
+"""Apply a shaper to one reference until it ends, and check for hidden motion."""
 
 import time
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
 LONGEST = 3.0
-"""Time after the reference's end within which a shaped reference has to end [s]."""
+"""Time after the reference's end within which a shaped reference must end [s]."""
 ENDED = 10
 """Number of ticks at the target after which the output has ended."""
 WATCHED = 0.5
@@ -26,23 +26,23 @@ WARM = 20
 
 
 class ShaperFaultError(Exception):
-    """A shaper's output is no shaped reference, so no figure can be based on it; the message says why."""
+    """A shaper's output is no valid shaped reference; the message tells why."""
 
 
 @dataclass(frozen=True)
 class Shaped:
-    """A shaped reference, and what the drives need to follow it."""
+    """A shaped reference, and the feed-forward to follow it."""
 
     q: Floats
     """Samples up to the end and a few ticks more, shape (T', n) [rad]."""
     delay: float = 0.0
-    """Time from the reference's end to the output's, limited to the declared delay [s]."""
+    """Time from the reference's end to the output's, at most the declared delay [s]."""
     cost: float | None = None
     """Measured processor time per tick [s]."""
     elastic: ElasticFeedForward | None = None
     """Elastic feed-forward for the drives; None for that of the paper's controller."""
     law: Floats | None = None
-    """Friction that the drives are fed forward with it; None for that of the unshaped motion."""
+    """Friction to feed forward; None for that of the unshaped motion."""
     ended: bool = True
     """Whether it came to rest at the target."""
 
@@ -55,19 +55,19 @@ class RunningShaper(Protocol):
 
     @property
     def delay(self) -> float | None:
-        """Time over which the last output depends on the past [s]; None if the shaper does not declare it."""
+        """Time over which the last output depends on the past [s]; None if not declared."""
 
 
 @runtime_checkable
 class InOneGo(Protocol):
-    """A shaper that takes many samples at once, faster than one by one."""
+    """A shaper that can process many samples at once, faster than one by one."""
 
     def all(self, q: Floats) -> Floats:
         """Return the next samples, shape (T, n) [rad], equal to those one by one."""
 
 
 class Running:
-    """A filter in operation, which fails when its shaper's function does, so that no figure has old weights."""
+    """A filter in operation; it fails if its shaper's function does, so that no result has old weights."""
 
     def __init__(self, tvist: Filter) -> None:
         self._tvist = tvist
@@ -92,10 +92,9 @@ class Running:
 
 
 def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped:
-    """Apply a shaper to a reference until it rests at the target; both are at rest at its first and last sample.
-
-    If it is watched, it has to end, keep its word about its delay, and hide no tail; its processor time is measured.
-    """
+    """Apply a shaper to a reference, at rest at both ends, until the output rests at the target."""
+    # If it is watched, the shaper must end, keep its declared delay and hide no tail, else ShaperFaultError is
+    # raised; its processor time is measured.
     target, stop = reference[-1], len(reference) - 1
     q, cost = _through(stepper, reference, timed=watched)
     declared = [stepper.delay]
@@ -116,7 +115,7 @@ def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped
 
 
 def _through(stepper: RunningShaper, reference: Floats, *, timed: bool) -> tuple[list[Floats], float | None]:
-    """Shape a reference; return the samples, and the processor time of a tick if it is wanted."""
+    """Shape a reference; return the samples and, if `timed`, the processor time per tick [s]."""
     if not timed and isinstance(stepper, InOneGo):
         return list(stepper.all(reference)), None
     warm = min(WARM, len(reference) - 1)
@@ -135,7 +134,7 @@ def _check_end(last: Floats, target: Floats, *, ended: bool) -> None:
 
 
 def _check_tail(stepper: RunningShaper, target: Floats) -> None:
-    """Run on for a while, and check that the output stays at the target."""
+    """Continue for a while, and check that the output stays at the target."""
     for late in range(round(WATCHED / PERIOD)):
         away = float(np.abs(stepper.step(target) - target).max())
         if away > TAIL:
@@ -146,7 +145,7 @@ def _check_tail(stepper: RunningShaper, target: Floats) -> None:
 
 
 def _check_word(q: list[Floats], stop: int, declared: list[float | None], own: float) -> None:
-    """Check that the output does not move for longer than was declared at each tick."""
+    """Check that the output does not move for longer than declared at each tick."""
     for late, said in enumerate(declared):
         if said is None or late * PERIOD <= said + SLACK * PERIOD:
             continue

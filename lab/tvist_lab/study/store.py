@@ -1,8 +1,4 @@
-"""The folder of a study: what determines its rows, the parts done so far, and at the end all rows in one file.
-
-Each file is written under another name, and renamed when it is complete, so that every file of the folder can be read
-at any time, whatever ended the program.
-"""
+"""The folder of a study; each file is renamed when complete, so that all can be read even after a crash."""
 
 import fcntl
 import io
@@ -19,11 +15,10 @@ from tvist_lab.study.work import FAILED
 from tvist_lab.whole_file import UNFINISHED, whole_file
 
 MANIFEST = "study.json"
-"""What determines the rows."""
+"""File with the study's identity, which determines the rows."""
 PARTS = "parts"
-"""Folder of the parts of a study that has not ended."""
+"""Folder for the parts of an unfinished study."""
 ROWS = "rows.parquet"
-"""All rows of a study that has ended."""
 
 
 class StoreError(OSError):
@@ -31,7 +26,7 @@ class StoreError(OSError):
 
 
 class Store:
-    """An open folder; no other process can open it meanwhile."""
+    """An open folder, locked against other processes."""
 
     def __init__(self, folder: Path, identity: dict[str, Any], schema: dict[str, Any]) -> None:
         self.folder, self._schema = folder, schema
@@ -79,7 +74,7 @@ class Store:
         os.close(self._lock)
 
     def rows(self) -> pl.DataFrame:
-        """Return all rows that there are, each once, in the order of their cases."""
+        """Return all available rows, each once, in the order of their cases."""
         found = pl.concat([pl.DataFrame(schema=self._schema), *map(self._read, self._files())])
         found = found.unique(["case", "shaper", "arm"], keep="last", maintain_order=True)
         return found.sort("case", maintain_order=True)
@@ -93,7 +88,7 @@ class Store:
             ) from error
 
     def done(self) -> set[int]:
-        """Return the cases that are done: their rows are there, and none failed."""
+        """Return the cases that are done: all their rows exist and none failed."""
         found = self.rows().group_by("case").agg(well=(pl.col("status") != FAILED).all())
         return set(found.filter("well")["case"].to_list())
 

@@ -1,4 +1,4 @@
-"""A study: cases by methods, what is computed of their rows, and what tables, page and figures show."""
+"""A study: cases by methods, computed values, and the content of tables, page and figures."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,7 +25,7 @@ KINDS: Mapping[type, Any] = {
     str: pl.String,
     list: pl.List(pl.Float64),
 }
-"""Types of columns by those of the values of an axis."""
+"""Column types by the type of an axis's values."""
 COUNTS = {
     "rows": pl.len(),
     **{
@@ -33,20 +33,19 @@ COUNTS = {
         for status in (MEASURED, TOO_WEAK, FAILED)
     },
 }
-"""What is counted in each group of rows."""
+"""Counts in each group of rows."""
 DIGITS = 3
-"""Decimals of the measures that a study shows."""
 
 Figures = Mapping[str, tuple[Figure, str]]
-"""Figures and their captions, by the names of their files without suffix."""
+"""Figures and captions, by file name without suffix."""
 
 
 class StudyError(ValueError):
-    """A study cannot be made; the message says why."""
+    """A study cannot be made; the message tells why."""
 
 
 def of_measures(*names: str) -> tuple[Column, ...]:
-    """Return columns of the medians of measures, and of their 95th percentiles."""
+    """Return columns of the medians and 95th percentiles of measures."""
     return tuple(
         Column(f"{name}\n{called}", share(name, of, called), DIGITS, meaning=_meaning(name))
         for name in names
@@ -55,7 +54,7 @@ def of_measures(*names: str) -> tuple[Column, ...]:
 
 
 def ends_of(*names: str) -> tuple[Column, ...]:
-    """Return columns of the least and the largest values of measures."""
+    """Return columns of the smallest and the largest values of measures."""
     return tuple(
         Column(f"{name}\n{called}", of(name), DIGITS, meaning=_meaning(name))
         for name in names
@@ -75,73 +74,68 @@ class Result:
 
     study: "Study"
     rows: pl.DataFrame
-    """All rows."""
     values: dict[str, Any]
-    """What --json prints."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Every method makes every case."""
+    """A study in which every method makes every case."""
 
     title: str
     cases: Sequence[Case]
-    """The cases, each with the same axes; a case may have methods of its own."""
+    """Cases, each with the same axes; a case may have its own methods."""
     methods: Sequence[Method] = ()
     by: tuple[str, ...] = ()
-    """Axes that the tables distinguish, besides several arms and methods; the figure is drawn over the
-    first. The other axes, such as the number of the move, are summarized. """
+    """Axes that the tables distinguish besides arms and methods; the figure is drawn over the first one.
+    Other axes, such as the number of the move, are summarized."""
     pooled: tuple[str, ...] = ()
-    """What the tables do not distinguish though it differs: "arm" or "shaper"."""
+    """What the tables do not distinguish although it differs: "arm" or "shaper"."""
     splits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """Further axes that further summaries distinguish, by the names that these have in --json."""
+    """Further axes for additional summaries, by their names in --json."""
     show: tuple[str, ...] = ("reduction_percent", "delay_ms")
-    """Measures in the figure, and in the table unless there are columns."""
+    """Measures in the figure, and in the table if there are no columns."""
     columns: tuple[Column, ...] = ()
-    """Columns of the table."""
     few: tuple[Column, ...] = ()
-    """Its columns where so few rows count that a median says nothing."""
+    """Columns if too few rows count for a median."""
     more: tuple[pl.Expr, ...] = ()
-    """What is computed of each group of rows besides, for --json."""
+    """Further values of each group of rows, for --json."""
     measures: tuple[str, ...] = OF_PEAKS
-    """What is measured and kept in the rows besides what the columns need."""
+    """Measures kept in the rows besides those that the columns need."""
     prepare: Callable[[pl.DataFrame], pl.DataFrame] = lambda rows: rows
-    """What is computed of all rows together before they are grouped."""
+    """Transforms all rows before they are grouped."""
     finish: Callable[[Result], None] = lambda _: None
     """Adds to a result what no column can compute."""
     tables: Callable[[Result], Sequence[Table]] | None = None
-    """The tables; None for one with the summary."""
+    """Returns the tables; None for one with the summary."""
     draw: Callable[[Result], Figures] | None = None
     """Draws the figures; None for the measures over the first axis."""
     as_served: bool = True
-    """Whether moves are planned for the shaper as a robot plans them, instead of giving it the same
-    reference."""
+    """Whether moves are planned for the shaper as by a robot, instead of using the same reference."""
     notes: str = ""
-    """What a reader should know."""
     facts: Mapping[str, Any] = field(default_factory=dict)
-    """What determines the cases, for --json."""
+    """Properties of the cases, for --json."""
     identity: Mapping[str, Any] = field(default_factory=dict)
-    """What determines the rows, besides title, facts and the version of tvist: rows of another one are not
+    """What determines the rows besides title, facts and version of tvist: rows of another identity are not
     continued."""
 
     @property
     def shown(self) -> tuple[Column, ...]:
-        """The columns of its table, without what distinguishes the lines."""
+        """Columns of its table, without those that distinguish the lines."""
         return self.columns or of_measures(*self.show)
 
     @property
     def jobs(self) -> Sequence[Job]:
-        """What workers do, each made when it is asked for."""
+        """Jobs for workers, each created on access."""
         return _Jobs(self)
 
     @property
     def measured(self) -> tuple[str, ...]:
-        """All that is measured."""
+        """All measures."""
         return tuple(dict.fromkeys((*self.measures, *(name for name in self._needed() if name in MEASURES))))
 
     @property
     def schema(self) -> dict[str, Any]:
-        """Types of the columns of its rows."""
+        """Column types of its rows."""
         axes = {name: _kind_of(name, self.cases) for name in self.cases[0].axes}
         figures = dict.fromkeys(self.measured, pl.Float64)
         texts = dict.fromkeys(("shaper", "arm", "status"), pl.String)
@@ -154,7 +148,7 @@ class Study:
         return [name for name in dict.fromkeys((*self.by, *several, "shaper")) if name not in self.pooled]
 
     def check(self) -> None:
-        """Check that it can be made."""
+        """Raise StudyError if the study cannot be made."""
         if not self.cases or not (self.methods or self.cases[0].methods):
             raise StudyError("it needs a case and a method at least")
         for place, case in enumerate(self.cases):
@@ -194,16 +188,16 @@ class Study:
                 raise StudyError(f"column {one.title!r} needs an expression, such as median({one.of!r})")
 
     def determined_by(self) -> dict[str, Any]:
-        """Return what determines the rows, by names that a message can give."""
+        """Return what determines the rows, by names for messages."""
         return {"title": self.title, **self.facts, **self.identity, "version of tvist": version("tvist")}
 
     def frame(self, rows: Sequence[Row]) -> pl.DataFrame:
-        """Return rows as a table with all columns; what a row lacks is null."""
+        """Return rows as a table with all columns; missing values are null."""
         schema = self.schema
         return pl.DataFrame([{name: row.get(name) for name in schema} for row in rows], schema=schema)
 
     def summary(self, rows: pl.DataFrame, *more: str) -> list[dict[str, Any]]:
-        """Return an entry for each group of rows, which differ in no key and in none of some more axes."""
+        """Return an entry for each group of rows that agree in all keys, and in the axes `more`."""
         grouped = self.prepare(rows).group_by([*self.keys, *more], maintain_order=True)
         return grouped.agg(**COUNTS, **self._computed()).to_dicts()
 
@@ -219,7 +213,7 @@ class Study:
         return [name for one in self._computed().values() for name in one.meta.root_names()]
 
     def result(self, rows: pl.DataFrame, about: Mapping[str, Any]) -> Result:
-        """Return what was found."""
+        """Return the result of all rows."""
         methods = {one.name: one for one in (*self.cases[0].methods, *self.methods)}
         values = {
             "title": self.title, **self.facts, **about,
@@ -242,7 +236,7 @@ class Study:
         return [self.table_of(result.values["summary"])]
 
     def table_of(self, entries: Sequence[dict[str, Any]], title: str = "") -> Table:
-        """Return the table of a summary: of few rows, with their ends instead of medians."""
+        """Return the table of a summary; with few rows, with extremes instead of medians."""
         many = all(entry.get("counted", entry["rows"]) >= MANY for entry in entries)
         columns = self.shown if many else self.few or (self.columns or ends_of(*self.show))
         return Table(title, entries, [*(Column(name, name) for name in self.keys), *columns])
@@ -261,7 +255,7 @@ class _Jobs(Sequence[Job]):
 
 
 def _kind_of(name: str, cases: Iterable[Case]) -> Any:
-    """Return the type of the column of an axis; whole numbers and others among them are as the others."""
+    """Return the column type of an axis; mixed whole numbers and floats are floats."""
     kinds = {type(case.axes[name]) for case in cases}
     if kinds == {int, float}:
         kinds = {float}

@@ -1,4 +1,4 @@
-"""What a worker does: make a case by some methods on its arms, and measure each motion: one flat row a motion."""
+"""The work of a job: make a case by some methods on its arms, and measure each motion as one flat row."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -20,20 +20,18 @@ from tvist_plant.plant import PERIOD, SimulatedArm
 from tvist_plant.user_file import named
 
 MEASURED, TOO_WEAK, FAILED = "measured", "too weak", "failed"
-"""What became of a row."""
 
 Row = Mapping[str, Any]
-"""A row: a value, or None, by the name of its column."""
+"""A row: values by column name."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A case, and the methods to make it by."""
+    """A case, and the methods to make it."""
 
     case: Case
     methods: tuple[Method, ...]
     measures: tuple[str, ...] = OF_PEAKS
-    """Names of the columns to measure."""
     as_served: bool = True
     """See `Task.as_served`."""
 
@@ -43,21 +41,21 @@ class Job:
         return len(self.methods) * len(self.case.arms)
 
     def head(self, method: str, arm: str) -> dict[str, Any]:
-        """Return the cells of a row that are known before anything is made."""
+        """Return the cells of a row that are known in advance."""
         return {**self.case.axes, "shaper": method, "arm": arm}
 
 
 class Bench:
-    """The arms and the line of a job, on which its motions are made."""
+    """The arms and the control line of a job."""
 
     def __init__(self, job: Job) -> None:
         self.job, case = job, job.case
         self.task = Task(
             case.description, case.declared, case.reference(), case.limits, job.as_served, case.stream
         )
-        """What the first method gets."""
-        # A robot has one calibration: the friction in it is fed forward whatever shapes, and unshaped as well. A method
-        # that is made for more has it in `Shaped.law`.
+        """Task of the first method."""
+        # The friction in the robot's calibration is fed forward for every method, shaped or not; a method with
+        # another friction sets `Shaped.law`.
         recipes = (getattr(method, "recipe", None) for method in job.methods)
         law = next((recipe.friction(case.description) for recipe in recipes if recipe is not None), None)
         self._line = ControlLine(
@@ -65,11 +63,11 @@ class Bench:
         )
         self._plain: dict[str, Motion] = {}
         self.ticks: int | None = None
-        """Duration of the first motion, which others are as long as; None before it is measured."""
+        """Duration of the first motion, for methods of equal duration; None before it is measured."""
 
     @cached_property
     def _arms(self) -> dict[str, SimulatedArm]:
-        """The arms by their names, each of which starts anew with each motion."""
+        """The arms by name, each reset for every motion."""
         case, carried = self.job.case, self._body(self.job.case.move.mass)
         return {arm.name: arm.make(case.description, carried, case.seed) for arm in case.arms}
 
@@ -77,7 +75,7 @@ class Bench:
         return body(paper_payload(self.job.case.description, mass))
 
     def make(self, method: Method) -> Iterator[tuple[str, Motion]]:
-        """Yield the motion of each arm, with the arm's name."""
+        """Yield each arm's name and motion."""
         if isinstance(method, Waiting):
             yield from ((arm.name, self.unshaped(arm.name)) for arm in self.job.case.arms)
             return
@@ -104,13 +102,13 @@ class Bench:
 
 
 def measure(job: Job) -> tuple[Row, ...]:
-    """Make a case by every method, on every arm; methods after the first are compared with it."""
+    """Make a case by every method on every arm; methods after the first are compared with it."""
     bench = Bench(job)
     return tuple(row for method in job.methods for row in _rows(bench, method))
 
 
 def measure_each(job: Job) -> tuple[Row, ...]:
-    """Make a case by every method; a method that fails costs its own rows alone."""
+    """Make a case by every method; a failing method loses only its own rows."""
     try:
         share = 0.0 if job.case.stream or not job.as_served else job.case.torque_share
         if share > 1.0:
@@ -133,7 +131,6 @@ def measure_each(job: Job) -> tuple[Row, ...]:
 
 
 def _rows(bench: Bench, method: Method) -> list[Row]:
-    """Make the motions of a method, and measure them."""
     job = bench.job
     found: list[Row] = []
     for arm, motion in bench.make(method):
@@ -143,19 +140,19 @@ def _rows(bench: Bench, method: Method) -> list[Row]:
 
 
 def record(job: Job) -> tuple[Recording, Recording]:
-    """Record a case unshaped, and by the first method of a job, on its first arm."""
+    """Record a case on its first arm, unshaped and by the job's first method."""
     bench = Bench(job)
     ((_, motion), *_) = bench.make(job.methods[0])
     return motion.unshaped.recording, motion.recording
 
 
 def failed(job: Job, status: str, error: str) -> tuple[Row, ...]:
-    """Return the rows of a job that measures nothing."""
+    """Return the rows of a job without measurements."""
     return tuple(row for method in job.methods for row in _lost(job, method.name, status, error))
 
 
 def why(error: Exception) -> str:
-    """Return an error in one line."""
+    """Return an error as one line."""
     return str(error) if isinstance(error, TaskError) else named(error)
 
 

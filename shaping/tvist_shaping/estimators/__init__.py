@@ -1,4 +1,4 @@
-"""Estimators of the modes, with different models of f_d(q) and ζ(q)."""
+"""Estimators, which provide the modes f_d(q) and ζ(q) from different models."""
 
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.basis import terms

@@ -1,4 +1,4 @@
-"""Base of all estimators, which provide a filter with the modes of the arm."""
+"""Base class of all estimators."""
 
 from abc import ABC, abstractmethod
 
@@ -10,13 +10,11 @@ class Estimator(Forked, ABC):
 
     Attributes:
         modes: Number of modes estimated, >= 1.
-        f_d_min: Lower bound of every mode's damped frequency over every q [Hz], > 0. It determines the longest possible
-            delay.
-        zeta_max: Upper bound of every mode's damping ratio over every q [-], < 1.
-        clipped: Whether a mode of the last estimate was outside `f_d_min` or `zeta_max` and was clamped to it, so
-            that the arm's mode differs. It is always False for an estimator whose bounds are those of its modes.
-        abrupt: Whether modes may change almost at once from one configuration to the next, as where two of them come
-            close.
+        f_d_min: Lower bound of every mode's damped frequency at every q [Hz], > 0; determines the longest delay.
+        zeta_max: Upper bound of every mode's damping ratio at every q [-], < 1.
+        clipped: Whether a mode of the last estimate was clamped to `f_d_min` or `zeta_max`, so that the arm's mode
+            differs. It is always False for an estimator whose bounds are those of its modes.
+        abrupt: Whether modes may change almost at once between nearby configurations, as where two of them meet.
     """
 
     modes: int
@@ -27,25 +25,17 @@ class Estimator(Forked, ABC):
 
     @abstractmethod
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
-        """Estimate the modes at a configuration.
+        """Return f_d [Hz] and ζ [-] at a configuration, each of shape (modes,); these arrays are not modified later.
 
         Args:
             q: Joint angles [rad], shape (joints,), finite.
-
-        Returns:
-            f_d [Hz] and ζ [-], each of shape (modes,). The estimator does not modify these arrays later.
         """
 
     def settle(self, q: Floats) -> tuple[Floats, Floats]:
-        """Estimate the modes anew, where a jump of the estimate has no effect: at rest, or when a filter begins.
+        """Estimate the modes anew, where a jump has no effect: at rest, or when a filter starts.
 
         An estimator that follows its modes from one configuration to the next may switch to other modes only here,
-        since a jump would shake a moving arm. Other estimators return their usual estimate.
-
-        Args:
-            q: Joint angles, see `estimate`.
-
-        Returns:
-            Modes, see `estimate`.
+        since a jump would shake a moving arm. Other estimators return their usual estimate. Argument and result are
+        those of `estimate`.
         """
         return self.estimate(q)

@@ -1,9 +1,8 @@
-"""Trigonometric basis functions of the joint angles for polynomial estimators.
+"""Trigonometric basis functions of the joint angles, for polynomial estimators.
 
-These are 1, and cos(m·u), sin(m·u) for integer m ≠ 0 with Σ |m_k| <= degree; of each pair m and -m, only the one whose
-first non-zero entry is positive. They are periodic in every joint, as the arm is.
-
-u = q - centre of the selected joints. The order is by degree and fixed, since coefficients refer to it.
+With u = q - centre of the selected joints, these are 1, and cos(m·u), sin(m·u) for integer m ≠ 0 with Σ |m_k| <=
+degree; of m and -m, only the one whose first non-zero entry is positive. They are periodic in every joint, as the arm
+is. They are ordered by degree; coefficients rely on this fixed order.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,24 +16,18 @@ from tvist_shaping.errors import EstimatorError
 
 MAX_JOINTS = 7
 MAX_TERMS = 1000
-"""Largest number of terms; more would take too much of a tick, and could not be identified from ring-downs."""
+"""Largest number of terms; more would take too long in a tick, and ring-downs could not identify them."""
 
 
 class BasisFunctions:
-    """A set of basis functions.
+    """A set of basis functions of selected joints."""
 
-    Attributes:
-        joints: Indices of the selected joints, from 0.
-        degree: Highest total degree.
-        centre: Angles that are subtracted [rad], shape (len(joints),), read-only.
-    """
-
-    joints: tuple[int, ...]
-    degree: int
-    centre: Floats
+    joints: tuple[int, ...]  # indices of the selected joints, from 0
+    degree: int  # highest total degree
+    centre: Floats  # angles that are subtracted [rad], shape (len(joints),), read-only
 
     def __init__(self, joints: Sequence[int], degree: int, centre: npt.ArrayLike | None = None) -> None:
-        """Create the basis for different indices of joints from 0, at most 7."""
+        """Create the basis for up to 7 different joints; raise EstimatorError if an argument is invalid."""
         n = len(joints)
         if not 1 <= n <= MAX_JOINTS or len(set(joints)) != n or not set(joints) <= set(range(MAX_JOINTS)):
             raise EstimatorError("joints", joints, f"1 to {MAX_JOINTS} different indices below {MAX_JOINTS}")
@@ -50,12 +43,11 @@ class BasisFunctions:
         self.centre.setflags(write=False)
 
     def __len__(self) -> int:
-        """Number of terms."""
         n, degree = len(self.joints), self.degree
         return sum(2**i * comb(n, i) * comb(degree, i) for i in range(n + 1))
 
     def multiples(self) -> npt.NDArray[np.int64]:
-        """Combinations m ≠ 0, one per row, shape (rows, len(joints))."""
+        """Return the combinations m ≠ 0, one per row, shape (rows, len(joints))."""
         n = len(self.joints)
         rows = [
             row
@@ -66,7 +58,7 @@ class BasisFunctions:
         return np.array(rows, dtype=np.int64).reshape(len(rows), n)
 
     def terms(self, q: npt.ArrayLike) -> Floats:
-        """Evaluate every basis function for a fit: 1, then cos and sin of each combination."""
+        """Return the design matrix of a fit, shape (N, terms): 1, then cos and sin of each combination."""
         angles = np.asarray(q, dtype=float)
         if angles.ndim != 2 or angles.shape[1] <= max(self.joints):
             raise EstimatorError("q", angles.shape, f"of shape (N, n), n > {max(self.joints)}")
@@ -92,16 +84,15 @@ def _rows(n: int, total: int) -> Iterator[tuple[int, ...]]:
 def terms(
     q: npt.ArrayLike, *, joints: Sequence[int], degree: int, centre: npt.ArrayLike | None = None
 ) -> Floats:
-    """Return the design matrix for fitting the coefficients of a `Polynomial` with these parameters.
+    """Return the design matrix for fitting the coefficients of a `Polynomial` with these parameters [-].
+
+    Its shape is (N, terms), in the order of the coefficients.
 
     Args:
         q: Configurations [rad], shape (N, n).
-        joints: Selected joints; all further arguments are as in `Polynomial`.
+        joints: Selected joints; this and all further arguments are as in `Polynomial`.
         degree: Highest total degree.
         centre: Centre of the angles [rad], shape (len(joints),).
-
-    Returns:
-        Values [-], shape (N, terms), in the order of the coefficients.
 
     Raises:
         EstimatorError: A parameter is invalid.

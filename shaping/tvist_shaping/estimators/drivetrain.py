@@ -1,6 +1,6 @@
-"""Springs and motors of an arm; with its mass matrix, all its poles follow from the linearised equations.
+"""Springs and motors of an arm; with its mass matrix they give all poles of the linearised equations.
 
-A flexible joint is a motor under P control of position and velocity in series with its gear, the textbook model.
+A flexible joint is the textbook model: a motor under P control of position and velocity, in series with its gear.
 """
 
 from dataclasses import dataclass
@@ -53,13 +53,10 @@ class Drivetrain:
         )
 
     def system(self, mass: Floats) -> tuple[Floats, Floats, Floats]:
-        """Inertia, damping and stiffness of the L coordinates followed by the n motors that drive some of them.
+        """Return inertia, damping and stiffness of the L coordinates, then the n motors, each of shape (L+n, L+n).
 
         Args:
             mass: M(q), shape (L, L) [kg m^2].
-
-        Returns:
-            Three matrices of shape (L+n, L+n).
         """
         K, B, K_d, K_p, D = self.rows
         driven = np.flatnonzero(B)
@@ -76,13 +73,12 @@ class Drivetrain:
         return inertia, damping, stiffness
 
     def poles(self, mass: Floats) -> tuple[Complex, Complex]:
-        """Compute all vibrating poles, as eigenvalues of the whole linear system.
+        """Return all vibrating poles, as eigenvalues of the whole linear system, and their shapes.
+
+        Poles are in the order of frequency, shape (k,) [1/s]; shapes are (k, L) with largest entry 1.
 
         Args:
             mass: M(q), shape (L, L) [kg m^2].
-
-        Returns:
-            Poles in the order of their frequency, shape (k,) [1/s], and their shapes, (k, L), with largest entry 1.
         """
         inertia, damping, stiffness = self.system(mass)
         L, N = len(self.stiffness), len(inertia)

@@ -1,11 +1,11 @@
 """One flexible joint whose inertia depends on the configuration: its mode in closed form.
 
-The paper's Figure 2: an actuator with flexibility carries an arm that stretches and folds. With a motor that holds its
-reference q*, a spring K and a damper D beside it, the link's angle θ obeys
+As in the paper's Figure 2, an actuator with flexibility carries an arm that stretches and folds. With a motor that
+holds its reference q*, and a spring K and a damper D in parallel, the link's angle θ obeys
 
     I θ̈ + D (θ̇ - q̇*) + K (θ - q*) = 0
 
-where the arm that it carries does not move within itself. This is a mode with (any textbook of vibrations; eq. (5))
+while the arm behind the joint keeps its shape. This is a mode with (any textbook on vibrations; eq. (5))
 
     ω_n = √(K/I),    ζ = D / (2 √(K I)),    f_d = ω_n/(2π) √(1 - ζ²)
 """
@@ -21,15 +21,12 @@ from tvist_shaping.estimators.base import Estimator
 
 
 def flexible_joint(inertia: float, stiffness: float, damping: float) -> tuple[float, float]:
-    """Mode of a flexible joint that carries an inertia: ω_n = √(K/I), ζ = D/(2√(K I)) and eq. (5).
+    """Return f_d [Hz] and ζ [-] of a flexible joint that carries an inertia: ω_n = √(K/I), ζ = D/(2√(K I)) and eq. (5).
 
     Args:
         inertia: I about the joint's axis [kg m²], > 0.
         stiffness: K of its spring [N m/rad], > 0.
-        damping: D of the damper beside the spring [N m s/rad], >= 0.
-
-    Returns:
-        f_d [Hz] and ζ [-].
+        damping: D of the damper parallel to the spring [N m s/rad], >= 0.
 
     Raises:
         EstimatorError: A value is out of range, or so much damping leaves no vibration.
@@ -50,10 +47,10 @@ class FlexibleJoint(Estimator):
     """Estimator of one flexible joint: f_d(q) and ζ(q) from the inertia I(q) that it carries.
 
     Args:
-        inertia: I(q) about the joint's axis, of joint angles of shape (joints,) [kg m²].
-        inertia_range: Smallest and largest inertia [kg m²]; an inertia beyond is held there, and `clipped` says so.
+        inertia: Function from joint angles, shape (joints,) [rad], to I about the joint's axis [kg m²].
+        inertia_range: Smallest and largest inertia [kg m²]; others are clamped to it, and set `clipped`.
         stiffness: K of the joint's spring [N m/rad].
-        damping: D of the damper beside the spring [N m s/rad].
+        damping: D of the damper parallel to the spring [N m s/rad].
 
     Raises:
         EstimatorError: A value is out of range.
@@ -72,7 +69,7 @@ class FlexibleJoint(Estimator):
         self._inertia, self._low, self._high = inertia, float(low), float(high)
         self._stiffness, self._damping = float(stiffness), float(damping)
         ends = [flexible_joint(end, self._stiffness, self._damping) for end in (self._low, self._high)]
-        # Between the ends f_d² = (K/I - D²/4I²)/4π² has a maximum at most, and ζ falls with the inertia.
+        # Between the ends, f_d² = (K/I - D²/4I²)/4π² has no minimum, and ζ decreases with the inertia.
         self.modes, self.f_d_min, self.zeta_max = 1, min(f_d for f_d, _ in ends), ends[0][1]
 
     def __repr__(self) -> str:

@@ -7,9 +7,8 @@ or the bending of a link, which is a spring with a damper:
                                               κ(s) = k           at a bend,   k(s) = K + D s
 
 A pole s = -σ ± iω is a mode with f_d = ω/2π and ζ = σ/|s|. Poles change little within a tick, so Newton's method for
-the nonlinear eigenvalue problem continues from the last ones. Each mode is thus followed by continuity, even if two
-modes cross. (A motor impedance in series with the gear is the textbook model of a flexible joint under drive control;
-Newton's method for eigenvalues that enter nonlinearly: Ruhe 1973.)
+the nonlinear eigenvalue problem (Ruhe 1973) starts from the last ones. Each mode is thus followed by continuity, even
+if two modes cross.
 """
 
 from collections.abc import Callable
@@ -24,14 +23,14 @@ from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.poles import Complex, follow
 
 JUMP = 0.1
-"""Change of a joint from one estimate to the next that is too large for a motion [rad]."""
+"""Change of a joint between two estimates that is too large for a motion [rad]."""
 RESTING, MOVING, JUMPED = range(3)
 """Relation of a configuration to the previous one."""
 
 
 @compiled
 def compare(q: Floats, last: Floats) -> int:
-    """Compare a configuration with the previous one, which it then replaces."""
+    """Compare a configuration with `last`, and overwrite that; return RESTING, MOVING or JUMPED."""
     how = RESTING
     for joint in range(q.shape[0]):
         change = abs(q[joint] - last[joint])
@@ -45,7 +44,7 @@ def compare(q: Floats, last: Floats) -> int:
 
 @compiled
 def describe(poles: Complex, f_d_min: float, zeta_max: float, f_d: Floats, zeta: Floats) -> bool:
-    """Compute frequencies and damping ratios of poles, clamped to their bounds; return whether one was clamped."""
+    """Compute f_d [Hz] and ζ [-] of poles, clamped to their bounds; return whether one was clamped."""
     clipped = False
     for k in range(poles.shape[0]):
         f_d[k] = poles[k].imag / (2.0 * np.pi)
@@ -57,16 +56,15 @@ def describe(poles: Complex, f_d_min: float, zeta_max: float, f_d: Floats, zeta:
 
 
 class Modal(Estimator):
-    """Lowest modes of an arm with a known mass matrix, followed by continuity.
+    """The lowest modes of an arm with a known mass matrix, followed by continuity.
 
     A mode that was among the lowest may move above one that was not. `settle` therefore selects the lowest modes anew
-    from all poles; `estimate` does so only if q jumps by more than any motion. If a pole is lost, because it no
-    longer vibrates or coincides with another, `estimate` keeps all modes unchanged until every one is found again.
+    from all poles; `estimate` does so only if q jumps by more than any motion. If a pole is lost, because it no longer
+    vibrates or coincides with another, `estimate` keeps all modes unchanged until it finds every one again.
 
     Attributes:
         drivetrain: Springs and motors.
-        clipped: Whether a mode of the last estimate was outside `f_d_min` or `zeta_max` and was clamped to it, or a
-            mode was lost.
+        clipped: Whether a mode of the last estimate was clamped to `f_d_min` or `zeta_max`, or was lost.
     """
 
     drivetrain: Drivetrain
@@ -182,7 +180,7 @@ class Modal(Estimator):
             raise EstimatorError("mass_matrix(q)", mass.tolist(), f"finite, at q = {q.tolist()}")
 
     def _begin(self, q: Floats) -> None:
-        """Check once what does not change later, and discard the last configuration."""
+        """Check what does not change later, and discard the last configuration."""
         if q.ndim != 1:
             raise EstimatorError("q", q.shape, "of shape (joints,)")
         size = len(self.drivetrain.stiffness)

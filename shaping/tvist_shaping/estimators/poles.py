@@ -1,7 +1,4 @@
-"""Poles followed from one configuration to the next, by Newton's method for the nonlinear eigenvalue problem.
-
-The equations are in `tvist_shaping.estimators.modal`; for eigenvalues that enter nonlinearly, see Ruhe 1973.
-"""
+"""Follow poles between configurations by Newton's method for the nonlinear eigenvalue problem of `modal`."""
 
 import numpy as np
 import numpy.typing as npt
@@ -17,21 +14,20 @@ LOWEST = 0.5
 DAMPED = 0.9
 """Damping ratio above which a pole does not count as a vibration [-]."""
 STEPS = 12
-"""Largest number of Newton steps for a mode; two or three are enough from one tick to the next."""
+"""Largest number of Newton steps for a mode; two or three are enough between ticks."""
 TURNED = 0.01
-"""Squared change of a shape with largest entry 1, above which another step is needed [-]."""
+"""Squared change of a shape with largest entry 1 above which another step is needed [-]."""
 CONVERGED = 1e-5
-"""Relative size of the last Newton step of a pole; the remaining error is its square [-]."""
+"""Largest relative last Newton step of a converged pole; the remaining error is its square [-]."""
 APART = 1e-7
 """Relative distance below which two poles may be the same one [-]."""
 
 
 @compiled
 def follow(mass: Floats, rows: Floats, poles: Complex, shapes: Complex, scratch: Complex) -> bool:
-    """Follow every pole by Newton's method from its last value; change poles and shapes in place.
+    """Follow every pole by Newton's method from its last value, in place; return whether all converged apart.
 
-    Return whether all converged to different poles; otherwise poles and shapes are not changed. Scratch: (L +
-    k, L + 1).
+    Otherwise poles and shapes are not changed. `rows` are `Drivetrain.rows`; scratch has shape (L + modes, L + 1).
     """
     L = mass.shape[0]
     before = scratch[L:]
@@ -58,8 +54,7 @@ def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over 
         s = poles[k]
         found = False
         for _ in range(STEPS):
-            # F is symmetric, so the pole for a shape v solves vᵀ F(s) v = 0, and its error is of second order in the
-            # error of v.
+            # F is symmetric, so the s that solves vᵀ F(s) v = 0 has an error of second order in that of the shape v.
             for _ in range(STEPS):
                 residual, slope = 0.0j, 0.0j
                 for i in range(L):
@@ -129,7 +124,7 @@ def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over 
 
 @compiled
 def _spring(rows: Floats, i: int, s: complex) -> tuple[complex, complex]:
-    """Return κ(s) of a coordinate, and its derivative."""
+    """Return κ(s) of a coordinate and its derivative."""
     D = rows[4, i]
     k = rows[0, i] + D * s
     if rows[1, i] == 0.0:

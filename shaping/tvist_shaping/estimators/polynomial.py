@@ -15,7 +15,7 @@ from tvist_shaping.estimators.basis import BasisFunctions
 from tvist_shaping.impulse_train import F_D_RANGE
 
 MARGIN = 0.1
-"""Share of a range, at both ends, in which the saturation is curved [-]."""
+"""Share of a range, at each end, in which the saturation is curved [-]."""
 
 
 @compiled
@@ -49,7 +49,7 @@ def evaluate(
     ranges: Floats,
     modes: Floats,
 ) -> bool:
-    """Evaluate both polynomials at one configuration: f_d [Hz] and ζ [-]; return whether one was clamped."""
+    """Evaluate f_d [Hz] and ζ [-] at q into `modes`, shape (2, 1); return whether one was clamped."""
     f_d = coefficients[0, 0]
     zeta = coefficients[1, 0]
     term = 1
@@ -136,7 +136,7 @@ class Polynomial(Estimator):
         self.coefficients = Coefficients(
             joints_used, self.basis.centre.copy(), self.basis.multiples(), self._coefficients, self._ranges,
         )  # fmt: skip
-        """What `evaluate` needs, as arrays that can be written: numba takes those alone by its fast way."""
+        """Arguments of `evaluate`, as writable arrays, since numba's fast path accepts only those."""
         self._joints_needed = max(self.basis.joints) + 1
 
     def __repr__(self) -> str:

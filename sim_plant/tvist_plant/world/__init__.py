@@ -1,1 +1,1 @@
-"""The arm in MuJoCo, alone and in a world that it touches; only this package needs MuJoCo."""
+"""The arm in MuJoCo, alone or in a scene; only this package needs MuJoCo."""

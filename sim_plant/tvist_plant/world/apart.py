@@ -1,4 +1,4 @@
-"""A world made in a process of its own: no file of a scene can end this one, take its memory or hold it up."""
+"""Build a MuJoCo world in a separate process, so that no scene file can crash, block or bloat this one."""
 
 import os
 import pickle
@@ -18,19 +18,19 @@ from tvist_plant.world.scene import World, build
 from tvist_plant.world.scene_file import SceneError, SceneFile
 
 LONGEST, MOST_MEMORY = 30, 768 << 20
-"""Longest time [s] and largest memory [byte] that MuJoCo may take for a scene."""
+"""Longest time [s] and largest memory [byte] for building a scene."""
 Asked = tuple[RobotDescription, Payload, SceneFile, float, Hand | None]
 """Arguments of `build`."""
 
 
 def build_apart(asked: Asked) -> World:
-    """Put an arm into a scene as `build` does; a `SceneError` also says that MuJoCo fails with it."""
+    """Put an arm into a scene as `build` does; raise SceneError also if MuJoCo fails."""
     done = subprocess.run(  # noqa: S603
         [sys.executable, "-P", "-m", __name__],
         input=pickle.dumps((LONGEST, asked)),
         capture_output=True,
         check=False,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # the memory of others would be counted
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # other threads' memory would count
     )
     found = f"MuJoCo ends with exit code {done.returncode}: a scene may take {LONGEST} s and {MOST_MEMORY >> 20} MiB"
     if done.returncode == 0 and isinstance(found := pickle.loads(done.stdout), World):  # noqa: S301  from above
@@ -39,13 +39,13 @@ def build_apart(asked: Asked) -> World:
 
 
 def _main() -> None:
-    """Build the world that stdin describes, and put the arm at rest in it once; write it, or what is wrong."""
+    """Build the world described on stdin, settle the arm once, and write the world or an error message."""
     answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # MuJoCo prints warnings, and writes a log of them where it is
+    os.dup2(2, 1)  # MuJoCo prints warnings, and logs them to its directory
     os.chdir("/")
     longest, asked = pickle.load(sys.stdin.buffer)  # noqa: S301  from above
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
-    signal.alarm(longest)  # also ends what waits inside MuJoCo, and what nobody waits for any more
+    signal.alarm(longest)  # also ends a process that hangs in MuJoCo or was abandoned
     found: World | str
     try:
         description, found = asked[0], build(*asked)

@@ -1,8 +1,8 @@
-"""The arm as a model of MuJoCo, built from its description: hinges, rotors, gears and links that bend.
+"""The arm as a MuJoCo model: hinges, rotors, gears and bending links.
 
-Bodies, virtual joints and lumps are placed by the description's frames. A motor is a rotor of inertia B in a body of
-its own beside the chain, and a gear is the spring of a fixed tendon between its angle and the joint's. All beyond the
-flange hangs on one body, so that the wrench between the two is what a sensor there feels.
+Bodies, virtual joints and lumps have the description's frames. A motor is a rotor of inertia B in a separate
+body, and a gear is the spring of a fixed tendon between motor and joint. All that is beyond the flange hangs
+on one body, so that a sensor there feels the wrench between the two.
 """
 
 from typing import NamedTuple
@@ -16,20 +16,20 @@ from tvist_plant.description import Payload, RobotDescription, Tensor
 from tvist_plant.model import FLANGE, Floats, link_frame
 
 LOAD = "load"
-"""Name of the body that all beyond the flange is part of: the payload, and the fingers of a gripper."""
+"""Name of the body beyond the flange: the payload, and the fingers of a gripper."""
 
 
 class Hinges(NamedTuple):
-    """Numbers of the arm's hinges among a model's coordinates."""
+    """Indices of the arm's hinges among a model's coordinates."""
 
     joints: NDArray[np.int64]
     motors: NDArray[np.int64]
     flexes: NDArray[np.int64]
-    """Virtual joints about y and z of each link that bends."""
+    """Virtual joints about y and z of each bending link."""
 
     @classmethod
     def of(cls, description: RobotDescription, model: "mujoco.MjModel") -> "Hinges":
-        """Find them by their names."""
+        """Find the hinges by name."""
         numbers = range(description.joints)
         names = (
             [f"joint {number}" for number in numbers],
@@ -40,12 +40,12 @@ class Hinges(NamedTuple):
 
 
 def link_name(description: RobotDescription, number: int) -> str:
-    """Name of the body whose frame is that of a link; -1 for the world."""
+    """Return the name of the body with a link's frame; -1 for the world."""
     return "world" if number < 0 else FLANGE if number == description.joints - 1 else f"link {number}"
 
 
 def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -> "mujoco.MjSpec":
-    """Return the arm: hinges, a welded body for each link's frame, rotors beside the chain, and nothing to touch."""
+    """Return the arm without contacts: hinges, a welded body per link frame, rotors beside the chain."""
     kinematics, links, drives = description.kinematics, description.links, description.drives
     flexibility = description.link_flexibility
     stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
@@ -108,10 +108,7 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
 
 
 def principal(inertia: Tensor) -> tuple[list[float], list[float]]:
-    """Return the principal moments of an inertia, and the orientation of their axes as MuJoCo's quaternion.
-
-    Those of a point are not quite zero, which MuJoCo would not take.
-    """
+    """Return principal moments, above zero for MuJoCo, and their axes as a quaternion."""
     xx, xy, xz, yy, yz, zz = inertia
     moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     if np.linalg.det(axes) < 0.0:
@@ -120,7 +117,7 @@ def principal(inertia: Tensor) -> tuple[list[float], list[float]]:
 
 
 def carry(model: "mujoco.MjModel", payload: Payload) -> None:
-    """Give the body beyond the flange another payload."""
+    """Set the payload of the body beyond the flange."""
     load = model.body(LOAD).id
     model.body_mass[load], model.body_ipos[load] = payload.mass, payload.com
     model.body_inertia[load], model.body_iquat[load] = principal(payload.inertia)
@@ -130,7 +127,7 @@ def carry(model: "mujoco.MjModel", payload: Payload) -> None:
 def settle(
     description: RobotDescription, model: "mujoco.MjModel", data: "mujoco.MjData", q: Floats
 ) -> Floats:
-    """Set static equilibrium with the motors at q; return the torques of gravity on the joints, shape (n,) [N m]."""
+    """Set static equilibrium with the motors at q; return the joints' gravity torques, shape (n,) [N m]."""
     joints, motors, flexes = Hinges.of(description, model)
     mujoco.mj_resetData(model, data)
     gravity = np.zeros(model.nv)

@@ -1,15 +1,14 @@
-"""Contacts of a world: every pair of shapes that may touch is a spring and a damper with friction.
+"""Contacts of a world: each pair of shapes is a spring and damper with friction.
 
-MuJoCo's contact force, with a negative `solref` (-s, -b) and an impedance d that does not vary, is
+MuJoCo's contact force, with a negative `solref` (-s, -b) and a constant impedance d, is
 
     f = (s r + b v) / [Â (1 - d) + A d]
 
-at depth r and speed of approach v, where A is the inverse of the effective mass of the contact, and Â MuJoCo's
-estimate of it at compile time. With d near 0 only Â remains. So s = k Â and b = c Â make a spring of k [N/m] and a
-damper of c [N s/m] of whatever touches, and no light body or far lever changes that. The force follows the position a
-step of h later, so a body with A k h² above 4 flies apart; `check_masses` refuses it long before. Friction is at most
-μ f. Below that it yields a little, by `IMPRATIO` less than the contact does, so that what is held creeps by some
-micrometres a second.
+at depth r and approach speed v, where A is the inverse effective mass of the contact and Â MuJoCo's estimate
+at compile time. With d near 0 only Â remains, so s = k Â and b = c Â give a spring k [N/m] and a damper c [N
+s/m] for any mass and lever. The force lags the position by a step h, so a body with A k h² above 4 would be
+flung away; `check_masses` refuses it long before. Friction is at most μ f. Below that it yields `IMPRATIO`
+times less than the contact, so a held part creeps by some micrometres a second.
 
 Source: MuJoCo's documentation, "Computation", sections "Impedance", "Reference" and "Regularization".
 """
@@ -23,42 +22,40 @@ import numpy as np
 from tvist_plant.world.scene_file import SceneError
 
 PREFIX = "world/"
-"""What precedes the scene's names in the model, so that no name of the arm's is taken."""
+"""Prefix of the scene's names in the model, to keep them apart from the arm's."""
 STIFFNESS = 1e5
-"""Stiffness of a contact of which no shape gives one [N/m]."""
+"""Default stiffness of a contact [N/m]."""
 DAMPING_RATIO = 0.3
-"""Damping ratio of such a contact, for the mass that MuJoCo estimates [-]."""
+"""Default damping ratio of a contact, for the mass that MuJoCo estimates [-]."""
 IMPEDANCE = 2e-3
-"""d: the stiffness of a contact depends by this share on what touches [-]."""
+"""d: fraction by which a contact's stiffness depends on the bodies [-]."""
 IMPRATIO = 1e6
-"""How much harder friction is than the contact [-]."""
+"""Stiffness of friction relative to the contact [-]."""
 FACES = 4
-"""Points at which a box lies on a box or a plane, which share the stiffness; all else touches at single points."""
+"""Contact points of a box on a box or plane, which share the stiffness; other shapes touch at one point."""
 GRIP = 500.0
-"""Rate at which friction ends a slip [1/s]."""
+"""Rate at which friction ends slip [1/s]."""
 MOST_PAIRS = 4000
-"""Largest number of pairs of shapes that may touch, which is what a step of 0.25 ms can look through in real time."""
+"""Largest number of shape pairs that can be checked in real time at steps of 0.25 ms."""
 FIRMEST = 0.5
-"""Largest A k h²: beyond, a contact is an oscillation of few steps [-]."""
+"""Largest A k h²; above, a contact would oscillate within few steps [-]."""
 
 TURNS = 50.0
-"""How much smaller a body's inverse mass at its centre of mass is than at its reach if all that it does is turn [-]."""
+"""Ratio of inverse mass at a body's reach to that at its centre of mass, above which it is treated as only
+turning [-]."""
 
 _FLAT = {int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_PLANE)}
 
 ALL = 0x7FFFFFFF
-"""`contype` and `conaffinity` of what touches every solid shape: the arm and the fingers."""
+"""`contype` and `conaffinity` of arm and fingers, which touch every solid shape."""
 
 Names = frozenset[str]
 Contacts = Sequence[tuple[float | None, float | None]]
-"""Stiffness [N/m] and damping [N s/m] of each pair of shapes, where a shape gives them."""
+"""Stiffness [N/m] and damping [N s/m] of each pair of shapes; None where no shape defines them."""
 
 
 def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Contacts:
-    """Add every pair of shapes that may touch; those of the arm, by their names, do not touch one another.
-
-    All shapes of the world have names; the model is the same world, compiled.
-    """
+    """Add every pair of named shapes that may touch, not within the arm; `model` is `spec` compiled."""
     own = {frozenset((pair.geomname1, pair.geomname2)) for pair in spec.pairs}
     apart = {frozenset((one.bodyname1, one.bodyname2)) for one in spec.excludes}
     shapes = [one for one in spec.geoms if one.contype or one.conaffinity]
@@ -84,14 +81,14 @@ def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Con
 
 
 def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
-    """Give each pair of `add_pairs` its spring and damper, for the masses that the world has now."""
+    """Set spring and damper of each pair of `add_pairs` for the present masses."""
     if given:
         _count_turning(model)
     for number, (stiffness, damping) in enumerate(given):
         if model.pair_solimp[number][0] != IMPEDANCE:
-            continue  # the scene's own pair is as its file says
+            continue  # keep the scene's own pairs
         if (inverse := _inverse_mass(model, number)) == 0.0:
-            continue  # no force moves either
+            continue  # both are immovable
         k = STIFFNESS if stiffness is None else stiffness
         c = 2.0 * DAMPING_RATIO * np.sqrt(k / inverse) if damping is None else damping
         kinds = {int(model.geom_type[geom]) for geom in (model.pair_geom1[number], model.pair_geom2[number])}
@@ -101,9 +98,9 @@ def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
 
 
 def _count_turning(model: "mujoco.MjModel") -> None:
-    """Give bodies that turn about their centre of mass the inverse mass that their inertia has where they are touched.
+    """Set the inverse mass of bodies that turn about their centre of mass, from their inertia and reach.
 
-    MuJoCo's estimate Â is that of the centre of mass, which stands still then, so it would be 0 or far too small.
+    MuJoCo's Â holds for the centre of mass, which then does not move, and would be zero or far too small.
     """
     for body in range(1, model.nbody):
         light, turning = model.body_invweight0[body]
@@ -115,7 +112,7 @@ def _count_turning(model: "mujoco.MjModel") -> None:
 
 
 def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
-    """Check that no body is too light for the springs that it may touch."""
+    """Check that no body is too light for the springs it may touch."""
     for number in range(model.npair):
         inverse = _inverse_mass(model, number)
         if inverse == 0.0:
@@ -135,7 +132,7 @@ def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
 
 
 def _inverse_mass(model: "mujoco.MjModel", pair: int) -> float:
-    """MuJoCo's estimate of the inverse effective mass of a pair, Â [1/kg]."""
+    """Return MuJoCo's estimate of a pair's inverse effective mass, Â [1/kg]."""
     geoms = model.pair_geom1[pair], model.pair_geom2[pair]
     return float(sum(model.body_invweight0[model.geom_bodyid[geom]][0] for geom in geoms))
 
@@ -143,7 +140,7 @@ def _inverse_mass(model: "mujoco.MjModel", pair: int) -> float:
 def _touching(
     shapes: Sequence["mujoco.MjsGeom"], model: "mujoco.MjModel", arm: Names, apart: set[frozenset[str]]
 ) -> Iterator[tuple["mujoco.MjsGeom", "mujoco.MjsGeom"]]:
-    """Pairs of shapes by MuJoCo's own rules: one of them moves, and they are not of one body nor of neighbours."""
+    """Yield pairs by MuJoCo's rules: at least one moves, and their bodies are not equal or adjacent."""
     fixed_to = model.body_weldid
 
     def before(body: int) -> int:
@@ -160,7 +157,7 @@ def _touching(
 
 
 def _in_series(first: "mujoco.MjsGeom", second: "mujoco.MjsGeom") -> tuple[float | None, float | None]:
-    """Stiffness and damping of two shapes that touch, as of springs in series; None if neither gives any."""
+    """Return stiffness and damping of two shapes in series; None if neither defines them."""
     given = [-np.array(one.solref[:2]) for one in (first, second) if one.solref[0] < 0.0]
     if not given:
         return None, None

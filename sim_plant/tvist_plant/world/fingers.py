@@ -1,4 +1,4 @@
-"""Two fingers on the flange, which close with a limited force and hold by friction."""
+"""Two fingers on the flange that close with limited force and hold by friction."""
 
 import mujoco
 import numpy as np
@@ -8,23 +8,23 @@ from tvist_plant.plant import Hand
 from tvist_plant.world.contacts import ALL
 
 PAD = (0.011, 0.004, 0.03)
-"""Half of the lengths of a finger along x y z of the tool centre point [m]."""
+"""Half lengths of a finger along x y z of the tool centre point [m]."""
 BEYOND = 0.008
-"""How far a finger reaches beyond the tool centre point [m]."""
+"""Length of a finger beyond the tool centre point [m]."""
 MASS, DRIVE = 0.001, 0.5
-"""Mass of a finger, which is otherwise part of the tool's, and what its gear makes of its motor's inertia [kg]."""
+"""A finger's own mass, the rest being part of the tool's, and its motor's inertia through the gear [kg]."""
 STIFFNESS, DAMPING = 2e4, 200.0
-"""Gains of the law that moves a finger [N/m, N s/m]."""
+"""Gains of the position controller of a finger [N/m, N s/m]."""
 TOGETHER = 2e5
-"""Stiffness of the linkage that keeps both fingers equally far from the middle [N/m]."""
+"""Stiffness of the linkage that centres the fingers [N/m]."""
 FRICTION = (1.0, 0.01, 1e-4)
 """Friction of a finger: sliding [-], torsional and rolling [m]."""
 SIDES = {"finger left": 1.0, "finger right": -1.0}
-"""Bodies of the fingers, and the side on which each stands."""
+"""Bodies of the fingers and their sides."""
 
 
 def add_fingers(spec: "mujoco.MjSpec", load: "mujoco.MjsBody", hand: Hand) -> None:
-    """Add the fingers of a hand to an arm, open, on the body of what is beyond its flange."""
+    """Add the open fingers of a hand to the body beyond the flange."""
     turn = np.roll(pin.Quaternion(hand.rotation).coeffs(), 1).tolist()
     for name, side in SIDES.items():
         half = hand.stroke / 2.0
@@ -48,7 +48,7 @@ def add_fingers(spec: "mujoco.MjSpec", load: "mujoco.MjsBody", hand: Hand) -> No
 
 
 class Fingers:
-    """The law that moves the fingers of a compiled arm."""
+    """Position controller of the fingers of a compiled arm."""
 
     def __init__(self, model: "mujoco.MjModel", hand: Hand) -> None:
         self._dofs = [int(model.joint(name).dofadr[0]) for name in SIDES]
@@ -57,15 +57,15 @@ class Fingers:
         self.open()
 
     def open(self) -> None:
-        """Want the fingers open."""
+        """Command the fingers open."""
         self.wanted, self.force = self._stroke, 0.0
 
     def opening(self, data: "mujoco.MjData") -> float:
-        """Distance between the fingers [m]."""
+        """Return the distance between the fingers [m]."""
         return float(self._stroke - sum(data.qpos[self._angles]))
 
     def drive(self, data: "mujoco.MjData") -> None:
-        """Set the forces for the next step: towards the wanted opening, and no larger than allowed."""
+        """Set the forces for the next step, limited and towards the wanted opening."""
         way = (self._stroke - self.wanted) / 2.0
         for angle, dof in zip(self._angles, self._dofs, strict=True):
             force = STIFFNESS * (way - data.qpos[angle])

@@ -1,7 +1,7 @@
-"""The arm in MuJoCo as a plant, alone or among things that it touches.
+"""The arm in MuJoCo as a plant, alone or in a scene.
 
-The same arm as `FlexibleArm`, built from the same description independently of our model: MuJoCo computes the dynamics
-and integrates them (semi-implicit Euler with implicit damping, first order). Gears have no kinematic error.
+An independent model of the same description as `FlexibleArm`; MuJoCo computes the dynamics and integrates
+them (semi-implicit Euler with implicit damping, first order). Gears have no kinematic error.
 """
 
 import math
@@ -30,7 +30,7 @@ from tvist_plant.world.scene_file import SceneFile
 TIMESTEP = 0.00025
 """Time step at which MuJoCo agrees with `FlexibleArm` [s]."""
 DEEPEST = 1e-4
-"""Depth up to which an arm may touch something where it is put [m]."""
+"""Largest penetration of an arm at the pose of a reset [m]."""
 _OF_HANDS: Final = (Plant.mount, Plant.grip, Plant.opening)
 
 
@@ -47,10 +47,10 @@ def drive(
     qd: Floats,
     applied: Floats,
 ) -> None:
-    """Compute the torques [N m] of the drives for one of MuJoCo's steps, and step their integrators s.
+    """Compute the drives' torques [N m] for one MuJoCo step, and step their integrators s.
 
-    The commands have rows q_r, q̇_r and τ_ff; the rows of `laws` are gains of velocity, position and integral, friction
-    and its width. Velocity gain and the slope of friction at rest are joint damping, which MuJoCo integrates itself.
+    Commands have rows q_r, q̇_r, τ_ff; `laws` has rows K_d, position gain, integral gain, friction, width.
+    MuJoCo integrates velocity gain and the slope of friction at rest as joint damping.
     """
     for j in range(motors.shape[0]):
         m = motors[j]
@@ -64,19 +64,10 @@ def drive(
 
 
 class MujocoArm(SimulatedArm):
-    """The arm in MuJoCo. It is deterministic; alone it has no noise, in a scene it has that of its sensors.
+    """The arm in MuJoCo: deterministic, in a scene with sensor noise, a force sensor and possibly a gripper.
 
-    In a scene it also has a force sensor in its flange, and room for a gripper.
-
-    Args:
-        description: The arm.
-        payload: Carried payload.
-        scene: The scene; None for the arm alone.
-        timestep: Time step of MuJoCo's integrator, a fraction of 2 ms [s]. 1 ms is unstable for the UR5e.
-
-    Raises:
-        ValueError: 2 ms is not a multiple of the time step.
-        SceneError: The file is no scene, or no arm can stand in it.
+    Raise ValueError unless `PERIOD` is a multiple of `timestep` [s] (1 ms is unstable for the UR5e), and
+    SceneError if the scene is invalid or no arm can stand in it.
     """
 
     def __init__(
@@ -115,7 +106,7 @@ class MujocoArm(SimulatedArm):
         self._state = data.qpos, data.qvel, data.qfrc_applied
         self._place, self._turn = data.xpos[self._flange], data.xmat[self._flange]
         self._evaluated = False
-        """Whether MuJoCo has evaluated the present positions and velocities already."""
+        """Whether MuJoCo has already evaluated the present positions and velocities."""
 
     def _seed(self, seed: int) -> None:
         sensors, alone = self._description.sensors, self._scene is None
@@ -125,11 +116,11 @@ class MujocoArm(SimulatedArm):
         )
 
     def can(self, method: Callable[..., Any]) -> bool:
-        """Return whether the arm can do something; alone it has no gripper that really holds."""
+        """Return whether the plant has a method; without a scene it has no gripper."""
         return super().can(method) and (self._scene is not None or method not in _OF_HANDS)
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest in static equilibrium under a command, and the things where the scene has them."""
+        """Put the arm at rest in static equilibrium under a command, and reset the scene's bodies."""
         self._seed(seed)
         if self._fingers is not None:
             self._fingers.open()
@@ -154,7 +145,7 @@ class MujocoArm(SimulatedArm):
         return measured
 
     def move(self, command: DriveCommand) -> None:
-        """Simulate 2 ms, in which the drives approach the command linearly."""
+        """Simulate one period in which the drives' commands go linearly to this one."""
         if self._fingers is not None:
             self._fingers.drive(self._data)
         start, end = self._command, np.array([command.q, command.qd, command.torque])
@@ -162,7 +153,7 @@ class MujocoArm(SimulatedArm):
         motors, laws, s, (q, qd, applied) = self._motors, self._laws, self._s, self._state
         for k in range(steps):
             drive(start, end, (k + 0.5) / steps, timestep, motors, laws, s, q, qd, applied)
-            if self._evaluated:  # the first half of MuJoCo's step is done
+            if self._evaluated:  # first half of MuJoCo's step already done
                 mujoco.mj_step2(model, data)
                 self._evaluated = False
             else:
@@ -170,7 +161,6 @@ class MujocoArm(SimulatedArm):
         self._command = end
 
     def _measure(self) -> Measurement:
-        """Evaluate the accelerations at the present state, and measure."""
         model, data = self._model, self._data
         mujoco.mj_forward(model, data)
         self._evaluated = True
@@ -188,7 +178,7 @@ class MujocoArm(SimulatedArm):
         )
 
     def _wrench(self) -> Floats:
-        """What all beyond the flange exerts on it, in its frame, shape (6,) [N, N m]."""
+        """Return the wrench on the flange from everything beyond it, in its frame, shape (6,) [N, N m]."""
         data, load = self._data, self._load
         whole = data.cfrc_int[load]  # of the flange, about the centre of mass of the arm
         x, y, z = (data.subtree_com[self._model.body_rootid[load]] - self._place).tolist()
@@ -199,7 +189,7 @@ class MujocoArm(SimulatedArm):
         return felt
 
     def truth(self) -> PlantTruth:
-        """Return what a real robot cannot measure, at the present state."""
+        """Return the present values that a real robot cannot measure."""
         q, qd, _ = self._state
         return PlantTruth(
             motor_q=q[self._motors],
@@ -212,7 +202,7 @@ class MujocoArm(SimulatedArm):
         )
 
     def load(self, payload: Payload) -> None:
-        """Carry another payload from now on. Its shape in the world stays the first one's."""
+        """Carry another payload from now on; its collision shape stays that of the first one."""
         self.payload, self._evaluated = payload, False
         carry(self._model, payload)
         set_contacts(self._model, self._world.contacts)  # their stiffness is relative to the masses
@@ -222,27 +212,27 @@ class MujocoArm(SimulatedArm):
         self._data.qfrc_applied[self._joints] = torque
 
     def make_nan(self) -> None:
-        """Make the state NaN, so that the next step raises `PlantError`."""
+        """Make the state NaN; the next step then raises `PlantError`."""
         self._data.qvel[0] = np.nan
 
     # ------------------------------------------------------------------ the world
 
     def things(self) -> Things | None:
-        """Return what stands around it."""
+        """Return the objects around the arm."""
         return self._world.things
 
     def places(self) -> Floats:
-        """Return the poses of the bodies that move, shape (bodies, 6) [m, rad]."""
+        """Return the poses of the moving bodies, shape (bodies, 6) [m, rad]."""
         data = self._data
         turns = [pin.log3(data.xmat[body].reshape(3, 3)) for body in self._bodies]
         return np.concatenate([data.xpos[self._bodies], np.reshape(turns, (-1, 3))], axis=1)
 
     def contact(self) -> Floats:
-        """Return the force of all that touches the arm, base frame, shape (3,) [N]."""
+        """Return the contact force on the arm, base frame, shape (3,) [N]."""
         return np.asarray(self._data.cfrc_ext[self._own, 3:].sum(axis=0))
 
     def obstacle(self, q: Floats, payload: Payload | None) -> str | None:
-        """Say what the arm would stand in after a reset."""
+        """Return what the arm would overlap after a reset, None if nothing."""
         model = copy(self._model)
         if payload is not None:
             carry(model, payload)  # it bends the arm
@@ -251,7 +241,6 @@ class MujocoArm(SimulatedArm):
         return self._met(data)
 
     def _met(self, data: "mujoco.MjData") -> str | None:
-        """Say what the arm stands in; None if it is clear."""
         for touch in data.contact[: data.ncon]:
             geoms = [self._model.geom(geom) for geom in touch.geom]
             ours = any(one.bodyid[0] in self._world.arm or one.name.startswith("arm ") for one in geoms)

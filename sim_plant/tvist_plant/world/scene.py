@@ -1,4 +1,4 @@
-"""A scene and the arm in it, as one model of MuJoCo."""
+"""A scene with the arm in it, as one MuJoCo model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,9 +16,9 @@ from tvist_plant.world.fingers import add_fingers
 from tvist_plant.world.scene_file import SceneError, SceneFile
 
 TOOL = "tool"
-"""Name of the scene's body whose shapes are mounted on the flange."""
+"""The scene's body whose shapes are mounted on the flange."""
 MOST_BODIES = 50
-"""Largest number of bodies that move."""
+"""Largest number of moving bodies."""
 _KINDS = {
     mujoco.mjtGeom.mjGEOM_PLANE: "plane",
     mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
@@ -31,27 +31,24 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class World:
-    """An arm in a scene, or alone."""
+    """An arm, alone or in a scene."""
 
     model: "mujoco.MjModel"
-    """Both, the arm first."""
+    """Model of both, the arm first."""
     contacts: Contacts = ()
     """Result of `add_pairs`, for `set_contacts`."""
     things: Things | None = None
-    """What there is besides the arm."""
+    """The objects besides the arm."""
     bodies: tuple[int, ...] = ()
     """Numbers of the bodies of `things`."""
     arm: tuple[int, ...] = ()
-    """Numbers of the arm's bodies, with what is mounted on it."""
+    """Numbers of the bodies of the arm and of what is mounted on it."""
 
 
 def build(
     description: RobotDescription, payload: Payload, scene: SceneFile, timestep: float, hand: Hand | None
 ) -> World:
-    """Put an arm with its payload, and maybe a gripper, into a scene, whose origin is the arm's base.
-
-    The time step is that of MuJoCo's integrator [s].
-    """
+    """Put an arm, its payload and a gripper, if any, into a scene with the arm's base at the origin."""
     spec = arm_spec(description, payload, timestep)
     option = spec.option
     option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
@@ -62,7 +59,7 @@ def build(
     _name_all(spec, "arm ")
     load, before = spec.body(LOAD), {one.name for one in spec.bodies}
     if tooled:
-        content.compiler.fusestatic = False  # else the tool would be part of the world
+        content.compiler.fusestatic = False  # else the tool would merge with the world
         _mount(tool, load, content.compile())
         content.delete(tool)
     if hand is not None:
@@ -92,11 +89,7 @@ def build(
 
 
 def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjModel") -> None:
-    """Mount the shapes of the scene's tool on the flange; their weight is the payload's.
-
-    The load is the body beyond the flange. In `alone`, the scene compiled, poses and sizes are numbers
-    however the file gives them.
-    """
+    """Mount the scene's tool on the flange, massless; `alone` is the scene compiled, with final numbers."""
     if tool.joints or tool.bodies:
         raise SceneError(
             "the body 'tool', which is mounted on the flange, has joints or bodies: must have shapes only"
@@ -117,10 +110,7 @@ def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjMode
 def _add_capsules(
     spec: "mujoco.MjSpec", description: RobotDescription, payload: Payload, hand: Hand | None, *, tooled: bool
 ) -> None:
-    """Give the arm the capsules of its file, and one for the payload unless the scene has a tool.
-
-    They have no friction of their own: what they touch has.
-    """
+    """Add the robot file's capsules without friction, and one for the payload unless the scene has a tool."""
 
     def add(
         body: "mujoco.MjsBody", name: str, start: Sequence[float], end: Sequence[float], radius: float
@@ -139,14 +129,13 @@ def _add_capsules(
         body = spec.worldbody if one.link < 0 else spec.body(link_name(description, one.link))
         add(body, one.name, one.start, one.end, one.radius)
     radius, end = description.collision.payload_radius, 2.0 * np.array(payload.com)
-    if hand is not None:  # the palm, as far as the fingers' roots
+    if hand is not None:  # palm, up to the fingers' roots
         radius, end = min(radius, 0.04), hand.root - 0.04 * hand.direction
     if not tooled and description.collision.bodies and (payload.mass or hand is not None):
         add(spec.body(LOAD), "payload", (0.0, 0.0, 0.0), end.tolist(), radius)
 
 
 def _name_all(spec: "mujoco.MjSpec", whose: str) -> None:
-    """Give names to what has none, so that pairs and messages can name it."""
     for what, those in (("body", spec.bodies), ("shape", spec.geoms)):
         for number, one in enumerate(those):
             if not one.name:
@@ -158,7 +147,7 @@ def _things(name: str, model: "mujoco.MjModel", bodies: tuple[int, ...], arm: se
     mujoco.mj_kinematics(model, data)
 
     def shape(one: Any, there: Any) -> Shape:
-        """A shape in the frame of the moving body that carries it, or in that of the base."""
+        """Return a shape in the frame of the moving body that carries it, else in the base frame."""
         place, turn, body = there.xpos, there.xmat.reshape(3, 3), int(one.bodyid[0])
         if body in bodies:
             place, turn = one.pos, pin.Quaternion(np.roll(one.quat, -1)).matrix()

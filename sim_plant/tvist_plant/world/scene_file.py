@@ -1,4 +1,4 @@
-"""Files of scenes: those that come with the package, by name, and a user's own, by path."""
+"""Scene files: those of the package by name, a user's own by path."""
 
 from dataclasses import dataclass
 from hashlib import file_digest, sha256
@@ -8,35 +8,34 @@ from xml.etree.ElementTree import Element
 from tvist_plant.user_file import LARGEST, UserFileError, check_is_file, one_line, read_bytes, xml
 
 SCENES = Path(__file__).parent / "scenes"
-"""Folder of the scenes that come with the package."""
 
 LARGEST_FILES, MOST_PLACES = 256 << 20, 20_000
-"""Largest size of all files that a scene names [byte], and number of their names, each in each folder."""
+"""Largest total size of the files that a scene names [byte], and largest number of paths searched for them."""
 
 
 class SceneError(ValueError):
-    """There is no such scene, or no arm can stand in it; the message says why."""
+    """There is no such scene, or no arm can stand in it; the message states the reason."""
 
 
 @dataclass(frozen=True)
 class SceneFile:
-    """A file that was found, and is yet to be understood."""
+    """A scene file that was found but not yet parsed."""
 
     name: str
-    """Name of a scene that comes with the package, or the path that was given."""
+    """Name of a scene of the package, or the given path."""
     path: Path
-    """Its file."""
+    """Path of the file."""
     sha256: str
-    """SHA-256 of the file, in hexadecimal; if it names others, such as meshes, of the hashes of all."""
+    """SHA-256 of the file in hexadecimal; if it names other files, of all their hashes."""
 
 
 def scenes() -> list[str]:
-    """Names of the scenes that come with the package."""
+    """Return the names of the package's scenes."""
     return sorted(file.stem for file in SCENES.glob("*.xml"))
 
 
 def find_scene(name: str) -> SceneFile:
-    """Find a scene: one of `scenes`, or the path of a file in MuJoCo's format (MJCF)."""
+    """Find a scene of the package, or the path of an MJCF file; raise SceneError."""
     path = SCENES / f"{name}.xml" if name in scenes() else Path(name)
     try:
         content = read_bytes(path, "world")
@@ -65,12 +64,9 @@ def find_scene(name: str) -> SceneFile:
 
 
 def _named(root: Element, folder: Path) -> list[Path]:
-    """Return the files that a scene in a folder names, and those that included ones name.
-
-    Missing files are left out: MuJoCo reports them.
-    """
+    """Return the existing files that a scene and its included files name; MuJoCo reports missing ones."""
     folders, names, elements, included = {folder}, set[str](), list(root.iter()), 0
-    for one in elements:  # they become more with each included file
+    for one in elements:  # grows with each included file
         for key, value in one.items():
             if one.tag == "compiler" and key.endswith("dir"):
                 folders.add(folder / value)

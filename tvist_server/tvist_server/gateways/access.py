@@ -1,10 +1,8 @@
-"""Rights of clients on the network, as rules for Zenoh's access control; computed from names alone.
+"""Rights of clients on the network, as rules for Zenoh's access control.
 
-Zenoh silently denies everything that no rule allows. A rule applies to a key only if the rule's key includes it, so
-`tvist/**` is denied where only `tvist/ur5e/state` is allowed. Flows are named from the server's point of view:
-`ingress` is what a client sends, `egress` is what reaches it. A client learns of a subscriber or queryable only
-through its declaration, so declarations need permission on egress; without it, a client would not even send its put
-or query.
+Zenoh silently denies everything that no rule allows. A rule for `tvist/ur5e/state` does not allow `tvist/**`. Flows
+are the server's: `ingress` is what a client sends, `egress` what it receives. Declarations need permission on egress:
+without it, a client knows of no subscriber or queryable and sends neither puts nor queries.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,29 +11,25 @@ from typing import Any, Literal
 from tvist_protocol import keys
 
 Role = Literal["operator", "viewer", "robot", "router"]
-"""An operator moves the robot and sees what it does; a viewer only sees. A router knows two more roles: a robot, whose
-name or namespace is that of its certificate, and another router, which it trusts."""
+"""An operator sees and moves the robot; a viewer only sees it. On a router, a `robot` serves the robot or the
+namespace that its certificate names, and a `router` is trusted fully."""
 
 STREAMS = ("state", "event", "telemetry", "truth", "io")
-"""Topics that everyone with a role may read and only the robot may publish."""
+"""Topics that every role may read and only the robot may publish."""
 MESSAGES = (
     "put", "delete", "declare_subscriber", "query", "declare_queryable", "reply", "liveliness_token",
     "declare_liveliness_subscriber", "liveliness_query",
 )  # fmt: skip
-"""Everything that Zenoh's access control knows."""
+"""All message types of Zenoh's access control."""
 
 
 def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: str = "") -> dict[str, Any]:
-    """Return Zenoh's `access_control` settings for a server with certificates, which has at least one role.
-
-    The names are the common names of certificates. Names without a role, and clients without a certificate,
-    are denied everything.
-    """
+    """Return Zenoh's `access_control` settings for a server with certificates; no role (by common name), no access."""
     robots = [_at(namespace, robot) for robot in robots]
     viewing, operating = _viewing(robots), _operating(robots)
     rules_of: dict[Role, list[dict[str, Any]]] = {"viewer": viewing, "operator": [*viewing, *operating]}
     named = {role: [name for name, its in roles.items() if its == role] for role in rules_of}
-    # Zenoh rejects an empty list of names, since that would apply to everyone.
+    # Zenoh rejects an empty list of names, because it would apply to everyone.
     there = [role for role in rules_of if named[role]]
     return {
         "enabled": True,
@@ -52,11 +46,11 @@ def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: 
 def open_access(robots: Sequence[str], namespace: str = "") -> dict[str, Any]:
     """Return Zenoh's `access_control` settings for a server without certificates: every client is an operator.
 
-    Only the server may answer commands or publish the robot's topics. Otherwise another session could swallow a stop
-    or make up states.
+    Only the server may answer commands and publish the robot's topics; another session could otherwise
+    intercept a stop command or forge states.
     """
     robots = [_at(namespace, robot) for robot in robots]
-    # Keys with wildcards are allowed too: egress is restricted below, and only the server answers queries.
+    # Keys with wildcards are allowed because egress is restricted below, and only the server answers queries.
     asking = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query", "query"]
     rules = [*_viewing(robots), *_operating(robots), _rule("ask for anything", "ingress", asking, ["**"])]
     return {
@@ -71,8 +65,8 @@ def open_access(robots: Sequence[str], namespace: str = "") -> dict[str, Any]:
 def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
     """Return Zenoh's `access_control` settings for a router with certificates.
 
-    Operators and viewers have their rights on all robots. A robot may publish and answer as the robot of its
-    certificate's name, and as all robots of the namespace of that name. Another router may do everything.
+    Operators and viewers have their rights on all robots. A `robot` may publish and answer as the robot of
+    its certificate's name, and as all robots in the namespace of that name. A `router` may do everything.
     """
     everywhere = [keys.ANYWHERE]
     viewing, operating = _viewing(everywhere), _operating(everywhere)
@@ -82,7 +76,7 @@ def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
         own: list[dict[str, Any]] = []
         if role == "robot":
             places = [f"**/{keys.PREFIX}/{name}", f"**/{name}/{keys.PREFIX}/*"]
-            # What reaches a client of its robot leaves the robot, and the reverse.
+            # Egress to a client is ingress from its robot, and vice versa.
             own = [_turned(rule, name) for rule in (*_viewing(places), *_operating(places))]
             own[0]["key_exprs"] = [f"{keys.ANYWHERE}/{leaf}" for leaf in STREAMS]
         elif role == "router":
@@ -102,12 +96,9 @@ def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
 def with_robots_behind(
     access: Mapping[str, Any], robots: Sequence[str], namespace: str, protocol: str
 ) -> dict[str, Any]:
-    """Return `access_control` settings that also let the robots themselves connect, over a protocol of their own.
-
-    Nobody but them can connect over that protocol.
-    """
+    """Return `access_control` settings that also admit the robots' own processes, over a protocol only they can use."""
     places = [_at(namespace, robot) for robot in robots]
-    # What reaches a client of a robot leaves the robot, and the reverse.
+    # Egress to a client is ingress from its robot, and vice versa.
     own = [_turned(rule, "robots") for rule in (*_viewing(places), *_operating(places))]
     return {
         **access,
@@ -121,7 +112,6 @@ def with_robots_behind(
 
 
 def _turned(rule: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return a rule for the other end of a link."""
     flow = "egress" if rule["flows"] == ["ingress"] else "ingress"
     return {**rule, "id": f"{rule['id']} of {name}", "flows": [flow]}
 
@@ -130,7 +120,7 @@ def _viewing(robots: Sequence[str]) -> list[dict[str, Any]]:
     streams = _keys(robots, *STREAMS)
     info, alive = _keys(robots, "info"), _keys(robots, "alive")
     return [
-        # Subscribers may ask for the streams of all robots; `streams` decides which ones they get.
+        # Subscribers may ask for the streams of all robots; the rule `streams` decides which ones they get.
         _rule("read", "ingress", ["declare_subscriber"], _keys([keys.ANYWHERE], *STREAMS)),
         _rule("streams", "egress", ["put"], streams),
         _rule("ask info", "ingress", ["query"], info),
@@ -156,15 +146,13 @@ def _operating(robots: Sequence[str]) -> list[dict[str, Any]]:
         _rule("answer command", "egress", ["declare_queryable", "reply"], command),
         _rule("set-points", "ingress", ["put"], setpoint),
         _rule("take set-points", "egress", ["declare_subscriber"], setpoint),
-        # When a client's token disappears, its lease ends. A viewer with a token of that name could end an
-        # operator's.
+        # A lease ends when its client's token disappears: a viewer with that token could end an operator's.
         _rule("be there", "ingress", ["liveliness_token"], clients),
         _rule("look for clients", "egress", ["declare_liveliness_subscriber", "liveliness_query"], clients),
     ]
 
 
 def _at(namespace: str, robot: str) -> str:
-    """Place of a robot: what its keys begin with."""
     return keys.within(namespace, f"{keys.PREFIX}/{keys.check_robot_name(robot)}")
 
 

@@ -1,4 +1,4 @@
-"""Gateways, through which clients reach a robot, and the interface between a gateway and its robot."""
+"""Gateways, through which clients reach a robot, and their interface to the robot."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
@@ -13,41 +13,41 @@ from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 Message = State | Event | Truth | Telemetry | Io
 Answer = Callable[[Reply], None]
-"""Takes the reply to a command, once, from any thread."""
+"""Takes the reply to a command; called once, from any thread."""
 
 
 def topic_of(message: Message) -> Topic:
-    """Return the topic on which a message is published, which its type names."""
+    """Return the topic of a message, which follows from its type."""
     return cast("Topic", tag(type(message)))
 
 
 class GatewayError(Exception):
-    """A gateway cannot open; the message says why and what to do."""
+    """A gateway cannot open; the message gives the reason and the remedy."""
 
 
 class Queried(Protocol):
-    """Answers the queries that arrive at a gateway. Its methods may be called from any thread and do not block."""
+    """Answers the queries that arrive at a gateway. The methods may be called from any thread and do not block."""
 
     def request(self, data: bytes, answer: Answer) -> None:
-        """Take an encoded command; `answer` is called once: immediately if it is rejected, else from another thread."""
+        """Take an encoded command; `answer` is called once, at once if it is rejected, else from another thread."""
 
     def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
-        """Answer a request for `info`; `answer` is called once, from any thread, with what makes the encoded message.
+        """Answer a request for `info`: call `answer` once, from any thread, with a function that encodes the message.
 
-        Only the thread that answers may call that, since it may read files.
+        Only the answering thread may call that function, since it may read files.
         """
 
 
 class Desk(Queried, Protocol):
-    """Receives all messages that arrive at a gateway, as `Queried` does."""
+    """Receives all messages that arrive at a gateway; threads as for `Queried`."""
 
     def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
-        """Take a command that the gateway made itself.
+        """Take a command that the gateway itself has made.
 
         Args:
             command: The command.
             answer: As for `request`.
-            origin: IP address of the machine on whose behalf it was made, if known.
+            origin: IP address of the machine that caused it, if known.
         """
 
     def setpoint(self, data: bytes) -> None:
@@ -65,24 +65,23 @@ class Desk(Queried, Protocol):
         """Note that a client's liveliness token, or the session that declared it, has disappeared."""
 
     def session_gone(self, session: str) -> None:
-        """Note that a session has ended, even if other sessions hold liveliness tokens of the same clients."""
+        """Note that a session has ended, even if other sessions hold tokens of the same clients."""
 
     def holder(self) -> str | None:
-        """Client that has control; None if no client has it."""
+        """Return the client that has control; None: no client."""
 
 
 class Gateway(ABC):
-    """One way for clients to reach a robot, and for the robot's messages to reach them."""
+    """A way for clients to reach a robot and for the robot's messages to reach them."""
 
     setpoints_refused: int
-    """Number of set-points rejected before the desk: those on a key with a wildcard, and those that are too large."""
+    """Number of set-points rejected before the desk: on a key with a wildcard, or too large."""
     dropped = 0
-    """Number of states dropped because too many were waiting."""
+    """Number of states dropped because too many were queued."""
     takes: Collection[Topic] = frozenset(get_args(Topic))
-    """Topics of which somebody wants messages at present; what no gateway takes is not made. Read from any thread."""
+    """Topics that currently have a reader; messages that no gateway takes are not made. Read from any thread."""
 
     def report(self, report: Report) -> None:
-        """Publish the state of a tick; see `publish`."""
         self.publish("state", report.state, report.encoded)
 
     @abstractmethod
@@ -90,10 +89,10 @@ class Gateway(ABC):
         """Publish a message, given both decoded and encoded. Called from one thread; network errors raise nothing."""
 
     async def open(self) -> None:  # noqa: B027  not every gateway has to wait for something
-        """Let clients in. Called when the robot ticks."""
+        """Admit clients. Called when the robot ticks."""
 
     async def shut(self) -> None:  # noqa: B027  likewise
-        """Let no more clients in, and disconnect the present ones."""
+        """Admit no more clients, and disconnect the present ones."""
 
     @abstractmethod
     def close(self) -> None:

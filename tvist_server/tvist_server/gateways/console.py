@@ -14,20 +14,15 @@ from tvist_server.gateways.base import Gateway, Message
 log = logging.getLogger(__name__)
 
 WINDOW = 10.0
-"""Time window in which lines are counted [s]."""
+"""Window in which lines are counted [s]."""
 STOPS, WARNINGS = 10, 5
 """Largest number of lines of each kind per window; warnings never displace stops."""
 LEAVE = 0.2
-"""Longest wait at shutdown for a console that nobody reads [s]."""
+"""Longest wait at shutdown for a blocked console [s]."""
 
 
 class Throttle:
-    """Lets a limited number of lines through per window and counts the rest; the caller supplies the time.
-
-    Args:
-        lines: Largest number of lines in `WINDOW`.
-        what: Kind of the lines, for the line that says how many were left out.
-    """
+    """Lets at most `lines` lines per `WINDOW` through and counts the rest; `what` names them in the count's line."""
 
     def __init__(self, lines: int, what: str) -> None:
         self._lines, self._what = lines, what
@@ -35,12 +30,7 @@ class Throttle:
         self._said = self._left_out = 0
 
     def take(self, line: str, now: float) -> list[str]:
-        """Return the lines to write when a new line comes.
-
-        Args:
-            line: The new line.
-            now: Time on any monotonic clock [s].
-        """
+        """Return the lines to write when a new line comes, at the time `now` of a monotonic clock [s]."""
         lines = self.due(now)
         if self._began is None:
             self._began = now
@@ -51,18 +41,18 @@ class Throttle:
         return lines
 
     def due(self, now: float) -> list[str]:
-        """Return the line that says how many lines were left out, if the window is over and any were."""
+        """Return the line that counts the omitted lines, if the window is over and there are any."""
         return [] if self._began is None or now - self._began < WINDOW else self.rest()
 
     def rest(self) -> list[str]:
-        """Return that line now and end the window."""
+        """Return that line now, and end the window."""
         left_out, self._began = self._left_out, None
         self._said = self._left_out = 0
         return [f"{left_out} more {self._what} in the last {WINDOW:g} s, left out here"] if left_out else []
 
 
 class Console:
-    """Writes lines to the log from a thread of its own, since a console that nobody reads blocks the writer."""
+    """Writes lines to the log from its own thread, since a console that nobody reads blocks the writer."""
 
     def __init__(self) -> None:
         self._throttles = {"stop": Throttle(STOPS, "stops"), "warning": Throttle(WARNINGS, "warnings")}
@@ -71,21 +61,15 @@ class Console:
         self._thread = threading.Thread(target=self._write, name="tvist-console", daemon=True)
 
     def start(self) -> None:
-        """Begin to write; lines from before wait in the queue."""
         self._thread.start()
 
     def say(self, line: str, *, stop: bool) -> None:
-        """Write a line, unless the limit is reached.
-
-        Args:
-            line: The line.
-            stop: Whether it is about a stop, not a warning.
-        """
+        """Write a line about a stop or a warning, unless the limit is reached."""
         with self._lock:
             self._put(self._throttles["stop" if stop else "warning"].take(line, time.monotonic()))
 
     def update(self) -> None:
-        """Write how many lines were left out, if it is time; to be called regularly."""
+        """Write the number of omitted lines when it is due; call this regularly."""
         with self._lock:
             for throttle in self._throttles.values():
                 self._put(throttle.due(time.monotonic()))
@@ -109,13 +93,7 @@ class Console:
 
 
 class ConsoleGateway(Gateway):
-    """Passes one robot's events to the console; it takes no input.
-
-    Args:
-        console: Console to write to.
-        name: Name of the robot.
-        command_line: Function that returns the command line of a command for this robot.
-    """
+    """Passes the events of the robot `name` to the console; `command_line` builds its commands."""
 
     setpoints_refused = 0
     takes: Collection[Topic] = frozenset[Topic]({"event"})
@@ -124,11 +102,10 @@ class ConsoleGateway(Gateway):
         self._console, self._name, self._command_line = console, name, command_line
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
-        """Write stops and warnings to the console."""
         if not isinstance(message, Event) or message.kind not in _TOLD:
             return
         stop = message.kind != "warning"
-        # After other stops the next step depends on what has happened since, which `tvist check` reports.
+        # After other stops the next step depends on what has happened since; `tvist check` reports it.
         command = {"protective_stop": "unlock", "safety_stop": "check"}.get(message.kind)
         then = "" if command is None else f". Next: {self._command_line(command)}"
         what = _TOLD[message.kind]

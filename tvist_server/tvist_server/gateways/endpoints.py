@@ -26,11 +26,7 @@ def options(endpoint: str) -> str:
 
 
 def is_local(endpoint: str) -> bool:
-    """Return whether only this machine can reach an endpoint.
-
-    When in doubt, an endpoint counts as reachable from other machines: if the protocol is unknown, if its host name
-    cannot be looked up, or if any one of the name's addresses is not local.
-    """
+    """Return whether only this machine can reach an endpoint; False if in doubt, as for an unknown protocol or host."""
     if protocol(endpoint) in LOCAL_PROTOCOLS:
         return True
     if protocol(endpoint) not in IP_PROTOCOLS:
@@ -42,7 +38,6 @@ def is_local(endpoint: str) -> bool:
 
 
 def _addresses(host: str) -> list[ipaddress.IPv4Address | ipaddress.IPv6Address]:
-    """Return all addresses of a host; empty if there is no such host or no host is named."""
     if not host:
         return []
     try:

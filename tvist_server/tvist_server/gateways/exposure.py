@@ -1,15 +1,11 @@
-"""Access protection of a server that other machines can reach: certificates and roles, or an explicit `--insecure`.
+"""Access protection of a server that other machines can reach: certificates and roles, or `--insecure`.
 
-`tvist keys` fills the folder given as `--security` with
+`tvist keys` fills the folder given as `--security`; on a router, roles may also be "robot" and "router":
 
     authority.pem    certificate of the authority that signs all others
     robot.pem        the robot's certificate, and
     robot.key        its private key
-    clients.toml     role by name: "anna" = "operator"; a client that is not listed has no access
-
-A router's folder is the same; its roles may also be "robot" and "router".
-
-Both sides show a certificate (mutual TLS); the common name in the client's certificate determines its role.
+    clients.toml     role by a certificate's common name: "anna" = "operator"; others have no access
 """
 
 import contextlib
@@ -29,15 +25,15 @@ AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key"
 _LINE = 'a line is "NAME" = "operator", "viewer", "robot" or "router"'
 
 HANDSHAKE_MS = 60_000
-"""Longest time for a TLS handshake [ms]. Zenoh accepts no client for 100 ms after each failed handshake (its issue
-2685), so a hundred that fail at once delay the next client by 10 s, and a handshake must outlast that. Since at most
-ten can fail per second, no more than 600 are in progress."""
+"""Longest TLS handshake [ms]. After a failed handshake Zenoh accepts no client for 100 ms (its issue 2685),
+so a hundred failures at once delay the next client by 10 s, which a handshake must outlast. At most ten
+handshakes fail per second, so at most 600 are in progress."""
 
 LIMITS: Mapping[str, Any] = {
-    # Largest message that the server assembles from fragments; the gateway refuses messages above MAX_BYTES.
+    # Largest message assembled from fragments; the gateway refuses messages above MAX_BYTES.
     "transport/link/rx/max_message_size": 2 * MAX_BYTES,
 }
-"""Zenoh settings of a session that other machines can reach, by path."""
+"""Zenoh settings, by path, of a session that other machines can reach."""
 
 
 def guarded(
@@ -48,11 +44,7 @@ def guarded(
     insecure: bool,
     namespace: str = "",
 ) -> tuple[list[str], dict[str, Any]]:
-    """Return the endpoints to listen on and the settings that protect them.
-
-    Raises:
-        StartError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
-    """
+    """Return the endpoints to listen on and the settings that protect them; StartError if one is unprotected."""
     secured, settings, roles = _protected(listen, security, insecure=insecure)
     access = open_access(robots, namespace) if roles is None else access_control(robots, roles, namespace)
     return secured, {**settings, "access_control": access}
@@ -61,21 +53,13 @@ def guarded(
 def guarded_router(
     listen: Sequence[str], *, security: str | None, insecure: bool
 ) -> tuple[list[str], dict[str, Any]]:
-    """Return the same for a router; without certificates, everyone may connect as a robot or a client.
-
-    Raises:
-        StartError: See `guarded`.
-    """
+    """Return the same for a router; without certificates, anyone may connect as a robot or a client."""
     secured, settings, roles = _protected(listen, security, insecure=insecure)
     return secured, settings if roles is None else {**settings, "access_control": router_access(roles)}
 
 
 def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
-    """Check the form of endpoints.
-
-    Raises:
-        StartError: One has another form.
-    """
+    """Raise StartError if an endpoint is malformed."""
     for endpoint in endpoints:
         if not is_endpoint(endpoint):
             raise StartError(
@@ -86,7 +70,7 @@ def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
 def _protected(
     listen: Sequence[str], security: str | None, *, insecure: bool
 ) -> tuple[list[str], dict[str, Any], dict[str, Role] | None]:
-    """Return endpoints, the settings of their transport, and the roles by name if there are certificates."""
+    """Return endpoints, transport settings, and the roles by name if there are certificates."""
     check_endpoints("listen", listen)
     if security is not None:
         if insecure:
@@ -108,11 +92,7 @@ def _protected(
 
 
 def guarded_interfaces(address: str, *, insecure: bool) -> None:
-    """Refuse to open UR's interfaces, which cannot authenticate clients, where other machines would reach them.
-
-    Raises:
-        StartError: Other machines could reach them.
-    """
+    """Raise StartError if other machines could reach UR's interfaces, which cannot authenticate clients."""
     if not insecure and not ipaddress.ip_address(address).is_loopback:
         raise StartError(
             f"ur_address is {address}, which other machines can reach, and UR's interfaces do not authenticate "
@@ -121,12 +101,7 @@ def guarded_interfaces(address: str, *, insecure: bool) -> None:
 
 
 def roles_in(folder: Path) -> dict[str, Role]:
-    """Read the role of each client from `clients.toml`.
-
-    Raises:
-        StartError: The file cannot be read, or a role is invalid.
-        UserFileError: The file is not text, too large or nested too deeply.
-    """
+    """Read the role of each client from `clients.toml`; StartError or UserFileError if it is invalid."""
     path = folder / CLIENTS
     try:
         return read_start_file(path, "file of roles", dict[str, Role])
@@ -136,11 +111,7 @@ def roles_in(folder: Path) -> dict[str, Role]:
 
 
 def _secured(endpoint: str) -> str:
-    """Check an endpoint for use with `--security`.
-
-    Another protocol is refused rather than converted to TLS: the server would otherwise listen on a different endpoint
-    than the one requested, and a client of tcp/ would get no answer and no explanation.
-    """
+    """Check an endpoint for use with `--security`; clients of another protocol would not expect TLS."""
     if protocol(endpoint) != "tls":
         address = endpoint.partition("/")[2] or "<address>:<port>"
         raise StartError(
@@ -176,7 +147,7 @@ def _settings(security: str) -> dict[str, Any]:
 
 
 def _check_pair(folder: Path) -> None:
-    """Try a TLS handshake with itself, since Zenoh would not report clearly what is wrong with the files."""
+    """Attempt a TLS handshake with itself, because Zenoh's errors do not say what is wrong with the files."""
     for name in (AUTHORITY, CERTIFICATE, KEY):
         try:
             read_bytes(folder / name, "certificate or key")
@@ -186,7 +157,7 @@ def _check_pair(folder: Path) -> None:
         server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         server.load_cert_chain(folder / CERTIFICATE, folder / KEY)
         client = ssl.create_default_context(cafile=folder / AUTHORITY)
-        client.check_hostname = False  # clients alone know the name by which they reach the robot
+        client.check_hostname = False  # only clients know the name by which they reach the robot
         _shake_hands(server, client)
     except ssl.SSLCertVerificationError as error:
         why = f"no client would trust {CERTIFICATE}: {error.verify_message}"

@@ -1,4 +1,4 @@
-"""Figures of the robots for Prometheus, over HTTP; they can be read and nothing can be changed.
+"""Prometheus figures of the robots over HTTP, read-only.
 
 `python -m tvist_server.gateways.metrics > docs/reference/generated/metrics.md` writes the page that lists them.
 """
@@ -17,17 +17,14 @@ if TYPE_CHECKING:
     from prometheus_client.metrics_core import Metric
     from prometheus_client.registry import Collector
 else:
-    Collector = object  # the library is imported when figures are asked for
+    Collector = object  # the library is imported when figures are requested
 
 LABELS = ("namespace", "robot")
 MICRO = 1e-6
 
 
 class MetricsGateway(Gateway):
-    """Keeps a robot's newest messages for whoever asks; it takes no input.
-
-    `newest` returns the robot's newest state when somebody asks, from any thread.
-    """
+    """Keeps a robot's newest messages for Prometheus; `newest` returns the newest state, from any thread."""
 
     setpoints_refused = 0
     takes: Collection[Topic] = frozenset[Topic]({"event", "telemetry"})
@@ -36,13 +33,11 @@ class MetricsGateway(Gateway):
         self.labels = (namespace, robot)
         self._newest = newest
         self.state: State | None = None
-        """Newest state."""
         self.telemetry: Telemetry | None = None
-        """Newest telemetry."""
         self.events: Counter[str] = Counter()
-        """Number of events of each kind."""
+        """Number of events by kind."""
         self.warnings: Counter[str] = Counter()
-        """Number of warnings of each code; empty for those that have none."""
+        """Number of warnings by code; empty: no code."""
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
         if isinstance(message, Telemetry):
@@ -51,13 +46,12 @@ class MetricsGateway(Gateway):
             self.count(message)
 
     def count(self, event: Event) -> None:
-        """Count an event."""
         self.events[event.kind] += 1
         if event.kind == "warning":
             self.warnings[event.code or ""] += 1
 
     def look(self) -> None:
-        """Take the newest state; before the figures are read."""
+        """Fetch the newest state, before the figures are read."""
         self.state = self._newest() or self.state
 
     def close(self) -> None:
@@ -65,11 +59,7 @@ class MetricsGateway(Gateway):
 
 
 class Metrics(Collector):
-    """An HTTP server for Prometheus; `collect` computes the figures when somebody asks. Port 0 takes any.
-
-    Raises:
-        GatewayError: The server cannot listen there, or prometheus_client is not installed.
-    """
+    """HTTP server for Prometheus, which computes figures on request; GatewayError if it cannot listen at `address`."""
 
     def __init__(self, address: str) -> None:
         host, port = place(address)
@@ -87,26 +77,24 @@ class Metrics(Collector):
         except (OSError, socket.gaierror) as error:
             raise GatewayError(f"cannot publish metrics on {address}: {error.strerror or error}") from error
         self.page = f"http://{f'[{host}]' if ':' in host else host}:{self._server.server_port}/metrics"
-        """Address of the page with the figures."""
+        """URL of the page with the figures."""
 
     def gateway(self, namespace: str, robot: str, newest: Callable[[], State | None]) -> MetricsGateway:
-        """Create the gateway of a robot; arguments as for the gateway."""
+        """Create the gateway of a robot; arguments as for `MetricsGateway`."""
         gateway = MetricsGateway(namespace, robot, newest)
         self.add(gateway)
         return gateway
 
     def add(self, gateway: MetricsGateway) -> None:
-        """Publish the figures of one more robot."""
         self._robots.append(gateway)
 
     def close(self) -> None:
-        """Stop publishing the page."""
         with contextlib.suppress(OSError):
             self._server.shutdown()
             self._server.server_close()
 
     def collect(self) -> "Iterator[Metric]":
-        """Yield the figures of all robots; robots that have sent no telemetry yet have only those of their states."""
+        """Yield the figures of all robots; a robot without telemetry has only those of its state."""
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
         for robot in self._robots:
@@ -154,7 +142,7 @@ class Metrics(Collector):
         )
 
     def _counted(self, name: str, what: str, label: str) -> "Metric":
-        """Return how many events or warnings there were of each kind or code."""
+        """Return the number of events or warnings for each kind or code."""
         from prometheus_client.core import CounterMetricFamily
 
         family = CounterMetricFamily(name, what, labels=(*LABELS, label))
@@ -212,11 +200,7 @@ COUNTERS = (
 
 
 def place(address: str) -> tuple[str, int]:
-    """Split `ADDRESS:PORT`; without an address it is the loopback interface.
-
-    Raises:
-        GatewayError: It is neither.
-    """
+    """Split `ADDRESS:PORT`, or `PORT` of the loopback interface; raise GatewayError if it is neither."""
     host, _, port = address.rpartition(":")
     if not (port.isascii() and port.isdigit() and len(port) < 6 and int(port) < 65536):
         raise GatewayError(
@@ -243,7 +227,7 @@ change once a second. [Operate many robots](../../how-to/operate-many-robots.md#
 
 
 def page() -> str:
-    """Return the page of the reference that lists all figures."""
+    """Return the reference page that lists all figures."""
     metrics = Metrics("0")
     families = list(metrics.collect())
     metrics.close()

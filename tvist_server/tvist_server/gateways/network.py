@@ -1,7 +1,4 @@
-"""The network: one Zenoh session for all robots of the server.
-
-It acts as a router to which clients connect, or connects to a router of a fleet as a client, or both.
-"""
+"""One Zenoh session for all robots of the server: a router for clients, a client of a fleet's router, or both."""
 
 import json
 import threading
@@ -20,36 +17,36 @@ from tvist_server.gateways.zenoh import ZenohGateway
 
 CONFIG: Mapping[str, Any] = {
     "mode": "router",
-    # Skip looking for other routers, which by default makes opening wait for half a second.
+    # Do not look for other routers: it delays opening by half a second.
     "scouting/delay": 0,
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
-    # A payload in shared memory would bypass every size limit; it is used from 3 kB.
+    # Shared memory, which Zenoh uses from 3 kB, would bypass every size limit.
     "transport/shared_memory/enabled": False,
-    # By default a hundred silent connections keep all other clients out for ten seconds.
+    # By default, a hundred silent connections keep all other clients out for ten seconds.
     "transport/unicast/accept_timeout": 2000,
     "transport/unicast/accept_pending": 1000,
-    # A state costs about 20 µs for each subscriber: this many would use up a tick's 2 ms several times over.
+    # A state costs about 20 µs per subscriber: this many already use several times a tick's 2 ms.
     "transport/unicast/max_sessions": 256,
 }
 """Zenoh settings of the session, by path."""
 REALTIME: Mapping[str, Any] = {
-    # Data beyond this send buffer, half a second of states, is dropped rather than late. By default the system
-    # buffers 3 MB, and a client on a slow link would get states and answers that are half a minute old.
+    # Data beyond this send buffer, half a second of states, is dropped. By default the system buffers 3 MB,
+    # and a client on a slow link would get states and answers that are half a minute old.
     "transport/link/tcp/so_sndbuf": 131_072,
     "transport/link/tls/so_sndbuf": 131_072,
-    # In real time, answers are the only messages that wait for room, and all other answers wait behind them. A client
-    # that keeps asking but has stopped reading is disconnected after this time [us] instead of 5 s.
+    # In real time only answers wait for room, and each delays all later ones. A client that keeps asking but does
+    # not read is disconnected after this time [µs] instead of 5 s.
     "transport/link/tx/queue/congestion_control/block/wait_before_close": 1_000_000,
-    # The tick thread publishes, and must not wait for room; by default it would for a millisecond.
+    # The tick thread publishes and must not wait for room; by default it would for a millisecond.
     "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 0,
-    # An answer that waits for room holds its priority's queue of the link, and has the priority of its query. Nothing
-    # is published with this one, so the tick thread never waits for a client that asks and does not read.
+    # An answer that waits blocks the queue of its query's priority on that link. Nothing is published with
+    # this priority, so the tick thread never waits for a client that asks and does not read.
     "qos/network": [{"messages": ["query"], "flows": ["ingress"], "overwrite": {"priority": "data"}}],
 }
 """Additional settings for a clock that does not wait for clients."""
 CONNECT_S = 10
-"""Longest time to reach a router at the start [s]; a router that is lost later is looked for until the end."""
+"""Longest time to reach a router at the start [s]; a router lost later is looked for until the end."""
 CONNECT: Mapping[str, Any] = {
     "connect/timeout_ms": 1000 * CONNECT_S,
     "connect/exit_on_failure": True,
@@ -59,32 +56,18 @@ CONNECT: Mapping[str, Any] = {
 
 
 class Network:
-    """Listens on endpoints, and creates a gateway for each robot.
-
-    Args:
-        endpoints: Endpoints to listen on, such as `tcp/127.0.0.1:7447`.
-        guard: Session settings that restrict access, by path.
-        lockstep: Whether a client advances time, so that the server waits for slow clients.
-        connect: Routers to connect to; the first that answers is taken.
-        security: Folder with this robot's certificate for the router, as a client has one.
-        namespace: Chunks that precede all keys on the network.
-        on_router: Called with False when the connection to a router is lost, and with True when it is back; in
-            Zenoh's threads.
-
-    Raises:
-        GatewayError: The server cannot listen on an endpoint, or reaches no router within `CONNECT_S`.
-    """
+    """Listens on endpoints and creates a gateway for each robot; GatewayError if that fails or no router answers."""
 
     def __init__(
         self,
         endpoints: Sequence[str],
-        guard: Mapping[str, Any] = MappingProxyType({}),
+        guard: Mapping[str, Any] = MappingProxyType({}),  # session settings that restrict access, by path
         *,
-        lockstep: bool = True,
-        connect: Sequence[str] = (),
-        security: str | None = None,
-        namespace: str = "",
-        on_router: Callable[[bool], None] | None = None,
+        lockstep: bool = True,  # whether a client advances time: the server waits for slow clients
+        connect: Sequence[str] = (),  # routers; the first that answers is used
+        security: str | None = None,  # folder with this robot's certificate for the router
+        namespace: str = "",  # precedes all keys on the network
+        on_router: Callable[[bool], None] | None = None,  # connected or lost; Zenoh's threads
     ) -> None:
         settings = guard if lockstep else {**REALTIME, **guard}
         if namespace:
@@ -92,7 +75,6 @@ class Network:
         self.session = (
             _connected(connect, endpoints, settings, security) if connect else _open(endpoints, settings)
         )
-        """The session, in the namespace."""
         self._gateways: list[ZenohGateway] = []
         self._expected: dict[str, ZenohGateway] = {}
         self._closed = False
@@ -109,33 +91,22 @@ class Network:
         truth: bool,
         wanted: Callable[[bool], None] | None = None,
     ) -> ZenohGateway:
-        """Create the gateway of a robot.
+        """Create the gateway of a robot for its desk; in lockstep, the publisher waits so that no state is lost.
 
-        Args:
-            robot: Name of the robot, which is part of every key.
-            desk: Desk that receives the messages that arrive.
-            lockstep: Whether a client advances time: then no state may be lost, and the publisher waits.
-            truth: Whether to publish the topic with values that a real robot cannot measure.
-            wanted: Called, from any thread, with whether a client subscribes to that topic, if it is published only
-                then.
+        If `truth` is False, `wanted`, if given, is called from any thread with whether a client subscribes to
+        the topic `truth`.
         """
         gateway = self._expected.pop(robot, None) or self._added(robot, desk)
         gateway.serve(desk, lockstep=lockstep, truth=truth, wanted=wanted)
         return gateway
 
     def expect(self, robots: Sequence[str], starting: Queried, *, here: bool = True) -> None:
-        """Answer queries for robots that are starting.
-
-        Args:
-            robots: Names of the robots.
-            starting: Answers until `gateway` gives each a desk.
-            here: Whether they will have gateways here; otherwise another session answers as soon as it can.
-        """
+        """Let `starting` answer queries for robots until `gateway`, or another session (`here` False), serves them."""
         for robot in robots:
             self._expected[robot] = self._added(robot, starting, complete=here)
 
     def forget(self) -> None:
-        """Leave the robots that were expected to other sessions: Zenoh does not always prefer a complete answer."""
+        """Leave the expected robots to other sessions, because Zenoh does not always prefer a complete answer."""
         for gateway in self._expected.values():
             gateway.withdraw()
 
@@ -145,7 +116,7 @@ class Network:
         return gateway
 
     def close(self) -> None:
-        """Close the session, which makes every `alive` token disappear at once. A second call does nothing."""
+        """Close the session, so that every `alive` token disappears at once. A second call does nothing."""
         if self._closed:
             return
         self._closed = True
@@ -179,10 +150,7 @@ def _open(endpoints: Sequence[str], settings: Mapping[str, Any]) -> zenoh.Sessio
 def _connected(
     connect: Sequence[str], listen: Sequence[str], settings: Mapping[str, Any], security: str | None
 ) -> zenoh.Session:
-    """Connect to a router: as its client, or as its peer if clients can connect here, too.
-
-    It is no router, since each router keeps a map of all others, and a fleet has many robots.
-    """
+    """Connect to a router as a client, or as a peer with clients of its own; routers keep maps of all other routers."""
     mode = {"mode": "peer", "listen/endpoints": list(listen)} if listen else {"mode": "client"}
     try:
         return _session({**settings, **mode, **CONNECT, **_towards(connect, security)})
@@ -199,23 +167,13 @@ def _connected(
 def open_router(
     listen: Sequence[str], connect: Sequence[str], settings: Mapping[str, Any], security: str | None
 ) -> zenoh.Session:
-    """Open the session of a router; other routers may appear later.
-
-    Args:
-        listen: Endpoints to listen on.
-        connect: Other routers to connect to.
-        settings: Further settings, by path.
-        security: Folder with a certificate for other routers.
-
-    Raises:
-        GatewayError: The router cannot listen on an endpoint, or the certificate is missing.
-    """
+    """Open the session of a router, which connects to others when they appear; GatewayError if it cannot listen."""
     retry = {"connect/retry": CONNECT["connect/retry"]}
     return _open(listen, {**settings, **retry, **_towards(connect, security)})
 
 
 def _towards(connect: Sequence[str], security: str | None) -> dict[str, Any]:
-    """Return the settings of a session that connects to routers: their endpoints, and the certificate to show."""
+    """Return the settings of a session that connects to routers: their endpoints and the certificate to present."""
     shown: dict[str, Any] = {"connect/endpoints": list(connect)}
     try:
         for endpoint in connect:
@@ -233,7 +191,7 @@ def _session(settings: Mapping[str, Any]) -> zenoh.Session:
 
 
 def _explain(error: zenoh.ZError, endpoints: str) -> str:
-    """Zenoh's reason in one sentence, without the source locations that it appends."""
+    """Return Zenoh's reason in plain words, without the source locations that it appends."""
     cause = str(error)
     reasons = {
         "Address already in use": "the port is in use: stop the server that uses it, or choose another port",
@@ -255,6 +213,6 @@ def _close_all() -> None:
         network.close()
 
 
-# A session that is left open can hang the process at its end. `atexit` runs too late: after threads were joined.
+# An open session can hang the process at its end. `atexit` runs too late: after threads were joined.
 _register: Callable[[Callable[[], None]], None] = threading._register_atexit  # type: ignore[attr-defined]  # noqa: SLF001
 _register(_close_all)

@@ -20,12 +20,9 @@ CLOSE_WAIT = 0.2
 
 
 class Answers:
-    """Sends replies to queries.
+    """Sends replies to queries from its own thread, because a client that does not read blocks it.
 
-    A reply has the quality of service that its client asked for, by default BLOCK. A client that sends queries and
-    stops reading therefore blocks the thread that answers until its link is closed, after 1 s in real time and 5 s in
-    lockstep. Because a separate thread answers, the messages published 500 times a second still reach other clients
-    in time.
+    It blocks until its link is closed, after 1 s in real time and 5 s in lockstep: by default, replies use BLOCK.
     """
 
     def __init__(self) -> None:
@@ -35,11 +32,11 @@ class Answers:
         self._thread.start()
 
     def to(self, query: zenoh.Query, key: str) -> Callable[[Reply | Callable[[], bytes]], None]:
-        """Return the function that answers a query on a key, with a reply or what makes an encoded one."""
+        """Return a function that answers a query with a reply, or with a function that returns an encoded one."""
         return lambda reply: self._queue.put((query, key, reply))
 
     def close(self) -> None:
-        """Send the answers still waiting, unless that takes longer than `CLOSE_WAIT`."""
+        """Send the queued answers, for at most `CLOSE_WAIT`."""
         self._queue.put(None)
         self._thread.join(CLOSE_WAIT)
         self._closed = True
@@ -53,6 +50,6 @@ class Answers:
 
 
 def _send(query: zenoh.Query, key: str, reply: Reply | Callable[[], bytes]) -> None:
-    # If the client has left or the session is closed, the answer is no longer needed. Here Zenoh ends the query.
+    # Leaving this block ends the query; if the client has left, the answer is not needed.
     with contextlib.suppress(zenoh.ZError), query:
         query.reply(key, reply() if callable(reply) else encode(reply), encoding=ENCODING)

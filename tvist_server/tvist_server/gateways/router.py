@@ -1,4 +1,4 @@
-"""A router for a fleet: Zenoh's own, with the settings of this house for access and for rates."""
+"""A router for a fleet: Zenoh's router with tvist's settings for access and rates."""
 
 import re
 import resource
@@ -13,31 +13,27 @@ from tvist_server.gateways.network import REALTIME, open_router
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 SESSIONS = 4096
-"""Largest number of robots, clients and routers that are connected at once."""
+"""Largest number of robots, clients and routers connected at once."""
 MOST = 10_000
-"""Largest count of robots in one word: each has rules of its own."""
+"""Largest COUNT in `NAME*COUNT`; each robot has its own rules."""
 FASTEST = 500.0
-"""Largest rate of states to pass on [1/s]: a robot publishes no more."""
+"""Largest rate of states to pass on [1/s], which is the rate at which a robot publishes."""
 REDUCED = ("state", "truth")
-"""Leaves of the keys whose rates can be reduced: each message says all, so that one more recent replaces it."""
+"""Keys whose rates can be reduced, because each message replaces the one before."""
 _RATE = re.compile(r"(\d+(?:\.\d+)?)(?:@([\w.:-]+))?")
 
 
 class Rate(NamedTuple):
-    """A limit on the states of each robot that the router passes on."""
+    """A limit on the rate of each robot's states that the router passes on."""
 
     hz: float
     """States per second."""
     interface: str | None
-    """Network interface that they leave through; None: any."""
+    """Network interface that the states leave through; None: any."""
 
     @classmethod
     def read(cls, text: str) -> Self:
-        """Read `10` or `10@eth1`.
-
-        Raises:
-            ValueError: It is neither, or no possible rate.
-        """
+        """Parse `10` or `10@eth1`; ValueError if it has another form or an impossible rate."""
         found = _RATE.fullmatch(text)
         if found is None or not 0.0 < float(found[1]) <= FASTEST:
             raise ValueError(
@@ -47,14 +43,9 @@ class Rate(NamedTuple):
 
 
 class Router:
-    """A running router, which connects to other routers now or when they appear.
+    """A running router; `rates` limit the outgoing states of each robot in `robots`, and of all others together.
 
-    It limits the states that leave: those of each of `robots`, and those of all others together. An interface
-    that is named has its own rates.
-
-    Raises:
-        StartError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
-        GatewayError: The router cannot listen on an endpoint.
+    May raise StartError or GatewayError.
     """
 
     def __init__(
@@ -79,17 +70,11 @@ class Router:
         self._session = open_router(endpoints, connect, settings, security)
 
     def close(self) -> None:
-        """Close the router, which disconnects all robots and clients."""
         close_session(self._session)
 
 
 def robots_of(text: str) -> list[Place]:
-    """Read `[NAMESPACE/]NAME`, or `[NAMESPACE/]NAME*COUNT` for NAME-1 to NAME-COUNT, as `tvist serve` names them.
-
-    Raises:
-        ProtocolError: A namespace or a name is none.
-        ValueError: The count is not from 1 to `MOST`.
-    """
+    """Parse `[NAMESPACE/]NAME`, or `[NAMESPACE/]NAME*COUNT` for NAME-1 to NAME-COUNT; may raise ValueError."""
     first, star, count = text.partition("*")
     if not star:
         return [place_of(first)]
@@ -102,8 +87,8 @@ def robots_of(text: str) -> list[Place]:
 def downsampling(rates: Sequence[Rate], robots: Sequence[Place]) -> list[dict[str, Any]]:
     """Return Zenoh's `downsampling` settings for what leaves the router.
 
-    Zenoh counts by rule, not by key: a rule with a wildcard lets one robot's states use up what is meant for all. So
-    each robot has rules of its own, and only robots that are not listed share one. The first rule that fits is taken.
+    Zenoh counts per rule, not per key: under a wildcard, one robot could use up the rate of all. Listed
+    robots therefore have rules of their own, which come first.
     """
     places = [
         *(keys.within(place.namespace, f"{keys.PREFIX}/{place.robot}") for place in robots),
@@ -124,6 +109,6 @@ def downsampling(rates: Sequence[Rate], robots: Sequence[Place]) -> list[dict[st
 
 
 def _allow_files() -> None:
-    """Allow this process as many connections as the system permits; the usual limit is 1024 files."""
+    """Raise this process's limit of open files, usually 1024, to what the system permits."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))

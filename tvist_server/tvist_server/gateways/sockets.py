@@ -1,4 +1,4 @@
-"""The sockets of a robot's programs as sockets of this machine."""
+"""The sockets of a robot's programs as TCP sockets of this machine."""
 
 import asyncio
 import contextlib
@@ -27,24 +27,19 @@ from tvist_server.gateways.base import Gateway, Message
 log = logging.getLogger(__name__)
 
 CONNECT_WITHIN: Final = 2.0
-"""Longest time to connect, with looking up the name [s]; that of UR's controllers."""
+"""Longest time to connect, including name resolution [s]; as on UR's controllers."""
 PATIENCE: Final = 1.0
 """Wall time for which a step waits for a socket that a program reads [s]."""
 MAX_UNREAD: Final = 65_536
-"""Bytes that may wait for a program to read them, besides those of one more piece; then the sender has to wait."""
+"""Number of unread bytes (plus one piece) above which the sender is paused."""
 FLUSH_WITHIN: Final = 5.0
-"""Longest time to send what a closed socket has left to send [s]."""
+"""Longest time to flush a closed socket [s]."""
 MAX_UNSENT: Final = 262_144
-"""Bytes that may wait for the other side to read them; then it is disconnected."""
+"""Number of unsent bytes above which the peer is disconnected."""
 
 
 class _Link(asyncio.Protocol):
-    """One socket. Its methods are called in the network's thread.
-
-    Args:
-        number: Number of the socket.
-        tell: Tells the controller what happened to it.
-    """
+    """One socket, used in the network's thread; `tell` passes its news to the controller."""
 
     def __init__(self, number: int, tell: Callable[[SocketNews], None]) -> None:
         self._number, self._tell = number, tell
@@ -53,11 +48,11 @@ class _Link(asyncio.Protocol):
         self.taken = 0
         """Received bytes that the program has read; written in the controller's thread."""
         self.paused = False
-        """True while the sender has to wait, since the program has much to read."""
+        """Whether the sender is paused, because the program has much to read."""
         self.ended = False
-        """True from its end on; what happens to it later is not told."""
+        """Whether the socket has ended; later events are not reported."""
         self.connecting: asyncio.Task[None] | None = None
-        """Connects it; None before that begins."""
+        """Task that connects it; None before it starts."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -72,16 +67,15 @@ class _Link(asyncio.Protocol):
         self._say("received", data)
         self.look()
 
-    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  the program is told only that it ended
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  the program only learns that the socket ended
         self._transport = None
         self.end("closed")
 
     def look(self) -> None:
-        """Let the sender wait, or let it go on."""
         transport = self._transport
         if transport is None or transport.is_closing():
             return
-        self.paused = True  # before looking, so that what is read meanwhile leads to another look
+        self.paused = True  # set before checking, so that a concurrent read triggers another check
         if self._received - self.taken > MAX_UNREAD:
             transport.pause_reading()
         else:
@@ -89,7 +83,7 @@ class _Link(asyncio.Protocol):
             transport.resume_reading()
 
     def send(self, data: bytes) -> None:
-        """Send bytes; disconnect a machine that leaves too many of them unread."""
+        """Send bytes; disconnect a peer that leaves too many unread."""
         transport = self._transport
         if transport is None or transport.is_closing():
             return
@@ -99,7 +93,7 @@ class _Link(asyncio.Protocol):
             transport.abort()
 
     def end(self, change: SocketChange | None = None) -> None:
-        """End it, and tell the controller unless it knows."""
+        """End the socket, and report `change` to the controller unless the controller caused it."""
         if change is not None:
             self._say(change)
         elif self.connecting is not None:
@@ -115,13 +109,7 @@ class _Link(asyncio.Protocol):
 
 
 class ProgramSockets(Gateway, SocketPorts):
-    """Opens sockets to the machines that programs may connect to, and carries their bytes.
-
-    Args:
-        tell: Tells the controller what happened; may be called from any thread and does not block.
-        warn: Tells people; likewise.
-        allowed: The machines that programs may connect to.
-    """
+    """Opens sockets to the machines that programs may connect to; `tell` and `warn` run in any thread."""
 
     takes: Collection[Topic] = ()
 
@@ -132,20 +120,20 @@ class ProgramSockets(Gateway, SocketPorts):
         self._tell_controller, self._warn, self._allowed = tell, warn, allowed
         self._loop: asyncio.AbstractEventLoop | None = None
         self._early: list[Callable[[], object]] | None = []
-        """Actions that wait until the network's thread begins; None from then on."""
-        # The following are used in the controller's thread only.
+        """Actions that wait for the network's thread to start; None from then on."""
+        # The controller's thread alone uses the following fields.
         self._links: dict[int, _Link] = {}
         self._waits: dict[int, tuple[int, float]] = {}
-        """Socket of each present wait, and when it began."""
+        """Socket and start time of each present wait."""
         self._moved: set[int] = set()
-        """Sockets of which something was told since the last tick."""
+        """Sockets with news since the last tick."""
         self._silent: set[int] = set()
         """Sockets that a step has waited for in vain."""
 
-    # ------------------------------------------------------------------ in the controller's thread
+    # The following methods run in the controller's thread.
 
     def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketNews]:
-        """Carry out orders; what comes of them is told later."""
+        """Carry out orders; the results are reported later."""
         now = time.monotonic()
         for order in orders:
             match order:
@@ -181,10 +169,7 @@ class ProgramSockets(Gateway, SocketPorts):
             self._silent.discard(news.number)
 
     def patience(self) -> float:
-        """Return how long a step may wait for a socket that a program reads [s]; 0 if there is no reason.
-
-        A step waits once for a socket that remains silent, and again when it has received something.
-        """
+        """Return how long a step may wait for a socket that a program reads [s]; once for each silence."""
         waits = [(socket, begun) for socket, begun in self._waits.values() if socket not in self._silent]
         if not waits or not self._moved.isdisjoint(socket for socket, _ in waits):
             self._moved.clear()
@@ -194,23 +179,22 @@ class ProgramSockets(Gateway, SocketPorts):
         return max(0.0, max(begun for _, begun in waits) + PATIENCE - now)
 
     def _after(self, seconds: float, news: SocketNews) -> None:
-        """Tell the controller in the network's thread, so that what has arrived by then is told first."""
+        """Report news after a delay from the network thread, so that data that came earlier is reported first."""
         self._soon(
             lambda: asyncio.get_running_loop().call_later(max(0.0, seconds), self._tell_controller, news)
         )
 
     def _soon(self, action: Callable[[], object]) -> None:
-        """Have something done in the network's thread."""
         if self._loop is not None:
             with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
                 self._loop.call_soon_threadsafe(action)
         elif self._early is not None:
             self._early.append(action)
 
-    # ------------------------------------------------------------------ in the network's thread
+    # The following methods run in the network's thread.
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
-        """Ignore what the robot publishes."""
+        """Ignore the messages of the robot."""
 
     async def open(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -219,14 +203,12 @@ class ProgramSockets(Gateway, SocketPorts):
             action()
 
     async def shut(self) -> None:
-        """Close all sockets, and ignore further orders of programs."""
         self._loop = None
         for link in tuple(self._links.values()):
             link.end()
         await asyncio.sleep(0)  # lets the connections end
 
     def close(self) -> None:
-        """Connect no more. A second call does nothing."""
         self._loop = self._early = None
 
     def _begin(self, order: Open, link: _Link) -> None:
@@ -234,7 +216,7 @@ class ProgramSockets(Gateway, SocketPorts):
 
     async def _connect(self, order: Open, link: _Link) -> None:
         loop = asyncio.get_running_loop()
-        with contextlib.suppress(Exception):  # whatever a name leads to, the program has to hear of it
+        with contextlib.suppress(Exception):  # any failure must be reported to the program
             async with asyncio.timeout(CONNECT_WITHIN):
                 for address in await self._addresses(order):
                     with contextlib.suppress(OSError):
@@ -243,7 +225,7 @@ class ProgramSockets(Gateway, SocketPorts):
         link.end("failed")
 
     async def _addresses(self, order: Open) -> list[str]:
-        """IP addresses of a machine that the program may connect to; warns if it has others only."""
+        """Return the addresses of a machine that the program may connect to; warn if all are forbidden."""
         loop = asyncio.get_running_loop()
         found = await loop.getaddrinfo(order.address, order.port, proto=6)
         addresses = list(dict.fromkeys(str(one[4][0]) for one in found))

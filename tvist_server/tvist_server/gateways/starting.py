@@ -1,4 +1,4 @@
-"""What clients hear of a robot that is not ready yet."""
+"""Answers to clients while robots are starting."""
 
 from collections.abc import Callable
 from functools import partial
@@ -8,19 +8,18 @@ from tvist_protocol.replies import Refused
 from tvist_server.gateways.base import Answer, Queried
 
 Tell = Callable[[int, int], None]
-"""Takes the number of kernels that are compiled, and of all."""
+"""Takes the number of compiled kernels and of all kernels."""
 Prepare = Callable[[Tell], None]
-"""Does what takes long before robots can be made."""
+"""Does the slow work that precedes the creation of robots."""
 
 
 class Starting(Queried):
-    """Refuses every query to robots that are starting, and says how far that is."""
+    """Refuses every query to robots that are starting, and reports the progress."""
 
     def __init__(self) -> None:
         self._how_far = ""
 
     def note(self, done: int, total: int) -> None:
-        """Note how many kernels are compiled, of how many."""
         self._how_far = f"{done} of {total} kernels are compiled; "
 
     def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  whatever it is

@@ -1,8 +1,7 @@
 """The Zenoh gateway: one robot's keys on the server's session.
 
-Callbacks run directly in Zenoh's own threads (`indirect=False`), so messages of one client are handled in the order
-in which it sent them: a liveliness token before the command that follows it. They convert payloads to bytes, pass
-them to the desk and return. One may still be running when the session is closed, hence the flag.
+Callbacks run in Zenoh's threads (`indirect=False`), so that one client's messages are handled in order: a liveliness
+token before the command that follows it. One may still be running when the session is closed, hence the flag.
 """
 
 import contextlib
@@ -20,17 +19,13 @@ from tvist_server.gateways.base import Desk, Gateway, Message, Queried
 from tvist_server.gateways.replies import ENCODING, Answers
 
 EVERY_TICK: frozenset[Topic] = frozenset({"state", "truth"})
-"""Topics of each tick, whose messages nobody makes while nobody subscribes to them."""
+"""Topics published every tick; their messages are made only for subscribers."""
 
 
 class ZenohGateway(Gateway):
-    """One robot on Zenoh, created by `Network`: it answers queries, and serves the robot once that is ready.
+    """One robot on Zenoh; `starting` answers queries until `serve`. Close the session after this gateway.
 
-    Args:
-        session: An open session, to be closed after this gateway.
-        robot: Name of the robot, which is part of every key.
-        starting: Answers queries until `serve` is called.
-        complete: Whether queries come here even if another session answers them, too.
+    If `complete` is False, queries need not come here if another session answers them.
     """
 
     def __init__(
@@ -51,7 +46,6 @@ class ZenohGateway(Gateway):
         ]
 
     def withdraw(self) -> None:
-        """Leave the queries to another session."""
         for queryable in self._queryables:
             queryable.undeclare()  # type: ignore[no-untyped-call]
 
@@ -64,27 +58,25 @@ class ZenohGateway(Gateway):
         session.liveliness().declare_subscriber(
             keys.any_client(robot), Callback(self._on_client, indirect=False), history=True
         )
-        self._queried = desk  # which knows the clients by now
+        self._queried = desk  # it knows the clients by now
         setpoint = keys.key(robot, "setpoint")
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
         self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth or wanted is not None)
         self.takes = set(self._publishers)
-        # In lockstep a client must not miss the tick that it asks for right after it has subscribed.
+        # In lockstep a client must not miss the tick that it requests right after subscribing.
         if not lockstep:
             for topic in EVERY_TICK & self.takes:
                 self.takes.discard(topic)
                 self._listen(topic, partial(self._on_wanted, topic))
         if wanted is not None:
             self._listen("truth", wanted)
-        # Declared last, since it announces that everything else is ready.
+        # Declared last, because it announces that everything else is ready.
         self._alive = session.liveliness().declare_token(keys.key(robot, "alive"))
 
     def report(self, report: Report) -> None:
-        """Publish a tick's state, which need not be made for that."""
         self._put("state", report.encoded)
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  it is already encoded
-        """Publish an encoded message; a message of a topic that is not served is ignored."""
         self._put(topic, payload)
 
     def _put(self, topic: Topic, payload: bytes) -> None:
@@ -99,10 +91,10 @@ class ZenohGateway(Gateway):
             self._answers.close()
             self._closed = True
 
-    # ------------------------------------------------------------------ what arrives, in Zenoh's threads
+    # The following methods run in Zenoh's threads.
 
     def _listen(self, topic: Topic, tell: Callable[[bool], None]) -> None:
-        """Have it told whether anybody subscribes to a topic: now, if somebody does, and whenever that changes."""
+        """Call `tell` with whether a topic has subscribers, now if it has any and at every change."""
 
         def on_matching(status: zenoh.MatchingStatus) -> None:
             tell(status.matching)
@@ -134,7 +126,7 @@ class ZenohGateway(Gateway):
             self._queried.info(answer)
 
     def _answer(self, key: str, query: zenoh.Query) -> Callable[[Reply | Callable[[], bytes]], None] | None:
-        """Return the function that answers a query; None if the gateway is closed."""
+        """Return the function that answers a query; None if the gateway is closed or the key has a wildcard."""
         if self._closed:
             query.drop()  # type: ignore[no-untyped-call]
             return None
@@ -174,22 +166,21 @@ def _publishers(
 ) -> dict[Topic, zenoh.Publisher]:
     """Declare one publisher for each topic.
 
-    In real time nothing may block the publisher, so all publishers use DROP and none is express. Messages that find
-    the link busy then share a batch of 64 KiB, and two batches may wait. With express, each message has a batch of
-    its own, so only two states could wait: on two cores loaded with eight busy processes, a client that read as fast
-    as it could got 2330 of 3000 states; without express it got all of them, none of them late.
+    In real time nothing may block the publisher, so all publishers use DROP, and none is express. Messages
+    for a busy link then share batches of 64 KiB, two of which may wait; an express message takes a whole
+    batch, so only two states could wait. Measured on two cores with eight busy processes, a client got 2330
+    of 3000 states with express, and all of them, on time, without.
 
-    Messages of every tick have a low priority, so on a link that is too slow for them, answers, events and telemetry
-    are sent first. With real-time priority, and a link fast enough for a fifth of the states, no answer arrived.
+    Messages of every tick have a low priority, so that on a slow link answers, events and telemetry come
+    first. With real-time priority and a link fast enough for a fifth of the states, no answer arrived.
 
-    Events must not be lost. They have a priority, and hence queues, of their own, so that about a thousand can wait
-    for a client that has stopped reading, in addition to what its socket buffers. Measured with a reader that stopped
-    for 7.5 s under more states than its socket buffers: 3300 of 6000 states were dropped, but none of 240 events;
-    with the states' priority, half of the events were lost. BLOCK would have held up the publisher, and with it all
-    other clients, for 5 s.
+    Events must not be lost, so they have a priority, and hence queues, of their own: about a thousand can
+    wait for a client that has stopped reading, besides its socket's buffers. With a reader that stopped for
+    7.5 s, 3300 of 6000 states were dropped but none of 240 events; with the states' priority, half of the
+    events were lost. BLOCK would have blocked the publisher, and with it all other clients, for 5 s.
 
-    In lockstep all publishers use BLOCK, as the protocol requires, and events share the states' queue: a client that
-    reads state `n` has read all events up to tick `n`.
+    In lockstep all publishers use BLOCK, as the protocol requires, and events share the states' queue: a
+    client that reads state `n` has read all events up to tick `n`.
     """
     control = zenoh.CongestionControl.BLOCK if lockstep else zenoh.CongestionControl.DROP
     every_tick = zenoh.Priority.REAL_TIME if lockstep else zenoh.Priority.DATA_LOW
@@ -198,7 +189,7 @@ def _publishers(
     priorities: dict[Topic, zenoh.Priority] = {
         "state": every_tick,
         "event": event,
-        "telemetry": zenoh.Priority.DATA_HIGH,  # in real time nothing has the priority of answers, see `REALTIME`
+        "telemetry": zenoh.Priority.DATA_HIGH,  # in real time nothing shares the priority of answers, see `REALTIME`
         "io": event,
     }
     if truth:

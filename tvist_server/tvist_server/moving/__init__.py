@@ -1,1 +1,1 @@
-"""A UR robot that is moved: `follow.script` runs on it and follows set-points that come in RTDE's registers."""
+"""A real UR robot that tvist moves: `follow.script` runs on it and follows set-points from RTDE registers."""

@@ -1,4 +1,4 @@
-"""Why a robot may not be moved, or does not follow any more: one sentence each, which says what to do."""
+"""Reasons why a robot must not be moved or no longer follows, each with the remedy."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -16,67 +16,64 @@ from tvist_server.ur_model import series
 
 MODEL, REMOTE = "get robot model", "is in remote control"
 QUESTIONS = MODEL, REMOTE
-"""What the dashboard is asked."""
 LEAST_MINOR = {3: 14, 5: 9}
-"""Oldest software that our program is written for, by its major version; every later major version will do."""
+"""Oldest supported minor version of the robot's software by major version; later major versions are all supported."""
 NEAR = 0.01
-"""Largest angle by which joints may differ from where they should be [rad]."""
+"""Largest deviation of a joint from its expected angle [rad]."""
 SAME_MASS = 0.05
 """Largest difference of two masses that count as equal [kg]."""
 SAME_PLACE, SAME_TURN = 1e-3, 0.01
-"""Largest difference of two tools that count as equal [m, rad]."""
+"""Largest difference of two tool centre points that count as equal [m, rad]."""
 STILL = 1e-3
-"""Speed below which a joint stands [rad/s]."""
+"""Speed below which a joint is at rest [rad/s]."""
 LEANING = 0.15
 """Largest angle between the measured and the expected direction of gravity [rad]."""
 PLAUSIBLE = 2.0
-"""Largest difference of the measured gravity from the real one, of an accelerometer that tells something [m/s²]."""
+"""Largest error of the measured gravity for which the accelerometer is used [m/s²]."""
 _AGAIN = "then power on here"
 _SAFETY = {
-    SafetyMode.PROTECTIVE_STOP: "it has made a protective stop: see why, and unlock it at the robot, then here",
-    SafetyMode.SAFEGUARD_STOP: f"a safeguard has stopped it: release that, stop the program at the robot, {_AGAIN}",
+    SafetyMode.PROTECTIVE_STOP: "it has made a protective stop: remove the cause, unlock it at the robot, then here",
+    SafetyMode.SAFEGUARD_STOP: f"a safeguard has stopped it: reset it, stop the program at the robot, {_AGAIN}",
     SafetyMode.SYSTEM_EMERGENCY_STOP: "the system's emergency stop was pressed: release it, switch the robot on at its "
     f"teach pendant, {_AGAIN}",
     SafetyMode.ROBOT_EMERGENCY_STOP: "its emergency stop was pressed: release it, switch the robot on at its teach "
     f"pendant, {_AGAIN}",
 }
 _ENDED = {
-    Ended.ORDERED: f"its program was told to end by somebody else: see who writes its registers, {_AGAIN}",
-    Ended.SILENCE: "no set-point reached it for 40 ms, so that it has braked: look at the network and at the load of "
-    f"this machine, {_AGAIN}",
-    Ended.AWAY: f"it stands more than .01 rad from the first set-point: {_AGAIN}, to begin where it stands",
-    Ended.TOO_FAST: f"a set-point was faster than the speed cap, so that it has braked: {_AGAIN}, and tell us how",
-    Ended.LOST: f"its program was paused or fell behind, so that it has braked: see why, {_AGAIN}",
-    Ended.STRAYED: "the arm did not follow the set-points, so that it has braked: see what held it, and whether the "
-    f"speed slider was moved while it was going, {_AGAIN}",
+    Ended.ORDERED: f"another client has ended its program: find the client that writes its registers, {_AGAIN}",
+    Ended.SILENCE: "no set-point reached it for 40 ms, so it braked: check the network and the load of this machine, "
+    f"{_AGAIN}",
+    Ended.AWAY: "it is more than 0.01 rad from the first set-point: power on here to start from its present position",
+    Ended.TOO_FAST: "a set-point exceeded the speed cap, so it braked: power on here, and report how this happened",
+    Ended.LOST: f"its program was paused or fell behind, so it braked: find the cause, {_AGAIN}",
+    Ended.STRAYED: "the arm did not follow the set-points, so it braked: look for an obstacle, do not move the speed "
+    f"slider during a motion, {_AGAIN}",
 }
 _MOVABLE = {SafetyMode.NORMAL, SafetyMode.REDUCED}
 _PAUSED = {RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING}
 REPLACED = (
-    f"another program has replaced the one that follows set-points: end it, and see who has sent it, {_AGAIN}"
+    f"another program has replaced the one that follows set-points: end it, find out who sent it, {_AGAIN}"
 )
 FELL_SILENT = Halt(
-    "it says nothing any more, so that its own program has stopped it: look at the network and at the robot, "
-    f"{_AGAIN}",
+    f"it says nothing any more, so its own program has stopped it: check the network and the robot, {_AGAIN}",
     SafetyMode.UNDEFINED,
 )
 
 
 class Wanted(NamedTuple):
-    """What is said here about the robot."""
+    """What tvist was told about the robot."""
 
     description: RobotDescription
-    """The robot file."""
     payload: Payload
-    """Payload that it should have been told."""
+    """Payload that the robot should have been told."""
     tool: tuple[float, ...] | None = None
-    """Tool centre point that it should have been told; None for any."""
+    """Tool centre point that the robot should have been told; None: any."""
     q: tuple[float, ...] | None = None
-    """Where it should stand [rad]; None for anywhere."""
+    """Joint angles at which the robot should be [rad]; None: any."""
 
 
 def answers_trouble(wanted: Wanted, answers: Mapping[str, str], own: Configuration | None) -> str | None:
-    """Return why a robot may not be moved by what its interfaces have answered; None if it may."""
+    """Return why the answers of a robot's interfaces forbid moving it; None if they allow it."""
     model = wanted.description.robot.model
     told = answers.get(MODEL)
     if told is not None and series(told) != series(model):
@@ -91,7 +88,7 @@ def answers_trouble(wanted: Wanted, answers: Mapping[str, str], own: Configurati
 
 
 def remote_trouble(answers: Mapping[str, str]) -> str | None:
-    """Return why it takes no program; None if it does."""
+    """Return why the robot accepts no program; None if it accepts programs."""
     if answers.get(REMOTE) == "false":
         return (
             "it is in local control, or another client controls it: switch it to remote control at its teach pendant, "
@@ -101,26 +98,20 @@ def remote_trouble(answers: Mapping[str, str]) -> str | None:
 
 
 def version_trouble(version: Sequence[int]) -> str | None:
-    """Return why software of a version (major, minor, …) does not run our program; None if it does."""
+    """Return why software of a version (major, minor, …) does not run `follow.script`; None if it does."""
     major, minor = version[:2]
     least = LEAST_MINOR.get(major, 0 if major > max(LEAST_MINOR) else None)
     if least is not None and minor >= least:
         return None
     own = f"{major}.{minor}"
-    return f"its software {own} may not run our program: update it to 5.9 or later, on a CB3 robot to 3.14 or later"
+    return f"its software {own} may not run tvist's program: update it to 5.9 or later, on a CB3 robot to 3.14 or later"
 
 
 def state_trouble(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> str | None:
-    """Return why a robot may not be moved as it is now; None if it may.
-
-    Args:
-        wanted: What is said of it here.
-        sight: What it says.
-        may_play: Whether the program that runs on it is ours.
-    """
+    """Return why a robot must not be moved now, None if it may; `may_play`: the program that runs on it is ours."""
     mode, safety, runtime = sight.modes
     if mode == RobotMode.DISCONNECTED:
-        return "it is not connected: look at the network, and at the robot"
+        return "it is not connected: check the network and the robot"
     if safety != SafetyMode.NORMAL:
         return f"its safety mode is {_name(SafetyMode, safety)}: clear that at the robot, until it is NORMAL"
     if mode != RobotMode.RUNNING:
@@ -133,12 +124,12 @@ def state_trouble(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> st
 def _posture_trouble(wanted: Wanted, sight: Sight) -> str | None:
     target, measured = sight.target[0], sight.measured.q
     if np.abs(sight.target[1]).max() > STILL:
-        return "it moves: wait until it stands"
+        return "it moves: wait until it is at rest"
     if (joint := _apart(target, measured)) is not None:
         by = abs(target[joint] - measured[joint])
         return (
-            f"joint {joint} is {by:.3f} rad from where its controller has it, more than {NEAR:g}: see what holds it, "
-            "or switch its power off and on"
+            f"joint {joint} is {by:.3f} rad from where its controller has it, more than {NEAR:g}: remove what "
+            "holds it, or switch its power off and on"
         )
     if wanted.q is not None and (joint := _apart(np.array(wanted.q), target)) is not None:
         return (
@@ -173,30 +164,27 @@ def _load_trouble(wanted: Wanted, sight: Sight) -> str | None:
 
 
 def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> str | None:
-    """Return why the robot may not be mounted as the robot file says; None if it is.
+    """Return why the robot may not be mounted as its file says; None if it is.
 
-    Args:
-        description: The robot file.
-        q: Joint angles at rest, shape (6,) [rad].
-        felt: Mean specific force in the flange frame, shape (3,) [m/s²].
+    `q`: joint angles at rest, shape (6,) [rad]; `felt`: mean specific force in the flange frame, shape (3,) [m/s²].
     """
     up = Arm(description).pose(q)[0] @ felt / np.linalg.norm(felt)
     leans = float(np.arccos(np.clip(up[2], -1.0, 1.0)))
     if leans <= LEANING:
         return None
     return (
-        f"its accelerometer feels gravity {np.degrees(leans):.0f}° away from where an upright base has it: the robot "
-        "file is for an upright robot, and this one hangs, leans, or is another model"
+        f"its accelerometer measures gravity {np.degrees(leans):.0f}° from its direction for an upright base: the "
+        "robot file is for an upright robot, but this one hangs, leans, or is another model"
     )
 
 
 def tells_gravity(felt: Floats) -> bool:
-    """Return whether an accelerometer at rest, shape (3,) [m/s²], tells where gravity is."""
+    """Return whether an accelerometer at rest, shape (3,) [m/s²], plausibly measures gravity."""
     return bool(abs(np.linalg.norm(felt) - GRAVITY) <= PLAUSIBLE)
 
 
 def halt_by_modes(modes: tuple[int, int, int]) -> Halt | None:
-    """Return why a robot can follow no program, by its modes; None if it can."""
+    """Return why the robot's modes prevent it from following any program; None if they do not."""
     mode, safety, _ = modes
     if safety not in _MOVABLE:
         name = SafetyMode(safety).name if safety in {*SafetyMode} else str(safety)
@@ -209,12 +197,7 @@ def halt_by_modes(modes: tuple[int, int, int]) -> Halt | None:
 
 
 def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
-    """Return why our program, which has begun, does not follow any more; None if it does.
-
-    Args:
-        ended: What it says.
-        modes: Modes of the robot, by which it can follow.
-    """
+    """Return why the running program no longer follows; None if it does. `ended` is the program's `Ended` register."""
     _, safety, runtime = modes
     if ended in {*Ended} and ended != Ended.NOT:
         return Halt(_ENDED[Ended(ended)], safety)
@@ -227,7 +210,7 @@ def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
 
 
 def _apart(one: Floats, other: Floats) -> int | None:
-    """Return the joint that differs most, if that is too much."""
+    """Return the joint that differs most, if it differs by more than `NEAR`."""
     joint = int(np.argmax(np.abs(one - other)))
     return joint if abs(one[joint] - other[joint]) > NEAR else None
 

@@ -1,4 +1,4 @@
-"""What a robot's other interfaces say: its limits and dimensions, and the answers of its dashboard."""
+"""Queries to a real robot's other interfaces: its limits and dimensions, and the answers of its dashboard."""
 
 import socket
 import time
@@ -16,35 +16,26 @@ from tvist_server.watching.place import Place
 PATIENCE = 2.0
 """Longest duration of a conversation [s]."""
 MOST = 1 << 20
-"""Most bytes that are taken as an answer."""
+"""Largest answer [bytes]."""
 DASHBOARD = 29999
-"""Port of the dashboard server on a robot of UR's."""
+"""Port of the dashboard server on a UR robot."""
 _UNKNOWN = "could not understand"
 _PACKAGE, _PART, _DATA = Struct(">iB"), Struct(">IB"), Struct(">53d4i")
 PRIMARY = 30001
-"""Port of the primary interface on a robot of UR's."""
+"""Port of the primary interface on a UR robot."""
 STATE, CONFIGURATION = 16, 6
-"""Type of the packages with a robot's state, and number of the part with its configuration."""
+"""Type of robot state packages, and number of their part with the configuration."""
 FAR, TURNED = 5e-3, 0.01
-"""Differences of its dimensions from the robot file, from which on it is another model [m, rad]."""
+"""Smallest differences from the robot file that indicate another model [m, rad]."""
 T = TypeVar("T")
 
 
 class NoAnswerError(Exception):
-    """An interface does not answer; the message says which, and why."""
+    """An interface does not answer; the message names it and gives the reason."""
 
 
 def ask(place: Place, question: bytes, answer: Callable[[bytes], T | None]) -> T:
-    """Send a question, and return what its answer says.
-
-    Args:
-        place: The interface.
-        question: What to send, as soon as the connection is there.
-        answer: Reads what has come so far; None if more has to come.
-
-    Raises:
-        NoAnswerError: There is no interface, or it does not answer in time.
-    """
+    """Return an interface's answer, parsed by `answer` (None: more must come); NoAnswerError after `PATIENCE`."""
     heard, ends = b"", time.monotonic() + PATIENCE
     try:
         with socket.create_connection((place.host, place.port), PATIENCE) as connection:
@@ -64,11 +55,11 @@ def ask(place: Place, question: bytes, answer: Callable[[bytes], T | None]) -> T
 
 
 def asked(place: Place, questions: Sequence[str]) -> dict[str, str]:
-    """Return the answers by question; those that it does not understand are left out, all if there is no dashboard."""
+    """Return the answers by question, without those that it does not understand; empty if there is no dashboard."""
     text = "".join(f"{question}\n" for question in (*questions, "quit")).encode()
 
     def answers(heard: bytes) -> dict[str, str] | None:
-        # Without the greeting, and what is incomplete.
+        # Skip the greeting and an incomplete last line.
         lines = heard.decode(errors="replace").split("\n")[1:-1]
         if len(lines) < len(questions):
             return None
@@ -82,7 +73,7 @@ def asked(place: Place, questions: Sequence[str]) -> dict[str, str]:
 
 
 class Configuration(NamedTuple):
-    """What a robot is, and may do; all arrays have shape (6,)."""
+    """Dimensions and limits that a robot reports; all arrays have shape (6,)."""
 
     least: np.ndarray
     """Smallest joint angles [rad]."""
@@ -93,12 +84,12 @@ class Configuration(NamedTuple):
     acceleration: np.ndarray
     """Largest accelerations [rad/s²]."""
     a: np.ndarray
-    """Denavit and Hartenberg's lengths [m], as the next [m] and angles [rad]."""
+    """Denavit-Hartenberg link lengths [m]; `d` are offsets [m] and `alpha` twists [rad]."""
     d: np.ndarray
     alpha: np.ndarray
 
     def trouble(self) -> str | None:
-        """Return why no motion can be planned within its limits, equal in both directions; None if it can."""
+        """Return why the limits allow no planning; None if they do."""
         for name, found, least, most in (
             ("smallest angles", self.least, -1e3, -0.1),
             ("largest angles", self.most, 0.1, 1e3),
@@ -111,14 +102,14 @@ class Configuration(NamedTuple):
         return None
 
     def is_of(self, description: RobotDescription) -> bool:
-        """Return whether its dimensions are those of a robot file."""
+        """Return whether the dimensions are those of a robot file."""
         file = description.kinematics
         pairs = (self.a, file.a, FAR), (self.d, file.d, FAR), (self.alpha, file.alpha, TURNED)
         return all(np.abs(own - np.array(there)).max() <= apart for own, there, apart in pairs)
 
 
 def configuration_of(place: Place) -> Configuration | None:
-    """Ask a robot for its configuration; None if it does not tell any."""
+    """Ask a robot for its configuration; None if it does not report one."""
     try:
         return ask(place.beside(PRIMARY), b"", found)
     except NoAnswerError:
@@ -126,18 +117,18 @@ def configuration_of(place: Place) -> Configuration | None:
 
 
 def found(heard: bytes) -> Configuration | None:
-    """Return the configuration in what a primary interface has sent so far; None if it has not come yet."""
+    """Return the configuration in the data of a primary interface; None if it has not arrived yet."""
     try:
         for package in _split(heard, _PACKAGE, STATE):
             for part in _split(package, _PART, CONFIGURATION):
                 return _read(part)
-    except error:  # the rest is still to come
+    except error:  # the rest has not arrived
         pass
     return None
 
 
 def _split(data: bytes, head: Struct, wanted: int) -> list[bytes]:
-    """Return the bodies of the packages of a type; each begins with its length and its type."""
+    """Return the bodies of the packages of one type; each package starts with its length and type."""
     at, bodies = 0, list[bytes]()
     while len(data) - at >= head.size:
         length, kind = head.unpack_from(data, at)
@@ -159,13 +150,7 @@ def _read(part: bytes) -> Configuration:
 def narrowed(
     description: RobotDescription, configuration: Configuration | None, speed_cap: float
 ) -> RobotDescription:
-    """Return a robot file with limits no wider than the robot's own, nor than the speed cap.
-
-    Args:
-        description: The robot file.
-        configuration: What the robot says; None if it says nothing.
-        speed_cap: Largest velocity of every joint [rad/s].
-    """
+    """Return the robot file with limits no wider than the robot reports, and with no velocity above the cap [rad/s]."""
     limits = description.limits
     position, velocity, acceleration = map(np.array, (limits.position, limits.velocity, limits.acceleration))
     velocity = np.minimum(velocity, speed_cap)

@@ -1,4 +1,4 @@
-"""A robot that is moved: a plant whose drives are another controller's."""
+"""A real robot that tvist moves: a plant whose drives belong to another controller."""
 
 import math
 import time
@@ -30,39 +30,26 @@ from tvist_server.watching.place import Place
 from tvist_server.watching.watched_robot import WatchedRobot
 
 NUMBERS = 1_000_000_000
-"""Numbers of runs begin with our time in microseconds, so that those of two processes differ."""
+"""Run numbers start with the time in microseconds, so that those of two processes differ."""
 SILENT = 0.08
-"""Time without a row after which the robot counts as silent; its program has begun to brake long since [s]."""
+"""Time without a row after which the robot counts as silent; its program brakes much earlier [s]."""
 MOST = 50
-"""Most periods that are made up for after a gap: time that was longer away has passed by our clock."""
+"""Largest number of periods made up for after a gap; for a longer one, this machine's clock has counted the time."""
 
 
 class MovedRobot(RealArm):
-    """Moves one robot.
-
-    Args:
-        place: Where it is.
-        description: The robot file.
-        payload: Payload that it should have been told.
-        speed_cap: Largest speed of every joint [rad/s].
-        tool: Tool centre point that it should have been told; None for any.
-        start: Where it should stand [rad]; None for anywhere.
-        lag: Lag of its `servoj`, to be compensated; None if it is not known.
-
-    Raises:
-        PlantError: It may not be moved; the message says why, and what to do.
-    """
+    """Moves one robot; PlantError if that must not be, with the reason and the remedy."""
 
     def __init__(
         self,
         place: Place,
         description: RobotDescription,
-        payload: Payload,
+        payload: Payload,  # payload that the robot should have been told
         *,
-        speed_cap: float,
-        tool: tuple[float, ...] | None = None,
-        start: tuple[float, ...] | None = None,
-        lag: ServoLag | None = None,
+        speed_cap: float,  # largest speed of every joint [rad/s]
+        tool: tuple[float, ...] | None = None,  # tool centre point that it should have been told; None: any
+        start: tuple[float, ...] | None = None,  # where it should be [rad]; None: anywhere
+        lag: ServoLag | None = None,  # lag of its `servoj`, to be compensated; None: unknown
     ) -> None:
         self._robot = WatchedRobot(place, description, payload, OUTPUTS, INPUTS)
         self._place = place
@@ -78,10 +65,10 @@ class MovedRobot(RealArm):
         if tells_gravity(felt):
             self._refuse_if(mounting_trouble(description, self._sight.measured.q, felt))
         else:
-            self._told.append("its accelerometer does not tell gravity: nobody has checked how it is mounted")
-        self._wanted = self._wanted._replace(q=None)  # where it is to stand before it is first moved
+            self._told.append("its accelerometer does not measure gravity: its mounting was not checked")
+        self._wanted = self._wanted._replace(q=None)  # `start` only matters before the first motion
         if own is None:
-            self._told.append("its primary interface tells no limits: those of the robot file hold alone")
+            self._told.append("its primary interface reports no limits: only those of the robot file apply")
         if not answers:
             self._told.append("it has no dashboard: model and remote control were not checked")
         self._pace, self._number = Pace(), time.monotonic_ns() // 1000 % NUMBERS
@@ -89,17 +76,15 @@ class MovedRobot(RealArm):
         self._run: Run | None = None
         self._halt: Halt | None = None
         self._left_paused = False
-        """Whether our program is paused there by a safety stop, so that it may be replaced."""
+        """Whether a safety stop has paused our program on the robot, so that it may be replaced."""
 
     def _refuse_if(self, trouble: str | None) -> None:
         if trouble is not None:
             raise PlantError(f"the robot at {self._place} is not moved: {trouble}")
 
-    # ------------------------------------------------------------------ a plant
-
     @property
     def payload(self) -> Payload:  # type: ignore[override]
-        """Payload that it was told."""
+        """Payload that the robot was told."""
         return self._robot.payload
 
     def described(self) -> RobotDescription:
@@ -107,7 +92,7 @@ class MovedRobot(RealArm):
         return self._wanted.description
 
     def measure(self) -> Measurement:
-        """Return where its own controller holds it, if it may be moved from there."""
+        """Return the posture that the robot's controller holds, if it may be moved from there."""
         run = self._run
         if run is None or not run.ready:
             may_play = run is not None or self._left_paused
@@ -116,7 +101,7 @@ class MovedRobot(RealArm):
         return self._measured(last or self._robot.newest["target_q"])
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Write a set-point, and return the latest measurements; of several periods at once only the last writes."""
+        """Queue a set-point and return the latest measurements; of owed periods, only the last one sends."""
         if self._run is not None:
             self._run.add(command, played=(self._pace.tick - self._sight.tick) % self._interval == 0)
             if not self._pace.owed:
@@ -131,12 +116,12 @@ class MovedRobot(RealArm):
         )
 
     def seen(self) -> Sight:
-        """Return what it said last, with what people should know since the last call."""
+        """Return the robot's last row, with the messages for users since the last call."""
         told, self._told = (*self._told,), []
         return replace(self._sight, told=told)
 
     def wait(self, timeout: float) -> bool:
-        """Wait until the next period begins, by the robot's clock, or by ours while it is silent."""
+        """Wait for the next period, according to the robot's clock, or to this machine's while the robot is silent."""
         until = time.monotonic() + timeout
         while (now := time.monotonic()) < until:
             if self._pace.next(now):
@@ -145,12 +130,11 @@ class MovedRobot(RealArm):
                 if self._take(self._robot.sight()):
                     return True
             elif self._run is not None and self._pace.silent(time.monotonic()) and not self._robot.wait(0.0):
-                # Nor is it this process that was stopped, with rows that wait to be read.
+                # The last check: this process may have been suspended, with rows waiting to be read.
                 self._let_go(FELL_SILENT)
         return self._pace.next(time.monotonic())
 
     def _take(self, sight: Sight) -> bool:
-        """Take a row; return whether it begins a period."""
         self._sight = sight
         self._told += sight.told
         if not self._robot.connected:
@@ -163,7 +147,7 @@ class MovedRobot(RealArm):
                 self._number += 1
                 limits = self._wanted.description.limits
                 self._run = Run(self._robot, self._place, self._number, limits, self._lag, self._trouble)
-            else:  # what was so at the last look is not any more
+            else:  # the conditions at the last check no longer hold
                 self._let_go(Halt(trouble, sight.modes[1]))
         self._left_paused &= sight.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
         if self._run is not None:
@@ -174,29 +158,26 @@ class MovedRobot(RealArm):
         return self._pace.row(sight.tick, time.monotonic())
 
     def _trouble(self) -> str | None:
-        """Return why the robot does not accept the program now."""
         return state_trouble(self._wanted, self._sight, may_play=self._left_paused)
-
-    # ------------------------------------------------------------------ its program
 
     @property
     def condition(self) -> Condition:
-        """Whether its program follows."""
+        """Whether the program follows."""
         return Condition(self._run is not None and self._run.ready, halt=self._halt)
 
     def switch(self, *, power: bool, brakes: bool) -> None:
-        """Let our program run on it, or end; its power and brakes are switched by people at the robot."""
+        """Start or end our program; people switch power and brakes at the robot."""
         self.stop()
         self._held = power and not brakes
 
     def stop(self) -> None:
-        """Let our program brake and end."""
+        """Make the program brake and end."""
         if self._run is not None:
             self._run.end()
         self._run, self._held, self._halt = None, False, None
 
     def close(self) -> None:
-        """Let it go."""
+        """Release the robot."""
         self.stop()
         self._robot.close()
 
@@ -207,25 +188,25 @@ class MovedRobot(RealArm):
 
 
 class Pace:
-    """Counts the control periods of one robot: they begin with its rows, by its clock; by ours while it is silent."""
+    """Counts the control periods of one robot: by its rows, or by this machine's clock while it is silent."""
 
     def __init__(self) -> None:
         self.tick = 0
-        """Number of the present period, by the robot's time."""
+        """Number of the present period, in the robot's time."""
         self.owed = 0
-        """Number of periods that have begun with the last row, and are yet to be computed."""
+        """Number of periods that the last row has started and that are not computed yet."""
         self._heard, self._due = -math.inf, 0.0
 
     def silent(self, now: float) -> bool:
-        """Return whether the robot is silent; takes our time, as all that follows [s]."""
+        """Return whether the robot is silent at the local time `now` [s]."""
         return now - self._heard > SILENT
 
     def until(self, now: float) -> float:
-        """Return how long to wait for a row [s], until a period of our own begins or the robot counts as silent."""
+        """Return how long to wait for a row [s], until a local period starts or the robot counts as silent."""
         return max(0.0, (self._due if self.silent(now) else self._heard + SILENT) - now)
 
     def row(self, tick: int, now: float) -> bool:
-        """Take a row; return whether it begins a period. One that is made up for by our clock does not."""
+        """Take a row; return whether it starts a period that the local clock has not already counted."""
         self._heard = now
         passed = tick - self.tick
         if passed <= 0:
@@ -235,7 +216,7 @@ class Pace:
         return self.next(now)
 
     def next(self, now: float) -> bool:
-        """Begin the next period, if one is owed or it is time for one of our own; return whether it begins."""
+        """Start the next period if one is owed or a local one is due; return whether it starts."""
         if self.owed:
             self.owed -= 1
         elif self.silent(now) and now >= self._due:

@@ -20,38 +20,27 @@ from tvist_server.watching.place import Place
 from tvist_server.watching.watched_robot import WatchedRobot
 
 DECELERATION = 5.0
-"""Least deceleration of the fastest joint when the program brakes [rad/s²]."""
+"""Smallest deceleration of the fastest joint when the program brakes [rad/s²]."""
 BRAKES = 0.125
-"""Time in which it brakes at the speed cap, if that takes more [s]."""
+"""Braking time at the speed cap, if that needs a larger deceleration [s]."""
 SETTLES = 25
-"""Number of rows of the waiting program after which it gets the first set-point: what its start has delayed has come
-by then, since it ends when numbers come faster than it counts."""
+"""Number of rows of the waiting program before the first set-point; rows delayed by its start have come by then."""
 GRACE = 5
-"""Number of rows after the program's end in which modes may still tell why."""
+"""Number of rows after the program's end in which the modes may still explain it."""
 STANDS = 10
-"""Number of rows with the same set-point after which another program counts as having replaced this one."""
+"""Number of rows with the same set-point after which another program must have replaced this one."""
 HEEDS = 250
-"""Number of set-points without effect after which a waiting program is another one: `follow.script` follows the first.
-"""
+"""Number of ignored set-points after which a waiting program cannot be `follow.script`, which follows the first."""
 BEGINS = 5.0
-"""Longest time in which the program has to begin [s]."""
+"""Longest time for the program to start [s]."""
 TELL_EVERY = 10.0
-"""Shortest time between two sentences about set-points that did not come in time [s]."""
+"""Shortest time between two reports about late set-points [s]."""
 LOOK_EVERY = 0.2
-"""Longest time after which the thread ends [s]."""
+"""Longest time until the upload thread notices that it should end [s]."""
 
 
 class Run:
-    """Follows a run.
-
-    Args:
-        robot: The robot, which is connected.
-        place: Where it is.
-        number: Number of the run.
-        limits: Limits of the robot.
-        lag: Lag of its `servoj`; None if it is not known.
-        check: Returns why the robot takes no program now, in words; called from another thread.
-    """
+    """Runs the program once, on a connected robot."""
 
     def __init__(
         self,
@@ -59,8 +48,8 @@ class Run:
         place: Place,
         number: int,
         limits: ArmLimits,
-        lag: ServoLag | None,
-        check: Callable[[], str | None],
+        lag: ServoLag | None,  # lag of its `servoj`; None: unknown
+        check: Callable[[], str | None],  # why the robot accepts no program now; any thread
     ) -> None:
         self._robot, self._number, self._window = robot, number, Window()
         self._stands, speed = robot.newest["target_q"], max(limits.velocity)
@@ -70,11 +59,11 @@ class Run:
         self._waiting, self._settled, self._ending = False, 0, 0
         self._follows, self._played, self._still = False, 0, 0
         self.ready = False
-        """Whether the program follows what is added. It begins to between two ticks, so that no command comes first."""
+        """Whether the program follows `add`. It changes only between two ticks, so that no command is lost."""
         self.halt: Halt | None = None
-        """Why it does not, and will not any more."""
+        """Why the program does not follow, and will not again."""
         self._told, self._told_at = (0, 0, 0), 0.0
-        robot.write(self._window.values(0))  # what an earlier run has left there is not played
+        robot.write(self._window.values(0))  # so that set-points of an earlier run are not played
         deceleration = min(max(DECELERATION, speed / BRAKES), *limits.acceleration)
         text = program(number, speed=speed, deceleration=deceleration, lookahead=LOOKAHEAD, gain=GAIN)
         self._upload = Upload(place, text, check)
@@ -85,35 +74,30 @@ class Run:
         return self._window.newest
 
     def add(self, command: DriveCommand, *, played: bool) -> None:
-        """Take the command of a tick, or where the robot stands until the program follows.
-
-        Args:
-            command: The command.
-            played: Whether a period of the robot ends with the tick, so that it gets a set-point.
-        """
+        """Take the command of a tick, or the present posture until the program follows; `played`: send a set-point."""
         if self.ready:
             setpoint = self._setpoints.next(command).tolist()
             if played:
                 self._window.add(setpoint)
         elif played and (self._follows or (self._waiting and self._settled > SETTLES)):
-            stands = self.last or self._stands  # first where it stood when that was checked
+            stands = self.last or self._stands  # the first set-point is the posture that was checked
             self._setpoints.begin(np.array(stands))
             self._window.add(stands)
         self.ready = self._follows
 
     def write(self) -> None:
-        """Write the newest set-points."""
+        """Send the newest set-points."""
         if self._window.number:
             self._robot.write(self._window.values(self._number))
 
     def end(self) -> None:
-        """Let the program brake and end."""
+        """Make the program brake and end."""
         self._robot.write(self._window.values(-self._number))
         self._upload.close()
         self._waiting = self._follows = self.ready = False
 
     def take(self, sight: Sight) -> str | None:
-        """See by a row what has become of the program; return what people should know."""
+        """Update the program's state from a row; return a message for users, if any."""
         state, played, ended, number, alone, left_out = (
             int(self._robot.newest[f"output_int_register_{place}"][0])
             for place in (STATE, PLAYED, ENDED, RUN, ALONE, LEFT_OUT)
@@ -125,9 +109,7 @@ class Run:
             if self.halt is None and self._upload.trouble is not None:
                 self.halt = Halt(self._upload.trouble, sight.modes[1])
             elif self.halt is None and time.monotonic() - self._begun > BEGINS:
-                why = (
-                    f"our program has not begun within {BEGINS:g} s: look at its teach pendant for a message"
-                )
+                why = f"the program has not started within {BEGINS:g} s: look for a message on its teach pendant"
                 self.halt = Halt(f"{why}, then power on here", sight.modes[1])
             return None
         self._still = self._still + 1 if state == State.FOLLOWING and played == self._played else 0
@@ -157,24 +139,18 @@ class Run:
 
 
 class Upload:
-    """Sends a program from a thread of its own, and keeps the connection: some robots end one whose sender is gone.
-
-    Args:
-        place: The robot.
-        text: The program.
-        check: Returns why the robot takes no program now, in words; None if it does.
-    """
+    """Sends a program from its own thread, and stays connected, since some robots end a program without sender."""
 
     def __init__(self, place: Place, text: str, check: Callable[[], str | None]) -> None:
         self._place, self._text, self._check = place, text, check
         self.trouble: str | None = None
-        """Why the program cannot run, in words."""
+        """Why the program cannot run."""
         self._closed = threading.Event()
         self.thread = threading.Thread(target=self._run, name="tvist-upload", daemon=True)
         self.thread.start()
 
     def close(self) -> None:
-        """Let the connection go."""
+        """Close the connection."""
         self._closed.set()
 
     def _run(self) -> None:
@@ -184,7 +160,7 @@ class Upload:
         where = self._place.beside(PRIMARY)
         try:
             with socket.create_connection((where.host, where.port), PATIENCE) as connection:
-                self.trouble = self._check()  # a program that comes late would end another one's motion
+                self.trouble = self._check()  # a late program would end another program's motion
                 if self.trouble is not None or self._closed.is_set():
                     return
                 connection.sendall(self._text.encode())

@@ -1,4 +1,4 @@
-"""Set-points for an arm that follows them with a lag: what to send so that it is where it should be."""
+"""Compensates the lag with which `servoj` follows set-points."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -11,13 +11,12 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, PlantError
 
 LOOKAHEAD = 0.03
-"""`lookahead_time` of `servoj`: the shortest, since the lag is compensated and a longer one only adds to what is sent
-before a motion ends [s]."""
+"""`lookahead_time` of `servoj` [s]: the smallest, since a larger lag only increases the lead that is sent."""
 GAIN = 2000.0
-"""`gain` of `servoj`: the largest, for the same reason [1/s²]."""
+"""`gain` of `servoj` [1/s²]: the largest, for the same reason."""
 
 CUT = 1e-3
-"""Distance of a set-point from where it should be that counts [rad]."""
+"""Smallest cut of a set-point that is counted [rad]."""
 
 
 @dataclass(frozen=True)
@@ -25,36 +24,30 @@ class ServoLag:
     """How `servoj` follows the set-points p, each held for a period: q̈ = k (p - q - T q̇)."""
 
     time: float
-    """T, by which a motion of constant velocity is late [s]."""
+    """T, the delay of a motion of constant velocity [s]."""
     gain: float
     """k [1/s²]."""
 
     @classmethod
     def simulated(cls, lookahead: float = LOOKAHEAD, gain: float = GAIN) -> Self:
-        """Return the lag of our simulated robots' `servoj`; that of a real robot has to be identified."""
+        """Return the lag of `servoj` on a robot simulated by tvist; that of a real robot must be identified."""
         time = lookahead + DELAY * PERIOD
         return cls(time, max(gain, DAMPED / time**2))
 
 
 class Setpoints:
-    """Turns what the drives would get into set-points, one for each control period.
+    """Turns drive commands into set-points, one for each control period, which compensate the lag of `servoj`.
 
-    The arm is where the line wants it if p = q + T q̇ + q̈/k. All three are taken in the middle between two commands,
-    where p is held: q as their mean, q̇ as their difference, and q̈ as that of their velocities. Nothing of it is
-    measured, so that there is no noise to amplify; at rest p is q to the last bit. No set-point is beyond the joints'
-    range, or further from the one before than permitted: what is cut off there is made up for once there is room.
-
-    Args:
-        q: Joint angles at rest to start from, shape (n,) [rad].
-        lag: The lag to compensate; None if it is not known, to send the positions themselves.
-        fastest: Largest change of a set-point [rad/s].
-        reach: Largest position of each joint in either direction, shape (n,) [rad].
+    The arm is at the reference if p = q + T q̇ + q̈/k. All three are taken midway between two commands, where p is
+    held: q as their mean, q̇ and q̈ as difference quotients of q and q̇. Nothing is measured, so no noise is
+    amplified, and at rest p equals q to the last bit. A set-point is cut to the joints' range `reach` [rad] and to
+    the largest speed `fastest` [rad/s]; later ones make up for the cut. Without a lag, p is q.
     """
 
     def __init__(self, q: Floats, lag: ServoLag | None, *, fastest: float, reach: Floats) -> None:
         self._lag, self._most, self._reach = lag, fastest * PERIOD, np.array(reach)
         self.limited = 0
-        """Number of set-points that are clearly not where they should be."""
+        """Number of set-points that were cut by more than `CUT`."""
         self.begin(q)
 
     def begin(self, q: Floats) -> None:
@@ -63,7 +56,7 @@ class Setpoints:
         self._qd = np.zeros_like(self._q)
 
     def next(self, command: DriveCommand) -> Floats:
-        """Return the set-point for the next command, shape (n,) [rad]; one that is no number raises `PlantError`."""
+        """Return the set-point for the next command, shape (n,) [rad]; raise PlantError if it is not finite."""
         wanted, lag = command.q, self._lag
         if lag is not None:
             velocity = (command.q - self._q) / PERIOD

@@ -1,4 +1,4 @@
-"""Recording of every tick, and of everything that reached the controller, to MCAP files."""
+"""Records every tick, and everything that reached the controller, to MCAP files."""
 
 from tvist_controller.instruments.report import Report
 from tvist_protocol.errors import TvistError
@@ -7,7 +7,7 @@ from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, Truth
 
 Kept = Report | Event | Truth | Io | Entry
-"""What waits for the writer: of a tick its report, since its state takes a while to make."""
+"""Items queued for the writer; a tick is queued as its report, because its state takes time to build."""
 
 
 class RecorderError(TvistError):

@@ -1,4 +1,4 @@
-"""The last second before a failure: kept in memory, and written to a file when the arm fails."""
+"""Keeps the last second in memory and writes it to a file when the arm fails."""
 
 import logging
 import os
@@ -22,24 +22,17 @@ log = logging.getLogger(__name__)
 KEPT = 500
 """Number of ticks kept before the failure: one second."""
 MAX_FILES = 10
-"""Largest number of files of one robot, and of exceptions in the log, so that repeated failures do not fill the disk.
-"""
+"""Largest number of files of one robot, and of logged exceptions, so that repeated failures do not fill the disk."""
 
 
 class BlackBox(Sink):
-    """Keeps the latest messages in memory.
-
-    Args:
-        folder: Folder of the files.
-        info: Returns the robot's description; called when a file is written.
-        start: How the server was started, as in every recording.
-    """
+    """Keeps the latest messages in memory."""
 
     def __init__(
         self,
-        folder: Path,
-        info: Callable[[], Info],
-        start: Mapping[str, Any],
+        folder: Path,  # folder of the files
+        info: Callable[[], Info],  # called when a file is written
+        start: Mapping[str, Any],  # how the server was started, as in every recording
     ) -> None:
         self._folder, self._info, self._start = folder, info, start
         self._kept: deque[Kept] = deque()
@@ -48,9 +41,9 @@ class BlackBox(Sink):
         self._said = set[str]()
 
     def report(self, report: Report) -> None:
-        """Keep a tick, of which a file needs the state; the first one after a failure is the last one in its file."""
+        """Keep a tick; the first one after a failure is the last one in its file."""
         kept = self._kept
-        kept.append(copy(report))  # without what others will make of it, which would double its size
+        kept.append(copy(report))  # the state that others build in the original would double the size
         while kept[0].tick < report.tick - KEPT:
             kept.popleft()
         if self._failed:
@@ -62,7 +55,7 @@ class BlackBox(Sink):
         self._failed |= event.code == "plant_failure"
 
     def raised(self, error: Exception) -> None:
-        """Log an exception with its traceback, but not the same one in every tick."""
+        """Log an exception with its traceback, but each kind only once."""
         said = named(error)
         if said not in self._said and len(self._said) < MAX_FILES:
             self._said.add(said)
@@ -93,7 +86,7 @@ class BlackBox(Sink):
             ).start()
 
     def _write_file(self, path: Path, info: Info, messages: list[Kept]) -> None:
-        from tvist_server.recording.recorder import Recorder  # with the library that writes
+        from tvist_server.recording.recorder import Recorder  # imports the MCAP library
 
         try:
             with Recorder(path, info, self._start, wait=True) as recorder:

@@ -1,4 +1,4 @@
-"""The recorder: takes messages from the tick without blocking it, and writes them in a separate thread."""
+"""Takes messages from the tick thread without blocking it, and writes them in its own thread."""
 
 import logging
 import os
@@ -28,61 +28,39 @@ from tvist_server.recording.writer import heading
 log = logging.getLogger(__name__)
 
 QUEUE_SIZE = 8192
-"""Number of messages that may wait. State, truth and a set-point every tick make 1500 messages a second, so this
-bridges five seconds in which the disk does not respond, the time that a file system may take to commit; about 30 MB.
-"""
+"""Number of messages that may wait: 30 MB, five seconds at 1500 messages/s, as a file system's commit may take."""
 PAUSE = 0.02
-"""Time between two checks of the queue [s]. The tick does not wake the writer, since that would cost it a system
-call, and the interpreter's lock in the middle of its work.
-"""
+"""Time between two checks of the queue [s]; waking the writer would cost a system call and the interpreter's lock."""
 LOOK = 1.0
-"""Time between two checks whether the file has been moved or deleted [s]."""
+"""Time between two checks whether the file was moved or deleted [s]."""
 
 
 class Recorder(Sink):
-    """Records one robot until it is closed.
+    """Records one robot until it is closed; RecorderError if the recording cannot start.
 
-    Messages come from one thread; they are not copied, and must not be changed afterwards. Without `wait`, only
-    `close` blocks. No other method raises: messages are dropped and counted when the queue is full or the recording
-    has stopped.
-
-    Args:
-        path: Path of the file; with `keep`, segments are named after it.
-        info: Description of the robot.
-        start: How the server was started: everything besides the journal that a replay needs, as JSON types.
-        overwrite: Whether to replace an existing file.
-        keep: Number of ticks that the recording keeps at least, in segments, of which the oldest are deleted. Those of
-            the five latest runs of the same name stay. None: it keeps all, and the file must not exist.
-        queue_size: Number of messages that may wait for the writer.
-        wait: Whether to wait when the queue is full: for robots whose time waits too, with the clocks lockstep and
-            free.
-        on_error: Called once, from the writer's thread, with a sentence when the recording has stopped by itself
-            because the disk is full or the file was deleted.
-        on_moved: Called once, from the writer's thread, with a sentence when the file was moved. The recording
-            continues in it.
-
-    Raises:
-        RecorderError: The file exists or cannot be written, or `start` cannot be encoded.
+    Messages come from one thread; they are not copied and must not change afterwards. Without `wait`, only
+    `close` blocks. No other method raises: if the queue is full or the recording has stopped, messages are
+    dropped and counted.
     """
 
     def __init__(
         self,
-        path: str | os.PathLike[str],
+        path: str | os.PathLike[str],  # with `keep`, segments are named after it
         info: Info,
-        start: Mapping[str, Any],
+        start: Mapping[str, Any],  # all that a replay needs besides the journal, as JSON types
         *,
-        overwrite: bool = False,
-        keep: int | None = None,
-        queue_size: int = QUEUE_SIZE,
-        wait: bool = False,
-        on_error: Callable[[str], None] | None = None,
-        on_moved: Callable[[str], None] | None = None,
+        overwrite: bool = False,  # whether to replace an existing file
+        keep: int | None = None,  # least number of ticks kept, in segments; None: all
+        queue_size: int = QUEUE_SIZE,  # number of messages that may wait for the writer
+        wait: bool = False,  # whether to wait when the queue is full (lockstep and free)
+        on_error: Callable[[str], None] | None = None,  # called once in the writer's thread if it stops
+        on_moved: Callable[[str], None] | None = None,  # called once when the file was moved
     ) -> None:
         if queue_size < 1:
             raise RecorderError(f"queue_size is {queue_size}: must be at least 1")
         self.path = Path(path)
         self.error: str | None = None
-        """Why the recording stopped by itself, as a sentence."""
+        """Why the recording stopped by itself."""
         self._dropped: dict[type[msgspec.Struct], int] = dict.fromkeys((State, Event, Truth, Io, Entry), 0)
         self._queue: deque[Kept | State] = deque()
         self._queue_size = queue_size
@@ -96,7 +74,7 @@ class Recorder(Sink):
         self._begin(info, start, overwrite, keep)
         self.place: Path | None = self._file.whole
         """Where readers find the recording: the last known path of the file, or a pattern for all segments."""
-        # A daemon thread does not keep a program that ends without closing from ending, and the file stays readable.
+        # A daemon thread does not keep a program alive that ends without `close`; the file stays readable.
         self._thread = Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
@@ -104,7 +82,7 @@ class Recorder(Sink):
         self._offer(report)
 
     def state(self, state: State) -> None:
-        """Take a state of which there is no report."""
+        """Take a state for which there is no report."""
         self._offer(state)
 
     def event(self, event: Event) -> None:
@@ -121,7 +99,7 @@ class Recorder(Sink):
 
     @property
     def dropped(self) -> int:
-        """Number of messages that were dropped because the queue was full or the recording had stopped."""
+        """Number of messages dropped because the queue was full or the recording had stopped."""
         return sum(self._dropped.values())
 
     def close(self) -> None:
@@ -133,7 +111,7 @@ class Recorder(Sink):
             self._thread.join()
 
     def discard(self) -> None:
-        """End a recording that never began; its file would only stand in the way of the next start."""
+        """Remove a recording that never started, because its file would block the next start."""
         self.close()
         self._file.path.unlink(missing_ok=True)
 
@@ -198,15 +176,11 @@ class Recorder(Sink):
                 f"the recording {self._file.path} was deleted, or moved to another file system, where it ends: "
                 "no more is recorded"
             )
-        except Exception as error:  # noqa: BLE001  a thread has nobody above it: whatever it was must be told
+        except Exception as error:  # noqa: BLE001  nothing above this thread would report it
             self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")
 
     def _look(self) -> None:
-        """Report once that the file was moved.
-
-        Raises:
-            DeletedError: The file was deleted; continuing would fill the disk with data that cannot be read.
-        """
+        """Report once that the file was moved; DeletedError if it was deleted, because its data is lost anyway."""
         there, expected = self._file.where(), self._file.path
         self.place = self._file.whole if there == expected else there
         if there != expected and self._on_moved is not None:
@@ -215,7 +189,7 @@ class Recorder(Sink):
             self._on_moved = None
 
     def _drain(self) -> None:
-        """Write the messages waiting now; later ones wait for the next call, so that the file is checked regularly."""
+        """Write the messages that wait now, not later ones, so that the file is checked regularly."""
         for _ in range(len(self._queue)):
             message = self._queue.popleft()
             self._file.write(message.state if isinstance(message, Report) else message)

@@ -1,8 +1,7 @@
-"""Files of a recording: one that grows or, if only the last ticks are kept, segments of which the oldest are deleted.
+"""Files of a recording: one growing file, or segments of which the oldest are deleted.
 
-A recording `run.mcap` that keeps the last ticks is `run-1-part0001.mcap`, `run-1-part0002.mcap` and so on, that of the
-next run begins with `run-2-part0001.mcap`. So a service that starts again and again with the same options needs nobody
-to clear the way. Each segment is a complete file, and none but the last loses anything when the process is killed.
+The segments of `run.mcap` are `run-1-part0001.mcap` and so on, those of the next run `run-2-part0001.mcap` and so on,
+so that a service can restart with the same options. Each is a complete file; only the last one can lose data.
 """
 
 import os
@@ -24,9 +23,9 @@ from tvist_protocol.stream import State
 from tvist_server.recording.writer import RecordingWriter
 
 PARTS = 4
-"""Number of segments that hold as many ticks as have to be kept."""
+"""Number of segments for the ticks that must be kept."""
 MOST = 5
-"""Number of earlier runs of which recordings are kept."""
+"""Number of earlier runs whose recordings are kept."""
 
 
 class DeletedError(Exception):
@@ -34,33 +33,20 @@ class DeletedError(Exception):
 
 
 class Segments:
-    """Writes a recording.
-
-    Args:
-        path: Path of the file, from whose name those of segments are made.
-        topic_of: Topic of each kind of message.
-        heading: Metadata at the beginning of each file.
-        dropped: Number of messages of each kind that the recorder has dropped so far.
-        overwrite: Whether to replace an existing file; segments never replace one.
-        keep: Number of ticks that segments hold at least together; None for one file with all.
-
-    Raises:
-        FileExistsError: The file exists.
-        OSError: It cannot be written.
-    """
+    """Writes a recording; FileExistsError or OSError if it cannot."""
 
     def __init__(
         self,
-        path: Path,
+        path: Path,  # segments are named after it
         topic_of: Mapping[type[msgspec.Struct], str],
-        heading: dict[str, str],
-        dropped: Mapping[type[msgspec.Struct], int],
+        heading: dict[str, str],  # metadata at the beginning of each file
+        dropped: Mapping[type[msgspec.Struct], int],  # messages dropped by kind; the recorder updates it
         *,
-        overwrite: bool,
-        keep: int | None,
+        overwrite: bool,  # whether to replace a file; segments never do
+        keep: int | None,  # least number of ticks in all segments; None: one file
     ) -> None:
         self.path = self.whole = path
-        """The file that grows; and what readers take for the recording, a pattern if there are segments."""
+        """The growing file, and the path of the recording for readers, a pattern if there are segments."""
         self._name, self._topic_of, self._heading, self._keep = path, topic_of, heading, keep
         self._dropped, self._counted = dropped, dict(dropped)
         self._held: deque[tuple[int, Path]] = deque()
@@ -77,11 +63,7 @@ class Segments:
         self._begin({}, overwrite=False)
 
     def write(self, message: Recorded) -> None:
-        """Add a message; between two ticks, begin a new segment if this one holds its part.
-
-        Raises:
-            OSError: A file cannot be written.
-        """
+        """Add a message; start a new segment before a tick if the present one is full. May raise OSError."""
         if self._first is None:
             self._first = message.tick
             self._held.append((message.tick, self.path))
@@ -98,17 +80,13 @@ class Segments:
         self._writer.flush()
 
     def finish(self) -> None:
-        """Write the last chunk, the numbers of messages that were dropped meanwhile, and the index."""
+        """Write the last chunk, the numbers of dropped messages, and the index."""
         now = dict(self._dropped)
         self._writer.finish({kind: count - self._counted[kind] for kind, count in now.items()})
         self._counted = now
 
     def where(self) -> Path | None:
-        """Return the current path of the file that grows, which may have been moved; None if the system keeps it back.
-
-        Raises:
-            DeletedError: The file no longer has a name.
-        """
+        """Return the growing file's path, which may have moved; None if unknown, DeletedError if it has none."""
         here = os.fstat(self._stream.fileno())
         if here.st_nlink == 0:
             raise DeletedError
@@ -117,12 +95,12 @@ class Segments:
                 return self.path
         except (FileNotFoundError, NotADirectoryError):
             pass
-        except OSError:  # the folder cannot be read now, which says nothing about the file
+        except OSError:  # the folder cannot be read now, so the file may still be there
             return self.path
         try:
             there = Path(f"/proc/self/fd/{self._stream.fileno()}").readlink()
             return there if os.path.samestat(there.stat(), here) else None
-        except OSError:  # of several names, the system may report a deleted one
+        except OSError:  # if the file has several names, the system may report a deleted one
             return None
 
     def close(self) -> None:
@@ -136,13 +114,13 @@ class Segments:
             self._writer = RecordingWriter(self._stream, self._topic_of, self._heading | more)
         except OSError:
             if not overwrite:
-                self.path.unlink()  # what the disk had no room for would only stand in the way of the next start
+                self.path.unlink()  # an incomplete heading would block the next start
             with suppress(OSError):
                 self._stream.close()
             raise
 
     def _turn(self, tick: int, keep: int) -> None:
-        """Complete the segment, begin the next one with this tick, and delete those that are not needed any more."""
+        """Complete the segment, start the next one with this tick, and delete those that are no longer needed."""
         self.finish()
         self._stream.close()
         self._number += 1
@@ -157,11 +135,7 @@ class Segments:
 
 
 def _new_run(path: Path) -> int:
-    """Return the number of a new run, and delete the oldest earlier ones, and those that have recorded nothing.
-
-    So neither a start that fails nor one that is killed at once costs an earlier recording its place. What another
-    process writes stays.
-    """
+    """Return the number of a new run; delete the oldest runs and empty ones, which do not count, unless in use."""
     runs: dict[int, list[Path]] = {}
     for place in path.parent.iterdir():
         found = segment_of(place.name)
@@ -178,16 +152,12 @@ def _new_run(path: Path) -> int:
 
 
 def _claim(stream: IO[bytes]) -> None:
-    """Mark an open file as one that is being written, until it is closed or the process is gone.
-
-    Raises:
-        BlockingIOError: Another process writes it.
-    """
+    """Lock an open file until it is closed; raise BlockingIOError if another process has locked it."""
     try:
         flock(stream, LOCK_EX | LOCK_NB)
     except BlockingIOError:
         raise
-    except OSError:  # it is no file, or on a file system without locks
+    except OSError:  # not a file, or a file system without locks
         return
 
 
@@ -201,7 +171,7 @@ def _is_claimed(place: Path) -> bool:
 
 
 def _is_empty(place: Path) -> bool:
-    """Return whether a recording ends before its first message; what is no recording, as zeros, counts as one."""
+    """Return whether a recording ends before its first message; False for other files."""
     with place.open("rb") as stream:
         try:
             return not any(

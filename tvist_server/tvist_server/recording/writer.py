@@ -23,22 +23,11 @@ from tvist_protocol.recorded import (
 )
 
 CHUNK_SIZE = 64 * 1024
-"""Bytes compressed at once: some 70 states, which take half a millisecond and are lost if the process is killed. A
-megabyte, the library's default, would stall for several ticks.
-"""
+"""Bytes compressed at once, and lost if killed: 70 states, 0.5 ms; the default, 1 MB, would stall for several ticks."""
 
 
 def heading(info: Info, start: Mapping[str, Any]) -> dict[str, str]:
-    """Return the metadata at the beginning of a recording.
-
-    Args:
-        info: Description of the robot.
-        start: How the server was started, as JSON types.
-
-    Raises:
-        TypeError: `start` holds a value that JSON cannot represent.
-        ValueError: `start` holds a number that is not finite.
-    """
+    """Return the metadata at the start of a recording; TypeError or ValueError if JSON cannot represent `start`."""
     return {
         "format": FORMAT,
         BEHAVIOUR: str(THIS_BEHAVIOUR),
@@ -48,16 +37,7 @@ def heading(info: Info, start: Mapping[str, Any]) -> dict[str, str]:
 
 
 class RecordingWriter:
-    """Writes one recording.
-
-    Args:
-        stream: Stream to write to; the caller closes it.
-        topic_of: Topic of each kind of message.
-        heading: Metadata at its beginning.
-
-    Raises:
-        OSError: The stream cannot be written to.
-    """
+    """Writes one recording to a stream, which the caller closes; OSError if it cannot be written to."""
 
     def __init__(
         self, stream: IO[bytes], topic_of: Mapping[type[msgspec.Struct], str], heading: dict[str, str]
@@ -72,12 +52,7 @@ class RecordingWriter:
         self.flush()
 
     def write(self, message: Recorded) -> None:
-        """Add a message.
-
-        Raises:
-            OSError: The stream cannot be written to.
-            TypeError: The message holds a value that JSON cannot represent, such as a numpy number.
-        """
+        """Add a message; raise TypeError if it has a value that JSON cannot represent, such as a numpy number."""
         time = message.tick * TICK_NS
         self._writer.add_message(self._channels[type(message)], time, to_json(message), time)
 
@@ -86,11 +61,7 @@ class RecordingWriter:
         self._stream.flush()
 
     def finish(self, dropped: Mapping[type[msgspec.Struct], int]) -> None:
-        """Write the last chunk, the numbers of dropped messages and the index. Nothing can be added afterwards.
-
-        Raises:
-            OSError: The stream cannot be written to.
-        """
+        """Write the last chunk, the numbers of dropped messages and the index. Nothing can be added afterwards."""
         counts = {tag(kind): str(dropped.get(kind, 0)) for kind in self._channels}
         self._writer.add_metadata(END_METADATA, counts)
         self._writer.finish()  # type: ignore[no-untyped-call]

@@ -1,5 +1,1 @@
-"""Real-time data exchange as both of its ends have it: packages, types of variables, and the end that reads.
-
-A package consists of its size in bytes, header included (uint16), its type (uint8) and a payload; numbers are
-big-endian.
-"""
+"""RTDE packages: size including header (uint16), type (uint8), payload; big-endian. And the client's end."""

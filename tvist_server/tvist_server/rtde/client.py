@@ -1,7 +1,6 @@
-"""The client's end of an RTDE connection, without its socket: bytes in, bytes and rows out.
+"""The client's end of an RTDE connection, without socket: bytes in, bytes and rows out.
 
-It asks for protocol version 2, for the controller's version and for a list of outputs, claims inputs if there are any
-to be written, and starts. It knows no other package, so that without inputs it can send no command.
+It negotiates version 2, sets up outputs, claims inputs if any, and starts. Without inputs it can send no command.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,43 +13,35 @@ from tvist_server.rtde.codec import PackageKind, PackageReader, package, words
 from tvist_server.rtde.wire import Field, Wire
 
 Row = Mapping[str, tuple[float, ...]]
-"""Values of one cycle of the robot by name, each in its range; a number is a tuple of one."""
+"""Values of one cycle of the robot by name, each within its range; a number is a tuple of one."""
 PROTOCOL = 2
-"""Version of the protocol, in which the client chooses the frequency."""
+"""Protocol version, in which the client chooses the frequency."""
 RATE = 500.0
-"""Frequency that is asked for; a robot with a slower cycle sends at its own [Hz]."""
+"""Requested frequency; a robot with a slower cycle sends at its own [Hz]."""
 _VERSION = Struct(">4I")
 
 
 class RtdeError(ValueError):
-    """The other end does not speak RTDE as a robot does; the message says what it did."""
+    """The other end violates RTDE; the message says how."""
 
 
 class Received(NamedTuple):
-    """What bytes from the robot have led to."""
+    """Result of bytes from the robot."""
 
     send: bytes
-    """Bytes to send."""
     rows: Sequence[Row]
-    """Rows that are complete, in the order in which they came."""
+    """Complete rows, in order."""
     texts: Sequence[str]
-    """Messages of the controller for people."""
 
 
 class RtdeClient:
-    """Reads one robot's outputs, and writes its inputs.
-
-    Args:
-        needed: Types and ranges of the variables without which the rows are of no use, by name.
-        optional: Those of further variables, which some robots do not know and rows then lack.
-        inputs: Types of the inputs to claim, by name; none is a vector.
-    """
+    """Reads one robot's outputs and writes its inputs."""
 
     def __init__(
         self,
-        needed: Mapping[str, Field],
-        optional: Mapping[str, Field],
-        inputs: Mapping[str, Wire] = MappingProxyType({}),
+        needed: Mapping[str, Field],  # types and ranges of the required variables
+        optional: Mapping[str, Field],  # those of variables that some robots, and so their rows, lack
+        inputs: Mapping[str, Wire] = MappingProxyType({}),  # types of the inputs to claim; no vectors
     ) -> None:
         self._needed, self._types = needed, {**needed, **optional}
         self._inputs, self._claimed = inputs, 0
@@ -60,9 +51,8 @@ class RtdeClient:
         self._row: Struct | None = None
         self._recipe = 0
         self.version: tuple[int, ...] = ()
-        """Version of the controller's software: major, minor, bugfix, build; empty until it has said so."""
+        """Software version of the controller: major, minor, bugfix, build; empty before its answer."""
         self.started = False
-        """Whether the robot sends rows."""
 
     @property
     def lacking(self) -> list[str]:
@@ -74,11 +64,7 @@ class RtdeClient:
         return package(PackageKind.REQUEST_PROTOCOL_VERSION, PROTOCOL.to_bytes(2, "big"))
 
     def receive(self, data: bytes) -> Received:
-        """Take bytes from the robot.
-
-        Raises:
-            RtdeError: They are not what a robot answers.
-        """
+        """Take bytes from the robot; raise RtdeError if they are not a robot's answer."""
         send, rows, texts = b"", list[Row](), list[str]()
         for kind, payload in self._reader.feed(data):
             if kind == PackageKind.DATA:
@@ -90,11 +76,10 @@ class RtdeClient:
         return Received(send, rows, texts)
 
     def write(self, numbers: Sequence[float]) -> bytes:
-        """Return a package with the values of all inputs, in their order, once the connection has started."""
+        """Return a package with the values of all inputs, in order, once the connection has started."""
         return package(PackageKind.DATA, self._written.pack(self._claimed, *numbers))
 
     def _answered(self, kind: int, payload: bytes) -> bytes:
-        """Take the answer to a package; return the next one."""
         match kind:
             case PackageKind.REQUEST_PROTOCOL_VERSION if payload[:1] == b"\x01":
                 return package(PackageKind.GET_URCONTROL_VERSION)
@@ -120,7 +105,7 @@ class RtdeClient:
         return package(PackageKind.SETUP_OUTPUTS, Struct(">d").pack(RATE) + names)
 
     def _take_recipe(self, payload: bytes) -> bytes:
-        """Take the types of the variables, and start; ask again without those that the robot does not know."""
+        """Take the types of the variables and start; ask again without those that the robot does not know."""
         types = _types(payload, len(self._names), "variables")
         unknown = [name for name, word in zip(self._names, types, strict=True) if word == "NOT_FOUND"]
         if needed := [name for name in unknown if name in self._needed]:
@@ -138,7 +123,6 @@ class RtdeClient:
         return package(PackageKind.START)
 
     def _take_claim(self, payload: bytes) -> None:
-        """Check that all inputs are this client's."""
         found = _types(payload, len(self._inputs), "inputs")
         by_word: dict[str, list[str]] = {}
         for name, word in zip(self._inputs, found, strict=True):
@@ -159,14 +143,14 @@ class RtdeClient:
 
     def _rows(self, payload: bytes) -> Sequence[Row]:
         if self._row is None or payload[:1] != bytes([self._recipe]):
-            return ()  # of a recipe that was replaced
+            return ()  # of a replaced recipe
         if len(payload) != 1 + self._row.size:
             raise RtdeError(f"a row has {len(payload) - 1} bytes instead of {self._row.size}")
         numbers, row, at = self._row.unpack_from(payload, 1), dict[str, tuple[float, ...]](), 0
         for name in self._names:
             wire, least, most = self._types[name]
             row[name] = values = numbers[at : at + wire.length]
-            wrong = [value for value in values if not least <= value <= most]  # or no number
+            wrong = [value for value in values if not least <= value <= most]  # or NaN
             if wrong:
                 raise RtdeError(f"its {name} is {wrong[0]:g}: must be {least:g} to {most:g}")
             at += len(values)
@@ -174,7 +158,7 @@ class RtdeClient:
 
 
 def _types(payload: bytes, count: int, of: str) -> list[str]:
-    """Return the types of so many variables, behind the number of a recipe."""
+    """Return the types of `count` variables, which follow the number of a recipe."""
     found = payload[1:].decode("ascii", "replace").removesuffix(",").split(",")
     if len(found) != count:
         raise RtdeError(f"it names {len(found)} types for {count} {of}")

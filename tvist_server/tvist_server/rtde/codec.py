@@ -1,4 +1,4 @@
-"""Splits the byte stream of a connection into packages, and makes packages of payloads."""
+"""Splits a byte stream into packages, and makes packages of payloads."""
 
 from collections.abc import Iterable
 from enum import IntEnum
@@ -6,7 +6,7 @@ from struct import Struct
 
 HEADER = Struct(">HB")
 LARGEST = 0xFFFF
-"""Largest size of a package, header included [bytes]."""
+"""Largest size of a package including the header [bytes]."""
 TEXT = 255
 """Longest text in a message [bytes]."""
 
@@ -34,17 +34,13 @@ class TextLevel(IntEnum):
 
 
 class PackageReader:
-    """Splits a byte stream into packages, and keeps at most one incomplete package.
-
-    A package whose size field is smaller than the header is skipped: reading continues behind its three bytes, since
-    the size does not tell where the next package begins.
-    """
+    """Splits a byte stream into packages; after a size smaller than the header, it continues behind the header."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[tuple[int, bytes]]:
-        """Add bytes, and return type and payload of each package that is complete now."""
+        """Add bytes; return type and payload of each package that is now complete."""
         buffer = self._buffer
         buffer += data
         at, packages = 0, []
@@ -67,13 +63,7 @@ def package(kind: PackageKind, payload: bytes = b"") -> bytes:
 
 
 def words(kind: PackageKind, head: bytes, names: Iterable[str]) -> bytes:
-    """Return a package of words separated by commas; words that do not fit into 65535 bytes are left out.
-
-    Args:
-        kind: Type of the package.
-        head: What precedes the words.
-        names: The words.
-    """
+    """Return a package of `head` and words separated by commas; words beyond 65535 bytes are omitted."""
     text = ",".join(names).encode()
     room = LARGEST - HEADER.size - len(head)
     if len(text) > room:
@@ -82,14 +72,7 @@ def words(kind: PackageKind, head: bytes, names: Iterable[str]) -> bytes:
 
 
 def text_message(version: int, level: TextLevel, text: str, source: str) -> bytes:
-    """Return a text message to the client.
-
-    Args:
-        version: Protocol version; in version 1 the message has neither lengths nor a source.
-        level: Severity.
-        text: The message, cut after 255 bytes.
-        source: Who sends it, cut after 255 bytes.
-    """
+    """Return a text message to the client, without lengths and source in version 1; texts are cut after 255 bytes."""
     message = text.encode()[:TEXT]
     if version == 1:
         return package(PackageKind.TEXT_MESSAGE, bytes([level]) + message)

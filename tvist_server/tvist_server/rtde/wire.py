@@ -1,4 +1,4 @@
-"""Types of RTDE's variables, and their bytes."""
+"""Types of RTDE variables, and their bytes."""
 
 from enum import Enum
 from struct import Struct
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Wire(Enum):
-    """A type by its name in RTDE; the value is its format in `struct`, without the byte order."""
+    """A type by its name in RTDE; the value is its format in `struct`, without byte order."""
 
     BOOL = "?"
     UINT8 = "B"
@@ -26,12 +26,12 @@ class Wire(Enum):
 
     @property
     def length(self) -> int:
-        """Number of entries of a vector; 1 for a type that is no vector."""
+        """Number of entries of a vector; 1 for other types."""
         return int(self.value[:-1] or 1)
 
 
 class Field(NamedTuple):
-    """A variable that is read: its type, and the range of its numbers."""
+    """Type and range of a variable that is read."""
 
     wire: Wire
     least: float = -(2.0**63)

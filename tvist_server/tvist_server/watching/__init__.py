@@ -1,1 +1,1 @@
-"""A UR robot that is watched: its RTDE rows give the ticks, and nothing but questions is sent to it."""
+"""A real UR robot that is only watched: its RTDE rows give the ticks, and it is only sent queries."""

@@ -1,4 +1,4 @@
-"""A connection to a robot's RTDE interface, which never blocks for longer than it is told."""
+"""A connection to a robot's RTDE interface, which never blocks longer than the given timeout."""
 
 import contextlib
 import os
@@ -13,51 +13,41 @@ from tvist_server.rtde.client import Row, RtdeClient, RtdeError
 from tvist_server.watching.place import PORT, Place
 
 ANSWERS = 3.0
-"""Longest time in which a robot must accept a connection and start to send [s]."""
+"""Longest time for a robot to accept a connection and start sending [s]."""
 SILENT = 1.0
-"""Time without a new row after which a connection is lost [s], as UR's own clients have it."""
+"""Time without a new row after which a connection is lost [s], as in UR's own clients."""
 Address = tuple[socket.AddressFamily, tuple[Any, ...]]
 """Family of an address, and the address as `socket` has it."""
 AT_ONCE = 1 << 16
-"""Most bytes that are read at once: two seconds of rows."""
+"""Largest number of bytes read at once: two seconds of rows."""
 
 
 class LostError(Exception):
-    """There is no connection, or no more; the message says why."""
+    """There is no connection, or it is lost; the message gives the reason."""
 
 
 class UnreachableError(LostError):
-    """Nobody answers there."""
+    """Nothing answers at the address."""
 
 
 class Connection:
-    """One connection.
-
-    Args:
-        place: Where the robot is.
-        address: Its resolved address, as `socket.getaddrinfo` returns it: family and address.
-        client: What is read and written there.
-    """
+    """One connection to the robot at `place`, whose `address` comes from `resolved`; `client` reads and writes."""
 
     def __init__(self, place: Place, address: Address, client: RtdeClient) -> None:
         self._place, self.client = place, client
         self.texts: list[str] = []
-        """Messages of the controller since somebody has emptied the list."""
+        """Messages of the controller, until the caller clears the list."""
         self._begun = self._heard = time.monotonic()
         self._connected, self._newest, self._rest = False, -1, b""
         self._socket = socket.socket(address[0], socket.SOCK_STREAM)
         self._selector = selectors.DefaultSelector()
         self._socket.setblocking(False)
-        with contextlib.suppress(BlockingIOError, OSError):  # which shows when it is ready, or is not
+        with contextlib.suppress(BlockingIOError, OSError):  # `rows` reports the error
             self._socket.connect(address[1])
         self._selector.register(self._socket, selectors.EVENT_WRITE)
 
     def rows(self, timeout: float) -> Sequence[Row]:
-        """Return the rows that have come, after waiting at most `timeout` [s] for the first.
-
-        Raises:
-            LostError: The robot is not there, has gone, or is none.
-        """
+        """Return the rows that have come, waiting at most `timeout` [s]; LostError without a robot."""
         try:
             ready = self._selector.select(max(0.0, timeout)) or self._selector.select(0.0)
             if ready and not self._connected:
@@ -73,7 +63,7 @@ class Connection:
         return rows
 
     def write(self, numbers: Sequence[float]) -> None:
-        """Write all inputs, without waiting: while a link takes nothing, packages are left out, and not kept."""
+        """Write all inputs, without waiting; packages that the link does not take at once are dropped."""
         if not self.client.started:
             return
         self._rest = self._rest[self._give(self._rest) :]
@@ -84,7 +74,7 @@ class Connection:
     def _give(self, data: bytes) -> int:
         try:
             return self._socket.send(data)
-        except OSError:  # a lost connection shows when it is read
+        except OSError:  # reading reports a lost connection
             return 0
 
     def close(self) -> None:
@@ -129,11 +119,7 @@ class Connection:
 
 
 def resolved(place: Place) -> Address:
-    """Look up an address, which may take seconds.
-
-    Raises:
-        LostError: It has none.
-    """
+    """Resolve an address, which may take seconds; raise LostError if it has none."""
     try:
         found = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)[0]
     except OSError as error:

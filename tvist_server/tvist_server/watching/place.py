@@ -1,11 +1,10 @@
-"""Where a robot is that is to be watched: ur://ADDRESS[:PORT]."""
+"""Address of a real robot: ur://ADDRESS[:PORT]."""
 
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
 SCHEME = "ur://"
 PORT = 30004
-"""Port of RTDE."""
 
 
 class Place(NamedTuple):
@@ -16,34 +15,25 @@ class Place(NamedTuple):
     port: int = PORT
 
     def beside(self, port: int) -> "Place":
-        """Return the place of another of its interfaces, as far from that of RTDE as on a robot of UR's.
-
-        Args:
-            port: Port of that interface on a robot of UR's.
-        """
+        """Return the place of another interface, which has `port` on a UR robot; it is shifted as RTDE's port is."""
         return self._replace(port=port + self.port - PORT)
 
     def __str__(self) -> str:
-        """Return it as people write it."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{SCHEME}{host}" + ("" if self.port == PORT else f":{self.port}")
 
 
 def is_place(plant: str) -> bool:
-    """Return whether the name of a plant is meant to be the address of a robot."""
+    """Return whether the name of a plant looks like the address of a robot."""
     return plant.lower().startswith(SCHEME)
 
 
 def place_of(plant: str) -> Place:
-    """Return the address.
-
-    Raises:
-        ValueError: It is none.
-    """
+    """Return the address; raise ValueError if it is invalid."""
     try:
         parts = urlsplit(plant)
         port = PORT if parts.port is None else parts.port
-    except ValueError:  # the port is no number, or too large
+    except ValueError:  # the port is not a number, or too large
         parts, port = urlsplit(SCHEME), 0
     if not parts.hostname or port == 0 or parts.username or parts.path.strip("/") or parts.query:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""What is read of a robot and what it means here, and which of its control periods a row belongs to."""
+"""Variables read from a real robot, their conversion, and the control periods that rows belong to."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -27,7 +27,7 @@ NEEDED: dict[str, Field] = {
     "runtime_state": Field(Wire.UINT32, -1, 255),
     "speed_scaling": Field(Wire.DOUBLE, 0.0, 2.0),
 }
-"""Variables that every robot with RTDE has. The ranges exclude what no robot can mean."""
+"""Variables that every robot with RTDE has; the ranges exclude impossible values."""
 OPTIONAL: dict[str, Field] = {
     "actual_current_as_torque": Field(Wire.VECTOR6D, -1e5, 1e5),
     "target_speed_fraction": Field(Wire.DOUBLE, 0.0, 1.0),
@@ -38,23 +38,15 @@ OPTIONAL: dict[str, Field] = {
     "actual_digital_input_bits": Field(Wire.UINT64, 0, 2**32 - 1),
     "actual_digital_output_bits": Field(Wire.UINT64, 0, 2**32 - 1),
 }
-"""Variables that older software does not have."""
+"""Variables that older software lacks."""
 JOINTS = 6
-"""Joints of every robot with RTDE."""
+"""Number of joints of every robot with RTDE."""
 SAME_CLOCK = 1.0
-"""Largest lead of a row over those before it, and difference of the clocks over a lost connection [s]."""
+"""Largest lead of a row over earlier ones, and largest difference of the clocks after a lost connection [s]."""
 
 
 def sight_of(row: Row, constants: Sequence[float], tick: int, missed: int, told: Sequence[str] = ()) -> Sight:
-    """Return a row in our units and orders.
-
-    Args:
-        row: The row.
-        constants: Torque over current of each joint, for robots that do not tell torques [N m/A].
-        tick: See `Sight`, as for the next two.
-        missed: Number of rows that did not arrive.
-        told: What people should know.
-    """
+    """Convert a row to SI units; `constants` are torque constants [N m/A], for robots that report no torques."""
     torque, slider = row.get("actual_current_as_torque"), row.get("target_speed_fraction")
     moment = np.array(row["actual_current"]) * np.array(constants) if torque is None else np.array(torque)
     angles, rates, felt = (
@@ -78,7 +70,7 @@ def sight_of(row: Row, constants: Sequence[float], tick: int, missed: int, told:
 
 
 def _payload(row: Row) -> Payload | None:
-    """Payload that the robot was told; its inertia is left out where the robot has none, or an impossible one."""
+    """Return the payload that the robot was told; its inertia is 0 if the robot reports none or an impossible one."""
     mass, com = row.get("payload"), row.get("payload_cog")
     if mass is None or com is None:
         return None
@@ -88,7 +80,7 @@ def _payload(row: Row) -> Payload | None:
 
 
 def has_real_payload(row: Row) -> bool:
-    """Return whether a body may have the inertia that the robot was told; one that it does not say is none."""
+    """Return whether a body can have the inertia that the robot was told; a missing one counts as possible."""
     return is_real_body(_inertia(row))
 
 
@@ -98,23 +90,20 @@ def _inertia(row: Row) -> tuple[float, float, float, float, float, float]:
 
 
 class Counted(NamedTuple):
-    """A row that is new."""
+    """A new row."""
 
     tick: int
     """Number of its control period; it increases from row to row."""
     missing: int
-    """Number of rows that are missing before it."""
+    """Number of rows missing before it."""
     anew: bool
-    """Whether the robot's clock has begun anew, so that `missing` is by our clock."""
+    """Whether the robot's clock was reset, so that `missing` is estimated from the local clock."""
 
 
 class RowCount:
-    """Numbers rows by the robot's time, as the number of control periods since its clock began.
+    """Numbers rows by control periods since the robot's clock started, `interval` periods apart.
 
-    If that clock begins anew, as after a restart, the numbers go on by as much as our clock says.
-
-    Args:
-        interval: Number of control periods between two rows: 1 at 500 Hz, 4 at 125 Hz.
+    If that clock is reset, as by a restart, the numbers continue according to the local clock.
     """
 
     def __init__(self, interval: int) -> None:
@@ -124,16 +113,13 @@ class RowCount:
         self.tick = 0
         """Number of the last row; 0 before the first."""
         self.rows = self.missing = self.doubled = 0
-        """Numbers of rows since the first one: those taken, those missing, and those left out since they came twice."""
+        """Numbers of rows taken, missing, and ignored as duplicates since the first one."""
 
     def take(self, timestamp: float, now: float, *, reconnected: bool = False) -> Counted | None:
-        """Take a row; return None if it is the last one again.
+        """Take a row at the robot's and the local time [s]; return None if it repeats the last one.
 
-        Args:
-            timestamp: The robot's time [s].
-            now: Our time [s].
-            reconnected: Whether the connection was lost before it. If not, time that does not go on as ours does, or
-                goes back, raises `RtdeError`.
+        Raise RtdeError if the robot's time goes back or deviates from the local one, unless the connection
+        was lost before.
         """
         own, before = round(timestamp / PERIOD), self._own
         if own == before:

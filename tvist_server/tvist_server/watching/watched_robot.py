@@ -1,7 +1,4 @@
-"""The robot that is watched, as a plant: it gives the ticks, and gets no command; what moves it writes its inputs.
-
-A lost connection is looked for again once a second, without delaying the thread that ticks.
-"""
+"""A real robot as a plant that gives the ticks but takes no command; a lost connection is retried every second."""
 
 import time
 from collections import deque
@@ -25,41 +22,29 @@ from tvist_server.watching.place import Place
 from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, RowCount, has_real_payload, sight_of
 
 LOOKED_AT = 25
-"""Number of rows from which the time between two is found."""
+"""Number of rows that determine the row rate."""
 INTERVALS = {1: "500", 4: "125"}
-"""Control periods between two rows, and the rate of such a robot [Hz]."""
+"""Control periods between two rows, and the row rate of such a robot [Hz]."""
 TEXTS = 10
-"""Most texts of the robot's that are passed on in a second, and that wait for its next row."""
+"""Largest number of the robot's texts passed on in a second, and queued for its next row."""
 RETRY = 1.0
 """Time between two attempts to connect [s]."""
 TELL_EVERY = 1.0
-"""Shortest time between two sentences about missing rows [s]."""
+"""Shortest time between two reports about missing rows [s]."""
 OTHER = 0.03
-"""Distance of the tool from where the robot file has it, from which on the robot is another model [m]; calibrated
-kinematics differ by some millimetres."""
+"""Smallest distance of the tool that indicates another model [m]; a calibration shifts it by some millimetres."""
 
 
 class WatchedRobot(RealArm):
-    """Reads one robot, and writes the inputs that are claimed.
-
-    Args:
-        place: Where it is.
-        description: The robot file.
-        payload: Payload, in case it does not say what it carries.
-        outputs: Types and ranges of further variables that are needed, by name.
-        inputs: Types of the inputs to claim, by name.
-
-    Raises:
-        PlantError: There is none, or it is none that can be watched.
-    """
+    """Reads one robot, and writes the inputs that are claimed; PlantError if it cannot be watched."""
 
     def __init__(
         self,
         place: Place,
         description: RobotDescription,
-        payload: Payload,
-        outputs: Mapping[str, Field] = MappingProxyType({}),
-        inputs: Mapping[str, Wire] = MappingProxyType({}),
+        payload: Payload,  # if the robot does not report one
+        outputs: Mapping[str, Field] = MappingProxyType({}),  # types and ranges of further required variables
+        inputs: Mapping[str, Wire] = MappingProxyType({}),  # types of the inputs to claim
     ) -> None:
         model = description.robot.model
         if description.joints != JOINTS:
@@ -74,11 +59,11 @@ class WatchedRobot(RealArm):
         self._sights: deque[tuple[Sight, Row]] = deque()
         self._connection: Connection | None = None
         self.looked_at: list[Row] = []
-        """Rows that were read before the first tick."""
+        """Rows read before the first tick."""
         self._checked = False
         """Whether the present connection has sent a row of the right robot."""
         self._lost = 0.0, ""
-        """When the connection was lost [s], and why; nothing while it is there."""
+        """Time [s] and reason of the loss of the connection; empty while connected."""
         self._retry_at = self._told_at = self._texts_at = 0.0
         self._untold = self._room = self._left_out = 0
         self._notes: list[str] = []
@@ -93,16 +78,16 @@ class WatchedRobot(RealArm):
         return self._last.measured
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Return the latest measurements: the command goes nowhere."""
+        """Return the latest measurements and ignore the command."""
         del command
         return self._last.measured
 
     def first(self) -> Sight:
-        """Return what it said before the first tick."""
+        """Return the last row from before the first tick."""
         return self._last
 
     def interval(self) -> float:
-        """Return the time between two of its rows [s]."""
+        """Return the time between two rows [s]."""
         return self._interval * PERIOD
 
     def sight(self) -> Sight:
@@ -131,11 +116,11 @@ class WatchedRobot(RealArm):
 
     @property
     def connected(self) -> bool:
-        """Whether it is connected."""
+        """Whether the robot is connected."""
         return self._connection is not None
 
     def write(self, numbers: Sequence[float]) -> None:
-        """Write all inputs, in their order; nothing happens while there is no connection."""
+        """Write all inputs, in order, if there is a connection."""
         if self._connection is not None:
             self._connection.write(numbers)
 
@@ -145,10 +130,8 @@ class WatchedRobot(RealArm):
             self._connection.close()
             self._connection = None
 
-    # ------------------------------------------------------------------ rows
-
     def _look(self) -> None:
-        """Read some rows before the server ticks: what the robot is, and how fast."""
+        """Read rows before the server ticks to determine the robot's model and row rate."""
         self._connect()
         rows = self.looked_at
         try:
@@ -159,7 +142,7 @@ class WatchedRobot(RealArm):
                     raise LostError(f"{self._place} sends only {len(rows)} rows in {ANSWERS:g} s")
             self._check(rows[-1])
             self.version = self._client.version
-            """Version of its software: major, minor, bugfix, build."""
+            """Software version: major, minor, bugfix, build."""
             lacking = self._client.lacking
         finally:
             self.close()
@@ -181,15 +164,15 @@ class WatchedRobot(RealArm):
         )
         if self._interval > 1:
             self._notes.append(
-                "125 rows a second show vibration up to 62.5 Hz: take what is above that from a sensor of your own"
+                "125 rows a second show vibration up to 62.5 Hz: use an external sensor for higher frequencies"
             )
         if not has_real_payload(rows[-1]):
             told = list(rows[-1]["payload_inertia"])
             self._notes.append(
-                f"no body has the payload inertia {told} that it was told: it counts as 0; correct it at the robot"
+                f"no body can have its payload inertia {told}: 0 is used instead; correct it at the robot"
             )
         if lacking:
-            self._notes.append(f"its software does not tell {', '.join(lacking)}")
+            self._notes.append(f"its software does not report {', '.join(lacking)}")
 
     def _connect(self) -> None:
         self._connection, self._checked = self._new_connection(), False
@@ -200,7 +183,7 @@ class WatchedRobot(RealArm):
         return Connection(self._place, self._address, client)
 
     def _rows(self, timeout: float) -> list[Row]:
-        """Return the rows that have come, and note what the robot says with them."""
+        """Return the rows that have come, and keep the robot's messages."""
         assert self._connection is not None
         rows, texts = list(self._connection.rows(timeout)), self._connection.texts
         if (now := time.monotonic()) - self._texts_at >= 1.0:
@@ -215,13 +198,11 @@ class WatchedRobot(RealArm):
         return rows
 
     def _check(self, row: Row) -> None:
-        """Check that the tool is where the robot file has it; without a tool in the row nothing can be said.
-
-        Raises:
-            LostError: It is elsewhere.
-        """
+        """Raise LostError if the tool is not where the robot file has it; without a tool in the row, only note that."""
         if "tcp_offset" not in row:
-            self._notes.append(f"whether it is a {self._model} is unknown, since it does not tell its tool")
+            self._notes.append(
+                f"whether it is a {self._model} is unknown, because it does not report its tool"
+            )
             return
         tool = self._arm.with_tool(row["tcp_offset"])
         here, there = tool.pose(np.array(row["actual_q"]))[1], np.array(row["actual_TCP_pose"][:3])
@@ -252,8 +233,8 @@ class WatchedRobot(RealArm):
         if self._untold and now - self._told_at >= TELL_EVERY:
             due = self._count.rows + self._count.missing
             self._notes.append(
-                f"{self._untold} rows of the robot are missing, {self._count.missing} of {due} since the start: look "
-                "at the network and at the load of this machine"
+                f"{self._untold} rows of the robot are missing, {self._count.missing} of {due} since the start: "
+                "check the network and the load of this machine"
             )
             self._told_at, self._untold = now, 0
         self._sights.append((self._sight(row, counted.tick), row))
@@ -265,10 +246,7 @@ class WatchedRobot(RealArm):
         return sight
 
     def _lose(self, error: LostError | RtdeError) -> None:
-        """Give up the connection, and say so in a tick of its own; once for each reason.
-
-        That nobody answers there is news only if it is the first.
-        """
+        """Close the connection and report the loss in a tick of its own, once per reason, not for failed retries."""
         self.close()
         now, why = time.monotonic(), str(error)
         self._retry_at = now + RETRY
@@ -278,7 +256,7 @@ class WatchedRobot(RealArm):
         self._lost = (since if before else now), why
         latest, row = self._sights[-1] if self._sights else (self._last, self.newest)
         modes = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
-        told = (*self._notes, f"{why}; the state stands still, and a connection is tried every second")
+        told = (*self._notes, f"{why}; the state stands still, and a connection is attempted every second")
         self._notes = []
         self._sights.append((replace(latest, tick=self._count.silence(), modes=modes, told=told), row))
 

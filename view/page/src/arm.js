@@ -9,7 +9,7 @@ const SLIM = 0.86; // radius of a tube over that of its capsule, which contains 
 const GHOST_OPACITY = 0.22;
 const Z = new THREE.Vector3(0, 0, 1);
 
-/** Points [r, z] of a cylinder between two heights whose edges are rounded. */
+/** Profile [r, z] of a cylinder between two heights, with rounded edges. */
 function rounded(radius, low, high, edge = 0.18 * radius) {
   const e = Math.min(edge, (high - low) / 2);
   const arc = (z, from) =>
@@ -29,7 +29,7 @@ function turned(profile, origin, direction) {
   return shape;
 }
 
-/** Where a link's capsule stands on a joint's axis: heights [low, high] and whether it lies along it. */
+/** Extent [low, high] of a link's capsule on a joint's axis, and whether it is parallel to the axis. */
 function onAxis(start, end, radius) {
   const way = end.clone().sub(start), length = way.length();
   if (length > 0 && Math.abs(way.z) > 0.9 * length) {
@@ -84,7 +84,7 @@ export function solids(geometry, chain) {
     if (joint > 0) add(far, capProfile(there.radius, low, -1), origin, axis, CAP);
     const ring = 0.09 * own.radius;
     add(far, rounded(0.93 * Math.min(there.radius, own.radius) + 0.04 * own.radius, middle - ring, middle + ring, 0), origin, axis, RING);
-    // The housing of this link turns with it: in its near frame, the joint's axis stands where the link begins.
+    // The housing of this link turns with it: in its near frame, the joint's axis is at the start of the link.
     const base = new THREE.Vector3().applyMatrix4(down), direction = axis.clone().transformDirection(down);
     add(1 + 2 * joint, rounded(own.radius, middle, high), base, direction, JOINT);
     if (!last) add(1 + 2 * joint, capProfile(own.radius, high, 1), base, direction, CAP);
@@ -97,7 +97,7 @@ function capProfile(radius, at, sign) {
   return sign > 0 ? rounded(0.9 * radius, at - 0.02 * radius, at + thick) : rounded(0.9 * radius, at - thick, at + 0.02 * radius);
 }
 
-/** Each link's capsule by its number; -1 is the base. An arm that tells none gets some of a size that fits its reach. */
+/** Each link's capsule by its number; -1 is the base. An arm without any gets some that fit its reach. */
 function capsulesOf(geometry, chain) {
   const found = new Map();
   for (const one of geometry.capsules) {
@@ -159,7 +159,7 @@ export class Arm {
     this.frames[frame].add(part);
   }
 
-  /** The URDF's meshes have all come: they stand in for the solids, but for the payload. */
+  /** Replace the solids, except the payload, by the URDF's meshes when all have been loaded. */
   _swap() {
     for (const frame of this.frames) for (const part of [...frame.children]) {
       if (!part.userData.mesh && part.material !== this.materials.get(LOAD)) frame.remove(part);
@@ -167,7 +167,7 @@ export class Arm {
     this.changed?.();
   }
 
-  /** Put it at joint angles with link deflections [rad]; returns where the flange is in the scene. */
+  /** Set joint angles and link deflections [rad]; returns the flange's position in the scene. */
   pose(q, bends) {
     const poses = this.chain.frames(q, bends);
     this.frames.forEach((frame, number) => {
@@ -177,7 +177,7 @@ export class Arm {
     return placed(poses.at(-1)).add(this.root.position);
   }
 
-  /** Points on its outline, for a camera that is to see all of it. */
+  /** Points on its outline, to fit the camera. */
   outline(q = null, bends = []) {
     const poses = q ? this.chain.frames(q, bends) : this.frames.map((frame) => frame.matrix);
     const found = [];

@@ -1,10 +1,10 @@
 // The arm as a chain of frames: the base, then for each joint the near and the far end of its link.
-// Both are the link's own frame. The near one takes no part in the link's bending, the far one does.
+// Both are the link's own frame; only the far one moves with the link's bending.
 import { Matrix4, Vector3 } from "three";
 
 export const placed = (matrix) => new Vector3().setFromMatrixPosition(matrix);
 
-/** Rotation about x, y, z in turn (roll, pitch, yaw), then a shift: what a URDF calls an origin. */
+/** A URDF's origin: rotation about x, y, z in turn (roll, pitch, yaw), and translation. */
 export function origin([x, y, z, roll, pitch, yaw]) {
   return new Matrix4().makeTranslation(x, y, z)
     .multiply(new Matrix4().makeRotationZ(yaw)).multiply(new Matrix4().makeRotationY(pitch))
@@ -12,7 +12,7 @@ export function origin([x, y, z, roll, pitch, yaw]) {
 }
 
 export class Chain {
-  /** @param geometry As `info` tells it: Denavit-Hartenberg lists a, d, alpha, or one placement for each joint. */
+  /** @param geometry From `info`: Denavit-Hartenberg lists a, d, alpha, or one placement for each joint. */
   constructor({ a, d, alpha, placement = [], bending }) {
     // Frame of each link in that of its joint.
     this.links = placement.length
@@ -44,7 +44,7 @@ export class Chain {
     return out;
   }
 
-  /** A line in a link's frame, cut in the middle of a link that bends: [{ frame, from, to }]. */
+  /** A line in a link's frame, split in the middle if the link bends: [{ frame, from, to }]. */
   cut(link, start, end) {
     const near = 1 + 2 * link, far = 2 + 2 * link;
     if (!this.bending.includes(link)) return [{ frame: far, from: start, to: end }];
@@ -57,7 +57,7 @@ export class Chain {
     return [{ frame: near, from: first, to: cut }, { frame: far, from: cut, to: last }];
   }
 
-  /** Sum of its links' lengths [m]. */
+  /** Sum of the links' lengths [m]. */
   reach() {
     return this.links.reduce((sum, link) => sum + placed(link).length(), 0);
   }

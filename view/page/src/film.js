@@ -1,5 +1,5 @@
-// Pictures for a film: runs beside each other, what they are called, how their tools shake, and the number.
-// The server asks for a time and gets a picture of it; nothing plays.
+// Frames of a film: runs side by side with labels, a plot of the tools' vibration, and the verdict.
+// The server requests a time and receives its frame.
 import * as THREE from "three";
 import { connected } from "./dom.js";
 import { COLOURS, roundUp } from "./plots.js";
@@ -9,7 +9,7 @@ import { columns, Track } from "./tracks.js";
 
 const INK = { light: ["#1f2933", "#5b6670", "#d9dee3", "#ffffff"], dark: ["#e6eaed", "#9aa6b1", "#343c44", "#14181c"] };
 
-const LIGHTER = { [COLOURS.with]: "#4aa3dd", [COLOURS.without]: "#f08a3c" }; // on a dark ground
+const LIGHTER = { [COLOURS.with]: "#4aa3dd", [COLOURS.without]: "#f08a3c" }; // on a dark background
 
 export class Film {
   constructor(boot) {

@@ -1,4 +1,4 @@
-// The live page: a robot that is served, and the cockpit that moves it.
+// The live page: a served robot and the controls that move it.
 import { connected, h, logo, slider, write } from "./dom.js";
 import { COLOURS, Plot, roundUp } from "./plots.js";
 import { Robot } from "./robot.js";
@@ -6,10 +6,10 @@ import { inWords, Stage } from "./stage.js";
 import { motionsOf } from "./words.js";
 
 const SPAN = 6; // seconds shown
-const BEFORE_S = 0.2, SETTLED_S = 0.05; // of an A/B: shown before the stop, and left out of the scale after it
-const PLOT_EVERY = 3; // pictures of the arm
-const JOG_MS = 50; // how often the page says that a jog button is still down
-const WAITS_MS = 1500; // until the page asks for its server again
+const BEFORE_S = 0.2, SETTLED_S = 0.05; // of an A/B: time shown before the stop, and time after it that does not affect the scale
+const PLOT_EVERY = 3; // frames of the arm
+const JOG_MS = 50; // time between two messages while a jog button is down
+const WAITS_MS = 1500; // time until the page tries to reconnect
 
 export class Live {
   constructor({ factor }) {
@@ -29,8 +29,8 @@ export class Live {
   _connect() {
     this.socket = connected(this);
     this.socket.onclose = () => {
-      this.on_notice({ text: "The page's server has ended: start tvist view again.", lasting: true });
-      this._state("gone", "page's server has ended", "");
+      this.on_notice({ text: "The page's server has stopped: start tvist view again.", lasting: true });
+      this._state("gone", "page's server has stopped", "");
       setTimeout(() => this._connect(), WAITS_MS);
     };
   }
@@ -40,13 +40,13 @@ export class Live {
     this.picker = h("select", { ariaLabel: "robot", onchange: () => this.send({ do: "robot", name: this.picker.value }) });
     this.state = h("span", { class: "state", role: "status" }, h("i"), h("span"));
     this.who = h("span", { class: "who" }, "Nobody has control.");
-    this.hold = button("Hold it", { title: "Check it, and power on here. Its own power and brakes are switched at the robot.", onclick: () => this.send({ do: "ready" }) });
+    this.hold = button("Hold it", { title: "Check the robot and power on here. Switch the robot's own power and brakes at the robot.", onclick: () => this.send({ do: "ready" }) });
     this.way = h("details", { class: "way", hidden: true, open: innerWidth > 820 }, h("summary", {}), h("ol", {}), this.hold);
     this.stage.main.append(this.way);
     this.take = button("Take control", { class: "take", onclick: () => this.send({ do: this.mine ? "give" : "take" }) });
     this.stop = button("STOP", { class: "stop", onclick: () => this.send({ do: "stop" }) });
     this.motions = h("span", { class: "motions", role: "group", ariaLabel: "motions" });
-    this.shaper = h("select", { ariaLabel: "shaper", title: "none shapes nothing, zv is the paper's, auto suppresses several modes.",
+    this.shaper = h("select", { ariaLabel: "shaper", title: "none: no shaping; zv: the paper's shaper; auto: suppresses several modes.",
       onchange: () => this.send({ do: "shape", shaper: this.shaper.value, modes: this.modes?.value() ?? null }) });
     this.ab = button("A/B", { class: "ab", onclick: () => this.send({ do: "compare", ...this.chosen, shaper: this.shaper.value }) });
     this.open = button("more", { ariaExpanded: "false", onclick: () => this._toggle() });
@@ -69,7 +69,7 @@ export class Live {
     this.qdd.box.classList.add("second");
   }
 
-  /** The robot that this tab shows, as it describes itself. */
+  /** Show a robot, given its description. */
   on_robot(robot) {
     this.robot?.remove();
     this.stage.scene.clear();
@@ -87,7 +87,7 @@ export class Live {
     const motions = motionsOf(this.robot.arm.chain, robot.motions, robot.poses);
     this.chosen = motions[0] ? { first: motions[0].first, last: motions[0].last } : null;
     this.motions.replaceChildren(...motions.map(({ first, last, words }) => {
-      const go = h("button", { type: "button", title: `Go to ${first}, if the arm is not there, then to ${last}.`,
+      const go = h("button", { type: "button", title: `Go to ${first} unless the arm is there, then to ${last}.`,
         onclick: () => {
           this.chosen = { first, last };
           this._overlay(null);
@@ -116,18 +116,18 @@ export class Live {
         tell();
         timer = setInterval(tell, JOG_MS);
       };
-      return h("button", { type: "button", title: "The arm stops as soon as the button is let go.", onpointerdown: begin,
+      return h("button", { type: "button", title: "The arm stops when you release the button.", onpointerdown: begin,
         onpointerup: end, onpointerleave: end, onpointercancel: end, oncontextmenu: (event) => event.preventDefault() }, text);
     };
     this.modes = slider("modes", { min: 1, max: robot.most_modes, step: 1, value: robot.modes,
-      hint: "How many modes a shaper such as zv suppresses; more than one takes a modal calibration.",
+      hint: "Number of modes that a shaper such as zv suppresses; more than one needs a modal calibration.",
       changed: (modes) => set({ do: "shape", shaper: this.shaper.value, modes }) });
-    const speed = slider("speed", { min: 10, max: 100, step: 1, value: 100, unit: " %", hint: "Speed slider of the robot.",
+    const speed = slider("speed", { min: 10, max: 100, step: 1, value: 100, unit: " %", hint: "The robot's speed slider.",
       changed: (percent) => set({ do: "speed", fraction: percent / 100 }) });
     const declared = slider("declared", { min: 0, max: robot.rated, step: 0.1, value: robot.mass, unit: " kg", show: (v) => v.toFixed(1),
-      hint: "What the controller believes that the arm carries: it shapes for this mass.", changed: (mass) => set({ do: "declare", mass }) });
+      hint: "Payload that the controller assumes: it shapes for this mass.", changed: (mass) => set({ do: "declare", mass }) });
     const carried = slider("carried", { min: 0, max: 2 * robot.rated, step: 0.1, value: robot.mass, unit: " kg", show: (v) => v.toFixed(1),
-      hint: "What the simulated arm carries in truth; changing it puts the arm at rest." });
+      hint: "Payload that the simulated arm really carries; a change puts the arm at rest." });
     const carry = h("button", { type: "button", onclick: () => set({ do: "carry", mass: carried.value() }) }, "Carry this mass");
     this.controls = h("div", {},
       h("fieldset", {}, h("legend", {}, "Jog"), joint, h("div", { class: "pair" }, jog("− hold to jog", -1), jog("+ hold to jog", 1))),
@@ -143,7 +143,7 @@ export class Live {
       ...Object.keys(faults).map((name) => h("option", { value: name }, name)));
     return h("fieldset", {}, h("legend", {}, "Faults"), fault, meaning, h("div", { class: "pair" },
       h("button", { type: "button", onclick: () => this.send({ do: "fault", name: fault.value }) }, "Cause it"),
-      h("button", { type: "button", title: "Unlock, restart safety, switch on.", onclick: () => this.send({ do: "ready" }) }, "Make the robot ready again")));
+      h("button", { type: "button", title: "Unlock, restart the safety system, power on.", onclick: () => this.send({ do: "ready" }) }, "Make the robot ready again")));
   }
 
   on_status(status) {
@@ -163,7 +163,7 @@ export class Live {
     this._enable();
   }
 
-  /** The steps to a real arm: those that are done, and the next one with how. */
+  /** Show the checklist for a real arm; the next step includes instructions. */
   _lead(steps, held) {
     const next = steps.findIndex(([done]) => !done);
     this.way.hidden = !steps.length;
@@ -174,7 +174,7 @@ export class Live {
       h("li", { class: done ? "done" : i === next ? "next" : "" }, what, i === next ? h("em", {}, how) : null)));
   }
 
-  /** The shaper that A/B compares with none. */
+  /** The shaper that A/B compares with no shaping. */
   _shaped() {
     const { value } = this.shaper;
     return value && value !== "none" ? value : this.info?.usual ?? "zv";
@@ -223,7 +223,7 @@ export class Live {
     this.stage.say(text, true);
   }
 
-  /** Both motions of an A/B, and what they say. */
+  /** Show both motions of an A/B and the verdict. */
   on_result(result) {
     const motion = [...this.motions.children].find((one) => one.dataset.motion === result.poses.join(" "));
     this.stage.result(inWords({ ...result, motion: motion?.textContent ?? result.poses.join(" → ") }));
@@ -235,7 +235,7 @@ export class Live {
     this.over = null;
     this.alpha.box.hidden = !!result;
     if (!result) return;
-    // Braking would hide what rings after it: the scale is that of the rest.
+    // Scale by the vibration after the stop; the deceleration is much larger and would hide it.
     const curves = [result.without, result.shaped];
     const rings = curves.flatMap((curve) => curve.filter((_, i) => result.time[i] > result.stop + SETTLED_S));
     const most = roundUp(1.1 * Math.max(...rings, 0.1));

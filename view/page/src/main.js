@@ -1,4 +1,4 @@
-// The page's beginning: which of its kinds it is stands in the page itself.
+// The page's entry point; the kind of page is in its boot data.
 import { Film } from "./film.js";
 import { Live } from "./live.js";
 import { Playback } from "./playback.js";

@@ -1,4 +1,4 @@
-// A URDF's own meshes, as the page's server hands them on.
+// A URDF's own meshes, from the page's server.
 import * as THREE from "three";
 import { ColladaLoader } from "three/examples/jsm/loaders/ColladaLoader.js";
 import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
@@ -6,7 +6,7 @@ import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { origin } from "./chain.js";
 
-/** One geometry of everything in a loaded scene. */
+/** Merge a loaded scene into one geometry. */
 function flattened(root) {
   root.updateMatrixWorld(true);
   const shapes = [];
@@ -24,7 +24,7 @@ function flattened(root) {
 const read = {
   stl: (data) => new STLLoader().parse(data),
   obj: (data) => flattened(new OBJLoader().parse(new TextDecoder().decode(data))),
-  // A Collada file says which axis is up; a URDF takes its coordinates as they are, in the file's unit.
+  // A Collada file names its upward axis, but a URDF takes its coordinates unrotated, in the file's unit.
   dae: (data) => {
     const { scene } = new ColladaLoader().parse(new TextDecoder().decode(data), "");
     scene.rotation.set(0, 0, 0);
@@ -32,7 +32,7 @@ const read = {
   },
 };
 
-/** Load a robot's meshes: `found(link, shape)` for each and `done()` when all have come. A damaged one leaves the solids. */
+/** Load a robot's meshes: `found(link, shape)` for each, `done()` after all. If one is damaged, the solids stay. */
 export async function loadMeshes(look, found, done) {
   try {
     const all = await Promise.all(look.geometry.meshes.map(async (mesh, number) => {

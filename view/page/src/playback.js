@@ -1,4 +1,4 @@
-// The page of recorded runs: one robot, or several beside each other at the same tick, with a bar of time.
+// The page of recorded runs: one robot, or several side by side at the same tick, with a time slider.
 import * as THREE from "three";
 import { h, logo, write } from "./dom.js";
 import { COLOURS, Plot } from "./plots.js";
@@ -6,7 +6,7 @@ import { inWords, Stage } from "./stage.js";
 import { columns, Track } from "./tracks.js";
 
 const PACES = [1, 0.5, 0.25, 0.1, 0.05];
-const NO_TRUTH = "the recording holds no truth (tvist serve --truth --record FILE)";
+const NO_TRUTH = "the recording contains no truth (record it with tvist serve --truth --record FILE)";
 
 export class Playback {
   constructor(boot) {
@@ -46,7 +46,7 @@ export class Playback {
     this.stage.each.push((seconds) => this._step(seconds));
   }
 
-  /** Let the camera see all that the arms reach. */
+  /** Fit the camera to everything that the arms reach. */
   keep() {
     const plain = { ...this.stage.appearance, ghost: false, trace: false };
     this.stage.scene.keep(this.tracks.flatMap((track) => track.outlines(plain)));
@@ -56,7 +56,7 @@ export class Playback {
     this.play = h("button", { type: "button", onclick: () => this.toggle() }, "pause");
     this.scrub = h("input", { type: "range", class: "time", min: 0, max: this.end, step: 0.002, value: 0, ariaLabel: "time", oninput: () => this.seek(+this.scrub.value) });
     this.clock = h("output", {});
-    const pace = h("select", { ariaLabel: "pace", title: "In slow motion an eye can follow the vibration.", onchange: () => (this.pace = +pace.value) },
+    const pace = h("select", { ariaLabel: "pace", title: "Slow motion makes the vibration visible.", onchange: () => (this.pace = +pace.value) },
       ...PACES.map((one) => h("option", { value: one }, one === 1 ? "real time" : `1/${1 / one} slow motion`)));
     const more = document.getElementById("more");
     more.append(this.stage.choices());
@@ -84,7 +84,7 @@ export class Playback {
     this.draw(this.time);
   }
 
-  /** Draw a time [s]. */
+  /** Draw the frame at a time [s]. */
   draw(time) {
     for (const track of this.tracks) track.robot.show(track.row(time), this.stage.appearance);
     this.scrub.value = time;

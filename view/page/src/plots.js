@@ -1,10 +1,10 @@
-// A strip of plots over the whole width, with legends and scales that only grow.
+// Plots over the whole width, with legends and scales that only grow.
 import uPlot from "uplot";
 
 export const COLOURS = { without: "#D55E00", with: "#0072B2", third: "#009E73", before: "#8A8A8A" };
 const STEPS = [1, 2, 5];
 
-/** The least of 1, 2, 5, 10, ... that is not below a value. */
+/** Round up to 1, 2, 5, 10, ... */
 export function roundUp(value) {
   const power = 10 ** Math.floor(Math.log10(Math.max(value, 1e-6)));
   return STEPS.map((step) => step * power).find((one) => one >= value * 0.999) ?? 10 * power;
@@ -14,7 +14,7 @@ const ink = () => getComputedStyle(document.documentElement).getPropertyValue("-
 const line = () => getComputedStyle(document.documentElement).getPropertyValue("--line").trim();
 
 export class Plot {
-  /** @param lines [{ label, colour, fill, points }]; least: upper end of the scale to begin with. */
+  /** @param lines [{ label, colour, fill, points }]; least: initial upper end of the scale. */
   constructor(parent, title, lines, { least = 1, x = "s", range = null, signed = false } = {}) {
     this.box = Object.assign(document.createElement("figure"), { className: "plot" });
     this.box.setAttribute("aria-label", title);
@@ -78,7 +78,7 @@ export class Plot {
     if (clientWidth > 20 && height > 20) this.plot.setSize({ width: clientWidth, height });
   }
 
-  /** Draw columns: x, then one for each line. The scale grows with what is in it. */
+  /** Draw columns: x, then one for each line. The scale grows with the data. */
   show(columns) {
     for (const column of columns.slice(1)) for (const value of column) if (Math.abs(value) > this.top) this.top = roundUp(Math.abs(value));
     this.plot.setData(columns);

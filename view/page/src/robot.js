@@ -1,11 +1,11 @@
-// A robot on the stage: the arm with its bending magnified, the ghost of where its reference is, the trace of its tool.
+// A robot on the stage: the arm with magnified bending, the ghost at its reference, the trace of its tool.
 import * as THREE from "three";
 import { Arm } from "./arm.js";
 import { Things } from "./things.js";
 
 const TRACE = 120; // points
-const JUMP = 0.15; // way between two pictures that is not drawn as a trace [m]
-const APART = 0.02; // angle from which on the ghost is seen beside the arm [rad]
+const JUMP = 0.15; // distance between two frames above which no trace is drawn [m]
+const APART = 0.02; // angle between arm and ghost above which the ghost is drawn [rad]
 
 export class Robot {
   /**
@@ -45,14 +45,14 @@ export class Robot {
   }
 
   show(row, appearance) {
-    // An arm that stands still is not drawn again: without a graphics processor each picture takes a whole core.
+    // An arm at rest is not drawn again: without a graphics processor, drawing takes a whole core.
     const asked = JSON.stringify([Array.from(row), appearance]);
     if (asked === this.asked) return;
     this.asked = asked;
     const { q, bends, reference } = Robot.drawn(row, this.joints, this.links, appearance);
     const flange = this.arm.pose(q, bends);
     this.things?.place(row.slice(4 * this.joints + 2 * this.links));
-    // Where both coincide, their surfaces would flicker.
+    // If both coincide, their surfaces would flicker.
     const apart = Math.max(...q.map((angle, i) => Math.abs(angle - reference[i])), ...bends.map(Math.abs)) > APART;
     this.ghost.root.visible = appearance.ghost && apart;
     if (this.ghost.root.visible) this.ghost.pose(reference, []);

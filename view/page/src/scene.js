@@ -1,4 +1,4 @@
-// The stage: a lit ground with a horizon, a camera that fits the arms, and pictures only when something has changed.
+// The stage: a lit ground with a horizon, a camera that fits the arms, and drawing only after changes.
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
@@ -7,7 +7,7 @@ const THEMES = {
   dark: { sky: ["#05070a", "#20272e"], ground: "#1a2026", minor: 0x29313a, major: 0x3a4550 },
 };
 const FOV = 32; // of the camera, upright [deg]
-const FILLED = 0.86, LEAST = 0.5, EASE = 4; // share of the picture that the arms fill; below the least the camera comes closer
+const FILLED = 0.86, LEAST = 0.5, EASE = 4; // share of the picture that the arms fill; below LEAST the camera moves closer
 const VIEWS = { front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0.001, 0, 1] };
 
 export class Scene {
@@ -19,10 +19,10 @@ export class Scene {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(FOV, 1, 0.05, 60);
     this.camera.up.set(0, 0, 1);
-    this.direction = null; // from what is looked at to the camera; null: the arm's own
+    this.direction = null; // from the target to the camera; null: the arm's default
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.addEventListener("change", () => this.invalidate());
-    this.orbit.addEventListener("start", () => (this.free = true)); // who turns the camera keeps it
+    this.orbit.addEventListener("start", () => (this.free = true)); // after the user has turned the camera, it stays
     this.arms = [];
     this.free = false;
     this._light();
@@ -59,7 +59,7 @@ export class Scene {
     };
     this.ground.add(floor, lines(8, 0.25, minor), lines(8, 1, major));
     this.scene.add(this.ground);
-    // A dome whose colour at the horizon is that of the fog, into which the ground fades.
+    // A dome whose colour at the horizon is that of the fog that hides the edge of the ground.
     const dome = new THREE.SphereGeometry(40, 16, 24), [high, low] = sky.map((one) => new THREE.Color(one));
     const { position } = dome.attributes;
     const shades = Array.from({ length: position.count }, (_, i) => low.clone().lerp(high, Math.max(0, position.getY(i) / 40) ** 0.7).toArray());
@@ -92,7 +92,7 @@ export class Scene {
     this.invalidate();
   }
 
-  /** Look from a side, by its name; "reset" looks as at first. */
+  /** Look from a side, by its name; "reset" restores the initial view. */
   look(view) {
     this.direction = VIEWS[view] ? new THREE.Vector3(...VIEWS[view]).normalize() : null;
     this.free = false;
@@ -100,7 +100,7 @@ export class Scene {
     this.invalidate();
   }
 
-  /** Points that the camera shall see; without any, the arms as they are. */
+  /** Set points that the camera has to see; without any, it fits the present arms. */
   keep(points) {
     this.kept = points;
     this.fitted = null;
@@ -110,7 +110,7 @@ export class Scene {
     this.stale = true;
   }
 
-  /** Where the camera has to be: { target, position } that fill the picture with the arms. */
+  /** Camera { target, position } with which the arms fill the picture. */
   _fit(points) {
     const back = this.direction ?? this._ownDirection(points);
     const right = new THREE.Vector3(-back.y, back.x, 0).normalize();
@@ -121,7 +121,7 @@ export class Scene {
     let [[x0, x1], [y0, y1]] = [span(x), span(y)];
     const [z0, z1] = span(z);
     let [cx, cy, distance] = [(x0 + x1) / 2, (y0 + y1) / 2, 0];
-    for (let round = 0; round < 4; round++) { // what is nearer looks larger, so the middle moves
+    for (let round = 0; round < 4; round++) { // near parts look larger, so the middle moves
       distance = Math.max(...points.map((_, i) => Math.max(Math.abs(x[i] - cx) / wide, Math.abs(y[i] - cy) / tall) + z[i]));
       const seen = points.map((_, i) => [(x[i] - cx) / (distance - z[i]), (y[i] - cy) / (distance - z[i])]);
       const [[l, r], [b, t]] = [span(seen.map(([h]) => h)), span(seen.map(([, v]) => v))];
@@ -133,7 +133,7 @@ export class Scene {
     return { target, position: target.clone().addScaledVector(back, distance - middle) };
   }
 
-  /** A look along the arm, a little from its side and from above: more so in a narrow window. */
+  /** A view along the arm, slightly from its side and above; more so in a narrow window. */
   _ownDirection(points) {
     if (!this.own) {
       const far = points.reduce((best, point) => (Math.hypot(point.x, point.y) > Math.hypot(best.x, best.y) ? point : best));
@@ -145,7 +145,7 @@ export class Scene {
     return this.own.clone();
   }
 
-  /** Share of the picture's width and height that the arms fill. */
+  /** Shares of the picture's width and height that the arms fill. */
   filled() {
     const points = this.arms.filter((arm) => arm.root.visible && !arm.ghost).flatMap((arm) => arm.outline());
     if (!points.length) return null;
@@ -178,7 +178,7 @@ export class Scene {
     this.camera.updateMatrixWorld();
   }
 
-  /** Draw, if anything has changed. Who has no graphics processor gets no shadows after a few slow pictures. */
+  /** Draw if anything has changed. After a few slow frames, as without a graphics processor, shadows are off. */
   draw(seconds = 1 / 30) {
     if (!this.stale && !this.easing) return false;
     this.stale = false;

@@ -1,4 +1,4 @@
-// What all pages have: the scene with its badge and views, the strip of plots, and one loop that draws.
+// Common parts of all pages: the scene with badge and views, the plots, and the loop that draws.
 import { Scene } from "./scene.js";
 import { check, h, slider, theme, write } from "./dom.js";
 
@@ -40,7 +40,7 @@ export class Stage {
     if (clientWidth && clientHeight) this.scene.resize(clientWidth, clientHeight);
   }
 
-  /** Whether deflections are known: without them the arm is drawn stiff, and the badge says so. */
+  /** Set whether deflections are known; without them the arm is drawn stiff, as the badge shows. */
   setTruth(truth) {
     this.truth = truth;
     this._tell();
@@ -53,7 +53,7 @@ export class Stage {
     this.scene.invalidate();
   }
 
-  /** Draw the arm as it is, so that it touches what it touches; say what of its world is not drawn. */
+  /** Draw the arm without magnification if it has a world, so that contacts look right; report shapes that are not drawn. */
   among(world) {
     if (!world) return;
     this.appearance.factor = 1;
@@ -61,22 +61,22 @@ export class Stage {
     if (world.unseen) this.say(`${world.unseen} shapes of the world ${world.name} are meshes, which are not drawn`, true);
   }
 
-  /** The choices of how the arm is drawn. */
+  /** Options for how the arm is drawn. */
   choices() {
     const set = (name) => (value) => {
       this.appearance[name] = value;
       this._tell();
     };
-    // A slider of powers: as far from 1 to 10 as from 10 to 100.
+    // A logarithmic slider.
     const bending = slider("bending ×", {
       min: 0, max: Math.log(FACTORS), step: 0.01, value: Math.log(this.appearance.factor),
       show: (v) => Math.round(Math.exp(v)), moved: (v) => set("factor")(Math.round(Math.exp(v))),
-      hint: "Gears twist and links bend by some milliradians: draw that so many times larger.",
+      hint: "Gears twist and links bend by a few milliradians: magnify this by the factor.",
     });
     return h("fieldset", {}, h("legend", {}, "View"), bending.row,
-      check("with gravity", false, "Magnify what the arm hangs through by its own weight, too.", set("gravity")),
-      check("ghost", this.appearance.ghost, "The grey arm is where the motion would be without shaper and bending.", set("ghost")),
-      check("trace", true, "The way of the tool in the last seconds.", set("trace")));
+      check("with gravity", false, "Magnify the static deflection by gravity, too.", set("gravity")),
+      check("ghost", this.appearance.ghost, "Show in grey where the arm would be without shaping and bending.", set("ghost")),
+      check("trace", true, "Show the path of the tool in the last seconds.", set("trace")));
   }
 
   say(sentence, lasting = false) {
@@ -86,7 +86,7 @@ export class Stage {
     if (sentence && !lasting) this.timer = setTimeout(() => (this.notice.hidden = true), 8000);
   }
 
-  /** A result in large figures: { large, small, colour }; null takes it away. */
+  /** Show a result in large figures, { large, second, small }; null removes it. */
   result(shown) {
     this.card.hidden = !shown;
     if (!shown) return;
@@ -98,7 +98,7 @@ export class Stage {
 
 const figure = (value) => value.toFixed(value < 0.1 ? 3 : 2);
 
-/** The result of a comparison in words, as `tvist demo` says it. */
+/** The result of a comparison in the words of `tvist demo`. */
 export function inWords({ less_percent: less, earlier_ms: earlier, before, after, with: name, motion }) {
   const large = less === null ? "not measurable" : `${Math.abs(less).toFixed(0)} % ${less >= 0 ? "less" : "more"} vibration`;
   const second = earlier === null ? "" : `at rest ${Math.abs(earlier).toFixed(0)} ms ${earlier >= 0 ? "earlier" : "later"}`;

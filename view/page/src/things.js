@@ -1,9 +1,9 @@
-// The world around an arm: its bodies, and what stands still, as primitive shapes.
+// The world around an arm as primitive shapes: movable bodies, and fixed objects.
 import * as THREE from "three";
 
-const Z_UP = Math.PI / 2; // MuJoCo's cylinders and capsules stand along z, those of three.js along y
+const Z_UP = Math.PI / 2; // the axis of cylinders and capsules is z in MuJoCo and y in three.js
 
-/** Shape of a kind with MuJoCo's sizes; null if it is not known here. */
+/** Shape of a kind with MuJoCo's sizes; null if the kind is unknown. */
 function shapeOf(kind, [a, b, c]) {
   switch (kind) {
     case "box": return new THREE.BoxGeometry(2 * a, 2 * b, 2 * c);
@@ -16,7 +16,7 @@ function shapeOf(kind, [a, b, c]) {
   }
 }
 
-/** Put an object at x y z and a rotation vector. */
+/** Place an object at x y z with a rotation vector. */
 function put(object, [x, y, z, ...turn]) {
   const axis = new THREE.Vector3(...turn), angle = axis.length();
   object.position.set(x, y, z);
@@ -30,7 +30,7 @@ export class Things {
     this.root.position.set(...at);
     this.bodies = world.bodies.map(() => new THREE.Group());
     for (const body of this.bodies) {
-      body.visible = false; // until it is known where it is
+      body.visible = false; // until its pose is known
       this.root.add(body);
     }
     for (const { kind, size, pose, body, colour: [r, g, b, opacity] } of world.shapes) {
@@ -49,7 +49,7 @@ export class Things {
     scene.add(this.root);
   }
 
-  /** Put the bodies where they are, six numbers each; one whose place is unknown stays. */
+  /** Place the bodies, six numbers each; a body whose pose is unknown stays. */
   place(poses) {
     this.bodies.forEach((body, number) => {
       const pose = Array.from(poses.slice(6 * number, 6 * number + 6));

@@ -1,11 +1,11 @@
-// Recorded runs: rows of poses and samples of signals by time, as the server packs them.
+// Recorded runs, decoded: rows of poses and samples of signals over time.
 import { Robot } from "./robot.js";
 import { COLOURS } from "./plots.js";
 
-const APART = 0.9; // of the farthest reach, between two bases [-]
+const APART = 0.9; // distance between two bases, as a share of the longest reach [-]
 export const LINES = [COLOURS.without, COLOURS.with, COLOURS.third];
 
-/** Numbers of a string of base64 of little-endian 32-bit floats. */
+/** Decode base64 of little-endian 32-bit floats. */
 export const floats = (text) => new Float32Array(Uint8Array.from(atob(text), (one) => one.charCodeAt(0)).buffer);
 
 export class Track {
@@ -20,7 +20,7 @@ export class Track {
     this.robot = new Robot(scene, packed.look, count > 1 ? { at: this.at, colour: this.colour } : {});
   }
 
-  /** The row at a time [s]: between two it is mixed. */
+  /** The row at a time [s], interpolated linearly. */
   row(time) {
     let low = 0, high = this.times.length - 1;
     while (low < high) {
@@ -34,7 +34,7 @@ export class Track {
     return from.map((value, i) => value + share * (to[i] - value));
   }
 
-  /** Points that the arm's outline reaches in the whole run. */
+  /** Points of the arm's outline during the whole run. */
   outlines(appearance, count = 24) {
     const { times, robot } = this, found = [];
     for (let k = 0; k < count; k++) {
@@ -46,7 +46,7 @@ export class Track {
   }
 }
 
-/** Columns of one signal of all tracks on the time of the longest. */
+/** Columns of one signal for all tracks, on the time axis of the longest. */
 export function columns(tracks, name) {
   const longest = tracks.reduce((a, b) => (b.samples.time.length > a.samples.time.length ? b : a));
   const time = Array.from(longest.samples.time);

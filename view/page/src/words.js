@@ -1,10 +1,10 @@
-// Motions between named poses in words: from where the tool is in them.
+// Name motions between poses by the tool's position in them.
 import { placed } from "./chain.js";
 
 const WAYS = ["front", "left", "back", "right"];
 const STRETCHED = 0.75, FOLDED = 0.5; // shares of the farthest pose's reach
 
-/** @returns for each motion { first, last, words }; poses that words do not tell apart keep their names. */
+/** @returns { first, last, words } for each motion; poses that look alike keep their names. */
 export function motionsOf(chain, motions, poses) {
   const tools = Object.fromEntries(Object.entries(poses).map(([name, q]) => [name, placed(chain.frames(q, []).at(-1))]));
   const reach = (at) => Math.hypot(at.x, at.y, at.z);

@@ -55,7 +55,7 @@ export function armScene(page: Page, arm: ArmParameters): SceneOf {
       const key = `${state.q} ${state.s}`;
       if (key === drawn) return showCurve();
       drawn = key;
-      // One error of the curve between two pictures, so that none of them comes late.
+      // Compute one point of the curve per frame, so that no frame is late.
       found = [ERRORS.map(() => null), ERRORS.map(() => null)];
       curve.top = 100;
       waiting = ERRORS.map((error, k) => () => {

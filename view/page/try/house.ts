@@ -1,4 +1,4 @@
-// What this page shares with that of `tvist view`, which is JavaScript: elements, plots, the stage of the UR5e.
+// Types of the JavaScript that this page shares with `tvist view`: elements, plots, the stage of the UR5e.
 // @ts-expect-error untyped
 import * as dom from "../src/dom.js";
 // @ts-expect-error untyped

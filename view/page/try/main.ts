@@ -1,4 +1,4 @@
-// The page for trying shaping: four scenes, one at a time, whose state is in the address.
+// The interactive shaping page: four scenes, one at a time, whose state is in the address.
 import type { ArmParameters } from "./numbers/arm.js";
 import * as arm from "./numbers/arm.js";
 import { Filter } from "./numbers/filter.js";
@@ -86,7 +86,7 @@ addEventListener("hashchange", () => {
 
 let last = performance.now(), pictures = 0;
 const picture = (now: number): void => {
-  const seconds = Math.min(Math.max(now - last, 0) / 1000, 0.1); // the first picture may be of before the script
+  const seconds = Math.min(Math.max(now - last, 0) / 1000, 0.1); // the first frame's time may precede the script
   last = now;
   pictures++;
   if (!paused || pictures < 3) scene?.frame(paused ? 0 : seconds);

@@ -1,4 +1,4 @@
-// One's own shaper: amplitudes and delays typed as expressions in f_d and ζ, and what is wrong with them.
+// The user's own shaper: amplitudes and delays as expressions in f_d and ζ, and their errors.
 import type { Impulses, Shaper } from "./numbers/impulses.js";
 import { decay } from "./numbers/impulses.js";
 import { say } from "./words.js";
@@ -10,7 +10,7 @@ export type Field = "A" | "t";
 export interface Refusal {
   field: Field;
   text: string;
-  /** Sum of the amplitudes, if that is all that is wrong. */
+  /** Sum of the amplitudes, if that is the only error. */
   sum?: number;
 }
 
@@ -106,7 +106,7 @@ function list(field: Field, text: string): Expression[] {
 
 const short = (value: number): string => String(+value.toPrecision(4)).replace("-", "−");
 
-/** The shaper of two texts, or what is wrong with the first wrong field, for a mode of f_d [Hz] and ζ [-]. */
+/** The shaper of two texts, or the first field's error, for a mode of f_d [Hz] and ζ [-]. */
 export function typed(A: string, t: string, f_d: number, zeta: number): Shaper | Refusal {
   const made: Partial<Record<Field, Expression[]>> = {};
   for (const [field, text] of [["A", A], ["t", t]] as const) {

@@ -26,7 +26,7 @@ function label(pen: CanvasRenderingContext2D, text: string, x: number, y: number
 export interface Cart {
   name: string;
   colour: string;
-  /** Way of the cart, 0 to 1, and how far the mass is from where it belongs [trips]. */
+  /** Position of the cart, 0 to 1, and distance of the mass from its rest position [trips]. */
   way: number;
   off: number;
 }
@@ -45,7 +45,7 @@ export function drawCarts(canvas: HTMLCanvasElement, carts: Cart[]): void {
     pen.lineTo(width - 0.6 * size, rail);
     pen.stroke();
     label(pen, name, 0.6 * size, lane * number + 20, colour);
-    // Where the mass belongs.
+    // The rest position of the mass.
     pen.setLineDash([4, 5]);
     pen.lineWidth = 1.5;
     pen.strokeStyle = ink("--muted");
@@ -87,7 +87,7 @@ export interface ArmShown {
   link: number[];
 }
 
-/** Arms beside each other, the twist of the shoulder magnified. */
+/** Arms side by side, with the shoulder's twist magnified. */
 export function drawArms(canvas: HTMLCanvasElement, arms: ArmShown[], lengths: number[], factor: number): void {
   const { pen, width, height } = begin(canvas);
   const cell = width / arms.length, scale = Math.min(cell / 0.78, (height - 34) / 0.68);

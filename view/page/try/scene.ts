@@ -1,4 +1,4 @@
-// What the four scenes have in common: where they draw, what they are told, and the plots below the picture.
+// Common parts of the four scenes: where they draw, their state, and the plots below the picture.
 import type { Plot, Slider } from "./house.js";
 import { h, slider } from "./house.js";
 import type { State } from "./state.js";
@@ -11,16 +11,16 @@ export interface Page {
   solid: HTMLCanvasElement;
   plots: HTMLElement;
   panel: HTMLElement;
-  /** The large figure, and a sentence below it. */
+  /** Show the large figure and the sentence below it. */
   result(large: string, small: string): void;
-  /** Take over what a control says. */
+  /** Change the state by a control. */
   change(part: Partial<State>): void;
 }
 
 export interface SceneOf {
   /** Show a state: the first one, or a changed one. */
   show(state: State): void;
-  /** Draw a moment; seconds since the last. */
+  /** Draw a frame; seconds since the last one. */
   frame(seconds: number): void;
   leave(): void;
 }

@@ -1,4 +1,4 @@
-// A mass on a spring, unshaped beside shaped: by the catalogue, or by one's own shaper.
+// A mass on a spring, unshaped and shaped, with a shaper of the catalogue or the user's own.
 import { COLOURS, h, newPlot, write } from "./house.js";
 import type { Impulses, Shaper } from "./numbers/impulses.js";
 import { SHAPERS, band, peak, residual } from "./numbers/impulses.js";
@@ -13,7 +13,7 @@ import type { State } from "./state.js";
 import { percent, say } from "./words.js";
 
 const LENGTH = 4, EVERY = 5, PERMITTED = 0.05, TESTED = 0.1;
-/** Shapers whose curves stand beside that of the one that is shown. */
+/** Shapers whose curves are shown for comparison. */
 const BESIDE = [["zv", "#8A8A8A"], ["zvd", COLOURS.third], ["ei", "#CC79A7"]] as const;
 const ERRORS = Array.from({ length: 101 }, (_, k) => k - 50);
 
@@ -52,7 +52,7 @@ export function springScene(page: Page, own: boolean, zetaMax: Record<string, nu
       const made = shaperOf(state);
       fields?.refuse("field" in made ? made : null);
       const unshaped = swing(state.f, state.z, { A: [1], tau: [0] }, LENGTH);
-      if ("field" in made) { // then only what needs no shaper is shown
+      if ("field" in made) { // show only what needs no shaper
         runs = [unshaped];
         return page.result("", "");
       }
@@ -87,7 +87,7 @@ export function springScene(page: Page, own: boolean, zetaMax: Record<string, nu
   };
 }
 
-/** The two fields of one's own shaper, what is wrong with them, and the verdict. */
+/** The two fields of the user's own shaper, their errors, and the verdict. */
 function typing(page: Page): { rows: HTMLElement[]; set(state: State): void; refuse(why: Refusal | null): void; judge(shaper: Shaper, state: State): void } {
   const input = (name: "A" | "t", label: string): HTMLInputElement =>
     h("input", { type: "text", id: `own-${name}`, ariaLabel: label, autocomplete: "off", autocapitalize: "off", spellcheck: false, oninput: () => page.change({ [name]: inputs[name].value }) }) as HTMLInputElement;
@@ -153,7 +153,7 @@ function inWords(train: Impulses, share: number, low: number, high: number, { f,
     try {
       rival = shaper(f, z);
     } catch {
-      continue; // it ends at less damping
+      continue; // it is not defined at this damping
     }
     if (rival.tau[rival.tau.length - 1] > lasts * (1 + 1e-6) || peak(rival) > 1 + 1e-6) continue;
     const ends = band(rival, f, z, PERMITTED).map((end) => 100 * (end / f - 1)) as [number, number], wide = Math.min(-ends[0], ends[1]);

@@ -1,4 +1,4 @@
-// What the page shows, as it stands in the address behind `#`: a link opens the page in the same state.
+// The page's state in the address after `#`: a link opens the page in the same state.
 import { SHAPERS } from "./numbers/impulses.js";
 
 export const SCENES = ["mass", "arm", "own", "ur5e"] as const;
@@ -14,7 +14,7 @@ export interface State {
   s: string;
   /** Angle of the elbow at which the arm stops [deg]. */
   q: number;
-  /** Amplitudes and delays of one's own shaper, as typed. */
+  /** Amplitudes and delays of the user's own shaper, as typed. */
   A: string;
   t: string;
 }
@@ -24,7 +24,7 @@ export const FIRST: State = { scene: "mass", f: 1.6, z: 0.02, e: 0, s: "zv", q: 
 export const RANGES = { f: [0.6, 2.6], z: [0, 0.3], e: [-50, 50], q: [30, 150] } as const;
 const LONGEST = 300; // characters of a text
 
-/** The state of an address, and what of it is not understood. */
+/** The state of an address, and its invalid parts. */
 export function read(hash: string): { state: State; refused: string[] } {
   const state: State = { ...FIRST }, refused: string[] = [];
   for (const [name, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
@@ -41,7 +41,7 @@ export function read(hash: string): { state: State; refused: string[] } {
   return { state, refused };
 }
 
-/** The address of a state: what is as at first is left out. */
+/** The address of a state, without initial values. */
 export function written(state: State): string {
   const out = new URLSearchParams({ scene: state.scene });
   for (const name of ["f", "z", "e", "s", "q", "A", "t"] as const) if (state[name] !== FIRST[name]) out.set(name, String(state[name]));

@@ -1,4 +1,4 @@
-// A UR5e's motion from Q1 to Q3, as the simulated arm made it, unshaped beside shaped.
+// A simulated UR5e's motion from Q1 to Q3, unshaped and shaped.
 import type { Stage3D, Track } from "./house.js";
 import { COLOURS, h, newPlot, newScene, newTrack, theme } from "./house.js";
 import type { Page, SceneOf } from "./scene.js";
@@ -12,11 +12,11 @@ export interface Ur5e {
   tracks: object[];
   /** Largest acceleration after the stop, unshaped and shaped [m/s²]. */
   left: number[];
-  /** When the reference stops before it is shaped [s]. */
+  /** Time at which the unshaped reference stops [s]. */
   stop: number;
 }
 
-let kept: { scene: Stage3D; tracks: Track[] } | null = null; // a page has few contexts of WebGL, so it keeps its own
+let kept: { scene: Stage3D; tracks: Track[] } | null = null; // browsers limit WebGL contexts, so this one is reused
 
 export function ur5eScene(page: Page, { tracks: packed, left, stop }: Ur5e): SceneOf {
   const trace = newPlot(page.plots, say("plot_alpha"), [{ label: say("unshaped"), colour: COLOURS.without }, { label: say("shaped"), colour: COLOURS.with }], { least: 1 });

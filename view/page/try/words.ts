@@ -1,4 +1,4 @@
-// The page's words, from the one file that a translation replaces.
+// The page's texts, from the one file that a translation replaces.
 import words from "./words.json";
 
 export type Key = keyof typeof words;

@@ -1,1 +1,1 @@
-"""The commands of `tvist log`, one a module: recordings, and other robots' logs."""
+"""The commands of `tvist log`, one per module."""

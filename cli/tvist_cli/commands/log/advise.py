@@ -1,4 +1,4 @@
-"""`tvist log advise`: say from logs what rings, and which shaper to take."""
+"""`tvist log advise`: find in logs what rings, and recommend a shaper."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,14 +14,15 @@ def advise(
     logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
-    """Say from a robot's logs what rings after its motions, what each shaper would leave, and which one to take.
+    """Find in a robot's logs what rings after its motions, predict what each shaper would leave, and recommend one.
 
-    The recorded acceleration is convolved with each shaper. Motions made with a shaper are told apart where the log
-    shows it. Record each motion two or three times, with a second of rest after it.
+    The prediction convolves the recorded acceleration with each shaper. Motions that were made with a shaper are
+    treated separately if the log shows it. Record each motion two or three times, with a second of rest after each.
 
     Args:
-        files: Recordings or logs of one robot in any format that tvist log analyze reads.
-        output: Web page to write or replace, in one file, with the two figures that show why.
+        files: Read these recordings or logs of one robot, in any format that tvist log analyze reads.
+        output: Write the result to this web page, one file with the two figures that show the reasons; an
+            existing file is replaced.
         logs: How to read logs.
         json: Print one JSON object with all figures of each shaper and motion.
     """

@@ -1,4 +1,4 @@
-"""`tvist log analyze`: what a recording or a robot's log holds, and what its motions measure; two are compared."""
+"""`tvist log analyze`: measure the motions of a recording or log, or compare two."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -17,12 +17,12 @@ OF_TWO = (
     "motion of A", "of B", "RV m/s²: A", "B", "change", "peak m/s²: A", "B", "change", "still after ms: A", "B",
     "change", "f_d Hz: A", "B",
 )  # fmt: skip
-"""Columns of the table of two files."""
+"""Column heads of the table that compares two files."""
 COMPARED = (
     ("residual_vibration_m_s2", 2, "residual_vibration"), ("peak_m_s2", 2, "peak"),
     ("still_after_ms", 0, "still_after"), ("f_d_hz", 2, ""),
 )  # fmt: skip
-"""Figures that it shows of both, their decimals, and the name of their change."""
+"""For each figure of the comparison: its field, its decimals, and the field of its change."""
 
 
 def analyze(
@@ -32,22 +32,22 @@ def analyze(
     logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
-    """Say what a recording or a robot's log holds, and measure each motion, with the columns of the paper's Table 2.
+    """Show what a recording or log contains and measure each motion, with the columns of the paper's Table 2.
 
-    Frequency and damping have 95 % intervals. A dash has its reason in a line below the table. A line says from which
-    motion on payload, gears or what rings after stops are not what they were before.
+    Frequency and damping have 95 % intervals. A line below the table explains each dash. If the payload, the
+    gears or the ringing changed during the log, a line gives the first motion with the new value.
 
-    A log of an accelerometer alone has no motions: its ring-downs, or a sweep of frequencies, are measured.
+    If the log is of an accelerometer alone, it has no motions: its ring-downs, or a frequency sweep, are measured.
 
-    Two files of the same motions, as without and with shaping, are compared. Motions correspond if they start and end
-    at the same joint angles within 0.02 rad. Those that only one file contains are listed, and not compared.
+    Two files with the same motions, such as unshaped and shaped, are compared. Motions correspond if they start and
+    end at the same joint angles within 0.02 rad. Motions that only one file contains are listed but not compared.
 
     Args:
-        files: Recording of `tvist serve --record`, `tvist log record` or `tvist log export`; or a log of another robot:
-            CSV with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP. Two are compared; their formats may
-            differ. A folder, or a pattern in quotes such as 'run-1-part*.mcap', names the files of one recording that
-            were made with --keep.
-        figures: Folder for the figures of each motion: what was recorded, and the ring-down after it.
+        files: Read this recording of `tvist serve --record`, `tvist log record` or `tvist log export`, or
+            this log of another robot: CSV with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP.
+            Give two to compare them; the formats may differ. A folder, or a quoted pattern such as
+            'run-1-part*.mcap', names the files of one recording that was made with --keep.
+        figures: Write figures of each motion to this folder: the recorded signals and the ring-down.
         look: How to write the figures.
         logs: How to read logs.
         json: Print one JSON object.
@@ -89,7 +89,7 @@ def analyze(
 def _motions(
     recording: "Recording", figures: Path | None, look: FigureOptions, *, json: bool
 ) -> dict[str, Any]:
-    """Measure all motions, and print them as a table, or return what --json says of them."""
+    """Measure all motions; print them as a table, or return the content for --json."""
     from tvist_lab.metrics import COLUMNS, Measured, changes, grouped_notes, measure, motion_cells, motions
     from tvist_lab.words import counted
 
@@ -117,7 +117,7 @@ def _motions(
 
 
 def _sensor_alone(recording: "Recording", *, json: bool) -> dict[str, Any]:
-    """Measure frequency and damping in a log that has no joint angles; see `_motions`."""
+    """Measure frequency and damping in a log without joint angles; see `_motions`."""
     from tvist_lab.metrics.columns import number as cell
     from tvist_lab.metrics.sensor_alone import free_vibrations
 
@@ -137,7 +137,7 @@ def _sensor_alone(recording: "Recording", *, json: bool) -> dict[str, Any]:
 
 
 def _draw(recording: "Recording", found: "list[MotionRows]", save: Save) -> None:
-    """Write the figures of each motion; what a log does not contain has none."""
+    """Write the figures of each motion, except those for which the log lacks a signal."""
     from tvist_lab.figures import motion_figure, ring_down_figure
     from tvist_lab.metrics import NotMeasurableError
 
@@ -186,7 +186,6 @@ def _lack(from_tick: int | None) -> str:
 
 
 def _compare(a: Path, b: Path, logs: LogOptions, *, json: bool) -> None:
-    """Print what changed between two recordings or logs, motion by motion."""
     from tvist_lab.metrics import Measured
     from tvist_lab.metrics import compare as compared
     from tvist_lab.recordings import RecordingError

@@ -1,4 +1,4 @@
-"""`tvist log export`: write a recording as CSV or Parquet, or with an arm that Foxglove draws."""
+"""`tvist log export`: write a recording as CSV or Parquet, or for Foxglove."""
 
 from pathlib import Path
 
@@ -19,12 +19,12 @@ def export(
     """Write a recording or a log as CSV or Parquet, in full precision, or a recording for Foxglove.
 
     Args:
-        file: A recording, or any log that tvist log analyze reads.
-        to: csv, parquet or foxglove. A vector becomes columns NAME_0, NAME_1, ... Units, events and info go along;
-            those of a CSV into FILE.csv-metadata.json. With foxglove, the recording is written with channels for the
-            3D panel of Foxglove and Lichtblick, and beside it a layout for both.
-        output: File to write or replace [FILE with its ending replaced, such as run.csv or run.foxglove.mcap for
-            run.mcap, if there is none yet; of several segments, the first one's].
+        file: Read this recording, or any log that tvist log analyze reads.
+        to: Write csv, parquet or foxglove. A vector becomes columns NAME_0, NAME_1, ... Units, events and
+            info are included; for CSV they go into FILE.csv-metadata.json. With foxglove, the recording gets
+            channels for the 3D panel of Foxglove and Lichtblick, and a layout for both is written beside it.
+        output: Write to this file and replace it if it exists [FILE with another ending, such as run.csv or
+            run.foxglove.mcap for run.mcap, if there is none yet; with several segments, the first one's name].
         logs: How to read logs.
         json: Print one JSON object.
     """

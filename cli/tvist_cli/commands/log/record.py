@@ -18,15 +18,15 @@ def record(
 ) -> None:
     """Record what a served robot publishes as MCAP until Control+C: states, events, truth, inputs and outputs.
 
-    Commands are known only to the server and are not recorded: `tvist log replay` needs a file from `tvist serve
-    --record`.
+    Commands are not recorded, since only the server knows them: `tvist log replay` needs a file from `tvist
+    serve --record`.
 
     Args:
-        file: MCAP file to write.
+        file: Write to this MCAP file.
         at: Where the robot is.
         seconds: Stop this many seconds after the first state.
-        keep: Keep the last 90s, 10min or 2h, and at most a quarter more, and forget what was before [keep all]. FILE
-            then names several files, as with tvist serve --keep.
+        keep: Keep only the last 90s, 10min or 2h, and at most a quarter more [all]. FILE then names several
+            files, as with tvist serve --keep.
         json: Print one JSON object at the end.
     """
     if seconds is not None and seconds <= 0.0:
@@ -54,7 +54,7 @@ def record(
                 robot.on_io(recorder.io)
                 say(f"recording {info.name} into {file}; press Control+C to stop")
                 end = asyncio.ensure_future(ended.wait())
-                # The requested time begins with the first state, which may come a second later in lockstep.
+                # The requested time starts with the first state, which may come a second later in lockstep.
                 first = asyncio.ensure_future(robot.state())
                 await asyncio.wait((end, first), return_when=asyncio.FIRST_COMPLETED)
                 if first.done():

@@ -1,4 +1,4 @@
-"""`tvist log replay`: run a recording's commands again and compare, or put it back on the network."""
+"""`tvist log replay`: run a recording's commands again and compare, or publish the recording."""
 
 import asyncio
 from collections.abc import Sequence
@@ -31,21 +31,21 @@ def replay(
 ) -> None:
     """Run a recording's messages again on a new robot, without a clock, and compare every state bit by bit.
 
-    With --publish, put the recording itself on the network instead, for programs that watch or record a robot.
+    With --publish, the recording itself is published instead, for programs that watch or record a robot.
 
     Args:
-        file: MCAP file that `tvist serve --record` wrote; with --publish also one of `tvist log record`.
-        output: MCAP file to write the second run to.
-        shaper: FILE.py:NAME, repeatable: your own shaper that the robot was served with. A recording names the file,
-            but replay runs it only if it is given here.
-        plant: FILE.py:NAME, or the name of an installed plant: the arm that the robot was served with. An arm that is
-            not simulated cannot do the same again.
-        publish: Serve the recording at its own time. All commands of clients are refused.
-        listen: With --publish, Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
-        name: With --publish, name of the robot on the network [that of the recording].
-        speed: With --publish, speed relative to the recording's own time [1].
-        loop: With --publish, begin again at the end of the recording.
-        security: With --publish, folder made by tvist keys, as for tvist serve.
+        file: Read this MCAP file of `tvist serve --record`; with --publish also one of `tvist log record`.
+        output: Write the second run to this MCAP file.
+        shaper: Allow this shaper of your own, FILE.py:NAME, repeatable. A recording names the file of the
+            shaper it was made with, but replay executes that file only if you name it here.
+        plant: Use the arm that the robot was served with: FILE.py:NAME, or the name of an installed plant. An
+            arm that is not simulated cannot be replayed.
+        publish: Publish the recording at its own time and refuse all commands of clients.
+        listen: With --publish, listen on this Zenoh endpoint, repeatable [tcp/127.0.0.1:7447].
+        name: With --publish, give the robot this name on the network [that of the recording].
+        speed: With --publish, play at this multiple of the recording's speed [1].
+        loop: With --publish, start again at the end of the recording.
+        security: With --publish, use this folder made by tvist keys, as tvist serve does.
         insecure: With --publish, accept remote connections without TLS and do not authenticate clients.
         json: Print one JSON object.
     """
@@ -106,11 +106,7 @@ def _publish(
     insecure: bool,
     json: bool,
 ) -> None:
-    """Publish a recording until its end, Control+C or another signal; see `tvist_lab.republish.Playback`.
-
-    Raises:
-        Failure: The file cannot be read, or the server cannot listen.
-    """
+    """Publish a recording until its end or a signal; raise Failure if it cannot be read or the server cannot listen."""
     if not 0.01 <= speed <= 100.0:
         raise Failure(f"speed is {speed:g}: must be 0.01 to 100", code=2)
     from tvist_lab.recordings import RecordingError

@@ -1,4 +1,4 @@
-"""`tvist log report`: a web page about recordings, in one file."""
+"""`tvist log report`: write a web page about recordings."""
 
 from pathlib import Path
 
@@ -15,12 +15,13 @@ def report(
 ) -> None:
     """Write a report of recordings or logs as one web page that needs no network.
 
-    It says in a sentence how much the tool vibrates; of several files, whether the others vibrate less than the first.
+    Its verdict tells how much the tool vibrates and, for several files, whether the others vibrate less than
+    the first.
 
     Args:
-        files: Recordings or logs in any format that tvist log analyze reads. The first one is what others are compared
-            with.
-        output: File to write or replace [report.html, if there is none yet].
+        files: Read these recordings or logs, in any format that tvist log analyze reads; the others are
+            compared with the first.
+        output: Write to this file and replace it if it exists [report.html, if there is none yet].
         logs: How to read logs.
         json: Print the verdict as one JSON object.
     """

@@ -1,1 +1,1 @@
-"""The controller's functions in programs, by subject: scripts call the public methods of each module's class."""
+"""The controller's functions for programs by subject: the public methods of each module's class."""

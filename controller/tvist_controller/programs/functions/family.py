@@ -1,4 +1,4 @@
-"""What the functions of every subject have in common."""
+"""Base of the functions of each subject."""
 
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, TypeVar
@@ -15,7 +15,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Parts(NamedTuple):
-    """What the functions work on: one robot, and what its programs share."""
+    """Objects that the functions use: one robot, and the state shared by its programs."""
 
     access: Access
     arm: ProgramArm
@@ -30,12 +30,12 @@ class Parts(NamedTuple):
 class Family:
     """Functions of one subject for the programs of one robot.
 
-    Scripts call the public methods, whose arguments are checked as they are annotated, see `checked`.
-    What a function sets after a move that is blended is set where the blend begins, see `ProgramArm.then`.
+    Scripts call the public methods; arguments are checked as annotated, see `checked`. What a function sets
+    after a blended move takes effect where the blend begins, see `ProgramArm.then`.
     """
 
     title: ClassVar[str]
-    """The subject, for the page of reference."""
+    """Heading in the reference page."""
 
     def __init__(self, on: Parts) -> None:
         self._access, self._arm, self._kinematics, self._parts = on.access, on.arm, on.kinematics, on
@@ -46,14 +46,14 @@ class Family:
 
 
 def described(function: F, what: str, **kinds: object) -> F:
-    """Return a function of several of the same shape, with its description and what its parameters may be."""
+    """Return one of several functions of the same form, with its description and parameter types."""
     function.__doc__ = what
     function.__annotations__.update(kinds)
     return function
 
 
 def reads(what: str, read: Callable[[Parts], Any], cost: int = 1) -> Callable[[Family], Any]:
-    """Return a function without parameters that only reads something, with its description and its cost."""
+    """Return a parameterless function that reads a value, with its description and cost."""
 
     def get(self: Family) -> Any:
         return read(self._parts)

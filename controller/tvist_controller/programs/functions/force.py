@@ -1,4 +1,4 @@
-"""Functions that control the force at the tool, let the arm be moved by hand, and detect contacts."""
+"""Functions for force control, freedrive and contact detection."""
 
 from typing import Annotated, Any
 
@@ -28,7 +28,7 @@ from tvist_protocol.values import Mass
 from tvist_urscript import Array, Fault, costs
 
 MAX_LIMIT = 1e3
-"""Largest limit of an axis that is passed on: nothing reaches it [m/s, m, rad]."""
+"""Largest limit of an axis; larger values have no effect [m/s, m, rad]."""
 ALL: Any = Array((1,) * 6)
 NOWHERE: Any = Array((0,) * 3)
 
@@ -59,7 +59,7 @@ Place = Annotated[tuple[float, ...], several(3, Length)]
 
 
 class ForceFunctions(Family):
-    """Lets one robot give way to forces."""
+    """Force control of one robot."""
 
     title = "Force"
 
@@ -76,31 +76,31 @@ class ForceFunctions(Family):
         type: Annotated[int, whole(1, 3)],
         limits: Annotated[Floats, _limits],
     ) -> Turns:
-        """Give way along the axes of a frame that are selected until a wrench is reached, and go on in the others."""
+        """Comply with forces along the selected axes of a frame, up to a wrench; other axes stay stiff."""
         task = ForceTask(selection_vector, np.array(wrench), limits, self._damping, self._gain)
         yield from self._arm.give_way(lambda: self._access.force.begin(task, task_frame, type))
 
     @costs(100)
     def end_force_mode(self) -> None:
-        """Hold the position again; a motion in the other axes ends, too."""
+        """End force mode and hold the position; also ends a motion in the other axes."""
         self._arm.hold_again(by_hand=False)
 
     def force_mode_set_damping(self, damping: Annotated[float, within(0.0, 1.0)]) -> None:
-        """Set how quickly the arm slows down in force mode where nothing touches it, from 0 to 1."""
+        """Set the damping of force mode in free space, from 0 to 1."""
         self._damping = damping
 
     def force_mode_set_gain_scaling(self, scaling: Annotated[float, within(0.0, 2.0)]) -> None:
-        """Scale how strongly force mode answers a difference of forces, from 0 to 2; above 1 it may get unstable."""
+        """Scale the gain of force mode, from 0 to 2; above 1 it may become unstable."""
         self._gain = scaling
 
     @costs(120)
     def freedrive_mode(self, freeAxes: Axes = ALL, feature: Annotated[Feature, _feature] = "base") -> Turns:
-        """Let the arm be moved by hand along and about the axes of a frame that are free."""
+        """Let the arm be moved by hand along and about the free axes of a frame."""
         yield from self._arm.give_way(lambda: self._access.force.free(freeAxes, feature))
 
     @costs(100)
     def end_freedrive_mode(self) -> None:
-        """Hold the position again."""
+        """End freedrive and hold the position."""
         self._arm.hold_again(by_hand=True)
 
     get_freedrive_status = reads(
@@ -122,17 +122,17 @@ class ForceFunctions(Family):
         sensor_measuring_offset: Place = NOWHERE,
         sensor_cog: Place = NOWHERE,
     ) -> Turns:
-        """Use the force sensor whose values clients write by RTDE; its mass is part of the payload to declare."""
+        """Use a force sensor whose values clients write by RTDE; include its mass in the declared payload."""
         if self._access.guidance.compliant is not None:
             raise Fault(
                 "the force sensor stays the same in force mode and freedrive: call end_force_mode before"
             )
         self._access.force.external.use(sensor_measuring_offset if enable else None)
-        yield  # what the program asks for next is told by that sensor
+        yield  # from the next tick on, the program reads this sensor
 
     enable_external_ft_sensor = ft_rtde_input_enable
 
     @costs(250)
     def tool_contact(self, direction: Vector6 | None = None) -> int:
-        """Return the number of steps since just before the tool touched something in a direction; 0 if it does not."""
+        """Return the number of steps since just before a contact in a direction; 0 without contact."""
         return self._access.force.touched((0.0,) * 3 if direction is None else direction[:3])

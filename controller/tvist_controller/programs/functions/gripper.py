@@ -1,8 +1,4 @@
-"""Functions of Robotiq's URCap, for programs that call them without bringing them along.
-
-A program that was exported with the URCap has these functions in its preamble: then its own are called, which talk to
-the gripper over a socket.
-"""
+"""Functions of Robotiq's URCap for programs that do not contain them in their preamble."""
 
 from math import ceil, floor
 from typing import Annotated
@@ -14,29 +10,29 @@ from tvist_controller.programs.journey import Turns
 from tvist_urscript import Fault
 
 _ONE = "1"
-"""Gripper that a call does not name. The cell has one, so the name makes no difference."""
+"""Gripper of a call without one; ignored, because the cell has one gripper."""
 
 
 Counts = Annotated[int, whole(0, 255)]
 Percent = Annotated[int, lambda name, value: ceil(number(name, value, 0.0, 100.0) / 100.0 * 255.0)]
-"""A percentage, as counts."""
+"""A percentage as counts."""
 
 
 class GripperFunctions(Family):
-    """Moves the fingers of the cell's gripper, and tells what they do."""
+    """Functions of the cell's gripper."""
 
     title = "Gripper"
 
     # ------------------------------------------------------------------ activation
 
     def rq_activate(self, gripper_socket: object = _ONE) -> None:
-        """Activate the gripper unless it is active: it opens its fingers."""
+        """Activate the gripper unless it is active; it opens its fingers."""
         if self._gripper.read("STA") != 3:
             self.rq_reset(gripper_socket)
             self._write(ACT=1)
 
     def rq_activate_and_wait(self, gripper_socket: object = _ONE) -> Turns:
-        """Activate the gripper unless it is active, and wait until it is."""
+        """Activate the gripper unless it is active, and wait for it."""
         yield from self._arm.finish()
         self.rq_activate(gripper_socket)
         while self._gripper.read("STA") != 3:
@@ -53,11 +49,11 @@ class GripperFunctions(Family):
     # ------------------------------------------------------------------ fingers
 
     def rq_open(self, gripper_socket: object = _ONE) -> None:
-        """Begin to open the fingers."""
+        """Start opening the fingers."""
         self.rq_move(0, gripper_socket)
 
     def rq_close(self, gripper_socket: object = _ONE) -> None:
-        """Begin to close the fingers."""
+        """Start closing the fingers."""
         self.rq_move(255, gripper_socket)
 
     def rq_open_and_wait(self, gripper_socket: object = _ONE) -> Turns:
@@ -65,11 +61,11 @@ class GripperFunctions(Family):
         return self.rq_move_and_wait(0, gripper_socket)
 
     def rq_close_and_wait(self, gripper_socket: object = _ONE) -> Turns:
-        """Close the fingers, or until they meet a part."""
+        """Close the fingers until they meet a part or each other."""
         return self.rq_move_and_wait(255, gripper_socket)
 
     def rq_move(self, pos: Counts, gripper_socket: object = _ONE) -> None:
-        """Begin to move the fingers to a position: 0 is open, 255 closed."""
+        """Start moving the fingers to a position: 0 is open, 255 closed."""
         self._write(POS=pos, GTO=1)
 
     def rq_move_and_wait(self, pos: Counts, gripper_socket: object = _ONE) -> Turns:
@@ -83,7 +79,7 @@ class GripperFunctions(Family):
         return self.rq_move_and_wait(pos_norm, gripper_socket)
 
     def rq_move_and_wait_mm(self, pos_in_mm: object, gripper_socket: object = _ONE) -> Turns:
-        """Move the fingers until they are so many millimetres apart, or meet a part."""
+        """Move the fingers to a distance in millimetres, or until they meet a part."""
         return self.rq_move_and_wait(self._counts(pos_in_mm), gripper_socket)
 
     def rq_stop(self, gripper_socket: object = _ONE) -> None:
@@ -91,7 +87,7 @@ class GripperFunctions(Family):
         self._write(GTO=0)
 
     def rq_go_to(self, gripper_socket: object = _ONE) -> None:
-        """Let the fingers move to the position that was set."""
+        """Start moving the fingers to the set position."""
         self._write(GTO=1)
 
     def rq_wait(self, gripper_socket: object = _ONE) -> Turns:
@@ -106,7 +102,7 @@ class GripperFunctions(Family):
     # ------------------------------------------------------------------ settings
 
     def rq_set_pos(self, pos: Counts, gripper_socket: object = _ONE) -> None:
-        """Set the position to which `rq_go_to` moves the fingers, 0 to 255."""
+        """Set the position for `rq_go_to`, 0 to 255."""
         self._write(GTO=0, POS=pos)
 
     def rq_set_speed(self, speed: Counts, gripper_socket: object = _ONE) -> None:
@@ -118,7 +114,7 @@ class GripperFunctions(Family):
         self.rq_set_speed(speed_norm, gripper_socket)
 
     def rq_set_force(self, force: Counts, gripper_socket: object = _ONE) -> None:
-        """Set the force of the fingers, 0 to 255. In a world it limits them; without one every grip is firm."""
+        """Set the force of the fingers, 0 to 255; without a world, every grip is firm."""
         self._write(FOR=force)
 
     def rq_set_force_norm(self, force_norm: Percent, gripper_socket: object = _ONE) -> None:
@@ -162,6 +158,6 @@ class GripperFunctions(Family):
         self._arm.then(lambda: gripper.write(values))
 
     def _counts(self, millimetres: object) -> int:
-        """Position at which the fingers are so many millimetres apart, to the next count."""
+        """Return the position for a distance of the fingers, rounded to counts."""
         stroke = 1e3 * self._gripper.stroke
         return round(CLOSED - number("pos_in_mm", millimetres, 0.0, stroke) / stroke * (CLOSED - OPEN))

@@ -35,7 +35,7 @@ CLOSE: Final = 1e-3
 
 
 MAX_TOOL: Final = 3.0, 15.0
-"""Speed [m/s] and acceleration [m/s^2] of the tool that `optimovel` takes shares of."""
+"""Tool speed [m/s] and acceleration [m/s^2] that the fractions of `optimovel` refer to."""
 
 
 def _share(name: str, value: object) -> float:
@@ -47,15 +47,15 @@ def _share(name: str, value: object) -> float:
 
 PartOfLargest = Annotated[float, _share]
 ToolRate = Annotated[float, above_zero(1e3)]
-"""Speed or acceleration of the tool, which the joints may limit further."""
+"""Speed or acceleration of the tool, possibly limited further by the joints."""
 AngularRate = Annotated[float, above_zero(1e5)]
 Duration = Annotated[float, within(0.0, LONGEST)]
-"""Duration of a move; if it is 0, its velocity and acceleration count [s]."""
+"""Duration of a move; 0 to use velocity and acceleration [s]."""
 Blend = Annotated[float, within(0.0, 10.0)]
 
 
 class MotionFunctions(Family):
-    """Moves the arm of one robot."""
+    """Motions of one robot."""
 
     title = "Motions"
 
@@ -70,7 +70,7 @@ class MotionFunctions(Family):
 
     @costs(180)
     def movej(self, q: object, a: Positive = 1.4, v: Positive = 1.05, t: Duration = 0, r: Blend = 0) -> Turns:
-        """Move all joints in phase to joint positions, or to those nearest that reach a pose."""
+        """Move all joints in phase to joint positions, or to the nearest ones for a pose."""
         posture = self._posture("q", q)
         if v > self._velocity and t == 0.0:
             why = f"v of movej is {v:.4g} rad/s: the joints turn with at most {self._velocity:.4g}"
@@ -89,7 +89,7 @@ class MotionFunctions(Family):
     def movel(
         self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, t: Duration = 0, r: Blend = 0
     ) -> Turns:
-        """Move the tool on a straight line to a pose, or to the one at joint positions."""
+        """Move the tool on a straight line to a pose, or to the pose at joint positions."""
         return self._follow(
             LineSegment(
                 pose=self._pose("pose", pose),
@@ -102,7 +102,7 @@ class MotionFunctions(Family):
 
     @costs(60)
     def movep(self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, r: Blend = 0) -> Turns:
-        """Move the tool on a straight line at a constant speed, also in the blend at its end."""
+        """Move the tool on a straight line at constant speed, also in the blend at its end."""
         return self._follow(
             ProcessSegment(
                 pose=self._pose("pose", pose),
@@ -122,7 +122,7 @@ class MotionFunctions(Family):
         r: Blend = 0,
         mode: Bit = 0,
     ) -> Turns:
-        """Move the tool on an arc through the position of one pose to another."""
+        """Move the tool on an arc through the position of one pose to another pose."""
         return self._follow(
             ArcSegment(
                 via=self._pose("pose_via", pose_via),
@@ -136,12 +136,12 @@ class MotionFunctions(Family):
 
     @costs(180)
     def optimovej(self, goal: object, a: PartOfLargest = 0.3, v: PartOfLargest = 0.3, r: Blend = 0) -> Turns:
-        """Move the joints with shares of the arm's largest acceleration and velocity."""
+        """Move the joints with fractions of the arm's largest acceleration and velocity."""
         return self.movej(goal, a * self._acceleration, v * self._velocity, 0, r)
 
     @costs(60)
     def optimovel(self, goal: object, a: PartOfLargest = 0.3, v: PartOfLargest = 0.3, r: Blend = 0) -> Turns:
-        """Move the tool on a line with shares of the largest acceleration and speed, which the joints limit further."""
+        """Move the tool on a line with fractions of its largest acceleration and speed; joints may limit it."""
         return self.movel(goal, a * MAX_TOOL[1], v * MAX_TOOL[0], 0, r)
 
     def _follow(self, segment: Segment) -> Turns:
@@ -162,13 +162,13 @@ class MotionFunctions(Family):
         lookahead_time: Positive = 0.1,
         gain: Positive = 300,
     ) -> Turns:
-        """Follow joint positions for a time; `a` and `v` have no effect, as on UR's robots."""
+        """Follow joint positions for a time; `a` and `v` have no effect, as on UR robots."""
         posture = np.array(self._posture("q", q))
 
         def start(shaped: bool) -> int | None:
             rests = self._access.motion.activity is Activity.REST
             if rests and np.abs(posture - self._reference).max() <= STILL:
-                return None  # clients repeat where the arm is: no motion of a tick for each
+                return None  # clients often repeat the present position: avoid motions of one tick
             return self._access.guidance.servo(posture, lookahead_time, gain, shaped=shaped)
 
         return self._arm.guide(start, iter([None] * max(round(t / PERIOD), 1)))
@@ -185,7 +185,7 @@ class MotionFunctions(Family):
 
     @costs(100)
     def speedj(self, qd: Joints, a: Positive = 1.4, t: Duration | None = None) -> Turns:
-        """Approach velocities of the joints, and keep them; return after a time, or when they are reached."""
+        """Approach joint velocities and keep them; return after a time, or when they are reached."""
         most, wanted = self._access.description.limits.velocity, np.array(qd)
         wanted *= min(1.0, *(limit / max(abs(one), 1e-12) for one, limit in zip(wanted, most, strict=True)))
         acceleration, guidance = _within(a, "acceleration", self._acceleration), self._access.guidance
@@ -201,7 +201,7 @@ class MotionFunctions(Family):
         t: Duration | None = None,
         aRot: AngularRate | None = None,
     ) -> Turns:
-        """Approach a velocity of the tool in the base frame, and keep it; see `speedj`."""
+        """Approach a tool velocity in the base frame and keep it; see `speedj`."""
         twist, acceleration, guidance = np.array(xd), _within(a, "acceleration"), self._access.guidance
         angular = acceleration if aRot is None else aRot
         return self._arm.guide(
@@ -210,13 +210,13 @@ class MotionFunctions(Family):
 
     @costs(150)
     def stopj(self, a: Positive = 2) -> Turns:
-        """Stop with a deceleration of the joints."""
+        """Stop with a joint deceleration."""
         deceleration = _within(a, "acceleration", self._acceleration)
         return self._arm.halt(lambda: self._access.guidance.stop_joints(deceleration))
 
     @costs(150)
     def stopl(self, a: ToolRate = 1.2, aRot: AngularRate | None = None) -> Turns:
-        """Stop with a deceleration of the tool."""
+        """Stop with a tool deceleration."""
         deceleration = _within(a, "acceleration")
         angular = deceleration if aRot is None else aRot
         return self._arm.halt(lambda: self._access.guidance.stop_tool(deceleration, angular))
@@ -228,7 +228,7 @@ class MotionFunctions(Family):
         return self._access.guidance.reference
 
     def _wait(self, t: float | None) -> Iterator[None]:
-        """Wait for a time, or if none is given until the velocity is reached."""
+        """Wait for a time, or without one until the velocity is reached."""
         if t:
             yield from self._arm.in_motion(t)
             return
@@ -237,7 +237,7 @@ class MotionFunctions(Family):
             yield
 
     def _posture(self, name: str, value: object) -> tuple[float, ...]:
-        """Joint positions within their range, from these or from a pose."""
+        """Return joint positions within range, from these or from a pose."""
         if isinstance(value, Pose):
             return self._kinematics.posture(pose(name, value), self._near)
         q = numbers(name, value, self._access.description.joints)
@@ -246,7 +246,6 @@ class MotionFunctions(Family):
         return q
 
     def _pose(self, name: str, value: object) -> tuple[float, float, float, float, float, float]:
-        """A pose of the tool, from this or from joint positions."""
         if isinstance(value, Pose):
             return pose(name, value)
         if not isinstance(value, Array):
@@ -255,7 +254,7 @@ class MotionFunctions(Family):
 
     @property
     def _near(self) -> Sequence[float]:
-        """Posture from which the next move begins."""
+        """Posture at the start of the next move."""
         here: list[float] = self._reference.tolist()
         end = self._arm.end
         if end is None:
@@ -264,5 +263,5 @@ class MotionFunctions(Family):
 
 
 def _within(value: float, name: str, most: float = np.inf) -> float:
-    """Velocity or acceleration of joints or tool that the arm is capable of and that moves it."""
+    """Clamp velocity or acceleration to what the arm can do and what moves it."""
     return min(max(value, SLOWEST[name]), most)

@@ -1,4 +1,4 @@
-"""Functions that concern the program itself: messages, time, statements from clients, stops."""
+"""Functions of the program itself: messages, time, client statements, stops."""
 
 from typing import Annotated
 
@@ -12,19 +12,19 @@ from tvist_protocol.stream import PopupKind
 from tvist_urscript import Array, Fault, Struct, Value, costs, to_str
 
 LONGEST_TEXT = 350
-"""Elements of a list that fit into a text."""
+"""Number of list elements that fit into a text."""
 LONGEST_SLEEP = 1e6
 """Longest time of `sleep` [s]."""
 
 
 class MessageFunctions(Family):
-    """Tells people something, and waits."""
+    """Messages to users, and waiting."""
 
     title = "Messages and time"
 
     @costs(30)
     def textmsg(self, s1: Value, s2: Value = "") -> None:
-        """Write a line to the log, which clients of the primary interface get."""
+        """Write a line to the log, which clients of the primary interface receive."""
         text = readable(f"{self._written(s1)}{self._written(s2)}")
         self._arm.then(lambda: self._access.emit("text", why=text))
 
@@ -37,7 +37,7 @@ class MessageFunctions(Family):
         error: Flag = False,
         blocking: Flag = False,
     ) -> Turns:
-        """Show a message; with `blocking`, wait until somebody closes it."""
+        """Show a message; with `blocking`, wait until it is closed."""
         text, head = readable(self._written(s)), readable(self._written(title))
         kind: PopupKind = "error" if error else "warning" if warning else "message"
         yield from self._arm.finish()
@@ -51,7 +51,7 @@ class MessageFunctions(Family):
         return to_str(value)
 
     def time(self, mode: Annotated[int, whole(0, 2)] = 0) -> Struct:
-        """Return the time since the start as `struct(sec, nanosec)`; there is no clock of the day (`mode` 2)."""
+        """Return the time since the start as `struct(sec, nanosec)`; the time of day (2) is unavailable."""
         if mode != 0:
             raise Fault(f"time: mode is {mode}; this controller has no clock of the day, so it must be 0")
         sec, nanosec = divmod(round(self._access.latest().timestamp * 1e9), 10**9)
@@ -63,42 +63,42 @@ class MessageFunctions(Family):
         yield
 
     def sleep(self, t: Annotated[float, within(0.0, LONGEST_SLEEP)]) -> Turns:
-        """Wait for a time [s]; a time of at least half a tick waits for at least one."""
+        """Wait for a time [s]; at least one tick if the time is at least half a tick."""
         yield from self._arm.finish()
         for _ in range(round(t / PERIOD)):
             yield
 
 
 class StatementFunctions(Family):
-    """Lets clients add statements to the program."""
+    """Statements added by clients."""
 
     title = "Statements from clients"
 
     def interpreter_mode(self, clearQueueOnEnter: Flag = True, clearOnEnd: Flag = True) -> Turns:
-        """Carry out the statements that clients send to port 30020, until one of them calls `end_interpreter`.
+        """Carry out statements that clients send to port 30020, until one calls `end_interpreter`.
 
-        They see the program's functions and its variables, and may define both.
+        They can use and define functions and variables of the program.
         """
         yield from self._arm.finish()
         yield from self._parts.statements.carry_out(clear_queue=clearQueueOnEnter, clear_at_end=clearOnEnd)
 
     def end_interpreter(self) -> None:
-        """Let `interpreter_mode` return when the present statement has ended."""
+        """Make `interpreter_mode` return after the present statement."""
         self._parts.statements.end()
 
     def clear_interpreter(self) -> None:
-        """Forget all statements so far, with the variables and functions that they define, and end their threads."""
+        """Clear all statements with their variables, functions and threads."""
         self._parts.statements.clear()
 
 
 class SafetyFunctions(Family):
-    """Stops the robot, or has it stopped when a client falls silent."""
+    """Stops, and watchdogs for clients."""
 
     title = "Safety"
 
     @costs(10)
     def protective_stop(self) -> Turns:
-        """Make a protective stop, which pauses the program here, or ends it if nothing follows; secondary ones wait."""
+        """Make a protective stop, which pauses the program, or ends it if nothing follows. Secondary programs wait."""
         motion = self._access.motion
         motion.protect("the program asked for a protective stop")
         while motion.activity.protective and not self._arm.ends:
@@ -106,7 +106,7 @@ class SafetyFunctions(Family):
 
     @costs(10)
     def powerdown(self) -> Turns:
-        """Switch the arm's power off, which ends the program; the controller stays on."""
+        """Power the arm off, which ends the program; the controller stays on."""
         yield from self._arm.finish()
         self._access.send(PowerOff(token=OWN_TOKEN), None)
         yield
@@ -118,7 +118,7 @@ class SafetyFunctions(Family):
         min_frequency: Annotated[float, above_zero(500.0)],
         action: Annotated[str, word("pause", "stop", "ignore")] = "pause",
     ) -> None:
-        """Pause or stop the program when a client writes an input of RTDE less often than a frequency [Hz]."""
+        """Pause or stop the program when a client writes an RTDE input less often than a frequency [Hz]."""
         if not isinstance(variable_name, str):
             raise Fault(f"variable_name is {shown(variable_name)}: it must be the name of an input variable")
         self._parts.watchdogs.watch(variable_name, min_frequency, action)

@@ -1,4 +1,4 @@
-"""Functions that set the tool, the payload and gravity, and the force at the tool to zero."""
+"""Functions that set tool, payload, gravity and the zero of the force."""
 
 from typing import Annotated
 
@@ -18,14 +18,14 @@ from tvist_protocol.values import Mass, Moment, Offset
 from tvist_urscript import Array, Fault, costs
 
 GRAVITY = 9.82
-"""Gravity that programs declare, within `TOLERANCE`; the simulated arm stands upright and knows no other [m/s^2]."""
+"""Gravity that programs may declare, within `TOLERANCE`, for an upright arm [m/s^2]."""
 TOLERANCE = 0.05
 ROUNDED = 0.05
-"""Share of the largest moment of inertia that others may lack because a CAD system has rounded them."""
+"""Fraction of the largest moment by which others may be too small due to rounding in CAD."""
 ORDER = (0, 3, 5, 1, 2, 4)
-"""Places of Ixx Iyy Izz Ixy Ixz Iyz, as programs have them, in the order of robot files."""
+"""Places of Ixx Iyy Izz Ixy Ixz Iyz, the order in programs, in the order of robot files."""
 NONE: Tensor = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-"""Inertia of a payload that is declared without any."""
+"""Inertia of a payload declared without it."""
 
 
 Centre = Annotated[tuple[float, float, float], several(3, Offset)]
@@ -34,7 +34,7 @@ ToolPose = Annotated[values.Pose, lambda name, value: pose(name, value, Length)]
 
 
 class SettingFunctions(Family):
-    """Changes the settings of one robot; the moves of the arm are carried out before."""
+    """Settings of one robot, which take effect after pending moves."""
 
     title = "Settings"
 
@@ -46,7 +46,7 @@ class SettingFunctions(Family):
 
     @costs(20)
     def set_payload(self, m: Mass, cog: Centre | None = None) -> Turns:
-        """Declare a payload without inertia; without a centre of mass, it is at the tool centre point."""
+        """Declare a payload without inertia; its centre of mass is by default the tool centre point."""
         x, y, z = self._access.motion.tcp[:3] if cog is None else cog
         return self._declare(m, (x, y, z), NONE)
 
@@ -70,12 +70,12 @@ class SettingFunctions(Family):
         inertia: Moments | None = None,
         transition_time: Annotated[float, within(0.0, 3600.0)] = 0,
     ) -> Turns:
-        """Declare a payload with its inertia, Ixx Iyy Izz Ixy Ixz Iyz; clients see it change in a time."""
+        """Declare a payload with inertia, Ixx Iyy Izz Ixy Ixz Iyz; clients see a gradual transition."""
         xx, yy, zz, xy, xz, yz = inertia or NONE
         return self._declare(m, cog, self._as_a_body((xx, xy, xz, yy, yz, zz)), transition_time)
 
     def _as_a_body(self, inertia: Tensor) -> Tensor:
-        """Make the moments of a body of those that were rounded, with a warning; others are left to be refused."""
+        """Correct slightly impossible moments with a warning; leave others to be refused."""
         lack = lacking_inertia(inertia)
         if not 0.0 < lack <= ROUNDED * max(inertia[0], inertia[3], inertia[5]):
             return inertia
@@ -89,7 +89,7 @@ class SettingFunctions(Family):
         return xx + lack, xy, xz, yy + lack, yz, zz + lack
 
     def set_gravity(self, d: Vector3) -> None:
-        """Accept the gravity that the arm has, which is installed upright."""
+        """Check that gravity is that of an upright arm."""
         x, y, z = d
         if max(abs(x), abs(y), abs(z - GRAVITY)) > TOLERANCE:
             raise Fault(f"set_gravity: d is [{x:g}, {y:g}, {z:g}]; the simulated arm stands upright, so it must be "
@@ -110,8 +110,8 @@ class SettingFunctions(Family):
     ) -> Turns:
         yield from self._arm.finish()
         command = SetPayload(token=OWN_TOKEN, mass=mass, com=com, inertia=inertia, transition_time=seconds)
-        # Planned beside the ticks and taken after a fixed number of them, as a move is: so it takes effect at the same
-        # tick on every machine.
+        # Planned in parallel and applied after a fixed number of ticks, so that every machine applies it at the same
+        # tick.
         ordered = self._access.plans.later(command)
         for _ in range(DELAY):
             yield

@@ -1,7 +1,4 @@
-"""Functions with which programs that PolyScope has written set up terminals, tool and safety.
-
-Settings without effect on the simulated robot are checked; a warning names those that a program changes.
-"""
+"""Set-up of terminals, tool and safety by programs from PolyScope; settings without effect are only checked."""
 
 from typing import Annotated, Any
 
@@ -24,7 +21,7 @@ from tvist_controller.programs.indicators import SHOWS_UNTIL_FAILURE, Group
 from tvist_urscript import Array, Fault
 
 RATES = (9600, 19200, 38400, 57600, 115200, 1000000, 2000000, 5000000)
-"""Rates of the tool's serial line [baud]."""
+"""Baud rates of the tool's serial line."""
 _NO_TURNS: Any = Array((0.0,) * 6)
 
 
@@ -54,7 +51,7 @@ Octet = Annotated[int, whole(0, 7)]
 
 
 class SetupFunctions(Family):
-    """Sets up one robot."""
+    """Set-up of one robot."""
 
     title = "Set-up"
 
@@ -69,11 +66,11 @@ class SetupFunctions(Family):
         self._arm.then(lambda: self._peripherals.choose_tool_input(port, voltage=domain))
 
     def set_tool_output_mode(self, mode: Bit) -> None:
-        """Use the digital outputs of the tool as such (0), or as a second supply (1)."""
+        """Use the tool's digital outputs as outputs (0) or as a second supply (1)."""
         self._arm.then(lambda: self._peripherals.set_tool(tool_output_mode=mode))
 
     def set_tool_digital_output_mode(self, n: Bit, mode: Annotated[int, whole(1, 3)]) -> None:
-        """Let a digital output of the tool sink (1), source (2), or both (3)."""
+        """Make a digital output of the tool sinking (1), sourcing (2), or both (3)."""
         self._arm.then(lambda: self._peripherals.set_tool(**{f"tool_digital_output{n}_mode": mode}))
 
     def set_tool_communication(
@@ -85,17 +82,17 @@ class SetupFunctions(Family):
         rx_idle_chars: Annotated[float, within(1.0, 40.0)],
         tx_idle_chars: Annotated[float, within(0.0, 40.0)],
     ) -> None:
-        """Check the settings of the tool's serial line; a warning says that nothing answers on one that is enabled."""
+        """Check settings of the tool's serial line; enabling it warns that nothing is connected."""
         if enabled:
             self._warn("set_tool_communication: no tool is connected to the simulated arm's serial line")
 
     # ------------------------------------------------------------------ inputs
 
     def set_input_actions_to_default(self) -> None:
-        """Let no input move the arm to freedrive, which none does."""
+        """Do nothing: no input starts freedrive."""
 
     def set_standard_digital_input_action(self, port: Octet, action: Action) -> None:
-        """Check what an input does: "default", or "freedrive", of which a warning says that it has no effect."""
+        """Check an input's action, "default" or "freedrive"; the latter warns that it has no effect."""
         self._act(f"standard digital input {port}", action)
 
     def set_configurable_digital_input_action(self, port: Octet, action: Action) -> None:
@@ -115,13 +112,13 @@ class SetupFunctions(Family):
     def set_runstate_standard_digital_output_to_value(self, outputId: Standard, state: RunState) -> None:
         """Choose what an output does while no program runs.
 
-        0: nothing; 1: low; 2: high; 3: low, and high while one runs; 4: low when one ends by an error or a stop;
-        5: that, and high when one starts. A paused program does not run.
+        0: nothing; 1: low; 2: high; 3: low, but high while one runs; 4: low when one ends by an error or a
+        stop; 5: as 4, and high when one starts. A paused program does not run.
         """
         self._choose("digital", outputId, state)
 
     def set_runstate_standard_digital_outputs(self, outputs: object) -> None:
-        """Check the numbers of outputs. What each does is said by the calls that PolyScope exports behind this one."""
+        """Check output numbers; the calls that PolyScope exports after this one define their actions."""
         for output in outputs.items if isinstance(outputs, Array) else (outputs,):
             integer("outputs", output, 0, 7)
 
@@ -146,36 +143,36 @@ class SetupFunctions(Family):
     # ------------------------------------------------------------------ arm and safety
 
     def set_safety_mode_transition_hardness(self, type: Bit) -> None:
-        """Check a setting: 0 (hard) or 1 (soft). Stops of the safety system are the same with both."""
+        """Check a setting, 0 (hard) or 1 (soft); stops of the safety system are the same for both."""
 
     def set_base_acceleration(self, a: Annotated[None, _at_rest]) -> None:
-        """Accept that the base stands."""
+        """Check that the acceleration of the base is zero."""
 
     get_base_acceleration = reads(
         "Return the acceleration of the base, which stands [m/s^2].", lambda _: Array((0.0, 0.0, 0.0))
     )
 
     def position_deviation_warning(self, enabled: Flag, threshold: Share = 0.8) -> None:
-        """Check a setting; a warning says that deviations are not told if it is enabled."""
+        """Check a setting; enabling it causes a warning, because deviations are not reported."""
         if enabled:
             self._warn("position_deviation_warning: this controller does not warn of deviations")
 
     def reset_revolution_counter(self, qNear: Joints = _NO_TURNS) -> None:
-        """Check joint positions: no joint of the simulated arm turns without end, so there is no counter to reset."""
+        """Check joint positions; no simulated joint turns endlessly, so there is no counter to reset."""
 
     def motion_version_set(self, version: Annotated[int, whole(1, 2)]) -> None:
-        """Remember a motion version, 1 or 2, for `motion_version_get`: moves are planned the same with both."""
+        """Store a motion version, 1 or 2, for `motion_version_get`; moves are the same for both."""
         self._motion_version = version
 
     def motion_version_get(self) -> int:
-        """Return the motion version that a program has set, 2 if none has since the server started."""
+        """Return the motion version set by a program, 2 if none has been set since the server started."""
         return self._motion_version
 
     def jerk_gain_scaling_set(self, gain: Annotated[float, within(0.01, 1.0)]) -> None:
-        """Check a gain, 0.01 to 1. It has no effect: profile and shaper say how quickly accelerations change."""
+        """Check a gain, 0.01 to 1; it has no effect, since profile and shaper determine the jerk."""
 
     def high_holding_torque_enable(self) -> None:
-        """Do nothing: the drives of the simulated arm hold it with the same torque at all times."""
+        """Do nothing: the simulated drives always hold with the same torque."""
 
     high_holding_torque_disable = high_holding_torque_enable
 

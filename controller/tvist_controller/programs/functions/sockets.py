@@ -1,4 +1,4 @@
-"""Functions for sockets, over which programs talk to other machines, and how messages are cut."""
+"""Functions for sockets to other machines, and parsing of messages."""
 
 import math
 import re
@@ -14,23 +14,23 @@ from tvist_urscript.texts import DECIMAL
 from tvist_urscript.values import Array, to_bytes, to_text
 
 MAX_VALUES = 30
-"""Most values that one call reads."""
+"""Largest number of values per call."""
 ANSWER = 2.0
-"""Time to wait for the value of a variable [s]."""
+"""Timeout for the value of a variable [s]."""
 MORE = 25
-"""Ticks for which a program waits for more data before the moves start that wait to be blended into a next one."""
+"""Ticks of waiting for data after which moves that wait to be blended start."""
 _ONE = "socket_0"
-"""Name of a socket that a call does not name."""
+"""Default name of a socket."""
 _VARIABLE = re.compile(r"\s*(\S+)\s+([+-]?\d+)\s*", re.ASCII)
 LONGEST_NUMBER = 64
-"""Longest number in characters [bytes]."""
+"""Longest number [bytes]."""
 LONGEST_LINE = 1023
-"""Longest line or string [bytes], as that of a text in a program."""
+"""Longest line or string, the same as for texts in programs [bytes]."""
 T = TypeVar("T")
 
 
 def _named(name: str, value: object) -> str:
-    """Return the name of a socket; a number is one, as in the functions that Robotiq's URCap brings along."""
+    """Return the name of a socket; numbers are accepted, as Robotiq's URCap uses them."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return to_str(value)
     return text(name, value)
@@ -42,10 +42,10 @@ Count = Annotated[int, whole(0, MAX_VALUES)]
 
 
 class SocketFunctions(Family):
-    """Opens and closes sockets, and reads and writes them.
+    """Opens, closes, reads and writes sockets.
 
-    Reading takes what has arrived, and waits for the rest. It waits for ever if the time-out is not above 0. What has
-    arrived incompletely when the time is over stays for the next call.
+    Reading takes what has arrived and waits for the rest, without limit if the timeout is not above 0.
+    Incomplete data stays for the next call after a timeout.
     """
 
     title = "Sockets"
@@ -56,41 +56,41 @@ class SocketFunctions(Family):
     ) -> Generator[None, None, bool]:
         """Connect to a machine; return whether this has succeeded within 2 s.
 
-        Programs may connect to the machine that sent them, to those that the server allows (`--ur-allow`), and to the
-        gripper of a cell at `127.0.0.1` port 63352.
+        Programs may connect to the machine that sent them, to those that the server allows (`--ur-allow`),
+        and to the gripper of a cell at `127.0.0.1` port 63352.
         """
         yield from self._arm.finish()
         return (yield from self._parts.sockets.connect(socket_name, address, port))
 
     @costs(5)
     def socket_close(self, socket_name: Name = _ONE) -> None:
-        """Close a socket. Nothing happens if it is not open."""
+        """Close a socket, if open."""
         self._arm.then(lambda: self._parts.sockets.disconnect(socket_name))
 
     @costs(10)
     def socket_read_binary_integer(
         self, number: Count, socket_name: Name = _ONE, timeout: Number = 2
     ) -> Generator[None, None, Array]:
-        """Read integers of 32 bits, at most 30, as `[n, v1, …, vn]`; `[0, -1, …, -1]` when the time is over."""
+        """Read up to 30 32-bit integers as `[n, v1, …, vn]`; `[0, -1, …, -1]` after the timeout."""
         return self._read_list(_integers, number, socket_name, timeout, -1)
 
     @costs(10)
     def socket_read_byte_list(
         self, number: Count, socket_name: Name = _ONE, timeout: Number = 2
     ) -> Generator[None, None, Array]:
-        """Read bytes, at most 30, as `[n, v1, …, vn]`; `[0, -1, …, -1]` when the time is over."""
+        """Read up to 30 bytes as `[n, v1, …, vn]`; `[0, -1, …, -1]` after the timeout."""
         return self._read_list(_octets, number, socket_name, timeout, -1)
 
     @costs(20)
     def socket_read_ascii_float(
         self, number: Annotated[int, whole(1, MAX_VALUES)], socket_name: Name = _ONE, timeout: Number = 2
     ) -> Generator[None, None, Array]:
-        """Read numbers in brackets, at most 30: `(1.5, 2)` is `[2, 1.5, 2]`; `[0, nan, …, nan]` if that fails."""
+        """Read up to 30 numbers in brackets: `(1.5, 2)` is `[2, 1.5, 2]`; `[0, nan, …, nan]` on failure."""
         return self._read_list(_floats, number, socket_name, timeout, math.nan)
 
     @costs(10)
     def socket_read_line(self, socket_name: Name = _ONE, timeout: Number = 2) -> Generator[None, None, str]:
-        """Read a line of at most 1023 bytes, without its end; an empty text when the time is over."""
+        """Read a line of at most 1023 bytes without its end; an empty text after the timeout."""
         found = yield from self._read(socket_name, _line, timeout)
         return to_text(found or b"")
 
@@ -103,9 +103,9 @@ class SocketFunctions(Family):
         interpret_escape: Flag = False,
         timeout: Number = 2,
     ) -> Generator[None, None, str]:
-        r"""Read what has arrived, or what stands between `prefix` and `suffix`; an empty text when the time is over.
+        r"""Read what has arrived, or the text between `prefix` and `suffix`; an empty text after the timeout.
 
-        Leading spaces of both do not count; with `interpret_escape` they may contain `\n`, `\r` and `\t`.
+        Leading spaces of both are ignored; with `interpret_escape` they may contain `\n`, `\r` and `\t`.
         """
         first, last = (
             to_bytes(_unescaped(one) if interpret_escape else one)
@@ -116,7 +116,7 @@ class SocketFunctions(Family):
 
     @costs(20)
     def socket_get_var(self, name: Text, socket_name: Name = _ONE) -> Generator[None, None, int]:
-        r"""Send `GET name\n` and return the integer of the answer `name value\n`; 0 if none comes within 2 s."""
+        r"""Send `GET name\n` and return the integer of the answer `name value\n`; 0 without one in 2 s."""
         yield from self._arm.finish()
         self._parts.sockets.send(socket_name, to_bytes(f"GET {name}\n"))
         found = yield from self._read(socket_name, lambda got: _variable(got, name), ANSWER)
@@ -129,7 +129,7 @@ class SocketFunctions(Family):
 
     @costs(5)
     def socket_send_int(self, value: Int32, socket_name: Name = _ONE) -> bool:
-        """Send an integer of 32 bits in network byte order; return whether the socket is open."""
+        """Send a 32-bit integer in network byte order; return whether the socket is open."""
         return self._send(socket_name, pack(">i", value))
 
     @costs(5)
@@ -159,7 +159,7 @@ class SocketFunctions(Family):
         timeout: float,
         missing: float,
     ) -> Generator[None, None, Array]:
-        """Read so many values; they follow their number, which is 0 if they are missing."""
+        """Read `count` values, preceded by their number, which is 0 if they are missing."""
         found = yield from self._read(name, lambda got: take(got, count), timeout)
         return a_list((0,) + (missing,) * count if found is None else (count, *found))
 
@@ -167,31 +167,29 @@ class SocketFunctions(Family):
         return self._parts.sockets.read(name, take, timeout, self._go_on)
 
     def _go_on(self, waited: int) -> None:
-        """Begin the moves that wait for a further one, if its data have not come by now; it may come under way."""
+        """Start moves that wait for another one if data have not come; it may still be blended in motion."""
         if waited >= MORE:
             self._arm.begin()
 
 
 # ---------------------------------------------------------------------- messages
 #
-# Each function takes what has been received so far and returns the message with its length in bytes, or None as
-# long as it is incomplete. A message that is not valid is None with the length of what is thrown away.
+# Each function gets the received bytes and returns a message with its length in bytes, or None while it is
+# incomplete. An invalid message is None with the number of bytes to discard.
 
 
 def _integers(received: bytes, number: int) -> tuple[tuple[int, ...], int] | None:
-    """Cut this many integers of 32 bits in network byte order."""
     if len(received) < 4 * number:
         return None
     return unpack_from(f">{number}i", received), 4 * number
 
 
 def _octets(received: bytes, number: int) -> tuple[tuple[int, ...], int] | None:
-    """Cut this many bytes, each as a number."""
     return None if len(received) < number else (tuple(received[:number]), number)
 
 
 def _line(received: bytes) -> tuple[bytes, int] | None:
-    """Cut a line; its end is LF or CR LF, which is not part of it. A longer one is cut at `LONGEST_LINE`."""
+    """Parse a line ended by LF or CR LF; cut longer ones at `LONGEST_LINE`."""
     end = received.find(b"\n", 0, LONGEST_LINE + 1)
     if end >= 0:
         return received[:end].removesuffix(b"\r"), end + 1
@@ -199,10 +197,7 @@ def _line(received: bytes) -> tuple[bytes, int] | None:
 
 
 def _between(received: bytes, prefix: bytes, suffix: bytes) -> tuple[bytes, int] | None:
-    """Cut what is between a prefix and a suffix, and drop what precedes the prefix.
-
-    Without a suffix it is everything that has been received, at most `LONGEST_LINE`.
-    """
+    """Parse the text between a prefix and a suffix (without one, all received); drop what precedes."""
     start = received.find(prefix)
     if start < 0:
         return None
@@ -214,23 +209,20 @@ def _between(received: bytes, prefix: bytes, suffix: bytes) -> tuple[bytes, int]
 
 
 def _floats(received: bytes, number: int) -> tuple[tuple[float, ...] | None, int] | None:
-    """Cut numbers in brackets, separated by commas: `( 1.414 , 3.14159, 1.616, 0.0 )`, with the line's end behind."""
+    """Parse comma-separated numbers in brackets with optional line end: `( 1.414 , 3.14159, 1.616, 0.0 )`."""
     end = received.find(b")")
     if end < 0:
         return None
     rest = next((len(mark) for mark in (b"\n", b"\r\n") if received.startswith(mark, end + 1)), 0)
     start = received.rfind(b"(", 0, end)
     parts = received[start + 1 : end].decode("ascii", "replace").split(",")
-    short = all(len(part) <= LONGEST_NUMBER for part in parts)  # the pattern takes long for long ones
+    short = all(len(part) <= LONGEST_NUMBER for part in parts)  # the pattern is slow for long ones
     valid = start >= 0 and len(parts) == number and short and all(map(DECIMAL.fullmatch, parts))
     return tuple(map(float, parts)) if valid else None, end + 1 + rest
 
 
 def _variable(received: bytes, name: str) -> tuple[int | None, int] | None:
-    """Cut the answer to a request for a variable: a line with its name and an integer; blank lines before are dropped.
-
-    One may be left of a message whose line feed came later than the rest of it.
-    """
+    """Parse the answer to a variable request, skipping blank lines whose line feed came late."""
     begin = len(received) - len(received.lstrip(b"\r\n"))
     found = _line(received[begin:])
     if found is None:
@@ -243,6 +235,6 @@ def _variable(received: bytes, name: str) -> tuple[int | None, int] | None:
 
 
 def _unescaped(text: str) -> str:
-    r"""Return a text with `\n`, `\r`, `\t`, `\\` and `\"` as the characters that they stand for."""
+    r"""Replace `\n`, `\r`, `\t`, `\\` and `\"` by the characters they represent."""
     known = {"n": "\n", "r": "\r", "t": "\t", "\\": "\\", '"': '"'}
     return re.sub(r"\\(.)", lambda match: known.get(match[1], match[0]), text)

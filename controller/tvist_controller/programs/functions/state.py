@@ -1,4 +1,4 @@
-"""Functions that read the robot's state, as it was in the last tick, and answer questions about the arm."""
+"""Functions that read the robot's state of the last tick, and kinematics and dynamics."""
 
 import math
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ INTEGRATED = {
     "joint_temperatures", "tool_temperature", "actual_robot_energy_consumed",
     "actual_robot_braking_energy_dissipated",
 }  # fmt: skip
-"""Variables of RTDE whose values need all ticks before."""
+"""RTDE variables that depend on all earlier ticks."""
 
 
 class _Target(NamedTuple):
@@ -43,7 +43,7 @@ class _Target(NamedTuple):
 
 
 def _target(state: State) -> _Target:
-    """The reference before shaping at the tick of the shaped one, as UR's interfaces report it."""
+    """Return the unshaped reference at the tick of the shaped one, as UR's interfaces report it."""
     if state.unshaped_q is None or state.unshaped_qd is None or state.unshaped_qdd is None:
         return _Target(state.target_q, state.target_qd, state.target_qdd)
     return _Target(state.unshaped_q, state.unshaped_qd, state.unshaped_qdd)
@@ -71,14 +71,14 @@ def _target_speed(on: Parts) -> Array:
 
 
 class StateFunctions(Family):
-    """Reads the state of one robot."""
+    """Functions that read the state of one robot."""
 
     title = "State"
 
     def __init__(self, on: Parts) -> None:
         super().__init__(on)
         self._instruments: Instruments | None = None
-        """What computes RTDE's variables, made when the first is read."""
+        """Computes RTDE variables; created when first needed."""
 
     get_steptime = reads("Return the control period [s].", lambda _: PERIOD)
     get_actual_joint_positions = reads("Return the measured joint positions [rad].", _positions)
@@ -184,7 +184,7 @@ class StateFunctions(Family):
 
     @costs(300)
     def get_rtde_value(self, key: Text) -> Value:
-        """Return an output variable of RTDE, as it was in the last tick."""
+        """Return an RTDE output variable of the last tick."""
         if key in INTEGRATED:
             raise Fault(f'get_rtde_value: only clients get "{key}", which is integrated over time')
         if self._instruments is None:
@@ -205,7 +205,7 @@ class StateFunctions(Family):
 
 
 class PoseFunctions(Family):
-    """Answers questions about one robot's kinematics and dynamics."""
+    """Kinematics and dynamics of one robot."""
 
     title = "Kinematics and dynamics"
 
@@ -222,9 +222,9 @@ class PoseFunctions(Family):
         maxOrientationError: object = 1e-10,
         tcp: ToolPose | None = None,
     ) -> Array:
-        """Return the joint positions nearest to others, or to the present ones, at which the tool has a pose.
+        """Return the joint positions for a tool pose that are nearest to `qnear`, or to the present ones.
 
-        The solution is exact to rounding, so both errors are met whatever they are.
+        The solution is exact to rounding, so it always meets both errors.
         """
         return a_list(self._kinematics.posture(x, self._near(qnear), tcp))
 
@@ -247,7 +247,7 @@ class PoseFunctions(Family):
 
     @costs(200)
     def is_within_safety_limits(self, pose: object, qNear: Joints | None = None) -> bool:
-        """Return whether the arm can be at a pose or at joint positions: within their range, without a collision."""
+        """Return whether the arm can be at a pose or joint positions: within range and without collision."""
         if isinstance(pose, Pose):
             q = self._solution(arguments.pose("pose", pose), self._near(qNear))
         else:
@@ -262,7 +262,7 @@ class PoseFunctions(Family):
 
     @costs(110)
     def get_jacobian(self, q: Joints | None = None, tcp: ToolPose | None = None) -> Array:
-        """Return the Jacobian of the tool in the base frame, rows for velocity and angular velocity."""
+        """Return the Jacobian of the tool in the base frame: rows of velocity, then angular velocity."""
         matrix = self._kinematics.jacobian(self._posture(q), tcp)
         return Array(tuple(a_list(row) for row in matrix.tolist()))
 
@@ -279,7 +279,6 @@ class PoseFunctions(Family):
     def _solution(
         self, goal: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None = None
     ) -> tuple[float, ...] | None:
-        """Joint positions nearest to others at which the tool has a pose; None if there are none."""
         try:
             return self._kinematics.posture(goal, near, tcp)
         except Fault:

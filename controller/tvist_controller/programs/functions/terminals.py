@@ -1,4 +1,4 @@
-"""Functions for digital and analogue inputs and outputs, registers and flags."""
+"""Functions for digital and analogue terminals, registers and flags."""
 
 from collections.abc import Callable
 from functools import partial
@@ -13,11 +13,11 @@ from tvist_urscript import Array, Fault, costs
 STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
 """Bits of the digital terminals."""
 FLAGS = 32
-"""Number of flags, which only programs have."""
+"""Number of flags; only programs have them."""
 
 
 def _old(name: str, value: object) -> int:
-    """Bit of a digital terminal as it was numbered before configurable ones existed."""
+    """Return the bit of a digital terminal in the old numbering without configurable ones."""
     number = integer(name, value, 0, 9)
     return number if number < len(STANDARD) else TOOL[number - 8]
 
@@ -64,7 +64,7 @@ def _sets(what: str, place: object) -> Callable[[Family, int, Flag], None]:
 
 
 class RegisterFunctions(Family):
-    """Reads and writes the registers of one robot."""
+    """Registers and flags of one robot."""
 
     title = "Registers and flags"
 
@@ -91,19 +91,19 @@ class RegisterFunctions(Family):
 
     @costs(8)
     def write_output_boolean_register(self, address: BitPlace, value: Flag) -> None:
-        """Write an output bit, which clients read."""
+        """Write an output bit for clients."""
         self._arm.then(lambda: self._peripherals.write("output_bit", address, value))
 
     @costs(8)
     def write_output_integer_register(
         self, address: NumberPlace, value: Annotated[int, whole(MIN_INTEGER, MAX_INTEGER)]
     ) -> None:
-        """Write an output integer of 32 bits, which clients read."""
+        """Write a 32-bit output integer for clients."""
         self._arm.then(lambda: self._peripherals.write("output_int", address, value))
 
     @costs(8)
     def write_output_float_register(self, address: NumberPlace, value: Number) -> None:
-        """Write an output number, which clients read."""
+        """Write an output number for clients."""
         self._arm.then(lambda: self._peripherals.write("output_double", address, value))
 
     def get_flag(self, n: FlagPlace) -> bool:
@@ -121,7 +121,7 @@ class RegisterFunctions(Family):
 
 
 class TerminalFunctions(Family):
-    """Reads and sets the terminals of one robot."""
+    """Terminals of one robot."""
 
     title = "Inputs and outputs"
 
@@ -149,7 +149,7 @@ class TerminalFunctions(Family):
 
     @costs(10)
     def set_analog_out(self, n: Bit, f: Share) -> None:
-        """Set an analogue output to a share of its range."""
+        """Set an analogue output to a fraction of its range."""
         self._arm.then(lambda: self._peripherals.set_analog_output(n, f))
 
     set_standard_analog_out = set_analog_out
@@ -159,7 +159,7 @@ class TerminalFunctions(Family):
         self._arm.then(lambda: self._peripherals.choose(2 + port, voltage=domain))
 
     def set_analog_inputrange(self, port: AnalogPort, range: Annotated[int, whole(0, 2)]) -> None:
-        """Make ports 0 and 1 a voltage by ranges 0 and 2; those of the tool, 2 and 3, by 0 and 1, or a current by 2."""
+        """Make port 0 or 1 a voltage (range 0 or 2), tool port 2 or 3 a voltage (0, 1) or current (2)."""
         if port > 1:
             self._arm.then(lambda: self._peripherals.choose_tool_input(port - 2, voltage=range < 2))
         elif range == 1:
@@ -178,7 +178,7 @@ class TerminalFunctions(Family):
         self._arm.then(lambda: self._peripherals.set_tool(tool_output_voltage=voltage))
 
     def set_runstate_outputs(self, outputs: object) -> None:
-        """Accept that no output shows whether a program runs."""
+        """Check that no output is to show whether a program runs."""
         if not isinstance(outputs, Array):
             raise Fault(f"outputs is {shown(outputs)}: it must be a list")
         if any(bool(item) for item in outputs.items):
@@ -197,7 +197,7 @@ class TerminalFunctions(Family):
         return self._peripherals.tool_analog_inputs[n]
 
     def get_analog_out(self, n: Bit) -> float:
-        """Return an analogue output as a share of its range."""
+        """Return an analogue output as a fraction of its range."""
         return self._peripherals.analog_shares[n]
 
     get_standard_analog_out = get_analog_out

@@ -1,4 +1,4 @@
-"""Functions of UR's controllers that this one does not simulate: each says so when it is called."""
+"""Functions of UR's controllers that are not simulated; calling one ends the program with an error."""
 
 import ast
 from collections.abc import Callable, Iterator, Mapping
@@ -78,7 +78,7 @@ _CALLS = {
     "programs that put the arm elsewhere at once": ("set_pos(q)",),
     "screw driving": ("screw_driving(f, v_limit)",),
 }
-"""What is not simulated, and the functions that need it, as scripts call them."""
+"""Subjects that are not simulated, and their functions as scripts call them."""
 
 
 def _subjects(
@@ -94,7 +94,7 @@ def _subjects(
 
 
 SUBJECTS: dict[str, tuple[tuple[Parameter, ...], str]] = dict(_subjects(_CALLS)) | {METHOD: ((), _OTHERS)}
-"""Parameters of each function, and what is not simulated."""
+"""Parameters and subject of each function."""
 
 
 def _method(_: object, name: object, __: object) -> None:
@@ -109,4 +109,4 @@ def _missing(name: str, subject: str) -> Callable[..., None]:
 
 
 MISSING = {name: _missing(name, subject) for name, (_, subject) in SUBJECTS.items()} | {METHOD: _method}
-"""Functions that end their program with an error, which says what is not simulated."""
+"""Functions that end their program with an error naming the subject."""

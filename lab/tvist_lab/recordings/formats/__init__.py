@@ -1,1 +1,1 @@
-"""Readers of log files, a module each; `@reader` registers them, and `read` imports all that are here."""
+"""Readers of log files, one per module; `@reader` registers them, and `read` imports all modules here."""

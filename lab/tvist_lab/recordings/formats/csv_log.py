@@ -1,4 +1,4 @@
-"""Logs as text, in CSV and the like, as UR's record.py, ur_rtde and `tvist log export` write them."""
+"""Read logs as text, in CSV and similar formats, as written by UR's record.py, ur_rtde and `tvist log export`."""
 
 import io
 import re
@@ -15,7 +15,7 @@ from tvist_lab.recordings.table import STRANGE, TEXT, Table, reader
 from tvist_lab.words import counted
 
 SEPARATORS = (";", "\t", ",", " ")
-"""Characters between cells, in the order in which they are looked for in the header."""
+"""Separators of cells, in the order in which they are sought in the header."""
 EMPTY = ("", "nan", "NaN", "NAN", "None", "null", "NULL", "NA", "-")
 """Cells without a number."""
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
@@ -23,11 +23,9 @@ _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 
 @reader(TEXT)
 def read_csv(path: Path) -> Table:
-    """Read lines of cells between spaces, commas, semicolons or tabs, below a header or without one.
-
-    Torn lines, which have too few or too many cells, are left out, and a note names the first. Numbers may have decimal
-    commas where these do not separate cells.
-    """
+    """Read cells separated by spaces, commas, semicolons or tabs, with or without a header."""
+    # Lines with too few or too many cells are left out, and a note names the first. Numbers may have decimal
+    # commas if cells have another separator.
     raw = content(path).removeprefix(b"\xef\xbb\xbf")
     all_lines = raw.splitlines()
     top, names, separator = _header(path, all_lines)
@@ -55,7 +53,7 @@ def read_csv(path: Path) -> Table:
             f"{cells[torn[0]]} cells instead of {width}"
         )
     elif len(body) > 1 and not raw.endswith(b"\n"):
-        # Nobody knows whether the last number is complete.
+        # The last number may be incomplete.
         whole[-1] = False
         notes.append(f"line {body[-1][0]} has no end and was left out")
     kept = [body[at] for at in np.flatnonzero(whole)]
@@ -74,7 +72,7 @@ def read_csv(path: Path) -> Table:
 
 
 def _header(path: Path, lines: list[bytes]) -> tuple[int, list[str], str]:
-    """Index of the header, its names, and what separates them; without a header that of the first row, no names."""
+    """Return the header's index, names and separator; without a header, index and separator of the first row."""
     top = _top(lines)
     if top is None:
         raise LogError(f"{path} holds no rows")
@@ -96,7 +94,7 @@ def _header(path: Path, lines: list[bytes]) -> tuple[int, list[str], str]:
 
 
 def _top(lines: list[bytes]) -> int | None:
-    """Index of the header: the first line that is no comment, or a comment with names right above numbers."""
+    """Return the index of the header: the first line without #, or a comment with names right above numbers."""
     filled = [at for at, line in enumerate(lines) if line.strip()]
     above = None
     for at in filled:
@@ -107,7 +105,7 @@ def _top(lines: list[bytes]) -> int | None:
 
 
 def _numbers(text: bytes, separator: str, width: int) -> tuple[Floats, dict[int, tuple[int, str]]]:
-    """Values of all cells, shape (T, columns), NaN for an empty one; and the first text of each column with some."""
+    """Return the values of all cells, shape (T, columns), NaN if empty, and the first text in each column with text."""
     names = [str(place) for place in range(width)]
     try:
         frame = _frame(text, separator, dict.fromkeys(names, pl.Float64()))

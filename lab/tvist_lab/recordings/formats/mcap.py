@@ -1,4 +1,4 @@
-"""Recordings of this controller and rosbags, both in MCAP."""
+"""Read recordings of this controller, and rosbags in MCAP."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from tvist_lab.recordings.table import Table, reader
 
 @reader(".mcap", MAGIC)
 def read_mcap(path: Path) -> Recording | Table:
-    """Read a file, or what a folder or pattern names."""
+    """Read a file, or the segments that a folder or pattern names."""
     try:
         content = mcap_file.read_checked(path)
     except mcap_file.RecordingFileError as error:

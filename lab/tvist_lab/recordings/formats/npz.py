@@ -1,4 +1,4 @@
-"""Arrays that NumPy saved, with one row for each time."""
+"""Read arrays saved by NumPy, with one row for each time."""
 
 import io
 import math
@@ -17,7 +17,7 @@ from tvist_lab.recordings.table import Table, reader
 
 @reader(".npz")
 def read_npz(path: Path) -> Table:
-    """Read the arrays of numbers with one or two dimensions, which must have equal numbers of rows."""
+    """Read numeric arrays with one or two dimensions, which must have equal numbers of rows."""
     try:
         with zipfile.ZipFile(path) as file:
             check_size(path, sum(entry.file_size for entry in file.infolist()) // 8)
@@ -39,7 +39,7 @@ def read_npz(path: Path) -> Table:
 
 
 def _array(data: bytes) -> NDArray[np.generic]:
-    """An array that may claim no more numbers than it has."""
+    """Decode an array, which cannot claim more numbers than it has."""
     stream = io.BytesIO(data)
     header = npy.read_array_header_1_0 if npy.read_magic(stream) == (1, 0) else npy.read_array_header_2_0
     shape, by_columns, kind = header(stream)

@@ -1,7 +1,7 @@
-"""Tables in Parquet, read in a process of their own: a damaged file can crash the reader, and then only this one ends.
+"""Read tables in Parquet, in a separate process, since a damaged file can crash the reader.
 
-`python -m tvist_lab.recordings.formats.parquet FILE` writes what `tvist log export` says of the columns in a line, and
-the numbers as Arrow; or says why it cannot.
+`python -m tvist_lab.recordings.formats.parquet FILE` writes the description of the columns on one line, then
+the numbers as Arrow; or an error.
 """
 
 import io
@@ -19,7 +19,7 @@ from tvist_lab.recordings.description import KEY, described
 from tvist_lab.recordings.table import Table, reader
 
 DENSEST = 2000
-"""Largest size of the content over that of its file; recordings reach a tenth of it."""
+"""Largest ratio of the content to the size of its file; recordings reach a tenth of it."""
 LEAST_CONTENT = 1 << 20
 """Size of the content that any file may have [bytes]."""
 
@@ -45,7 +45,7 @@ def read_parquet(path: Path) -> Table:
 
 
 def check_size(path: Path, numbers: int) -> None:
-    """Refuse a file that claims more numbers than can be packed into one of its size."""
+    """Refuse a file that claims more numbers than its size can hold."""
     most = (LEAST_CONTENT + DENSEST * path.stat().st_size) // 8
     if numbers > most:
         raise LogError(
@@ -54,7 +54,7 @@ def check_size(path: Path, numbers: int) -> None:
 
 
 def reason(error: BaseException) -> str:
-    """Return what an error of a library says, as the part of a sentence."""
+    """Return a library's error as part of a sentence."""
     said = (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
     return textwrap.shorten(said, 300, placeholder=" …")
 

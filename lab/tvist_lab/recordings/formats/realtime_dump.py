@@ -1,4 +1,4 @@
-"""Dumps of UR's real-time interface, port 30003: packets as they came over the socket, in a file."""
+"""Read dumps of UR's real-time interface, port 30003: packets as received from the socket."""
 
 import struct
 from pathlib import Path
@@ -10,14 +10,14 @@ from tvist_lab.recordings.packed import content
 from tvist_lab.recordings.table import BINARY, STRANGE, Table, reader
 
 SIZES = (1044, 1060, 1108, 1116, 1140, 1220)
-"""Lengths of a packet [bytes], from software 3.0 on; each later one begins like the earlier ones."""
+"""Lengths of a packet [bytes], from software 3.0 on; each later one starts like the earlier ones."""
 OLD = 812
-"""Length of a packet of software 1.8, in another order."""
+"""Length of a packet of software 1.8, which has another order."""
 
 
 @reader(BINARY)
 def read_dump(path: Path) -> Table:
-    """Read a dump of port 30003 of any software from 3.0 on. It may begin and end within a packet."""
+    """Read a dump of any software from 3.0 on; it may start and end within a packet."""
     from tvist_server.gateways.ur.realtime import LAYOUT
 
     data = content(path)
@@ -36,7 +36,7 @@ def read_dump(path: Path) -> Table:
 
 
 def _packets(path: Path, data: bytes) -> tuple[list[int], int, int]:
-    """First byte of each packet, the packets' length, and the number of bytes that belong to none."""
+    """Return the first byte of each packet, the packets' length, and the number of bytes outside packets."""
     first, size = _first(path, data)
     head = struct.pack(">i", size)
     starts, at = [], first
@@ -51,7 +51,7 @@ def _packets(path: Path, data: bytes) -> tuple[list[int], int, int]:
 
 
 def _first(path: Path, data: bytes) -> tuple[int, int]:
-    """First byte and length of the first packet that another one follows."""
+    """Return first byte and length of the first packet that another one follows."""
     for size in (*SIZES, OLD):
         head = struct.pack(">i", size)
         at = data.find(head)

@@ -1,1 +1,1 @@
-"""The arms that there are: what is known of each, and how well its vibration can be suppressed."""
+"""The available arms: what is known of each, and how well its vibration can be suppressed."""

@@ -1,4 +1,4 @@
-"""What a robot file says of an arm and where its numbers come from."""
+"""Describe an arm from its robot file, with the origin of its numbers."""
 
 from typing import Any
 
@@ -12,12 +12,10 @@ SIZE = (
     Column("model", "model"), Column("joints", lambda one: len(one["joints"])), Column("length m", "length_m", 2),
     Column("payload kg", lambda one: f"{one['payload_kg']:g}"),
 )  # fmt: skip
-"""Columns about what an arm is."""
 REDUCED = (
     Column("less % median", "reduction_percent.median", 1), Column("p5", "reduction_percent.p5", 1),
     Column("delay ms", "delay_ms", 0),
 )  # fmt: skip
-"""Columns about the effect of auto."""
 
 
 def _origin_of_drives(one: Entry) -> str:
@@ -25,7 +23,7 @@ def _origin_of_drives(one: Entry) -> str:
 
 
 def frequencies(title: str) -> Column:
-    """Return the column of the errors of a calibration's frequencies."""
+    """Return the column with the errors of a calibration's frequencies."""
     return Column(title, lambda one: ", ".join(f"{value:.1f}" for value in one["f_d_error_percent"]))
 
 
@@ -42,12 +40,7 @@ RESULTS = (
 
 
 def about(name: str, description: RobotDescription) -> dict[str, Any]:
-    """Return an arm as `tvist robots --json` describes it.
-
-    Args:
-        name: Name or file by which the arm is served.
-        description: The arm.
-    """
+    """Describe an arm for `tvist robots --json`; `name` is the name or file with which it is served."""
     limits, drives = description.limits, description.drives
     known = [load_calibration(name) for name in calibrations()]
     return {

@@ -1,4 +1,4 @@
-"""How well an arm is identified and its vibration suppressed: the same measurement for every arm."""
+"""Measure how well an arm is identified and its vibration suppressed, the same way for every arm."""
 
 import asyncio
 from collections.abc import Callable
@@ -28,7 +28,7 @@ from tvist_protocol.calibration import Calibration
 PLACES = 40
 """Number of random configurations at which the sag is compared."""
 ALONE = 4
-"""Least number of joints of an arm that auto can shape: it suppresses four modes."""
+"""Smallest number of joints of an arm that auto can shape, since it suppresses four modes."""
 TWIST = 1e-7
 """Twist below which gravity loads no gear [rad]."""
 
@@ -42,22 +42,12 @@ def measure(
     seed: int,
     progress: Callable[[int], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Measure an arm whose springs are stiffer by a factor.
+    """Measure an arm with gears and links `stiffness` times as stiff, by random `moves` with the rated payload.
 
-    Args:
-        description: The arm as its file describes it.
-        calibration: Calibration of this arm; None to identify the arm first.
-        stiffness: Factor of the stiffness of gears and links [-].
-        moves: Number of random moves with the rated payload.
-        seed: Seed of moves, identification and gear errors.
-        progress: Called with the number of moves that were made.
-
-    Returns:
-        Factor of the `stiffness`; name of the `calibration`, "identified" if it was made for this measurement;
-        `f_d_error_percent`, the median error of each mode's damped frequency; numbers of `moves`, of those left out
-        since the drives are `too_weak`, and of those `counted` since they vibrate enough for a percentage;
-        `reduction_percent` of the peak by `auto`, over moves; `delay_ms`, its median; and `sag_error_percent`, see
-        `sag_error`.
+    Without a calibration, the arm is identified first. Returns the factor of the `stiffness`; name of the
+    `calibration` or "identified"; `f_d_error_percent`, the median error of each mode; numbers of `moves`, of
+    those `too_weak` for the drives, and of those `counted` because they vibrate enough; `reduction_percent`
+    of the peak by `auto`; the median `delay_ms`; and `sag_error_percent`, see `sag_error`.
     """
     arm = description if stiffness == 1.0 else stiffer(description, stiffness)
     known = asyncio.run(_identified(arm, seed)) if calibration is None else calibration
@@ -83,7 +73,7 @@ def measure(
 
 
 async def _identified(arm: RobotDescription, seed: int) -> Calibration:
-    """Identify an arm in this process, as `tvist identify` does by default."""
+    """Identify an arm in this process, like `tvist identify` by default."""
     carried = tuple(paper_payload(arm, mass) for mass in (0.0, arm.payload.mass))
     start = next(iter(arm.poses.values()))
     setup = Setup(
@@ -103,10 +93,9 @@ async def _identified(arm: RobotDescription, seed: int) -> Calibration:
 
 
 def sag_error(arm: RobotDescription, seed: int) -> float:
-    """Compare the twist of the gears of an arm at rest with g(q)/K at random configurations.
+    """Compare gear twist at rest with g(q)/K at random configurations.
 
-    Returns:
-        Largest difference, relative to the largest twist in its pose [%]; 0 if gravity loads no joint.
+    Returns the largest difference relative to the largest twist in its pose [%]; 0 if gravity loads no joint.
     """
     plant, rigid = FlexibleArm(arm.clean(), arm.payload), rigid_model(arm, arm.payload)
     data, stiffness = rigid.createData(), np.array(arm.drives.gear_stiffness)

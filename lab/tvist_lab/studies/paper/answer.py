@@ -1,4 +1,4 @@
-"""What the demonstration found, in words: every number is of the run, and so is each "less" and "earlier"."""
+"""Describe the result of the demonstration in words, with numbers only from the run."""
 
 from typing import Any
 
@@ -6,11 +6,10 @@ from tvist_lab.change import Change
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL
 
 POSES = {"Q1": "stretched out", "Q2": "stretched out to the side", "Q3": "folded"}
-"""The paper's poses in words."""
 
 
 def answer(report: dict[str, Any], motion: str) -> list[str]:
-    """What shaping did to one motion, and in short to the others, a sentence or two a line."""
+    """Return what shaping did to one motion, and briefly to the others, one or two sentences a line."""
     start, end = motion.split("-")
     change, longer = _change(report, motion), report["baselines"][motion]["shaped"]["delay_ms"]
     before, after = map(_number, (change.before, change.after))
@@ -25,7 +24,7 @@ def answer(report: dict[str, Any], motion: str) -> list[str]:
 
 
 def terms(report: dict[str, Any], motion: str) -> dict[str, str]:
-    """Words of the answer to what they mean."""
+    """Return the terms of the answer with their meanings."""
     start, end = (report["table_1"][name]["f_d_hz"] for name in motion.split("-"))
     shaped = (
         "To keep the arm from shaking, the robot splits its command in two, half a period of the arm's vibration "
@@ -41,7 +40,7 @@ def terms(report: dict[str, Any], motion: str) -> dict[str, str]:
 
 
 def checks(report: dict[str, Any], difference: str | None) -> dict[str, str]:
-    """How far the figures can be trusted, words to sentences; `difference` is the first of the replay, if any."""
+    """Return how far the figures can be trusted; `difference` is the first of the replay, if any."""
     ticks, missed, lost = (
         report[name] for name in ("replayed_ticks", "missed_ticks", "states_lost_on_the_way")
     )

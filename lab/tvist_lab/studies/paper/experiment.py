@@ -1,7 +1,4 @@
-"""The paper's experiment: its three motions by several methods, with repetitions, as a client of any robot.
-
-The methods are: unshaped, the paper's, and the baselines it has to be compared with.
-"""
+"""The paper's experiment: three motions unshaped, by the paper's method and by baselines, on any robot."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -23,10 +20,10 @@ from tvist_protocol.info import Info
 BEFORE = 0.1
 """Time recorded before a motion [s]."""
 AFTER = 1.9
-"""Time recorded after the motion's end [s]; the slow part of the drives' loops needs it to settle within 0.03 mm."""
+"""Time recorded after the motion's end [s]: the drives' slow loops need it to settle within 0.03 mm."""
 
 ACCELERATION, JERK = 2.0, 100.0
-"""The paper's limits [rad/s^2, rad/s^3]."""
+"""The paper's limits [rad/s², rad/s³]."""
 Progress = Callable[[str], None]
 
 
@@ -35,16 +32,15 @@ class Method:
     """A method for making a motion: a shaper, and the modes that it is designed for."""
 
     name: str
-    """Name in tables and JSON."""
     label: str
-    """Name for people."""
+    """Name for display."""
     shaper: str = "none"
     modes: tuple[float, float] | None = None
     """Constant design frequency [Hz] and damping ratio [-]; None for the polynomials of the robot's calibration."""
     frozen: bool = False
-    """Whether it has the modes of the end pose during the whole motion; requires the target in advance."""
+    """Whether it uses the modes of the end pose throughout, which requires the target in advance."""
     jerk: float = JERK
-    """Limit of the motion [rad/s^3]."""
+    """Jerk limit of the motion [rad/s³]."""
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> None:
         """Set up a robot at rest for a motion that ends at a pose; without a shaper, the estimate is still recorded."""
@@ -63,11 +59,9 @@ class Method:
 
 
 UNSHAPED = Method("unshaped", "unshaped")
-"""The unchanged reference."""
 SHAPED = Method("shaped", "TVIST-ZV", "zv")
 """TVIST with the calibration's polynomials."""
 FROZEN_AT_END = Method("zv_frozen_at_end", "ZV for the end pose", "zv", frozen=True)
-"""ZV with the modes of the end pose."""
 
 
 def fixed(shaper: str, f_d: float, zeta: float) -> Method:
@@ -76,10 +70,8 @@ def fixed(shaper: str, f_d: float, zeta: float) -> Method:
 
 
 def equal_duration(delay: float) -> Method:
-    """Return a motion without shaper and model that takes as long as a shaped one, whose delay is given [s].
-
-    A double S that reaches its limits lasts way/v + v/a + a/j, so an increase of a/j lengthens it equally.
-    """
+    """Return a motion without shaper and model that takes as long as a shaped one with this delay [s]."""
+    # A double S that reaches its limits lasts way/v + v/a + a/j, so an increase of a/j lengthens it equally.
     jerk = ACCELERATION / (ACCELERATION / JERK + delay)
     return Method("equal_duration_double_s", "longer double S", jerk=jerk)
 
@@ -101,13 +93,12 @@ class Experiment:
     seed: int
     runs: int
     table_1: dict[str, dict[str, float]]
-    """Pose to its lowest mode: as estimated, and the truth if the robot publishes it."""
+    """Lowest mode at each pose: estimated, and true if the robot publishes the truth."""
     judged: dict[tuple[str, str], list[JudgedRun]] = field(default_factory=dict)
-    """(motion, method) to the results of its runs."""
+    """Results of all runs, by motion and method."""
     labels: dict[str, str] = field(default_factory=dict)
-    """Method to its name for people."""
     first: dict[tuple[str, str], Recording] = field(default_factory=dict)
-    """(motion, method) to the recording of its first run, for the figures."""
+    """Recording of the first run, by motion and method, for the figures."""
 
     def of_table_2(self) -> dict[str, Runs]:
         """Return the unshaped and shaped runs of each motion, for Table 2."""
@@ -166,7 +157,7 @@ async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) ->
 async def experiment(
     robot: Robot, arm: Arm, *, runs: int, seed: int, baselines: bool, progress: Progress
 ) -> Experiment:
-    """Run every motion with every method, and repeat it, each time with other noise and gear errors."""
+    """Run and repeat every motion with every method, each time with other noise and gear errors."""
     done = Experiment(info=await robot.info(), seed=seed, runs=runs, table_1=await table_1(robot, arm))
     for motion in MOTIONS:
         for method in (UNSHAPED, SHAPED):
@@ -190,7 +181,7 @@ def simulate(
 
 
 def fixed_baselines(info: Info, delay: float) -> Sequence[Method]:
-    """Return the baselines that the paper's method has to be compared with."""
+    """Return the baselines to compare with the paper's method."""
     if info.calibration is None:
         return [equal_duration(delay)]
     f_d, zeta = info.calibration.f_d_range, info.calibration.zeta_range

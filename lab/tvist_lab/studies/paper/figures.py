@@ -1,4 +1,4 @@
-"""The paper's figures, drawn from our runs, from the robot file and from the shaping library."""
+"""The paper's figures, drawn from new runs, the robot file and the shaping library."""
 
 from matplotlib.figure import Figure
 
@@ -17,15 +17,11 @@ from tvist_lab.studies.paper.published import MOTIONS
 
 NUMBERS = {"Q1-Q2": 12, "Q1-Q3": 13, "Q3-Q1": 14}
 DEFINED_ON = "Q1-Q2"
-"""Motion on which figure 15 shows delay, stabilisation time, cycle time and overshoot, and the spectrogram is made."""
+"""Motion for figure 15 with delay, stabilisation, cycle and overshoot, and for the spectrogram."""
 
 
 def draw(done: Experiment, *, all_figures: bool) -> dict[str, Figure]:
-    """Draw figures 12 to 16, and on request also 1 to 4, 7, 8 and the spectrogram of a ring-down.
-
-    Returns:
-        Name of the file, without its suffix, to the figure.
-    """
+    """Draw figures 12 to 16, or also 1 to 4, 7, 8 and the spectrogram; return them by file name without suffix."""
     pairs = {motion: _pair(done, motion) for motion in MOTIONS}
     figures = {f"figure_{NUMBERS[name]}": motion_figure(name, *pair) for name, pair in pairs.items()}
     figures |= {"figure_15": figure_15(DEFINED_ON, *pairs[DEFINED_ON]), "figure_16": figure_16(pairs)}
@@ -43,6 +39,6 @@ def overview(done: Experiment, motion: str) -> Figure:
 
 
 def _pair(done: Experiment, motion: str) -> tuple[Recorded, Recorded]:
-    """The first recording of a motion without and with shaping."""
+    """Return the first recording of a motion without and with shaping."""
     unshaped, shaped = (done.first[motion, kind] for kind in ("unshaped", "shaped"))
     return (unshaped, motions(unshaped)[0]), (shaped, motions(shaped)[0])

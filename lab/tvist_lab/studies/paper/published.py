@@ -8,7 +8,7 @@ from typing import Any
 
 @cache
 def published() -> dict[str, Any]:
-    """Return tables, configurations and figures' captions, as numbers."""
+    """Return tables, configurations and captions of figures, with numbers."""
     return dict(json.loads((resources.files(__package__) / "published.json").read_text(encoding="utf-8")))
 
 
@@ -18,6 +18,6 @@ def pose(name: str) -> tuple[float, ...]:
 
 
 ARMS = ("ur5e", "ur5e_stiction")
-"""The robots that make its experiment: one fitted to Table 1, and one tuned to Table 2 as well."""
+"""Robots for the experiment: one fitted to Table 1, and one tuned to Table 2 as well."""
 MOTIONS = {"Q1-Q2": ("Q1", "Q2"), "Q1-Q3": ("Q1", "Q3"), "Q3-Q1": ("Q3", "Q1")}
-"""The three motions: name to start and end."""
+"""Start and end of the three motions, by name."""

@@ -1,4 +1,4 @@
-"""The experiment's results as values and rows of tables, beside the paper's; the origin of each figure."""
+"""The experiment's results as values and table rows, beside the paper's, with the origin of each figure."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -34,27 +34,25 @@ OF_MOTION = (
     ("stabilisation", _BOTH, "stabilisation_ms", "{:.0f} ms", 0.25, 40.0),
     ("overshoot", _BOTH, "overshoot_m", "{:.1e} m", 0.35, 1.5e-5),
 )
-"""Figures of each motion: name, where in Table 2, form, and tolerance: relative, and what is granted in any case."""
+"""Figures of each motion: name, place in Table 2, format, and relative and absolute tolerance."""
 ADJUSTED = {
     "UR5e": {"Table 1": FITTED, "RV unshaped": TUNED, "RV reduced by": TUNED},
     "UR5e_stiction": {"Table 1": FITTED} | dict.fromkeys([name for name, *_ in OF_MOTION[1:]], TUNED),
 }
-"""Which figures the parameters of an arm were fitted or tuned to, by its model; all others are predicted."""
+"""Figures to which each arm's parameters were fitted or tuned, by model; all others are predicted."""
 
 FIGURES = ("delay ms", "stabilisation ms", "cycle ms", "overshoot m", "RV m/s²")
-"""Headings of the figures of Table 2."""
 IMPACTS = ("stabilisation", "cycle", "overshoot", "residual_vibration")
-"""What shaping changes, in the order of these figures."""
+"""Changes by shaping, in the order of these figures."""
 METHODS = (
     Column("method", "label"), Column("delay ms", "delay_ms", 0), Column("RV m/s²", "residual_vibration_m_s2", 3),
     Column("peak m/s²", "peak_m_s2", 3), Column("less peak %", "peak_reduction_percent", 1),
     Column("still after ms", "still_after_ms", 0), Column("peak q̈ / limit", "peak_acceleration_ratio", 3),
 )  # fmt: skip
-"""Columns of a table of methods."""
 
 
 def as_dict(done: Experiment) -> dict[str, Any]:
-    """Return what `tvist demo --json` prints of an arm."""
+    """Return an arm's part of `tvist demo --json`."""
     runs = done.of_table_2()
     result: dict[str, Any] = {
         "robot": done.info.model,
@@ -74,7 +72,7 @@ def as_dict(done: Experiment) -> dict[str, Any]:
 
 
 def _methods(done: Experiment, motion: str) -> dict[str, dict[str, float | None]]:
-    """Return the results of each method, the unshaped one first, which is what a robot that only waits achieves."""
+    """Return the results of each method, starting with the unshaped one, which corresponds to waiting."""
     unshaped = done.judged[motion, "unshaped"]
     return {method: _row(judged, unshaped) for (ran, method), judged in done.judged.items() if ran == motion}
 
@@ -83,7 +81,7 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
     residual = _mean([one.result.residual_vibration_m_s2 for one in judged])
     before = _mean([one.result.residual_vibration_m_s2 for one in unshaped])
     peak, peak_before = _mean([one.peak for one in judged]), _mean([one.peak for one in unshaped])
-    # The unshaped references of a motion start alike, so the later stop of the shaped one is its delay.
+    # All references of a motion start at the same tick, so a later stop is the delay.
     started = [one.result.stop_s - one.result.start_s for one in judged]
     started_before = [one.result.stop_s - one.result.start_s for one in unshaped]
     return {
@@ -99,7 +97,7 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
 
 
 def _mean(values: list[float | None]) -> float | None:
-    """Mean; None if one value is not measurable, since the mean of the rest would be biased."""
+    """Return the mean; None if one value is not measurable, since the mean of the rest would be biased."""
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if known and len(known) == len(values) else None
 
@@ -111,7 +109,7 @@ def _reduction(after: float | None, before: float | None) -> float | None:
 
 
 def origins(robot: str, result: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Return an entry for each figure of an arm: its name, the paper's value, the arm's, and the latter's origin."""
+    """Return an entry for each figure of an arm: its name, the paper's value, the arm's, and the origin."""
     theirs, adjusted, entries = published(), ADJUSTED.get(robot, {}), []
 
     def compare(
@@ -147,10 +145,7 @@ def origins(robot: str, result: Mapping[str, Any]) -> list[dict[str, str]]:
 
 
 def table_2(table: dict[str, Any], digits: int) -> list[tuple[str, ...]]:
-    """Return the rows of Table 2: the motion, what is shown and whose it is, and the figures.
-
-    The residual vibration has this number of decimals.
-    """
+    """Return the rows of Table 2: motion, kind and source, and the figures; RV has `digits` decimals."""
     forms = {
         "delay_ms": ".1f", "stabilisation_ms": ".1f", "cycle_ms": ".1f", "overshoot_m": ".1e",
         "residual_vibration_m_s2": f".{digits}f",
@@ -169,7 +164,7 @@ def table_2(table: dict[str, Any], digits: int) -> list[tuple[str, ...]]:
 
 
 def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, ...]]:
-    """Return the rows of a motion's table of methods; `first` writes the one that is still first, as "**{}**"."""
+    """Return the rows of a motion's table of methods; `first` formats the earliest at rest, such as "**{}**"."""
     rows = result["baselines"][motion]
     known = [row["still_after_ms"] for row in rows.values() if row["still_after_ms"] is not None]
     soonest = min(known, default=None)
@@ -182,7 +177,7 @@ def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, 
 
 
 def beside(arms: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
-    """Return heading and rows of the table of the origins, with the paper's figures and those of each arm."""
+    """Return heading and rows of the table of origins, with the paper's figures and those of each arm."""
     heading = ("figure", "paper", *(title for one in arms for title in (one["robot"], "origin")))
     rows = zip(*(one["origins"] for one in arms), strict=True)
     return [heading, *(

@@ -1,4 +1,4 @@
-"""The experiment on a served robot: in real time, measured by the robot's recording, and replayed."""
+"""Run the experiment on a served robot in real time, measure it in the robot's recording, and replay it."""
 
 import asyncio
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Served:
     report: dict[str, Any]
     """Results as plain values, with those of the checks."""
     difference: str | None
-    """Where the replay differs from the recording first; None if it does not."""
+    """First difference between replay and recording; None if there is none."""
 
     @property
     def equal(self) -> bool:
@@ -35,13 +35,9 @@ class Served:
 def serve(path: Path, seed: int, progress: Progress) -> Served:
     """Serve a robot, run the experiment once, and replay the recording, which replaces an earlier one.
 
-    The figures come from the server's own recording, which is complete however busy the machine is. The figures from
-    the messages that this client received are compared with them.
-
-    Raises:
-        RuntimeError: The robot did not start or disconnected.
-        NotMeasurableError: Its recording cannot be measured.
-        RecordingError: Its recording cannot be read.
+    Figures come from the server's own recording, which is complete even on a busy machine, and are compared
+    with those from the received messages. Raises RuntimeError if the robot did not start or disconnected,
+    NotMeasurableError or RecordingError if its recording is not usable.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     path.unlink(missing_ok=True)
@@ -62,7 +58,7 @@ def serve(path: Path, seed: int, progress: Progress) -> Served:
 async def _run(
     path: Path, seed: int, progress: Progress
 ) -> tuple[Experiment, dict[tuple[str, str], Recording]]:
-    """Move the arm; return the experiment, not yet measured, and the client's own recording of each motion."""
+    """Move the arm; return the experiment before measurement, and the client's recording of each motion."""
     live = {}
     options = ["--record", str(path), "--truth", "--seed", str(seed)]
     async with served_robot(options) as (robot, _), robot.control("demo") as arm:
@@ -79,7 +75,7 @@ async def _run(
 def _measure(
     done: Experiment, live: dict[tuple[str, str], Recording], content: RecordingFile
 ) -> tuple[bool, int]:
-    """Judge each motion by the recording; return whether the live stream, if it arrived completely, gives the same."""
+    """Measure each motion in the recording; return whether a complete live stream agrees, and the lost states."""
     same, lost = True, 0
     for key, received in live.items():
         ticks = received["tick"]

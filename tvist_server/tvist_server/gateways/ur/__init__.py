@@ -1,4 +1,1 @@
-"""UR's own interfaces, connected to the same controller as Zenoh.
-
-Each interface consists of a codec and a session without socket or clock; `interfaces` opens the sockets.
-"""
+"""UR's own interfaces to the controller: codecs, and sessions without socket or clock; `interfaces` opens sockets."""

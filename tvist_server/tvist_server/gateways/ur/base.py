@@ -1,4 +1,4 @@
-"""Common parts of UR's interfaces. A session is one client's connection to one interface, without its socket."""
+"""Base of the sessions of UR's interfaces: one client's connection, without its socket."""
 
 from abc import ABC, abstractmethod
 from collections import deque
@@ -12,62 +12,55 @@ from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
 
 Send = Callable[[bytes], None]
-"""Sends an answer; answers are never dropped."""
+"""Sends an answer, which is never dropped."""
 Item = TypeVar("Item")
 
 
 class PortSession(ABC):
-    """One connection. All methods are called from one thread and do not block.
-
-    The methods do not raise, whatever bytes arrive: errors are answered in the interface's own way.
-    """
+    """One connection. Methods do not block and, whatever bytes arrive, do not raise: errors are answered."""
 
     over = False
-    """True if the client has asked to end the connection, or if that is closed."""
+    """Whether the connection is closed, or the client has asked to close it."""
     client_begins = False
-    """Whether nothing is sent to a client that requests nothing, so that it may be disconnected to make room."""
+    """Whether the client gets nothing that it has not requested, so that it may be disconnected to make room."""
     served = False
-    """Whether the client is being sent what it requested; it may then be silent for any time, but has to read."""
+    """Whether the client is being sent what it requested; it may then be silent, but has to read."""
 
     @property
     def waiting(self) -> int:
-        """Number of received requests that are not answered; many of them pause reading."""
+        """Number of received requests without an answer; many of them pause reading."""
         return 0
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
         self._robot, self._control, self._send = robot, control, send
 
     def opened(self) -> None:  # noqa: B027  not every session has to
-        """Send the greeting, if any, to a client that has just connected."""
+        """Send a greeting, if any, to the new client."""
 
     @abstractmethod
     def receive(self, data: bytes) -> None:
-        """Take data that arrived; it may be split anywhere."""
+        """Take received data, which may be split anywhere."""
 
     def sample(self, snapshot: Snapshot) -> bytes:  # noqa: ARG002  many sessions send nothing
-        """Return the data that this tick sends to the client, or nothing. It is dropped if the client is slow."""
+        """Return this tick's data for the client, or nothing. It is dropped if the client is slow."""
         return b""
 
     def event(self, event: Event) -> None:  # noqa: B027  not every session has to
         """Handle an event of the robot."""
 
     def closed(self) -> None:
-        """Give back what the connection held, after it was closed."""
+        """Release what the connection held, after it was closed."""
         self.over = True
         self._control.leave()
 
 
 class InTurnSession(PortSession, Generic[Item]):
-    """Does what its client sends one after the other: the next begins when the previous one is done.
-
-    What has arrived is done even if the client disconnects, which keeps its control until then.
-    """
+    """Handles a client's requests one at a time; it finishes them, with control, even if the client disconnects."""
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
         super().__init__(robot, control, send)
         self._items = deque[Item]()
         self._busy = False
-        """True while an item is being processed."""
 
     @property
     def waiting(self) -> int:
@@ -75,10 +68,10 @@ class InTurnSession(PortSession, Generic[Item]):
 
     @abstractmethod
     async def _do(self, item: Item) -> None:
-        """Do one thing."""
+        """Handle one item."""
 
     def _add(self, item: Item, *, stop: bool = False) -> None:
-        """Do something in its turn; if it stops the arm and has to wait, stop the arm also at once."""
+        """Queue an item; if it stops the arm and has to wait, stop the arm at once as well."""
         if stop and self._busy:
             begin(self._robot.programs.stop(self._control))
         self._items.append(item)
@@ -110,12 +103,11 @@ class InTurnSession(PortSession, Generic[Item]):
 
 
 class Lines:
-    """Cuts a client's stream, which may be split anywhere, into lines, of which `longest` bytes are kept."""
+    """Splits a client's stream into lines; only the first `longest` bytes of each are kept."""
 
     def __init__(self, longest: int) -> None:
         self._longest = longest
         self.rest = bytearray()
-        """Beginning of an incomplete line."""
 
     def feed(self, data: bytes) -> list[bytes]:
         """Take a piece and return the lines that it completes, without their line feeds."""

@@ -1,4 +1,4 @@
-"""One client's socket with the session behind it, and how many clients may be connected."""
+"""One client's socket with its session, and the limit of connections."""
 
 import asyncio
 import contextlib
@@ -17,42 +17,37 @@ from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 log = logging.getLogger(__name__)
 
 PIECE = 256
-"""Bytes read from a client at a time, so that a client that floods its interface does not delay the others."""
+"""Bytes read from a client at a time, so that a flood does not delay the others."""
 MAX_COMMANDS = 32
-"""Commands of a client that may wait for answers before reading from it pauses, since one tick carries out all of
-them.
-"""
+"""Largest number of a client's unanswered commands; more pause reading, because one tick carries all of them out."""
 MAX_UNREAD = 1_000_000
 """Unread bytes at which a client is disconnected."""
 HEARS = MAX_UNREAD // 4
-"""Unread bytes above which, in real time, a client no longer gets messages that are sent to all clients."""
+"""In real time, unread bytes above which a client misses messages to all clients."""
 ANSWERS = MAX_UNREAD // 2
-"""Unread bytes above which, in real time, reading from a client pauses until it has read."""
+"""In real time, unread bytes above which reading from a client pauses."""
 MAX_UNREAD_LOCKSTEP = 64_000_000
-"""Limit in lockstep, where samples wait as well: a minute of samples."""
+"""`MAX_UNREAD` in lockstep, where samples wait as well: one minute of them."""
 
 LAST_WORDS = 65_536
-"""Most bytes that are still taken from a client that has reset its connection: the longest known program and more."""
+"""Largest amount still read from a client that has reset its connection [bytes]; longer than any known program."""
 
 UNREAD_FOR = 10.0
-"""Time after which a client is disconnected, in real time, to which no sample of what it requested can be sent [s]."""
+"""In real time, time without a successful sample after which a client is disconnected [s]."""
 
 MOST: Final = 256
-"""Largest number of connections to all interfaces of a robot together."""
+"""Largest number of connections to all interfaces of a robot."""
 KEPT: Final = 8
-"""Number of places kept for clients on this machine, so that a local user can always connect."""
+"""Number of places reserved for clients on this machine, so that a local user can always connect."""
 SCARCE: Final = 0.9
-"""Share of the places above which each new client displaces another [-]."""
+"""Share of places in use above which each new client displaces another [-]."""
 
 MakeSession = Callable[[ConnectionControl, Send], PortSession]
-"""Creates an interface's session from its access to the controller and the function that sends to the client."""
+"""Creates an interface's session from its access to the controller and its send function."""
 
 
 class Connection(asyncio.BufferedProtocol):
-    """One client at one interface. It counts to the limit of the robot until it is closed.
-
-    If it is lossless, samples wait for a slow client, because a client advances time.
-    """
+    """One client at one interface; if it is lossless (lockstep), samples wait for a slow client."""
 
     def __init__(
         self,
@@ -72,14 +67,14 @@ class Connection(asyncio.BufferedProtocol):
         self._behind = False
         """Whether the client has left many answers unread."""
         self._took = 0.0
-        """When a sample was last passed to the socket, which had sent the one before [s of the loop's clock]."""
+        """When the socket last accepted a sample [s of the loop's clock]."""
         self.session: PortSession | None = None
         self.peer = "a client"
-        """The client and its interface, as a phrase for messages to people."""
+        """Description of the client and its interface, for messages."""
         self.heard = 0.0
         """When the client last sent something, or connected [s of the loop's clock]."""
         self.dropped = 0
-        """Number of samples that were dropped because the client is slow."""
+        """Number of samples dropped because the client is slow."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start a session, unless all places are taken."""
@@ -100,11 +95,9 @@ class Connection(asyncio.BufferedProtocol):
         self._guarded(self.session.opened)
 
     def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002  the size is fixed
-        """Return the buffer for the next piece of data."""
         return self._piece
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Pass received data to the session."""
         session = self.session
         self.heard = asyncio.get_running_loop().time()
         if session is not None:
@@ -113,22 +106,19 @@ class Connection(asyncio.BufferedProtocol):
             self._listen()
 
     def pause_writing(self) -> None:
-        """Note that the client has stopped reading, and pause reading from it."""
         self._behind = True
         self._listen()
 
     def resume_writing(self) -> None:
-        """Note that the client has caught up, and resume reading from it."""
         self._behind = False
         self._listen()
 
     def _hear(self, answer: Callable[[], None]) -> None:
-        """Handle an answer of the controller."""
         self._guarded(answer)
         self._listen()
 
     def _listen(self) -> None:
-        """Resume or pause reading from the client, or close the connection if its session is over."""
+        """Pause or resume reading, or close the connection if its session is over."""
         session, transport = self.session, self._transport
         if session is None or transport is None or transport.is_closing():
             return
@@ -140,7 +130,6 @@ class Connection(asyncio.BufferedProtocol):
             transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Clean up after the connection was closed by either side."""
         session, transport = self.session, self._transport
         if isinstance(exc, ConnectionError) and session is not None and transport is not None:
             left = _left_in(transport)
@@ -172,7 +161,7 @@ class Connection(asyncio.BufferedProtocol):
             self.send(message)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Return the sample of a tick, which `put` sends; empty if there is none."""
+        """Return the sample of a tick for `put`; empty if there is none."""
         session, transport = self.session, self._transport
         if session is None or transport is None or transport.is_closing():
             return b""
@@ -187,7 +176,7 @@ class Connection(asyncio.BufferedProtocol):
         return data
 
     def put(self, sample: bytes) -> None:
-        """Send a sample; in real time it is dropped if earlier bytes are still waiting, never queued."""
+        """Send a sample; in real time it is dropped, not queued, if earlier bytes are still waiting."""
         transport, now = self._transport, asyncio.get_running_loop().time()
         if self._lossless:
             self.send(sample)
@@ -201,29 +190,26 @@ class Connection(asyncio.BufferedProtocol):
                 self.disconnect()
 
     def event(self, event: Event) -> None:
-        """Pass an event to the session."""
         session = self.session
         if session is not None:
             self._guarded(lambda: session.event(event))
 
     @property
     def dispensable(self) -> bool:
-        """Whether the client may be disconnected to make room for another."""
         session = self.session
         return session is not None and session.client_begins and not session.served
 
     def disconnect(self) -> None:
-        """Close the connection at once, even if the client has yet to read something."""
+        """Close the connection at once, even if data is still unsent."""
         if self._transport is not None:
             self._transport.abort()
 
     def close(self) -> None:
-        """Close the connection after sending what a client that reads still has to get."""
         if self._transport is not None:
             self._transport.close()
 
     def _guarded(self, action: Callable[[], None]) -> None:
-        """Call a function; log an error in it and end only this connection, so that other clients are not affected."""
+        """Call a function; log an exception and end only this connection."""
         try:
             action()
         except Exception:
@@ -233,13 +219,10 @@ class Connection(asyncio.BufferedProtocol):
 
 
 class ConnectionLimit:
-    """Decides which clients may connect.
+    """Decides which clients may connect, so that a flood of new ones does not disturb those at work.
 
-    When nine places of ten are taken, each new client displaces the dispensable client that has been silent for
-    longest. Dispensable are clients of the dashboard, and clients of RTDE that are not being served: RTDE serves a
-    client from its start to its pause, and during this time the client may only read. Clients that are being served
-    stay connected, and so do those that read from the other interfaces. A new client is turned away only if such
-    clients take all places, so a flood of new clients does not disturb those that are working.
+    When 90 % of the places are taken, each new client displaces the dispensable one that has been silent for
+    longest: a dashboard client, or an RTDE client outside the time from its start to its pause.
     """
 
     def __init__(self, now: Callable[[], float], note: Callable[[str], None], most: int = MOST) -> None:
@@ -250,7 +233,7 @@ class ConnectionLimit:
         self._most = most
 
     def make_room(self, peer: str, *, local: bool) -> bool:
-        """Return whether a new client, on this machine or another, may connect; disconnect one for it if necessary."""
+        """Return whether a new client may connect; disconnect another one for it if necessary."""
         if len(self.taken) >= SCARCE * self._most:
             self._send_one_away(peer)
         kept = 0 if local else KEPT
@@ -280,11 +263,7 @@ class ConnectionLimit:
 
 
 def _left_in(transport: asyncio.Transport) -> bytes:
-    """What has arrived on a connection that was reset before it was read.
-
-    A client that sends a script and closes at once, with states unread, resets its connection. If the server writes
-    before it reads, it gets to know of the reset first.
-    """
+    """Return unread data of a connection that its client has reset, as after sending a script with states unread."""
     left = bytearray()
     with (
         socket.socket(fileno=os.dup(transport.get_extra_info("socket").fileno())) as stream,

@@ -1,4 +1,4 @@
-"""UR's dashboard, port 29999: commands, one a line, and their answers, which clients compare word by word."""
+"""UR's dashboard, port 29999: one command a line, and answers that clients compare word by word."""
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
@@ -18,24 +18,23 @@ GREETING: Final = "Connected: Universal Robots Dashboard Server"
 LONGEST: Final = 4096
 """Longest line [bytes]; the rest of a longer one is ignored."""
 PATIENCE: Final = 2500
-"""Ticks within which a stopped arm has to come to rest."""
+"""Ticks within which a stopped arm must come to rest."""
 ECHO: Final = 200
 """Characters of an unknown line that the answer repeats."""
 UNNAMED: Final = "<unnamed>"
-"""Name of the program while none is loaded."""
+"""Reported name of the program while none is loaded."""
 INSTALLATION: Final = "default.installation"
-"""Name of the only installation."""
 MODES: Final = ("MANUAL", "AUTOMATIC")
 TOO_SOON: Final = (
     "Cannot unlock protective stop until 5s after occurrence. "
     "Always inspect cause of protective stop before unlocking"
 )
-"""UR's answer. Here it means that the arm is still stopping; there are no 5 s to wait."""
+"""UR's answer. Here it means that the arm is still stopping; there is no wait of 5 s."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """One command as a client sent it."""
+    """A command as a client sent it."""
 
     robot: UrRobot
     control: ConnectionControl
@@ -46,17 +45,14 @@ class Request:
 
 @dataclass(frozen=True)
 class Command:
-    """One row of the table of commands."""
+    """A row of the table of commands."""
 
     keyword: str
     """Keyword in the manual's spelling; clients may use any case."""
     carry_out: Callable[[Request], str | Awaitable[str | None] | None]
-    """Returns the answer, at once or later; None if the command has failed."""
+    """Returns the answer, possibly awaited; None if the command failed."""
     argument: bool = False
-    """True if the command takes an argument."""
-
-
-# ---------------------------------------------------------------------- power and safety
+    """Whether the command takes an argument."""
 
 
 def _changing(
@@ -64,7 +60,7 @@ def _changing(
     done: str,
     too_soon: str | None = None,
 ) -> Callable[[Request], Awaitable[str | None]]:
-    """Return what makes a change and answers `done`, or `too_soon` if the mode does not permit it."""
+    """Return a handler that makes a change and answers `done`, or `too_soon` if the mode forbids the change."""
 
     async def carry_out(request: Request) -> str | None:
         refused = await change(request.robot, request.control)
@@ -91,9 +87,6 @@ def _safety_status(request: Request) -> str:
 
 def _safety(number: int | None) -> str:
     return SafetyMode.UNDEFINED.name if number is None else SafetyMode(number).name
-
-
-# ---------------------------------------------------------------------- programs
 
 
 async def _load(request: Request) -> str:
@@ -150,9 +143,6 @@ def _is_program_saved(request: Request) -> str:
     return f"{_bool(programs.saved)} {programs.name or UNNAMED}"
 
 
-# ---------------------------------------------------------------------- the person at the robot
-
-
 def _popup(request: Request) -> str:
     stamp = messages.stamp(request.robot.latest)
     request.robot.tell(messages.popup(stamp, "Message", request.argument))
@@ -183,9 +173,6 @@ def _clear_operational_mode(request: Request) -> str | None:
         return None
     request.robot.operational_mode = NO_MODE
     return f"No longer controlling the operational mode. Current operational mode: {NO_MODE}"
-
-
-# ---------------------------------------------------------------------- information
 
 
 def _model(request: Request) -> str:
@@ -243,7 +230,7 @@ COMMANDS: Final = (
     Command("shutdown", _changing(power.power_off, "Shutting down")),
     Command(QUIT, _say("Disconnected")),
 )
-"""All commands; a longer keyword comes before one that it begins with."""
+"""All commands; a longer keyword precedes one that it starts with."""
 
 
 def find(line: str) -> tuple[Command, str] | None:
@@ -267,15 +254,14 @@ class DashboardSession(InTurnSession[str]):
         super().__init__(robot, control, send)
         self._lines = Lines(LONGEST)
         self._rests: Later[bool] | None = None
-        """What waits for the arm to rest."""
+        """Waits for the arm to rest."""
         self._last = 0
-        """Tick at which waiting for rest ends."""
+        """Tick at which this wait ends."""
 
     def opened(self) -> None:
         self._say(GREETING)
 
     def receive(self, data: bytes) -> None:
-        """Carry out the commands that are complete with these bytes."""
         for line in self._lines.feed(data):
             if not self.over:
                 text = line.decode(errors="replace").strip()
@@ -295,7 +281,7 @@ class DashboardSession(InTurnSession[str]):
             self._end()
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Continue a command that waited for the arm to rest."""
+        """Resume a command that waits for the arm to rest."""
         rests = self._rests
         if rests is not None:
             still = snapshot.runtime_state == RuntimeState.STOPPED
@@ -305,7 +291,6 @@ class DashboardSession(InTurnSession[str]):
         return b""
 
     def closed(self) -> None:
-        """Carry out nothing more."""
         self._end()
         super().closed()
         if self._rests is not None:

@@ -1,4 +1,4 @@
-"""Programs with a node External Control, which get a part of their text from the client that plays them."""
+"""Programs with an External Control node, which fetch part of their text from the client that plays them."""
 
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
@@ -12,36 +12,36 @@ from tvist_server.polyscope_nodes import EXTERNAL_CONTROL
 from tvist_server.program_folder import ProgramFolder
 
 FILE: Final = "external_control.urp"
-"""Program that consists of the node alone, which exists without a file."""
+"""Built-in program that consists of the node alone."""
 ALONE: Final = program("external_control", EXTERNAL_CONTROL)
 
 Fetch = Callable[[str], Awaitable[str | None]]
-"""Asks a machine for its part of the program; returns None if it does not answer."""
+"""Requests a machine's part of the program; returns None if it does not answer."""
 Aside = Callable[[Callable[[], str | None]], Awaitable[str | None]]
-"""Reads a text beside the thread that calls it, which serves all clients."""
+"""Reads a text in another thread, because the calling thread serves all clients."""
 
 
 class ExternalControl:
-    """Completes such programs; `folder` has those that clients load by their names."""
+    """Completes such programs; `folder` has those that clients load by name."""
 
     def __init__(self, folder: ProgramFolder | None, fetch: Fetch, aside: Aside) -> None:
         self._folder, self._fetch, self._aside = folder, fetch, aside
 
     async def find(self, name: str) -> str | None:
-        """Return the text of a program that has to be completed; None if there is none of this name."""
+        """Return the text of a program that must be completed; None if there is none of this name."""
         return await self._aside(partial(self._text, name))
 
     def _text(self, name: str) -> str | None:
         text = None
         if self._folder is not None:
-            with suppress(UserFileError):  # loading it says what is wrong
+            with suppress(UserFileError):  # loading it reports the error
                 text = self._folder.read(name)
         if text is None and name == FILE:
             return ALONE
         return text if text is not None and EXTERNAL_CONTROL in text else None
 
     async def complete(self, text: str, host: str) -> str | None:
-        """Complete a text for the machine that plays it; None if it does not answer or the text is too long."""
+        """Insert the part of the machine `host`; None if it does not answer or the text becomes too long."""
         sent = await self._fetch(host)
         whole = None if sent is None else with_external_control(text, sent)
         return None if whole is None or len(whole) > MAX_SCRIPT else whole

@@ -1,4 +1,4 @@
-"""One client of the gripper of a cell, on the port of Robotiq's URCap."""
+"""One client of the cell's gripper, on the port of Robotiq's URCap."""
 
 from collections.abc import Callable
 
@@ -8,11 +8,11 @@ from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
 
 AskGripper = Callable[[bytes, Callable[[bytes], None]], None]
-"""Has a request carried out between two ticks; the answer comes in another thread."""
+"""Carries out a request between two ticks; the answer comes in another thread."""
 
 
 class GripperSession(PortSession):
-    """Passes requests to the gripper in the controller; `soon` brings the answers to the interfaces' thread."""
+    """Passes requests to the gripper in the controller; `soon` runs a function in the interfaces' thread."""
 
     client_begins = True
     waiting = 0
@@ -30,7 +30,6 @@ class GripperSession(PortSession):
         self._requests = Requests()
 
     def receive(self, data: bytes) -> None:
-        """Pass on the requests that are complete with these bytes."""
         for request in self._requests.cut(data):
             self.waiting += 1
             self._ask(request, lambda answer: self._soon(lambda: self._answered(answer)))

@@ -41,32 +41,17 @@ log = logging.getLogger(__name__)
 FIRST = 1000
 """Longest wait for the first tick [ticks]."""
 MAX_PENDING = 250
-"""States that may wait for the interfaces' thread: half a second."""
+"""Largest number of states queued for the interfaces' thread: half a second."""
 LEAD = 20
-"""Largest lead in lockstep; the further a step runs ahead of published states, the later clients get answers."""
+"""Largest queue in lockstep: the further a step runs ahead of published states, the later clients get answers."""
 PAUSE = 0.02
-"""Time between two checks for room, in lockstep [s]."""
+"""Time between two checks for room in lockstep [s]."""
 UNREAD = 10
-"""States that are handed over at once while there is no client: they count for temperatures and energies alone."""
+"""States handed over together while there is no client; only temperatures and energies need them then."""
 
 
 class UrInterfaces(Gateway):
-    """A robot's interfaces. The constructor binds the sockets; `open` lets clients in.
-
-    Args:
-        desk: The robot's desk.
-        description: Description of the robot.
-        name: Name of the robot on the network.
-        address: IP address to listen on.
-        ports: Port of each interface; an interface without a port stays closed.
-        lockstep: Whether a client advances time, so that no state may be lost.
-        gripper: Has a request to the cell's gripper carried out; None without one, so that its port is closed.
-        programs: Folder with programs that clients load by their names.
-        reserved: Input variables of RTDE that no client may own, as if a fieldbus did.
-
-    Raises:
-        GatewayError: The server cannot listen on a port.
-    """
+    """A robot's UR interfaces. The constructor binds the sockets (GatewayError if it cannot); `open` admits clients."""
 
     takes: Collection[Topic] = frozenset[Topic]({"state", "event", "io"})
 
@@ -76,12 +61,12 @@ class UrInterfaces(Gateway):
         description: RobotDescription,
         name: str,
         address: str,
-        ports: Mapping[InterfaceName, int],
+        ports: Mapping[InterfaceName, int],  # an interface without a port stays closed
         *,
-        lockstep: bool = False,
-        gripper: AskGripper | None = None,
-        programs: ProgramFolder | None = None,
-        reserved: Sequence[str] = (),
+        lockstep: bool = False,  # whether a client advances time, so that no state may be lost
+        gripper: AskGripper | None = None,  # carries out a request; None: no gripper
+        programs: ProgramFolder | None = None,  # programs that clients load by name
+        reserved: Sequence[str] = (),  # RTDE inputs that no client may own, as if a fieldbus owned them
     ) -> None:
         self.setpoints_refused = 0
         self.address = address
@@ -95,20 +80,20 @@ class UrInterfaces(Gateway):
         self._instruments, self._boards = Instruments(description), defaultdict[int, Board](Board)
         self._io: Io | None = None
         self._early = deque[Report](maxlen=FIRST)
-        """States from before the interfaces open, since temperatures and energies begin with the first tick."""
+        """States from before `open`: temperatures and energies are integrated from the first tick."""
         self._connections: set[Connection] = set()
         """Connections that have a place while the interfaces are open."""
         self._leases = WeakValueDictionary[str, HostLease]()
-        """Lease of each host; it exists as long as one of the host's connections."""
+        """Lease of each host; it lives as long as one of the host's connections."""
         self._adopted: HostLease | None = None
         """Lease that this process holds in the name of a host."""
         self._lockstep = lockstep
         self._news = deque[Report | Message]()
-        """What was published and waits for the interfaces' thread."""
+        """Messages for the interfaces' thread."""
         self._woken = False
-        """Whether that thread has been asked to take it, and has not begun."""
+        """Whether that thread has been woken and has not run yet."""
         self._unread: Report | None = None
-        """Last tick that only temperatures and energies have followed."""
+        """Last tick of which only temperatures and energies were computed."""
         self._room = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._servers: list[asyncio.Server] = []
@@ -125,12 +110,10 @@ class UrInterfaces(Gateway):
 
     @property
     def ports(self) -> dict[InterfaceName, int]:
-        """Actual port of each interface."""
         return {interface: bound.getsockname()[1] for interface, bound in self._sockets.items()}
 
     @property
     def clients(self) -> int:
-        """Number of connections that are open now."""
         return len(self._connections)
 
     async def _first_tick(self) -> None:
@@ -141,10 +124,10 @@ class UrInterfaces(Gateway):
             await asyncio.sleep(PERIOD)
 
     async def open(self) -> None:
-        """Let clients in after the first tick; the running event loop serves them."""
+        """Admit clients after the first tick; the running event loop serves them."""
         await self._first_tick()
-        # One event loop beside the tick thread serves all clients: a process of its own would be a millisecond late and
-        # decode everything twice, and a thread for each client would compete with the tick.
+        # One event loop serves all clients: another process would be a millisecond late and decode everything
+        # twice, and a thread per client would compete with the tick.
         self._loop = asyncio.get_running_loop()
         limit = ConnectionLimit(self._loop.time, self._coming_and_going.tell)
         self._connections = limit.taken
@@ -160,7 +143,7 @@ class UrInterfaces(Gateway):
         self._run(self._keep_alive())
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  not MessagePack here
-        """Pass a message to the interfaces' thread; states come by `report`."""
+        """Pass a message to the interfaces' thread; states come through `report`."""
         if self._loop is None:
             if isinstance(message, Io):
                 self._io = message
@@ -169,7 +152,7 @@ class UrInterfaces(Gateway):
             self._wake()
 
     def report(self, report: Report) -> None:
-        """Pass a tick to the interfaces' thread, which makes its state for clients alone."""
+        """Pass a tick to the interfaces' thread, which builds its state only if there are clients."""
         if self._loop is None:  # the interfaces are not open
             self._early.append(report)
         elif not self._has_room():
@@ -180,7 +163,7 @@ class UrInterfaces(Gateway):
                 self._wake()
 
     def _has_room(self) -> bool:
-        """Return whether one more state may wait; in lockstep, wait until there is room."""
+        """Return whether one more state may be queued; in lockstep, wait until there is room."""
         most = LEAD if self._lockstep else MAX_PENDING
         while len(self._news) >= most:
             if not self._lockstep or self._loop is None:
@@ -190,13 +173,12 @@ class UrInterfaces(Gateway):
         return True
 
     def _wake(self) -> None:
-        """Have the interfaces' thread look, unless it is about to."""
+        """Wake the interfaces' thread, unless it is about to run."""
         if not self._woken:
             self._woken = True
             self._soon(self._look)
 
     async def shut(self) -> None:
-        """Let no more clients in, and disconnect the present ones."""
         for task in self._tasks:
             task.cancel()
         for server in self._servers:
@@ -211,14 +193,13 @@ class UrInterfaces(Gateway):
         self._coming_and_going.flush()
 
     def close(self) -> None:
-        """Stop listening. A second call does nothing."""
         self._loop = None
         self._close_sockets()
 
-    # ------------------------------------------------------------------ in the interfaces' thread
+    # The following methods run in the interfaces' thread.
 
     def _look(self) -> None:
-        """Take what waits by now; what comes meanwhile wakes this thread again, so that clients get their turn."""
+        """Handle the queued messages; later ones wake this thread again, so that clients get their turn."""
         self._woken = False
         for _ in range(len(self._news)):
             message = self._news.popleft()
@@ -238,7 +219,7 @@ class UrInterfaces(Gateway):
             return
         if self._connections:
             snapshot = self._read(report)
-            # All is made before any of it is sent: the readers' process then stays awake for all, and wakes up once.
+            # All samples are made before the first is sent, so that the readers' process wakes up only once.
             for connection, data in [(one, one.sample(snapshot)) for one in tuple(self._connections)]:
                 if data:
                     connection.put(data)
@@ -267,12 +248,12 @@ class UrInterfaces(Gateway):
                 connection.tell(message)
 
     def adopt(self, host: str, token: str) -> None:
-        """Let the clients of a host act with a lease that this process holds in its name; before `open`."""
+        """Let the clients of a host use a lease that this process holds in its name; call before `open`."""
         self._adopted = self._lease(host)
         self._adopted.adopt(token, self)
 
     def _session(self, interface: InterfaceName, control: ConnectionControl, send: Send) -> PortSession:
-        self._look()  # the client has to find the robot as it is now
+        self._look()  # the client must see the robot's present state
         robot, read_only = self.robot, interface.endswith("read_only")
         match interface:
             case "gripper":
@@ -302,7 +283,7 @@ class UrInterfaces(Gateway):
                 loop.call_soon_threadsafe(action)
 
     def _aside(self, read: Callable[[], str | None]) -> Later[str | None]:
-        """Read a file in a thread of its own, for which nobody waits at the end."""
+        """Read a file in a daemon thread, which shutdown does not wait for."""
         later = Later[str | None]()
 
         def reading() -> None:
@@ -317,7 +298,6 @@ class UrInterfaces(Gateway):
         return later
 
     def _fetch(self, host: str) -> Later[str | None]:
-        """Ask a machine for its part of a program."""
         later = Later[str | None]()
 
         async def fetching() -> None:
@@ -327,7 +307,6 @@ class UrInterfaces(Gateway):
         return later
 
     def _run(self, work: Coroutine[object, object, None]) -> None:
-        """Run a task until `shut`."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

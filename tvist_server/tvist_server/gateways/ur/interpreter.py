@@ -1,4 +1,4 @@
-"""UR's interpreter mode, port 30020: statements for the program that waits for them, each answered with one line."""
+"""UR's interpreter mode, port 30020: statements for a waiting program, each answered with one line."""
 
 from typing import Final, Literal
 
@@ -30,14 +30,14 @@ NO_PROGRAM, TOO_MANY, SYNTAX, COMPILATION, TOO_LONG = (
     "Compile error",
     "Statement is too long",
 )
-"""UR's words with which a `discard` begins, by which clients know the reason; the last is not UR's."""
+"""Reasons of a `discard`, by which clients recognize it; all but the last are UR's."""
 
 
 class InterpreterSession(InTurnSession[tuple[str, bool]]):
-    """One client of the interpreter mode.
+    """One client of the interpreter mode; a blank line is ignored.
 
-    A line is a statement, or several. It is answered by `ack: NUMBER: line`, or by `discard: REASON: line`; a question
-    by `state: NUMBER: question`. Blank lines are ignored.
+    A line of statements is answered by `ack: NUMBER: line` or `discard: REASON: line`, a question by
+    `state: NUMBER: question`.
     """
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
@@ -45,7 +45,6 @@ class InterpreterSession(InTurnSession[tuple[str, bool]]):
         self._lines = Lines(LONGEST + 1)
 
     def receive(self, data: bytes) -> None:
-        """Add the lines that are complete with these bytes to those that wait for their turn."""
         for line in self._lines.feed(data):
             too_long = len(line) > LONGEST
             text = (line[:ECHO] if too_long else line).decode(errors="replace").strip()
@@ -82,7 +81,7 @@ class InterpreterSession(InTurnSession[tuple[str, bool]]):
 
 
 def _reason(refused: Refused) -> str:
-    """Why a line was refused, with the column if it is not valid."""
+    """Return the reason of a refusal, with the column if the line is invalid."""
     why = refused.why
     if refused.code == "script_error":
         column = refused.where.rpartition(":")[2]

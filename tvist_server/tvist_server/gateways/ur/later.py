@@ -1,7 +1,6 @@
-"""Coroutines without a loop: each continues inside the call that brings what it waits for.
+"""Coroutines without an event loop: each resumes inside the call that brings its value.
 
-A task of asyncio would continue a turn of the loop later: in lockstep an answer could come behind the states of later
-ticks. Sessions also know no loop, so that their tests need none.
+An asyncio task would resume a turn of the loop later: in lockstep, answers could follow the states of later ticks.
 """
 
 from collections.abc import Coroutine, Generator
@@ -12,21 +11,19 @@ T = TypeVar("T")
 
 
 class Later(Generic[T]):
-    """A value that comes once. Those who wait for it continue in the order in which they began to wait."""
+    """A value that is set once. Waiting coroutines resume in the order in which they started to wait."""
 
     def __init__(self) -> None:
         self._values: list[T] = []
         self._waiting: list[Coroutine[Later[Any], None, object]] = []
 
     def come(self, value: T) -> None:
-        """Take the value; a second one changes nothing."""
         if not self._values:
             self._values.append(value)
             for coroutine in self._waiting:
                 begin(coroutine)
 
     def wait(self, coroutine: "Coroutine[Later[Any], None, object]") -> None:
-        """Continue a coroutine when the value has come."""
         self._waiting.append(coroutine)
 
     def __await__(self) -> "Generator[Later[Any], None, T]":
@@ -36,6 +33,6 @@ class Later(Generic[T]):
 
 
 def begin(coroutine: Coroutine[Later[Any], None, object]) -> None:
-    """Run a coroutine, or continue it, until it has to wait."""
+    """Run or resume a coroutine until it has to wait."""
     with suppress(StopIteration):
         coroutine.send(None).wait(coroutine)

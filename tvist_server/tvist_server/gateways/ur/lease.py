@@ -1,8 +1,4 @@
-"""Control for clients without leases: a host gets control with its first command that changes something.
-
-All connections of a host share the lease, because a client opens several: one for commands, one for inputs, one to
-listen. Control is given back when the last connection that used it is closed.
-"""
+"""Control for clients without leases: a host's connections share it from its first command until the last closes."""
 
 from collections.abc import Awaitable, Callable
 
@@ -11,8 +7,8 @@ from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_server.gateways.base import Desk
 from tvist_server.gateways.ur.later import Later, begin
 
-# The longest that the protocol allows, since the control of a host ends with its connections and not with time.
-# ALIVE is wall time, the lease robot's time, which may pass many times faster in lockstep.
+# The longest lease that the protocol allows: a host's control ends with its connections, not with time. ALIVE
+# is wall time but the lease is robot time, which can pass many times faster in lockstep.
 LEASE = 3600.0
 """Duration of the lease without renewal [s]; it is renewed every `ALIVE`."""
 ALIVE = 10.0
@@ -25,7 +21,7 @@ MakeCommand = Callable[[str], Command]
 
 
 class HostLease:
-    """Control for the clients of one host; `soon` brings replies to the interfaces' thread."""
+    """Control for the clients of one host; `soon` runs a function in the interfaces' thread."""
 
     def __init__(self, desk: Desk, host: str, soon: Callable[[Callable[[], None]], None]) -> None:
         self.client = f"ur-{host}"
@@ -34,7 +30,7 @@ class HostLease:
         self._soon = soon
         self._token = _NO_TOKEN
         self._taking: Later[Reply] | None = None
-        """Reply to a request for control that is under way."""
+        """Reply to a pending request for control."""
         self._users: set[object] = set()
 
     async def change(self, connection: object, command: MakeCommand) -> Reply:
@@ -44,8 +40,7 @@ class HostLease:
             reply = await self.ask(command(self._token))
             if not (isinstance(reply, Refused) and reply.code in _LOST and reply.where == "token"):
                 return reply
-            # The lease has been lost since, through another client's power command or a reset. Control may be free
-            # again.
+            # The lease was lost to another client's power command or to a reset; control may be free again.
             self._token = _NO_TOKEN
         taken = await self._take()
         if not isinstance(taken, Accepted) or taken.token is None:
@@ -53,37 +48,35 @@ class HostLease:
         return await self.ask(command(taken.token))
 
     def ask(self, command: Command) -> Later[Reply]:
-        """Send a command as it is; it needs no control, or has its token already."""
+        """Send a command that needs no control or already has its token."""
         later = Later[Reply]()
         self._desk.command(command, lambda reply: self._soon(lambda: later.come(reply)), self.host)
         return later
 
     def leave(self, connection: object) -> None:
-        """Note that a connection is closed; give back control if it was the last one that used it."""
+        """Note that a connection is closed; release control if it was the last one that used it."""
         self._users.discard(connection)
         if not self._users and self._token != _NO_TOKEN:
             token, self._token = self._token, _NO_TOKEN
             begin(self._release(token))
 
     async def _release(self, token: str) -> None:
-        """Give back control, and report the client as gone unless a connection has begun to use it again."""
+        """Release control, and report the client as gone unless a connection has used control again."""
         await self.ask(ReleaseControl(token=token))
         if not self._users:
             self._desk.client_gone(self.client)
 
     def adopt(self, token: str, holder: object) -> None:
-        """Act with control that this host holds already by somebody else, and do not give it back."""
+        """Use a lease that another part of the process has taken for this host, and do not release it."""
         self._token = token
         self._users.add(holder)
 
     def keep_alive(self) -> None:
-        """Renew the lease, if there is one."""
         if self._token != _NO_TOKEN:
             self.ask(KeepAlive(token=self._token))
 
     @property
     def held_by_other(self) -> bool:
-        """Whether another client has control."""
         return self._desk.holder() not in {None, self.client}
 
     def _take(self) -> Later[Reply]:
@@ -108,7 +101,7 @@ class HostLease:
 
 
 class ConnectionControl:
-    """How one connection sends commands to the controller; `peer` names its client in messages to people."""
+    """Access of one connection to the controller; `peer` names its client in messages."""
 
     def __init__(
         self,
@@ -119,16 +112,15 @@ class ConnectionControl:
         self.peer, self.host = peer or lease.client, lease.host
         self._lease = lease
         self.hear = hear
-        """Has an answer handled, which is a function to call."""
+        """Handles an answer, which is a function to call."""
         self.unanswered = 0
-        """Number of commands that are not yet answered."""
+        """Number of commands without an answer."""
 
     def change(self, command: MakeCommand) -> Later[Reply]:
-        """Send a command that needs control; it is refused if another client has control."""
+        """Send a command that needs control; it is refused if another client has it."""
         return self._heard(self._lease.change(self, command))
 
     def ask(self, command: Command) -> Later[Reply]:
-        """Send a command that does not need control."""
         return self._heard(self._lease.ask(command))
 
     def _heard(self, reply: Awaitable[Reply]) -> Later[Reply]:
@@ -144,13 +136,13 @@ class ConnectionControl:
 
     @property
     def held_by_other(self) -> bool:
-        """Whether another client is known to have control, so that commands that change something are refused."""
+        """Whether another client has control, so that commands that change something are refused."""
         return self._lease.held_by_other
 
     def lasting(self) -> "ConnectionControl":
-        """Return a further access for the same host, which does not end with the connection."""
+        """Return another access for the same host, which survives the connection."""
         return ConnectionControl(self._lease, self.hear, self.peer)
 
     def leave(self) -> None:
-        """Give back control, when the connection or what outlasted it has ended."""
+        """Release control, when the connection or its lasting access has ended."""
         self._lease.leave(self)

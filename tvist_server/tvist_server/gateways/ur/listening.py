@@ -8,19 +8,14 @@ from tvist_server.gateways.base import GatewayError
 from tvist_server.ur_ports import InterfaceName
 
 SEND_BUFFER = 32_768
-"""System's send buffer for a client [bytes]: a tenth of a second of samples; a larger one would only add delay."""
+"""System's send buffer for a client [bytes]: 0.1 s of samples; more would only add delay."""
 PROBES = (10, 5, 3)
-"""TCP keepalive: idle time before the first probe [s], time between probes [s], and number of unanswered probes after
-which a client counts as disconnected and loses control. Its machine may have lost power or network.
-"""
+"""TCP keepalive: idle time before the first probe [s], time between probes [s], and number of unanswered
+probes after which a client counts as disconnected and loses control, as when its machine has lost power."""
 
 
 def listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
-    """Return a socket that listens for the clients of an interface.
-
-    Raises:
-        GatewayError: The server cannot listen on this port.
-    """
+    """Return a socket that listens for clients of an interface; raise GatewayError if that is impossible."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     bound = socket.socket(family, socket.SOCK_STREAM)
     try:
@@ -41,7 +36,6 @@ def listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
 
 
 def _probe(bound: socket.socket) -> None:
-    """Have silent peers probed as `PROBES` says, where the system lets it be chosen."""
     if sys.platform == "linux":
         options = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
         for option, value in zip(options, PROBES, strict=True):

@@ -1,7 +1,4 @@
-"""Robot messages: packages of type 20, which report events.
-
-int32 length, uint8 20, uint64 time [µs], uint8 source, uint8 kind, body; big-endian.
-"""
+"""Robot messages: int32 length, uint8 20, uint64 time [µs], uint8 source, uint8 kind, body; big-endian."""
 
 from enum import IntEnum
 from struct import Struct
@@ -11,13 +8,12 @@ from tvist_controller.instruments.snapshot import Snapshot
 
 ROBOT_MESSAGE: Final = 20
 SOURCE: Final = 254
-"""Source -2, which is neither a joint nor a board."""
+"""Source -2: neither a joint nor a board."""
 LONGEST: Final = 1000
 """Longest text [bytes]: some clients reject packages of more than 2000 bytes."""
 
 PROTECTIVE_STOP: Final = 209
 READ_ONLY: Final = 210
-"""Codes of error messages."""
 
 _HEADER = Struct(">iBQBB")
 _ERROR = Struct(">iiiII")
@@ -43,7 +39,7 @@ class MessageKind(IntEnum):
 
 
 class ErrorLevel(IntEnum):
-    """UR's numbers for how severe an error code is."""
+    """UR's levels of severity of an error code."""
 
     DEBUG = 0
     INFO = 1
@@ -54,12 +50,12 @@ class ErrorLevel(IntEnum):
 
 
 def stamp(snapshot: Snapshot | None) -> int:
-    """Return the time of a tick as packages state it [µs]; 0 before the first tick."""
+    """Return the time of a tick for a package [µs]; 0 before the first tick."""
     return 0 if snapshot is None else round(1e6 * snapshot.timestamp)
 
 
 def version(major: int, minor: int, bugfix: int, build: int, date: str) -> bytes:
-    """Encode the version of the software, which is the first message that a client gets."""
+    """Encode the software version, the first message that a client gets."""
     name = b"URControl"
     body = bytes([len(name)]) + name + _VERSION.pack(major, minor, bugfix, build) + _text(date)
     return _message(0, MessageKind.VERSION, body)
@@ -71,7 +67,7 @@ def text(time: int, what: str) -> bytes:
 
 
 def label(time: int, number: int, name: str) -> bytes:
-    """Encode the line of the program tree that a program has come to, by its number and its name."""
+    """Encode the line of the program tree, by number and name, that a program has reached."""
     return _message(time, MessageKind.LABEL, _NUMBER.pack(number) + _text(name))
 
 
@@ -82,7 +78,7 @@ def key(time: int, title: str, what: str) -> bytes:
 
 
 def runtime_exception(time: int, line: int, column: int, what: str) -> bytes:
-    """Encode why a program cannot continue or cannot begin; line and column are 1 for the first."""
+    """Encode why a program cannot continue or start; line and column count from 1."""
     return _message(time, MessageKind.RUNTIME_EXCEPTION, _PLACE.pack(line, column) + _text(what))
 
 
@@ -92,14 +88,14 @@ def error_code(time: int, code: int, argument: int, level: ErrorLevel, what: str
 
 
 def safety_mode(time: int, mode: int) -> bytes:
-    """Encode a change to this safety mode, given as RTDE's number."""
+    """Encode a change to a safety mode, given as RTDE's number."""
     return _message(time, MessageKind.SAFETY_MODE, _SAFETY.pack(0, 0, mode & 0xFF, 0, 0))
 
 
 def popup(
     time: int, title: str, what: str, *, warning: bool = False, error: bool = False, blocking: bool = False
 ) -> bytes:
-    """Encode a window for the person at the robot, for which the program waits if it is `blocking`."""
+    """Encode a window for the operator; if it is `blocking`, the program waits until it is closed."""
     head = _text(title, 255)
     body = _POPUP.pack(0, 0, warning, error, blocking, len(head)) + head + _text(what)
     return _message(time, MessageKind.POPUP, body)
@@ -110,5 +106,4 @@ def _message(time: int, kind: MessageKind, body: bytes) -> bytes:
 
 
 def _text(what: str, most: int = LONGEST) -> bytes:
-    """UTF-8, cut at a boundary between two characters."""
     return what.encode(errors="replace")[:most].decode(errors="ignore").encode()

@@ -9,14 +9,7 @@ EVERY: Final = 1.0
 
 
 class Notices:
-    """Writes at most one line a second, however many are passed to it.
-
-    The first line is written at once. Of the lines that follow within a second, only the newest is written when the
-    second is over, together with the number of lines left out. All methods are called in the event loop's thread.
-
-    Args:
-        say: Takes a line, without its line feed.
-    """
+    """Passes at most one line a second to `say`, with the number of omitted lines; for the event loop's thread."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say

@@ -1,7 +1,4 @@
-"""Power, brakes and protective stops, as requested on the dashboard and the primary interface.
-
-Each function returns the refusal, or None if the robot is in the requested mode.
-"""
+"""Changes of power, brakes and protective stops; each function returns the refusal, or None for success."""
 
 from collections.abc import Callable
 
@@ -36,7 +33,7 @@ async def release_brakes(robot: UrRobot, control: ConnectionControl) -> Refused 
 
 
 async def power_off(_robot: UrRobot, control: ConnectionControl) -> Refused | None:
-    """Power off the arm once it stands still; this ends any program."""
+    """Power off the arm once it is at rest; this ends any program."""
     reply = await control.change(lambda token: PowerOff(token=token))
     return reply if isinstance(reply, Refused) else None
 
@@ -51,7 +48,7 @@ async def restart_safety(robot: UrRobot, control: ConnectionControl) -> Refused 
 
 
 async def unlock(robot: UrRobot, control: ConnectionControl) -> Refused | None:
-    """Unlock a protective stop; without one, there is nothing to do."""
+    """Unlock a protective stop; do nothing if there is none."""
     return await _unless_there(
         robot,
         control,

@@ -1,4 +1,4 @@
-"""Asks a client for the program of a node External Control, as UR's URCap of that name does."""
+"""Requests the program of an External Control node from a client, as UR's URCap of that name does."""
 
 import asyncio
 import contextlib
@@ -17,11 +17,11 @@ ENDS: Final = b"# NODE_CONTROL_LOOP_ENDS"
 WITHIN: Final = 2.0
 """Longest wait for a connection, and for more of a program [s]."""
 SILENCE: Final = 0.1
-"""Time without more data after which a program with the line `ENDS` is complete [s]; the library sends no end."""
+"""Silence after which a program with the line `ENDS` is complete [s]; the library does not mark its end."""
 
 
 async def program_of(host: str) -> str | None:
-    """Ask a machine for its program; return None if it does not answer."""
+    """Request a machine's program; return None if it does not answer."""
     try:
         return await asyncio.wait_for(_requested(host), 3 * WITHIN)
     except (OSError, TimeoutError, UnicodeDecodeError) as error:

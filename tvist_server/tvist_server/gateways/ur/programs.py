@@ -1,4 +1,4 @@
-"""The controller's programs as UR's interfaces present them: by path, key message, popup and runtime exception."""
+"""The controller's programs as UR's interfaces present them: path, key message, popup and runtime exception."""
 
 import re
 from collections.abc import Callable
@@ -28,43 +28,37 @@ from tvist_server.gateways.ur.lease import ConnectionControl
 FOLDER: Final = "/programs"
 """Folder in which a controller keeps programs; every other folder is accepted too."""
 _SAVED: Final = (".urp", ".script")
-"""How the names of files end. The name of a script that a client has sent has no ending."""
+"""Endings of file names. A script that a client has sent has a name without ending."""
 _PLACE: Final = re.compile(r"text:(\d+):(\d+)")
 
 
 class Host(Protocol):
-    """The robot, as far as messages about its programs need it."""
+    """The parts of the robot that messages about its programs need."""
 
     latest: Snapshot | None
     tell: Callable[[bytes], None]
 
 
 class Programs:
-    """Asks the controller to load, run, play, pause and stop programs, and reports to clients what they do.
-
-    It learns the program's state from replies and from `io`, which arrive in the controller's order.
-    """
+    """Loads, runs, plays, pauses and stops programs, and reports them; their state comes from replies and `io`."""
 
     def __init__(self, host: Host, external: ExternalControl) -> None:
         self._host, self._external = host, external
         self.path: str | None = None
-        """Path of the loaded program; only its name if a client has sent it as a script; None before the first."""
+        """Path of the loaded program, or name of a script that a client has sent; None before the first."""
         self.state: ProgramState = "STOPPED"
         self.interpreter = Interpreter()
-        """Statements of the interpreter mode, with those that were accepted since the robot has told of them."""
+        """Statements of the interpreter mode, including those accepted since the last `io`."""
         self._label: ProgramLabel | None = None
-        """Label that the clients were told last."""
         self._control: ConnectionControl | None = None
-        """Access of the client that plays the program. It lasts as long as the program, even after the client
-        disconnects.
-        """
+        """Access of the client that plays the program, kept as long as the program, even if it disconnects."""
         self._beginning: list[ConnectionControl] = []
-        """Accesses of clients whose secondary programs were accepted, before `program_started` tells of them."""
+        """Accesses of clients whose secondary programs are accepted but not started."""
         self._beside: list[ConnectionControl] = []
-        """Accesses of clients whose secondary programs run. They last until no secondary program runs."""
+        """Accesses of clients whose secondary programs run; kept until no secondary program runs."""
         self._running_beside = 0
         self._asked: object | None = None
-        """The request to play a program whose text is being found; None if there is none."""
+        """Pending request to play, while the text is being found; None: no request."""
 
     @property
     def name(self) -> str | None:
@@ -73,18 +67,14 @@ class Programs:
 
     @property
     def saved(self) -> bool:
-        """Whether the loaded program is a file."""
         return self.path is not None and self.path.endswith(_SAVED)
 
     @property
     def playing(self) -> bool:
-        """Whether a program runs and is not paused."""
         return self.state == "PLAYING"
 
-    # ------------------------------------------------------------------ requests, each for a client
-
     async def load(self, path: str, control: ConnectionControl) -> Refused | None:
-        """Load a program by its path, of which the folders are ignored, and stop the running one."""
+        """Load a program by its path, whose folders are ignored, and stop the running one."""
         name, self._asked = PurePosixPath(path).name, None
         if not re.match(PROGRAM_NAME_PATTERN, name):
             why = f"the path does not name a file, which has {PATTERN_MEANINGS[PROGRAM_NAME_PATTERN]}"
@@ -119,7 +109,7 @@ class Programs:
         self._asked = asked
 
         def wanted() -> bool:
-            """Return False if it was stopped meanwhile, or another program was loaded or started."""
+            """Return False if the program was stopped, or another one loaded or started, meanwhile."""
             return self._asked is asked and (self.name, self.state) == (name, state)
 
         text = await self._external.find(name)
@@ -142,21 +132,19 @@ class Programs:
         return True
 
     async def pause(self, control: ConnectionControl) -> bool:
-        """Pause the running program; return whether it was."""
+        """Pause the running program; return whether that succeeded."""
         if not self.playing or control.held_by_other:
             return False
         return self._changed("PAUSED", await control.change(lambda token: ProgramPause(token=token)))
 
     async def stop(self, control: ConnectionControl) -> bool:
-        """Stop all programs and any motion, for which no control is needed; return whether that was accepted."""
+        """Stop all programs and any motion, without control; return whether that was accepted."""
         self._asked = None
         return self._changed("STOPPED", await control.ask(ProgramStop()))
 
     async def close_popup(self, control: ConnectionControl) -> bool:
-        """Close the popup of a program, which may be waiting for that; no control is needed."""
+        """Close a program's popup without control; return whether that was accepted."""
         return not isinstance(await control.ask(ProgramClosePopup()), Refused)
-
-    # ------------------------------------------------------------------ what the robot tells
 
     def io(self, io: Io) -> None:
         """Take over the program's state from the controller."""
@@ -171,7 +159,6 @@ class Programs:
         self.interpreter = io.interpreter or Interpreter()
 
     def event(self, event: Event) -> None:
-        """Handle an event of the robot: tell the clients if it concerns a program."""
         stamp, program = messages.stamp(self._host.latest), event.program or ""
         match event.kind:
             case "program_started" | "program_stopped" if event.secondary:
@@ -197,14 +184,12 @@ class Programs:
                 self._host.tell(messages.runtime_exception(stamp, event.line, event.column or 1, why))
 
     def _except(self, refused: Refused) -> None:
-        """Tell all clients where the text of a program is not valid."""
+        """Report to all clients where the text of a program is invalid."""
         place = _PLACE.fullmatch(refused.where)
         if refused.code == "script_error" and place is not None:
             line, column = map(int, place.groups())
             stamp = messages.stamp(self._host.latest)
             self._host.tell(messages.runtime_exception(stamp, line, column, refused.why))
-
-    # ------------------------------------------------------------------ state and control
 
     def _changed(self, state: ProgramState, reply: Reply) -> bool:
         done = not isinstance(reply, Refused)
@@ -223,7 +208,7 @@ class Programs:
             before.leave()
 
     def _count_beside(self, *, started: bool) -> None:
-        """Count the secondary programs, and leave the accesses of those that have ended."""
+        """Count the secondary programs, and release the accesses when none runs."""
         if started:
             self._running_beside += 1
             self._beside += self._beginning
@@ -237,12 +222,11 @@ class Programs:
 
 
 def _path_of(name: str) -> str:
-    """Path that clients are told: that of a file, or only the name of a script."""
+    """Return the path reported to clients: a file's path, or only the name of a script."""
     return f"{FOLDER}/{name}" if name.endswith(_SAVED) else name
 
 
 def _title(name: str) -> str:
-    """Name of a program in key messages."""
     for ending in _SAVED:
         name = name.removesuffix(ending)
     return name

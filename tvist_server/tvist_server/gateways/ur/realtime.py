@@ -1,7 +1,4 @@
-"""UR's real-time interface, ports 30003 and 30013: all values of a tick, at every tick.
-
-One package of 1220 bytes: its length as an int32, then 152 doubles, big-endian.
-"""
+"""UR's real-time interface, ports 30003 and 30013: at every tick an int32 length and 152 doubles, big-endian."""
 
 from struct import Struct
 from typing import Final
@@ -52,7 +49,7 @@ LAYOUT: Final[tuple[tuple[str | None, int], ...]] = (
     ("payload_cog", 3),
     ("payload_inertia", 6),
 )
-"""Doubles of the package: the snapshot's attribute and its length; reserved ones have no name and are 0."""
+"""Doubles of the package: attribute of the snapshot and its length; reserved ones have no name and are 0."""
 
 PACKAGE: Final = Struct(f">i{sum(count for _, count in LAYOUT)}d")
 _KEY: Final = "realtime"
@@ -77,16 +74,11 @@ def package(snapshot: Snapshot) -> bytes:
 
 
 class RealtimeSession(ScriptSession):
-    """One client of the real-time interface.
-
-    What it sends is treated as URScript, and answered on the primary interface; what comes over the read-only port is
-    ignored.
-    """
+    """One client of the real-time interface; its input is URScript, ignored on the read-only port."""
 
     def receive(self, data: bytes) -> None:
         if not self._read_only:
             super().receive(data)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Return the package of the tick."""
         return package(snapshot)

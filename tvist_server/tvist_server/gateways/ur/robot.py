@@ -1,4 +1,4 @@
-"""State that all interfaces of one robot share, and which connection may write each input variable."""
+"""State that all interfaces of one robot share, and the owners of its input variables."""
 
 from collections.abc import Callable, Hashable, Sequence
 from zlib import crc32
@@ -13,48 +13,38 @@ NO_MODE = "NONE"
 
 
 class UrRobot:
-    """State of one robot that clients of its interfaces share.
-
-    Args:
-        description: Description of the robot.
-        name: Name of the robot on the network.
-        tell: Sends a robot message to all clients that get them.
-        external: Completes programs with a node External Control.
-        report: Writes a sentence to the server's console.
-        report_refusal: Writes a sentence about a refusal to it, which no other sentence displaces.
-    """
+    """State of one robot that the clients of its interfaces share."""
 
     def __init__(
         self,
         description: RobotDescription,
         name: str,
-        tell: Callable[[bytes], None],
-        external: ExternalControl,
-        report: Callable[[str], None],
-        report_refusal: Callable[[str], None],
+        tell: Callable[[bytes], None],  # sends a robot message to all clients that get them
+        external: ExternalControl,  # completes programs with an External Control node
+        report: Callable[[str], None],  # writes a line to the server's console
+        report_refusal: Callable[[str], None],  # the same for refusals, which other lines cannot displace
     ) -> None:
         self.description, self.name = description, name
         self.tell, self.report, self.report_refusal = tell, report, report_refusal
         self.serial = f"2024550{crc32(name.encode()) % 10_000:04d}"
-        """Serial number: UR's begin with the year; the last digits are derived from the name."""
+        """Serial number: the year, as UR's have, and digits derived from the name."""
         self.latest: Snapshot | None = None
         """Snapshot of the last tick; None before the first."""
         self.operational_mode = NO_MODE
-        """Operational mode set by the dashboard."""
+        """Operational mode set on the dashboard."""
         self.inputs = InputOwners()
         self.programs = Programs(self, external)
 
 
 class InputOwners:
-    """Each variable belongs to the first connection that asked for it, until that connection is closed."""
+    """A variable belongs to the first connection that requests it, until that connection closes."""
 
     def __init__(self) -> None:
         self._owners: dict[str, object] = {}
         self.pending = PendingWrites()
-        """Values that were written, by any connection."""
+        """Values written by any connection."""
 
     def is_free(self, name: str, connection: object) -> bool:
-        """Return whether no other connection owns the variable."""
         return self._owners.get(name, connection) is connection
 
     def take(self, names: Sequence[str], connection: object) -> None:
@@ -63,16 +53,14 @@ class InputOwners:
             self._owners[name] = connection
 
     def release(self, connection: object) -> None:
-        """Release all variables that a connection owns."""
         self._owners = {name: owner for name, owner in self._owners.items() if owner is not connection}
 
 
 class PendingWrites:
-    """Values requested from the controller, so that no value is requested twice.
+    """Values requested from the controller, so that none is requested twice although clients repeat them at 500 Hz.
 
-    Clients repeat their values five hundred times a second, and the robot publishes its terminals and registers some
-    ticks after they were set. A value is therefore news if it differs from the last one requested, or if that request
-    has been answered and the robot shows another value, because another client has set it since.
+    A value is new if it differs from the last one requested, or if that request is answered and the robot
+    shows another value, set by another client.
     """
 
     def __init__(self) -> None:
@@ -80,18 +68,16 @@ class PendingWrites:
         self._waiting: dict[Hashable, object] = {}
 
     def changed(self, key: Hashable, value: object, present: object) -> bool:
-        """Return whether to request a value; the robot published `present` last, or None so far."""
+        """Return whether to request a value; the robot last published `present`, None if it has not published any."""
         if key in self._waiting:
             return self._waiting[key] != value
         return value != present or self._asked.get(key, value) != value
 
     def ask(self, values: dict[Hashable, object]) -> None:
-        """Note that these values were requested."""
         self._asked |= values
         self._waiting |= values
 
     def answered(self, values: dict[Hashable, object]) -> None:
-        """Note that the controller has accepted or refused these values."""
         for key, value in values.items():
             if self._waiting.get(key) == value:
                 del self._waiting[key]

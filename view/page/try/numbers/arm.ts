@@ -31,7 +31,7 @@ export interface ArmParameters {
   limits: Limits;
 }
 
-/** Ticks at rest before a motion, and simulated after it. */
+/** Ticks at rest before a motion, and ticks simulated after it. */
 export const RESTING = 4, AFTER = 350;
 
 type Pair = [number, number];
@@ -42,7 +42,7 @@ export function modeOf({ middle, change, gear_stiffness: [K], gear_damping: [D] 
   return [(Math.sqrt(K / inertia) * Math.sqrt(1 - zeta ** 2)) / (2 * Math.PI), zeta];
 }
 
-/** The closed form as an estimator, with a share by which it takes the frequency too high [-]. */
+/** The closed form as an estimator, whose frequency is too high by a share [-]. */
 export const following = (arm: ArmParameters, error = 0): Estimator => (q) => {
   const [f_d, zeta] = modeOf(arm, q[1]);
   return [f_d * (1 + error), zeta];
@@ -150,11 +150,11 @@ class Plant {
 }
 
 export interface ArmRun {
-  /** Before shaping, then the motors and the links, of each tick: [shoulder, elbow] [rad]. */
+  /** Unshaped reference, motors and links at each tick: [shoulder, elbow] [rad]. */
   reference: number[][];
   motor: number[][];
   link: number[][];
-  /** Tick from which on the motors' reference stands at its end. */
+  /** Tick at which the motors' reference reaches its end. */
   stopped: number;
 }
 

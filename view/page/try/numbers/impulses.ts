@@ -1,4 +1,4 @@
-// Impulse trains of the catalogue, and what they leave of a vibration: `tvist_shaping`, ported.
+// Impulse trains of the catalogue and their residual vibration, ported from `tvist_shaping`.
 import { EI2_EXACT, EI3_EXACT, EI_EXACT, UM_ZV, UM_ZVD, ripple } from "./solved.js";
 
 export interface Impulses {
@@ -16,7 +16,7 @@ const sum = (values: number[]): number => values.reduce((total, one) => total + 
 /** Factor by which a mode decays in half a damped period [-]. */
 export const decay = (zeta: number): number => Math.exp((-Math.PI * zeta) / Math.sqrt(1 - zeta * zeta));
 
-/** A shaper from its amplitudes without damping and its times in damped periods: each decays as the mode does until then. */
+/** A shaper from undamped amplitudes, which decay as the mode does, and times in damped periods. */
 function train(a: number[], periods: number[]): Shaper {
   return (f_d, zeta) => {
     const rate = (-2 * Math.PI * zeta) / Math.sqrt(1 - zeta * zeta);
@@ -29,7 +29,7 @@ function train(a: number[], periods: number[]): Shaper {
 const spaced = (a: number[], distance: number): Shaper => train(a, a.map((_, j) => j * distance));
 const modified = [1, -2 * Math.cos(0.75 * Math.PI), 1];
 
-/** The catalogue's rows that this page knows, by the names of `tvist_shaping.SHAPERS`. */
+/** The shapers of the catalogue on this page, by their names in `tvist_shaping.SHAPERS`. */
 export const SHAPERS: Record<string, Shaper> = {
   none: spaced([1], 0),
   um_zv: UM_ZV,
@@ -39,7 +39,7 @@ export const SHAPERS: Record<string, Shaper> = {
   zvd: spaced([1, 2, 1], 0.5),
   ei: spaced(ripple(1), 0.5),
   ei_exact: EI_EXACT,
-  // As `specified` finds it for 0.75 to 1.25 and 5 %.
+  // The result of `specified` for 0.75 to 1.25 and 5 %.
   si: train(
     [0.16990040201608808, 0.3300995979839119, 0.3300995979839119, 0.16990040201608808],
     [0, 0.420881413088327, 0.8251686762703891, 1.246050089358716],
@@ -64,7 +64,7 @@ export function residual(f: number, zeta: number, { A, tau }: Impulses): number 
   return Math.hypot(C, S);
 }
 
-/** Frequencies around f_d between which at most V is left [Hz]; the highest is infinite where 10 f_d is still inside, both are NaN where f_d is not. */
+/** Frequencies around f_d between which at most V is left [Hz]; the highest is infinite if 10 f_d is still inside, both are NaN if f_d is not. */
 export function band(impulses: Impulses, f_d: number, zeta: number, V: number): [number, number] {
   const limit = V + 1e-9;
   const exceeds = (f: number): boolean => residual(f, zeta, impulses) > limit;
@@ -85,7 +85,7 @@ export function band(impulses: Impulses, f_d: number, zeta: number, V: number): 
   return [end((k) => f_d * (1 - k / 1000), 1000), end((k) => f_d * (1 + k / 1000), 9000)];
 }
 
-/** Σ A_j τ_j [s], by which the shaped reference lags at constant velocity. */
+/** Σ A_j τ_j [s], the lag of the shaped reference at constant velocity. */
 export const meanDelay = ({ A, tau }: Impulses): number => sum(A.map((one, j) => one * tau[j]));
-/** Σ |A_j|, by which it may exceed the reference's velocity and acceleration [-]. */
+/** Σ |A_j|, the factor by which velocity and acceleration may exceed the reference's [-]. */
 export const peak = ({ A }: Impulses): number => sum(A.map(Math.abs));

@@ -1,10 +1,10 @@
-// One mass on a spring, whose other end makes a motion: solved exactly for an acceleration that is constant between samples.
+// One mass on a spring with a moving end, solved exactly for an acceleration that is constant between samples.
 import type { Impulses } from "./impulses.js";
 
 export const STEP = 0.002, TURN = 1, MOTION_S = 0.6, JERK_S = 0.04;
 
 export interface Swing {
-  /** Where the moved end of the spring is, and by how much the spring is stretched [rad, or any length]. */
+  /** Position of the spring's moving end, and the spring's deflection [rad, or any length]. */
   reference: number[];
   deflection: number[];
 }

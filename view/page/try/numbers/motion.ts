@@ -6,7 +6,7 @@ export interface Limits {
   jerk: number;
 }
 
-/** Way at a time of the quickest motion over a way [rad], and its duration [s] (Biagiotti and Melchiorri 2008, ch. 3.4). */
+/** Position over time of the quickest motion over a distance [rad], and its duration [s] (Biagiotti and Melchiorri 2008, ch. 3.4). */
 export function doubleS(way: number, { velocity, acceleration, jerk }: Limits): { duration: number; at: (time: number) => number } {
   // Times of a ramp of acceleration, of constant acceleration, and of constant velocity.
   let ramp = acceleration / jerk, flat = velocity / acceleration - ramp, cruise: number;
@@ -34,7 +34,7 @@ export function doubleS(way: number, { velocity, acceleration, jerk }: Limits): 
   return { duration, at };
 }
 
-/** Samples from the first that may move to the one at the target [rad]. */
+/** Samples from the first one in motion to the one at the target [rad]. */
 export function pointToPoint(start: number[], target: number[], limits: Limits, period: number): number[][] {
   const ways = target.map((one, k) => one - start[k]), longest = Math.max(...ways.map(Math.abs));
   if (!(longest > 0)) return [[...target]];

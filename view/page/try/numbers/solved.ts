@@ -8,7 +8,7 @@ type Equations = (x: number[]) => number[];
 type Solution = { x: number[]; A: number[]; periods: number[] };
 type Follow = (zeta: number, near: number[]) => Solution;
 
-/** x of M x = b, by elimination with pivots; null where M is singular. */
+/** Solve M x = b by elimination with pivoting; null if M is singular. */
 function linear(M: number[][], b: number[]): number[] | null {
   const rows = M.map((row, i) => [...row, b[i]]), n = b.length;
   for (let i = 0; i < n; i++) {
@@ -45,7 +45,7 @@ function newton(equations: Equations, start: number[]): number[] {
   throw new Error(`Newton's method found no solution of ${start.length} equations`);
 }
 
-/** Polynomials in ζ through the solutions at Chebyshev's nodes; made when first asked. */
+/** Polynomials in ζ through the solutions at Chebyshev's nodes; computed when first needed. */
 function tabulated(follow: Follow, start: number[], zetaMax: number): Shaper {
   let coefficients: number[][] | null = null;
   const tabulate = (count: number): number[][] => {

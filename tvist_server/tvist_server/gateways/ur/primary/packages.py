@@ -1,7 +1,6 @@
-"""Robot state: the package of type 16, 1386 bytes in thirteen parts.
+"""Robot state: the package of type 16, 1386 bytes in thirteen parts, as of a controller with software 5.
 
-int32 length, uint8 16, then the parts. Each part has a uint32 length (which includes itself), a uint8 number and a
-body; all numbers are big-endian. The order and lengths of the parts are those of a controller with software 5.
+int32 length, uint8 16, then the parts: uint32 length (including itself), uint8 number, body; big-endian.
 """
 
 from struct import Struct
@@ -16,16 +15,14 @@ from tvist_server.ur_ports import MOST_JOINTS
 
 ROBOT_STATE: Final = 16
 NOMINAL: Final = 0xFFFFFFFF
-"""Checksum of uncalibrated kinematics."""
 SUBTYPE: Final = 3
 """Robot subtype of an e-Series arm."""
 BOARD_TEMPERATURE: Final = 25.0
 """Temperature of the boards [°C]."""
 FULL_SPEED: Final = 1.0
 MOTION_DEFAULTS: Final = (1.0471975511965976, 1.3962634015954636, 0.25, 1.2, 0.25)
-"""Defaults of a new program: joint velocity [rad/s] and acceleration [rad/s²], tool velocity [m/s] and acceleration
-[m/s²], and the radius that weighs rotation against translation [m].
-"""
+"""Defaults of a new program: joint velocity [rad/s] and acceleration [rad/s²], tool velocity [m/s] and
+acceleration [m/s²], and the radius that converts rotation to translation [m]."""
 _TYPES: Final = {"UR5": 1, "UR10": 2, "UR3": 3, "UR16": 4, "UR20": 7, "UR30": 8}
 
 _PACKAGE = Struct(">iB")
@@ -55,8 +52,8 @@ def robot_state(description: RobotDescription, snapshot: Snapshot) -> bytes:
             _part(3, _masterboard(snapshot)),
             _part(2, _tool(snapshot)),
             _part(6, _configuration(description)),
-            _part(7, _FORCE.pack(*snapshot.actual_TCP_force, 0.0)),  # the last is dexterity, which is not computed
-            _part(8, bytes((0, 1, 0, 1))),  # teach button: not pressed, and enabled; the one on the flange likewise
+            _part(7, _FORCE.pack(*snapshot.actual_TCP_force, 0.0)),  # dexterity, the last value, is not computed
+            _part(8, bytes((0, 1, 0, 1))),  # teach button, and the one on the flange: not pressed, enabled
             _part(10, bytes(38)),  # for UR's own safety check
             _part(11, _TOOL_LINE.pack(0, 115200, 0, 1, 1.5, 3.5)),  # off; baud, parity, stop bits, idle characters
             _part(12, bytes((snapshot.tool_output_mode, snapshot.tool_digital_output0_mode,
@@ -67,10 +64,7 @@ def robot_state(description: RobotDescription, snapshot: Snapshot) -> bytes:
 
 
 def robot_type(description: RobotDescription) -> int:
-    """Return UR's number of a robot type, which is the same with and without the `e`; 0 if the robot is not UR's.
-
-    Source of the numbers: `RobotType` in UR's client library, ur_client_library/ur/datatypes.h.
-    """
+    """Return UR's number of a robot type, 0 if it is not UR's; `RobotType` in ur_client_library/ur/datatypes.h."""
     return _TYPES.get(series(description.robot.model) or "", 0)
 
 

@@ -1,9 +1,4 @@
-"""Cuts script text from clients into units that can be carried out one by one.
-
-A unit is a line, or a block from `def`, `sec` or another word that opens a block to its `end`. The word opens the
-block, even where its colon follows on a later line. Lines end with a line feed; a carriage return before it is dropped.
-A last line without a line feed is incomplete.
-"""
+"""Cuts script text from clients into lines and blocks; a last line without a line feed is incomplete."""
 
 import re
 from dataclasses import dataclass
@@ -13,9 +8,9 @@ from tvist_protocol.programs import MAX_SCRIPT
 from tvist_server.gateways.ur.base import Lines
 
 LONGEST: Final = MAX_SCRIPT
-"""Longest unit with its line feeds [bytes]: twenty times the longest program that a known client sends."""
+"""Longest unit with its line feeds [bytes]: twenty times the longest program of a known client."""
 GLIMPSE: Final = 200
-"""Bytes that are kept of a unit that is too long."""
+"""Bytes kept of a unit that is too long."""
 TITLE: Final = 60
 """Longest title [characters]."""
 
@@ -30,11 +25,11 @@ class Unit:
     """A complete line or block."""
 
     text: str
-    """Text as sent, with lines ended by line feeds; only its beginning if it is too long."""
+    """Text with lines ended by line feeds; only its beginning if it is too long."""
     line: int
-    """Line at which its code begins, 1 for the first; comments may precede it."""
+    """Line at which its code starts, counted from 1; comments may precede it."""
     column: int
-    """Column in that line, 1 for the first."""
+    """Column in that line, counted from 1."""
     too_long: bool = False
     """Whether it is longer than `LONGEST` bytes and was therefore dropped."""
 
@@ -45,19 +40,19 @@ class Unit:
 
     @property
     def name(self) -> str | None:
-        """Name of the program that the script defines; None if it defines none."""
+        """Name of the program that it defines; None if it defines none."""
         head = _HEAD.match(self._first)
         return None if head is None else head[2]
 
     @property
     def secondary(self) -> bool:
-        """Whether it is a secondary program, which runs beside the program."""
+        """Whether it is a secondary program, which runs beside the main one."""
         head = _HEAD.match(self._first)
         return head is not None and head[1] == "sec"
 
     @property
     def title(self) -> str:
-        """Title for messages to people: the name of the program it defines, else its first line of code."""
+        """Title for messages: the name of the program that it defines, or its first line of code."""
         title = self.name or self._first
         if len(title) > TITLE:
             title = f"{title[: TITLE - 1]}…"
@@ -65,7 +60,7 @@ class Unit:
 
     @property
     def _first(self) -> str:
-        """Its first line of code, which may be missing from the kept text of a unit that is too long."""
+        """Its first line of code, which the kept text of a unit that is too long may lack."""
         lines = self.text.split("\n")
         return lines[min(self.line, len(lines)) - 1].strip()
 
@@ -76,15 +71,12 @@ class Intake:
     def __init__(self) -> None:
         self._lines = Lines(LONGEST)
         self._unit = bytearray()
-        """Lines of an incomplete unit. They are kept as bytes, since a string for each line takes twenty times the
-        memory.
-        """
+        """Lines of an incomplete unit, as bytes: one string per line would take twenty times the memory."""
         self._depth = 0
-        """Number of open blocks."""
         self._start: tuple[int, int] | None = None
         """Line and column of the unit's first code."""
         self._skipping = False
-        """Whether the rest of a unit that was too long is being skipped."""
+        """Whether the rest of a unit that is too long is being skipped."""
 
     @property
     def held(self) -> int:
@@ -93,7 +85,7 @@ class Intake:
 
     @property
     def unfinished(self) -> Unit | None:
-        """Beginning of the incomplete unit; None if there is none, or it has only comments so far."""
+        """Beginning of the incomplete unit; None if it has no code yet."""
         if self._skipping:  # it was returned when it became too long
             return None
         line, column = self._start or (self._unit.count(b"\n") + 1, 1)
@@ -102,18 +94,18 @@ class Intake:
         return Unit((self._unit + rest).decode(errors="replace"), line, column) if begun else None
 
     def feed(self, data: bytes) -> list[Unit]:
-        """Take a piece and return the units that it completes, and one that has become too long."""
+        """Take a piece; return the units that it completes, and one that has become too long."""
         return [unit for line in self._lines.feed(data) if (unit := self._take(line.removesuffix(b"\r")))]
 
     def _take(self, whole: bytes) -> Unit | None:
-        """Add a complete line to the present unit, which ends with the line on which all blocks are closed."""
+        """Add a complete line to the present unit, which ends with the line that closes all blocks."""
         unit = None
         if not self._skipping and len(self._unit) + len(whole) >= LONGEST:
             seen = bytes(self._unit + whole)[:GLIMPSE].decode(errors="replace")
             unit = Unit(seen, *(self._start or (1, 1)), too_long=True)
             self._skipping = True
             self._unit.clear()
-            whole = whole[:GLIMPSE]  # the beginning of a line determines what it opens
+            whole = whole[:GLIMPSE]  # the beginning of a line determines which blocks it opens
         line = whole.decode(errors="replace")
         code = _code(line)
         if not line.strip() and not self._unit and not self._skipping:
@@ -132,7 +124,7 @@ class Intake:
 
 
 def _code(line: str) -> str:
-    """The line without comments, the contents of strings, and surrounding space; nothing of a label."""
-    if line.lstrip().startswith("$"):  # its name may contain quotes, and words that open blocks
+    """Return a line without comments, contents of strings and surrounding space; empty for a label."""
+    if line.lstrip().startswith("$"):  # a label's name may contain quotes and words that open blocks
         return ""
     return _STRING.sub('""', line).partition("#")[0].strip()

@@ -1,4 +1,4 @@
-"""One client of the primary or the secondary interface, and what the real-time interface has in common with them."""
+"""Sessions of the primary and secondary interface, and their common base with the real-time interface."""
 
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Final
@@ -18,7 +18,7 @@ EVERY: Final = 50
 """Ticks between two robot states: 10 Hz."""
 TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was thrown away"
 SHORT: Final = 1000
-"""Length of none of the interface's own commands."""
+"""Minimum length of text that is not one of the interface's own commands."""
 READ_ONLY: Final = (
     "this interface is read-only: somebody else controls the robot, or the port takes no commands"
 )
@@ -29,38 +29,31 @@ CHANGES: Final[Mapping[str, Callable[[UrRobot, ConnectionControl], Awaitable[Ref
     "set robotmode run": power.release_brakes,
     "set unlock protective stop": power.unlock,
 }
-"""The interfaces' own commands that change the robot's mode."""
+"""The interface's own commands that change the robot's mode."""
 
 
 class ScriptSession(InTurnSession[Unit]):
-    """Carries out units of script text in their order.
-
-    A few commands are the interface's own; everything else is a program for the controller. The outcome of each unit
-    is also reported on the server's console, since few clients show their answers.
-    """
+    """Runs a few commands of the interface, and other script text as programs; the console shows the results."""
 
     def __init__(
         self, robot: UrRobot, control: ConnectionControl, send: Send, *, read_only: bool = False
     ) -> None:
         super().__init__(robot, control, send)
         self._read_only = read_only
-        """Whether what the client sends is declined."""
+        """Whether the client's commands are refused."""
         self._intake = Intake()
 
     def receive(self, data: bytes) -> None:
-        """Take a piece of a script."""
         for unit in self._intake.feed(data):
             self._add(unit, stop=not self._read_only and len(unit.text) < SHORT and unit.words == STOP)
 
     def closed(self) -> None:
-        """Report what the client leaves unfinished."""
         unfinished = self._intake.unfinished
         if unfinished is not None:
             self._report(unfinished, "was not run: the connection ended before its last line feed")
         super().closed()
 
     def _tell(self, message: bytes) -> None:
-        """Send a robot message to the client, or to those who get its messages."""
         self._robot.tell(message)
 
     async def _do(self, unit: Unit) -> None:
@@ -87,14 +80,13 @@ class ScriptSession(InTurnSession[Unit]):
             refused = await self._robot.programs.run(unit.text, self._control, secondary=unit.secondary)
             if refused is None:
                 self._report(unit, "was started")
-            elif refused.code == "script_error":  # all clients have got the exception
+            elif refused.code == "script_error":  # all clients have already received the exception
                 _, line, column = refused.where.split(":")
                 self._report_refusal(unit, f"line {line}, column {column}: {refused.why}")
             else:
                 self._tell_refused(unit, unit.title, refused)
 
     def _tell_refused(self, unit: Unit, what: str, refused: Refused) -> None:
-        """Tell the client, and the person at the console, why something was refused."""
         if refused.code in {"no_control", "stale_token"}:
             self._tell_read_only()
         else:
@@ -114,11 +106,7 @@ class ScriptSession(InTurnSession[Unit]):
 
 
 class PrimarySession(ScriptSession):
-    """Sends a client the robot's state and messages, and takes its commands.
-
-    The secondary interface is the same without messages, as on UR's controllers: some of its clients expect nothing but
-    the state.
-    """
+    """Sends a client the robot's state and messages, and takes its commands; the secondary one has no messages."""
 
     def __init__(
         self,
@@ -131,9 +119,8 @@ class PrimarySession(ScriptSession):
     ) -> None:
         super().__init__(robot, control, send, read_only=read_only)
         self.informed = informed
-        """Whether the client gets messages."""
         self._errors: list[bytes] = []
-        """Error codes of this tick, which follow the state with what caused them."""
+        """Error codes of this tick, which are sent after its state."""
         self._due = 0
         """Tick of the next robot state."""
         self._safety_mode: int | None = None
@@ -150,10 +137,7 @@ class PrimarySession(ScriptSession):
             self._send(message)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Return the robot state ten times a second, and at once when the safety mode changes.
-
-        A client that reacts to an error code at once then knows the state that it belongs to.
-        """
+        """Return the robot state ten times a second, and at once when the safety mode changes, before error codes."""
         mode = snapshot.safety_mode
         if mode != self._safety_mode:
             if self._safety_mode is not None:
@@ -174,10 +158,7 @@ class PrimarySession(ScriptSession):
         return b""
 
     def event(self, event: Event) -> None:
-        """Send a protective stop as an error, and other safety stops and warnings as lines of the log.
-
-        What programs tell is sent by `Programs`, once to all clients.
-        """
+        """Send a protective stop as an error, other safety stops and warnings as text; `Programs` reports programs."""
         stamp = messages.stamp(self._robot.latest)
         why = event.why or ""
         if event.kind == "protective_stop":

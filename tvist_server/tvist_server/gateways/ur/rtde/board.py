@@ -1,7 +1,4 @@
-"""What the RTDE clients of a robot read: every value is written once a tick, and every recipe gathers its bytes there.
-
-What no recipe names is not computed.
-"""
+"""Data packages of RTDE clients: values that recipes name are computed once a tick, and gathered per recipe."""
 
 from collections.abc import Iterable
 from itertools import chain
@@ -26,17 +23,15 @@ class Board:
         self._bytes: _Bytes | None = None
         """Bytes of the last tick; None if the recipes have changed since."""
         self._snapshot: Snapshot | None = None
-        """Snapshot of the last tick."""
         self._packages: dict[tuple[bytes, str], bytes] = {}
-        """Packages of the last tick by head and names."""
+        """Packages of the last tick, by head and names."""
 
     def begin(self, client: object, recipe: OutputRecipe) -> None:
-        """Note that a client reads a recipe, which is valid, instead of what it read before."""
+        """Note that a client reads a valid recipe, instead of its previous one."""
         self._recipes[client] = recipe
         self._bytes = self._snapshot = None
 
     def end(self, client: object) -> None:
-        """Note that a client reads nothing more."""
         if self._recipes.pop(client, None) is not None:
             self._bytes = self._snapshot = None
 
@@ -44,7 +39,7 @@ class Board:
         """Return the package of a tick for a recipe that a client reads; `head` precedes the variables."""
         try:
             gathered = self._at(snapshot)
-        except Exception:  # noqa: BLE001  what a variable raises concerns those alone who read it
+        except Exception:  # noqa: BLE001  an error in a variable must only affect its readers
             self._bytes = self._snapshot = None
             alone = _Bytes([recipe], snapshot)
             alone.write(snapshot)
@@ -56,7 +51,6 @@ class Board:
         return package
 
     def _at(self, snapshot: Snapshot) -> "_Bytes":
-        """Return the bytes of a tick."""
         if self._bytes is None:
             self._bytes = _Bytes(self._recipes.values(), snapshot)
         if snapshot is not self._snapshot:
@@ -71,7 +65,7 @@ def _package(head: bytes, data: bytes) -> bytes:
 
 
 class _Bytes:
-    """Bytes of the variables that some recipes name; the snapshot tells how many joints the arm has."""
+    """Bytes of the variables of some recipes; the snapshot determines the number of joints."""
 
     def __init__(self, recipes: Iterable[OutputRecipe], snapshot: Snapshot) -> None:
         different = {recipe.text: recipe for recipe in recipes}.values()
@@ -102,19 +96,14 @@ class _Bytes:
             self._of_io.write(snapshot, self._buffer)
             self._io = snapshot.io
         self._others.write(snapshot, self._buffer)
-        # The quickest mode; all places are inside.
+        # The fastest mode; all indices are in range.
         self._gathered = self._numbers.take(self._index, mode="clip").tobytes()
 
     def of(self, recipe: OutputRecipe) -> bytes:
-        """Return the bytes of the variables of a recipe."""
         return self._gathered[self._spans[recipe.text]]
 
     def _places_of(self, name: str) -> list[int]:
-        """Places of the bytes of a variable.
-
-        A vector that is too short is filled with zeros, since clients expect six entries of an arm with fewer joints.
-        Robots with more joints are refused before they are served, see `UrPorts`.
-        """
+        """Return the places of a variable's bytes; a short vector is filled with zeros to six entries."""
         (part, number), wire = PARTS[name], OUTPUTS[name]
         place, size = self._places[part], wire.size // wire.length
         entries = place.entries // part.variables
@@ -126,21 +115,14 @@ class _Bytes:
 
 
 class _Place(NamedTuple):
-    """Place of a part in the buffer."""
-
     first: int
-    """Place of its first byte."""
     entries: int
-    """Number of its entries."""
     of_machine: bool
     """Whether its bytes are in the machine's order."""
 
 
 class _Packing:
-    """Writes parts one behind the other, by one call, from the place `first` on; adds the place of each to `places`.
-
-    The snapshot tells the lengths of lists.
-    """
+    """Writes parts from the index `first` on in one call, and adds their places; a snapshot gives the lengths."""
 
     def __init__(self, parts: list[Part], snapshot: Snapshot, first: int, places: dict[Part, _Place]) -> None:
         found = [(part, part.read(snapshot)) for part in parts]
@@ -157,6 +139,5 @@ class _Packing:
         self._pack_into = Struct(layout).pack_into
 
     def write(self, snapshot: Snapshot, buffer: bytearray) -> None:
-        """Write the values of a tick."""
         numbers = chain.from_iterable([read(snapshot) for read in self._lists])
         self._pack_into(buffer, self._first, *numbers, *[read(snapshot) for read in self._others])

@@ -1,4 +1,4 @@
-"""Registers, and input variables, which clients set: names and types."""
+"""Registers and the input variables that clients set: names and types."""
 
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
@@ -9,9 +9,9 @@ from tvist_server.option_values import StartError
 from tvist_server.rtde.wire import Wire
 
 NUMBERS = range(48)
-"""Numbers of the integer registers; the double registers have the same."""
+"""Numbers of the integer registers and of the double registers."""
 SINGLE_BITS = range(64, 128)
-"""Bits that are variables of their own; bits 0 to 63 are sent in two words of 32."""
+"""Bits that are separate variables; bits 0 to 63 are sent in two words of 32."""
 WORDS = ("0_to_31", "32_to_63")
 """Suffixes of the names of the two words."""
 
@@ -52,10 +52,10 @@ NAMED: dict[str, tuple[Wire, str]] = {
     "standard_analog_output_1": (Wire.DOUBLE, "Value of analogue output 1 as a share of its range, 0 to 1."),
     "external_force_torque": (
         Wire.VECTOR6D,
-        "What a force sensor of one's own measures, every 100 ms; for programs of its host that use it [N, N m].",
+        "Wrench measured by an external force sensor, every 100 ms; for programs of its host that use it [N, N m].",
     ),
 }
-"""Type and description of each input variable that is no register."""
+"""Type and description of each input variable that is not a register."""
 
 _BITS, _INTS, _DOUBLES = get_args(Bank)[:3]
 REGISTERS: dict[str, tuple[Bank, int, Wire]] = (
@@ -72,17 +72,12 @@ INPUTS: dict[str, Wire] = {name: wire for name, (wire, _) in NAMED.items()} | {
 """Type of every input variable by name."""
 
 NEED_CONTROL = frozenset(NAMED) - {"external_force_torque"}
-"""Variables that only the client in control may own. Registers are memory, which any client may write; a wrench is for
-programs of the client in control, and `ur_rtde` asks for it with every connection.
-"""
+"""Variables that only the client in control may own. Any client may write registers, which are only memory. A
+wrench serves programs of the client in control, and every connection of `ur_rtde` requests it."""
 
 
 def matching(patterns: Iterable[str]) -> list[str]:
-    """Return the input variables that patterns name, in which `*`, `?` and `[0-9]` stand for others.
-
-    Raises:
-        StartError: A pattern names none.
-    """
+    """Return the input variables that match patterns with `*`, `?` and `[0-9]`; StartError if one matches none."""
     found = {pattern: [name for name in INPUTS if fnmatchcase(name, pattern)] for pattern in patterns}
     if wrong := [pattern for pattern, names in found.items() if not names]:
         why = "must be the name of an RTDE input, such as speed_slider_mask or input_int_register_*"

@@ -1,4 +1,4 @@
-"""Output variables, which clients read, with the registers among them."""
+"""Output variables, which clients read, including registers."""
 
 from collections.abc import Callable, Iterator
 from operator import attrgetter
@@ -26,11 +26,11 @@ class Part(NamedTuple):
     variables: int = 1
     """Number of variables."""
     of_io: bool = False
-    """Whether its values depend on terminals and registers alone, which rarely change."""
+    """Whether its values depend only on terminals and registers, which rarely change."""
 
 
 def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
-    """Return a function that returns the bits of a bank that are variables of their own."""
+    """Return a function that returns the bits of a bank that are separate variables."""
 
     def read(snapshot: Snapshot) -> list[bool]:
         words: list[int] = getattr(snapshot.io, bank)
@@ -41,7 +41,7 @@ def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
 
 def _parts() -> Iterator[tuple[str, tuple[Part, int]]]:
     for name, one in VARIABLES.items():
-        # What is computed may be read by others as well: the snapshot keeps it.
+        # Computed values may have other readers: the snapshot caches them.
         read = attrgetter(name) if one.source == "computed" else one.read
         yield name, (Part(read, Wire[one.type].value[-1], of_io=one.source == "io"), 0)
     joints = Part(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
@@ -61,4 +61,4 @@ def _parts() -> Iterator[tuple[str, tuple[Part, int]]]:
 
 
 PARTS: dict[str, tuple[Part, int]] = dict(_parts())
-"""Part with which each output variable is read, and its number in there."""
+"""Part with which each output variable is read, and its index in that part."""

@@ -8,29 +8,27 @@ from tvist_server.rtde.codec import HEADER, LARGEST
 from tvist_server.rtde.wire import Wire
 
 Value = int | float | tuple[float, ...]
-"""Value of an input variable."""
 
 
 def split(names: bytes) -> tuple[str, ...]:
-    """Return the names of a list that is separated by commas; a comma at its end is ignored."""
+    """Return the names in a list separated by commas; a trailing comma is ignored."""
     text = names.decode("ascii", "replace").removesuffix(",")
     return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
 class OutputRecipe:
-    """Variables that a client reads, by their names as it wrote them."""
+    """Variables that a client reads."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.words = [OUTPUTS[name].name if name in OUTPUTS else "NOT_FOUND" for name in names]
         """Type of each variable, or `NOT_FOUND`."""
         self.names = names
-        """The variables."""
+        """The variables' names as the client wrote them."""
         self.text = ",".join(names)
-        """The same as one text."""
         self.size = 0
         """Size of all of them [bytes]."""
         self.valid = bool(names) and "NOT_FOUND" not in self.words
-        """Whether each variable exists and all of them fit into one package."""
+        """Whether every variable exists and all of them fit into one package."""
         if self.valid:
             self.size = sum(OUTPUTS[name].size for name in names)
             self.valid = HEADER.size + 1 + self.size <= LARGEST
@@ -44,10 +42,7 @@ class InputRecipe:
         self._all = Struct(">" + "".join(wire.value for _, wire in self._fields))
 
     def values(self, data: bytes) -> dict[str, Value]:
-        """Return the value of each variable in the payload of a data package.
-
-        Variables that a short payload does not contain completely are missing; bytes after the last one are ignored.
-        """
+        """Return the values in a data package, without variables that a short payload lacks."""
         if len(data) >= self._all.size:
             numbers, fields = self._all.unpack_from(data), self._fields
         else:

@@ -1,7 +1,7 @@
 """One RTDE connection: its protocol version, its recipes, and the answers to its packages.
 
-A connection uses protocol version 1 until the client requests version 2. In version 1 the client cannot choose a
-frequency, packages of outputs carry no recipe id, and text messages carry no source.
+Version 1, in use until the client requests version 2, has no frequency, no recipe id in packages of outputs,
+and no source in text messages.
 """
 
 from collections.abc import Callable, Mapping
@@ -27,11 +27,11 @@ from tvist_server.rtde.codec import (
 )
 
 RATE = 500.0
-"""Frequency of the control loop, and so the highest frequency of data packages [Hz]."""
+"""Frequency of the control loop and highest frequency of data packages [Hz]."""
 RECIPES = 255
-"""Most input recipes of a connection: their ids are 1 to 255."""
+"""Largest number of input recipes of a connection: their ids are 1 to 255."""
 SENTENCES = 64
-"""Most text messages that a client gets between two starts, since it may send wrong packages for days."""
+"""Largest number of text messages between two starts, because a client may send wrong packages for days."""
 OUTPUT_ID = b"\x01"
 """Id of the output recipe: a connection has only one."""
 
@@ -42,11 +42,10 @@ _TRUE, _FALSE = b"\x01", b"\x00"
 
 
 class RtdeSession(PortSession):
-    """Answers the packages of one client, and sends it the outputs that it has subscribed to.
+    """Answers the packages of one client and sends it the outputs that it has subscribed to.
 
-    Args:
-        boards: Make the data packages of all clients of the robot, by ticks between two packages: what only a
-            slow client reads is not computed for the others.
+    `boards` has a board for each number of ticks between two packages, so that variables of slow clients are not
+    computed for the others.
     """
 
     client_begins = True
@@ -77,7 +76,7 @@ class RtdeSession(PortSession):
         }
 
     def receive(self, data: bytes) -> None:
-        """Handle all packages that are complete with these bytes; the rest is kept for the next call."""
+        """Handle all complete packages; the rest is kept for the next call."""
         for kind, payload in self._reader.feed(data):
             handler = self._handlers.get(kind)
             if handler is None:
@@ -86,10 +85,7 @@ class RtdeSession(PortSession):
                 handler(payload)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Return a data package if one is due, otherwise no bytes.
-
-        The first one is sent with the first tick after the start, the others at the frequency of the recipe.
-        """
+        """Return a data package if one is due, otherwise no bytes; the first is due right after the start."""
         if not self.served or self._outputs is None:
             return b""
         tick, every = snapshot.state.tick, self._every
@@ -101,15 +97,11 @@ class RtdeSession(PortSession):
         return self._board.package(self._outputs, snapshot, self._head)
 
     def closed(self) -> None:
-        """Release the input variables of the connection, so that other clients can set them, and read no more."""
         self._robot.inputs.release(self)
         self._board.end(self)
         super().closed()
 
-    # ------------------------------------------------------------------ answers
-
     def _request_version(self, payload: bytes) -> None:
-        """Switch to version 1 or 2. Any other is refused, and the present version stays in use."""
         wanted = _UINT16.unpack_from(payload)[0] if len(payload) >= _UINT16.size else 0
         accepted = wanted in {1, 2}
         if accepted:
@@ -122,10 +114,7 @@ class RtdeSession(PortSession):
         self._send(package(PackageKind.GET_URCONTROL_VERSION, _VERSION.pack(*numbers)))
 
     def _set_up_outputs(self, payload: bytes) -> None:
-        """Replace the output recipe, and answer with its id and the types of its variables.
-
-        If the new recipe is invalid, the id is 0 and no recipe is left; version 1 answers without an id.
-        """
+        """Replace the output recipe; answer with types and, in version 2, an id: 0 if the recipe is invalid."""
         frequency = RATE
         if self._version > 1:
             if len(payload) >= _DOUBLE.size:
@@ -140,10 +129,7 @@ class RtdeSession(PortSession):
         self._send(words(PackageKind.SETUP_OUTPUTS, head, recipe.words))
 
     def _set_up_inputs(self, payload: bytes) -> None:
-        """Add an input recipe, and answer with its id and the types of its variables.
-
-        If a variable cannot be set, or there are 255 recipes, the id is 0 and the owners of the variables stay.
-        """
+        """Add an input recipe; answer with an id and types. The id is 0 if a variable or the recipe is refused."""
         names = split(payload)
         types = [self._input_word(name) for name in names]
         valid = bool(names) and len(self._inputs) < RECIPES and not {"NOT_FOUND", "IN_USE"} & set(types)
@@ -164,7 +150,7 @@ class RtdeSession(PortSession):
         return INPUTS[name].name
 
     def _take_data(self, payload: bytes) -> None:
-        """Set the input variables of a data package, whether or not the client has started outputs."""
+        """Set the input variables of a data package, whether or not outputs are started."""
         number = payload[0] if payload else 0
         if 0 < number <= len(self._inputs):
             self._writer.write(self._inputs[number - 1].values(payload[1:]))
@@ -172,7 +158,6 @@ class RtdeSession(PortSession):
             self._complain(f"there is no input recipe {number}")
 
     def _start(self, _payload: bytes) -> None:
-        """Start to send outputs. This is refused without an output recipe, or if the last one was invalid."""
         self.served, self._next = self._outputs is not None, None
         self._read()
         self._said.clear()
@@ -184,31 +169,25 @@ class RtdeSession(PortSession):
         self._send(package(PackageKind.PAUSE, _TRUE))
 
     def _read(self) -> None:
-        """Have the variables of the recipe computed as long as the client reads them."""
+        """Register the recipe with its board while the client reads it."""
         self._board.end(self)
         if self.served and self._outputs is not None:
             self._board = self._boards[self._every]
             self._board.begin(self, self._outputs)
 
     def _take_text(self, _payload: bytes) -> None:
-        """Ignore a text message: on a robot of UR's, it would appear in the log of the teach pendant."""
+        """Ignore a text message: a UR robot would show it in the log of the teach pendant."""
 
     def _complain(self, sentence: str) -> None:
-        """Send the client a warning once per start.
-
-        Before the start nothing is sent, since clients would take it for the answer to the recipe that they set up.
-        """
+        """Send the client a warning once per start; before, clients would mistake it for the answer to a recipe."""
         if self.served and sentence not in self._said and len(self._said) < SENTENCES:
             self._said.add(sentence)
             self._send(text_message(self._version, TextLevel.WARNING, sentence, "RTDE"))
 
 
 def ticks_between(frequency: float) -> int:
-    """Return the ticks between two data packages: 500 Hz divided by the frequency [Hz], rounded down.
-
-    The frequency is clipped to 1 to 500; zero, negative numbers and NaN stand for 500.
-    """
+    """Return the ticks between two packages at a frequency [Hz], clipped to 1 to 500; 500 if it is not positive."""
     if not frequency > 0.0:
         return 1
-    # 500 / (500 / 15) is 14.999999999999998, and a client that asks for every 15th tick has to get it.
+    # 500 / (500 / 15) is 14.999999999999998, but a client that wants every 15th tick must get it.
     return floor(RATE / min(max(frequency, 1.0), RATE) + 1e-9)

@@ -35,7 +35,7 @@ REGISTER_ROWS = (
 
 
 def page() -> str:
-    """Return the page of reference that lists all variables."""
+    """Return the reference page that lists all variables."""
     outputs = _table(("variable", "type", "source", "what"), _outputs())
     inputs = _table(("variable", "type", "what"), _inputs())
     return f"""{HEAD}
@@ -54,7 +54,7 @@ changed.
 
 
 def describe(name: str) -> str:
-    """Return what an output variable is; an empty text if there is none of this name."""
+    """Return the description of an output variable; empty if there is none of this name."""
     return VARIABLES[name].what if name in VARIABLES else ""
 
 

@@ -1,4 +1,4 @@
-"""Turns the input variables of data packages into commands, and leaves out values that are in force already."""
+"""Turns the input variables of data packages into commands, omitting values that are already in force."""
 
 from collections.abc import Awaitable, Callable, Hashable, Iterable, Iterator
 from math import isclose
@@ -17,15 +17,11 @@ from tvist_server.rtde.wire import Wire
 
 Number = bool | int | float
 LARGEST = 1e308
-"""Largest absolute value of an input: infinity and NaN are refused."""
+"""Largest absolute value of an input; infinity and NaN are refused."""
 
 
 class InputWriter:
-    """Sets the inputs that one connection sends.
-
-    A variable that is not in a package keeps its last value on this connection. Until the first one a mask is 0, and
-    any other variable is not set.
-    """
+    """Sets the inputs of one connection; missing ones keep their last value, and a mask is 0 before its first."""
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, complain: Callable[[str], None]) -> None:
         self._robot = robot
@@ -35,7 +31,7 @@ class InputWriter:
         self._held: dict[str, Value] = {}
 
     def write(self, values: dict[str, Value]) -> None:
-        """Set the variables of one package; values that are not finite are refused one by one."""
+        """Set the variables of one package; values that are not finite are refused individually."""
         for name, value in values.items():
             numbers = value if isinstance(value, tuple) else (value,)
             if not all(abs(number) <= LARGEST for number in numbers):
@@ -51,7 +47,7 @@ class InputWriter:
         io = self._io
         if (
             isinstance(wrench, tuple) and io is not None and io.program_state != "STOPPED"
-        ):  # else nobody reads it
+        ):  # otherwise no program reads it
             a, b, c, d, e, f = (float(number) for number in wrench)
             self._change({}, lambda token: SetExternalWrench(token=token, wrench=(a, b, c, d, e, f)))
         if "speed_slider_mask" in values or "speed_slider_fraction" in values:
@@ -69,10 +65,7 @@ class InputWriter:
         assert not isinstance(value, tuple)
         return value
 
-    # ------------------------------------------------------------------ registers
-
     def _set_registers(self, values: dict[str, Value]) -> None:
-        """Write registers, for which the client needs no control."""
         io = self._io
         watched = () if io is None else io.watched  # the program's watchdogs count every write
         news: dict[Hashable, object] = {
@@ -92,8 +85,8 @@ class InputWriter:
                 cell.update({first + k: (bool(int(value) >> k & 1), new) for k in range(32)})
             else:
                 cell[first] = (value, new)
-        # One command, since a program must see a package as a whole: a client that sends what to do in one register and
-        # the numbers for it in others would have it done with those of the package before.
+        # One command, because programs must see a package as a whole: if one register selects an action and
+        # others hold its numbers, the action must not use the numbers of the previous package.
         head, *rest = [
             Registers(bank=bank, first=first, values=run)
             for bank, cell in cells.items()
@@ -102,8 +95,6 @@ class InputWriter:
         command = SetRegisters(bank=head.bank, first=head.first, values=head.values, also=tuple(rest))
         self._pending.ask(news)
         begin(self._answered(news, self._control.ask(command)))
-
-    # ------------------------------------------------------------------ what needs control
 
     def _set_speed(self) -> None:
         fraction = self._number("speed_slider_fraction")
@@ -139,7 +130,7 @@ class InputWriter:
         )
 
     def _digital(self, groups: set[str]) -> Iterator[tuple[int, bool]]:
-        """Digital outputs of these groups whose bit in the mask is set: number and value of each."""
+        """Yield number and value of each digital output in these groups that the mask selects."""
         for group, (first, count) in DIGITAL.items():
             if f"{group}_digital" not in groups or f"{group}_digital_output" not in self._held:
                 continue
@@ -155,7 +146,7 @@ class InputWriter:
         return self._pending.changed(("digital", bit), on, present)
 
     def _analog(self) -> Iterator[tuple[int, tuple[int, float]]]:
-        """Analogue outputs whose bit in the mask is set: number of each, and its type and share of the range."""
+        """Yield number, type and share of the range of each analogue output that the mask selects."""
         mask, types = (int(self._number(f"standard_analog_output_{part}")) for part in ("mask", "type"))
         for number in range(2):
             name = f"standard_analog_output_{number}"
@@ -167,7 +158,7 @@ class InputWriter:
         present: tuple[int, float] | None = None
         if io is not None:
             value, voltage = io.standard_analog_output[number], io.analog_io_types >> (2 + number) & 1
-            # The robot publishes volts or amperes: the share computed from them differs from the one set by rounding.
+            # The robot publishes volts or amperes; the share computed from them has rounding errors.
             shown = analog_share(value, voltage=bool(voltage))
             present = voltage, ratio if isclose(shown, ratio, abs_tol=1e-9) else shown
         return self._pending.changed(("analog", number), (kind, ratio), present)
@@ -191,7 +182,6 @@ class InputWriter:
         begin(self._answered(values, self._control.change(command)))
 
     async def _answered(self, values: dict[Hashable, object], reply: Awaitable[Reply]) -> None:
-        """Handle the reply to a command that sets these values."""
         answer = await reply
         self._pending.answered(values)
         if isinstance(answer, Refused):
@@ -199,7 +189,6 @@ class InputWriter:
 
 
 def _present(io: Io, name: str) -> Number:
-    """Return the present value of an input register in the robot's `io`."""
     bank, first, wire = REGISTERS[name]
     registers: list[int] | list[float] = getattr(io, f"{bank}_register")
     if wire is Wire.BOOL:
@@ -208,7 +197,7 @@ def _present(io: Io, name: str) -> Number:
 
 
 def _runs(cells: dict[int, tuple[Number, bool]]) -> Iterator[tuple[int, tuple[Number, ...]]]:
-    """Group registers with consecutive numbers: each group reaches from its first to its last new value."""
+    """Group registers with consecutive numbers; each group spans its first to its last new value."""
     run: list[Number] = []
     first = end = 0
     for number in [*sorted(cells), None]:
