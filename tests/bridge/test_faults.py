@@ -92,14 +92,16 @@ class Watch:
         plays = int(self.rows[-1]["runtime_state"][0]) == RuntimeState.PLAYING
         return not plays and max(map(abs, self.rows[-1]["target_qd"])) < STILL
 
-    def since(self, first, name):
-        """Values of a column from a row on."""
-        return np.array([row[name] for row in self.rows[first:]]).squeeze()
+    def since(self, first):
+        """Columns of the rows from one on, as many of each."""
+        rows = self.rows[first:]
+        return {name: np.array([row[name] for row in rows]).squeeze() for name in READ}
 
     def largest_step(self, first):
         """Largest way of a joint's target in a period [rad]."""
-        ways = np.abs(np.diff(self.since(first, "target_q"), axis=0)).max(axis=1)
-        return float((ways / np.round(np.diff(self.since(first, "timestamp")) / PERIOD)).max())
+        course = self.since(first)
+        ways = np.abs(np.diff(course["target_q"], axis=0)).max(axis=1)
+        return float((ways / np.round(np.diff(course["timestamp"]) / PERIOD)).max())
 
     def silence(self, first):
         """Time from the last new number before braking to the beginning of braking [s].
@@ -107,12 +109,13 @@ class Watch:
         Braking has begun at the last row before rest at which the fastest joint was not slower than a row before, or
         where the program says so, whichever is later.
         """
-        speed, time = np.abs(self.since(first, "target_qd")).max(axis=1), self.since(first, "timestamp")
-        said = int(np.argmax(self.since(first, OUTPUT) >= State.BRAKING))  # 0 where it does not say so
+        course = self.since(first)
+        speed, time = np.abs(course["target_qd"]).max(axis=1), course["timestamp"]
+        said = int(np.argmax(course[OUTPUT] >= State.BRAKING))  # 0 where it does not say so
         rest = int(np.argmax(speed[said:] < STILL)) + said
         faster = np.flatnonzero(np.diff(speed[: rest + 1]) >= 0.0)
         begun = max(said, int(faster[-1]) + 1 if len(faster) else 0)
-        came = np.flatnonzero(np.diff(self.since(first, INPUT)[: begun + 1]))
+        came = np.flatnonzero(np.diff(course[INPUT][: begun + 1]))
         return float(time[begun] - time[came[-1] + 1 if len(came) else 0])
 
 
@@ -165,7 +168,7 @@ class Faults:
             if fault != "kill":
                 wait_for(lambda: EXPECTED[fault] in bridge.said[said:], 20.0, f"words on {fault}")
             time.sleep(0.2 / TIME)
-            waited = watch.since(rested, "target_q")
+            waited = watch.since(rested)["target_q"]
             self.figures["moved_mrad"].append((fault, 1e3 * float(abs(waited - waited[0]).max())))
             if fault != "kill":
                 until_done(arm.unlock_protective_stop if fault == "protective stop" else arm.power_on)

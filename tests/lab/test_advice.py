@@ -16,6 +16,7 @@ from tests.lab.synthetic_logs import SyntheticLog
 
 from tvist_cli.commands.log.advise import advise as command_line
 from tvist_cli.failure import Failure
+from tvist_client.errors import MotionStoppedError
 from tvist_lab.advice import EACH, ONE, ROBOT, Stop, advise, as_dict, command, verdict
 from tvist_lab.advice.options import options, slowed, smoothed
 from tvist_lab.advice.ripple import WAVES, fitted, poles_of
@@ -234,12 +235,14 @@ def test_the_page_loads_nothing_and_every_option_is_plain_values(rings, advice, 
     assert plain["recommended"]["left_percent"] == min(same)
 
 
-WAYS, REPETITIONS = 2, 2
+WAYS, REPETITIONS = 3, 2
 """Number of random moves of each robot, each made to and fro, and how often."""
 REST, BEFORE = 1.2, 0.4
 """Time at rest after a motion, and after the arm was put at the start of a move [s]."""
-SPEED = {"velocity": 2.0, "acceleration": 3.0}
-"""Limits of the motions [rad/s, rad/s²]."""
+SPEEDS = ((1.5, 2.0), (2.0, 3.0))
+"""Velocity and acceleration limits [rad/s, rad/s²], in turn."""
+SEEDS = (201, 202)
+"""Seeds of hidden robots and their moves."""
 POINTS = 5.0
 """Largest difference of a reduction that comes true [percentage points]."""
 
@@ -248,11 +251,12 @@ async def predicted_and_real(name, seed):
     """Reductions of the rms after the stops of a robot: as predicted, and measured with the shaper on [%]."""
     description = load(name)
     moves = draw_moves(description, WAYS, seed, (description.payload.mass,) * 2).moves
-    unshaped = await recorded(name, seed, moves, None)
+    speed = SPEEDS[seed % len(SPEEDS)]
+    unshaped = await recorded(name, seed, moves, speed, None)
     advice = advise([unshaped])
     if advice.best is None:
         return []
-    shaped = await recorded(name, seed, moves, advice)
+    shaped = await recorded(name, seed, moves, speed, advice)
     made = []
     for stop in advice.ringing:
         after = Stop.of(shaped, stop.number - 1)
@@ -261,7 +265,7 @@ async def predicted_and_real(name, seed):
     return made
 
 
-async def recorded(name, seed, moves, advice):
+async def recorded(name, seed, moves, speed, advice):
     """Make the moves, to and fro; with the advised shaper if there is one."""
     setup = free_setup(robot=name, hidden=seed, truth=False, shaper="none", seed=seed)
     best = None if advice is None else advice.best
@@ -276,7 +280,7 @@ async def recorded(name, seed, moves, advice):
                     number += 1
                     if best is not None and number in groups:
                         await aim(arm, best, groups[number])
-                    await arm.move_j(target, **SPEED)
+                    await arm.move_j(target, velocity=speed[0], acceleration=speed[1])
                     await robot.pass_time(round(REST / PERIOD))
         return Measured.of(collected.recording())
 
@@ -292,7 +296,12 @@ async def aim(arm, best, group):
 @pytest.mark.nightly
 @pytest.mark.parametrize(("name", "most", "least"), [("ur5e", 3.0, 70.0), ("ur5-light", 6.0, 40.0)])
 def test_what_advice_predicts_comes_true(name, most, least, measured):
-    made = asyncio.run(predicted_and_real(name, 201))
+    made = []
+    for seed in SEEDS:
+        try:
+            made += asyncio.run(predicted_and_real(name, seed))
+        except MotionStoppedError:  # a hidden robot may need more torque than it has
+            measured("left out, seed", seed)
     off = [abs(predicted - real) for predicted, real in made]
     within = 100.0 * sum(one <= POINTS for one in off) / len(off)
     measured("moves; within 5 points [%]; median [points]", f"{len(made)}; {within:.0f}; {median(off):.2f}")
