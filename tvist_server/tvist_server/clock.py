@@ -228,7 +228,7 @@ class Realtime(Clock):
         robot.guarded(robot.jobs.do_waiting)
         if not silent and robot.interval is None:  # a watched robot reports by itself that it is lost
             robot.host.warn(
-                "the arm does not start its next tick: time stands still, and commands have no effect"
+                "the arm does not begin its next tick: time stands still, and commands have no effect"
             )
         return True
 
