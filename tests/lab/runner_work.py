@@ -17,12 +17,7 @@ def square_or_raise(number):
         raise KeyError(f"task {number}")
     if number % 10 == 8:
         raise OddError("odd", number)
-    return number * number
-
-
-def function_of(number):
-    """A result that cannot be pickled, for one task."""
-    return (lambda: number) if number == 3 else number
+    return (lambda: number) if number % 10 == 9 else number * number  # no function can be pickled
 
 
 def die_once(task):

@@ -40,25 +40,21 @@ class Arm:
     @classmethod
     def drawn(cls, seed, *, friction=True, masses=0.0):
         """Draw one; `masses` is the share by which each link is heavier or lighter."""
-        random, n = np.random.default_rng([seed, 7]), ROBOT.joints
-        known = ROBOT if friction else ROBOT.clean()
-        drives = known.drives
-        gains, own, sensors = (
-            1.0 + share * random.uniform(-1, 1, n) for share in (0.1, 0.2 if friction else 0.0, 0.03)
-        )
-        drives = msgspec.structs.replace(
+        random, known = np.random.default_rng([seed, 7]), ROBOT if friction else ROBOT.clean()
+        drives, changed = known.drives, msgspec.structs.replace
+        shares = (0.1, 0.2 if friction else 0.0, 0.03)
+        gains, own, sensors = (1.0 + share * random.uniform(-1, 1, ROBOT.joints) for share in shares)
+        drives = changed(
             drives,
             velocity_gain=tuple((gains * drives.velocity_gain).tolist()),
             coulomb_friction=tuple((own * drives.coulomb_friction).tolist()),
             friction_width=drives.friction_width * (0.5 if friction else 1.0),
         )
-        heavier = 1.0 + masses * random.choice([-1.0, 1.0], n)
-        links = msgspec.structs.replace(
-            known.links,
-            mass=tuple((heavier * known.links.mass).tolist()),
-            inertia=tuple(map(tuple, (heavier[:, None] * known.links.inertia).tolist())),
-        )
-        return cls(known, msgspec.structs.replace(known, drives=drives, links=links), sensors)
+        heavier = 1.0 + masses * random.choice([-1.0, 1.0], ROBOT.joints)
+        inertia = (heavier[:, None] * known.links.inertia).tolist()
+        mass = tuple((heavier * known.links.mass).tolist())
+        links = changed(known.links, mass=mass, inertia=tuple(map(tuple, inertia)))
+        return cls(known, changed(known, drives=drives, links=links), sensors)
 
 
 @dataclass(frozen=True)
@@ -88,18 +84,12 @@ class Driven:
         plant.reset(self.driven.rest, seed=seed)
         return plant.play(self.driven.commands)
 
-    def record(self, arm, carried, seed):
-        """What the robot records of it."""
-        return self.recorded(self.respond(arm, carried, seed), arm.sensors, seed)
-
     def recorded(self, response, sensors, seed):
-        """The same of an arm's response, with other gains of its torque sensors and other noise."""
+        """What a robot records of an arm's response, with these gains of its torque sensors and some noise."""
         kept, measured = slice(self.first, self.stop + AFTER), response.measured
         noise = 0.5 * np.random.default_rng([seed, 99]).standard_normal(measured.moment.shape)
-        return MotionRecord(
-            measured.q[kept], (sensors * measured.moment + noise)[kept], self.stop - self.first, True,
-            taken_for(self.believed),
-        )  # fmt: skip
+        moment = (sensors * measured.moment + noise)[kept]
+        return MotionRecord(measured.q[kept], moment, self.stop - self.first, True, taken_for(self.believed))
 
     def peak(self, arm, carried, seed):
         """Largest acceleration of the tool later than 10 ms after the stop [m/s²]."""
@@ -124,7 +114,8 @@ def followed(seed, *, friction=True, masses=0.0, motions=2):
     student, masses_believed = PayloadStudent(arm.known), [believed]
     payload = paper_payload(ROBOT, believed)
     for number, move in enumerate(moves[:motions]):
-        record = Driven.of(arm.known, move, payload.mass).record(arm, mass, 10 * seed + number)
+        driven, own = Driven.of(arm.known, move, payload.mass), 10 * seed + number
+        record = driven.recorded(driven.respond(arm, mass, own), arm.sensors, own)
         lesson = student.study(replace(record, beliefs=taken_for(payload)))
         payload = payload if lesson is None else lesson.payload
         masses_believed.append(payload.mass)

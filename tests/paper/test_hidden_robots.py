@@ -1,7 +1,6 @@
-"""Identification of robots that nobody knows, as a client; ten of them: TVIST_HIDDEN=10 pytest -m nightly FILE."""
+"""A robot that nobody knows is identified, as a client."""
 
 import asyncio
-import os
 from dataclasses import replace as changed
 
 import numpy as np
@@ -25,9 +24,8 @@ from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
 
 ROBOT = load("ur5e")
-FIRST = 101
-"""Seed of the first robot; seeds below have been looked at while the identification was made."""
-ROBOTS = int(os.environ.get("TVIST_HIDDEN", "2"))
+SEED = 101
+"""Seeds below have been looked at while the identification was made."""
 DRIVES = {
     "gear_stiffness": 0.2, "gear_damping": 0.2, "velocity_gain": 0.3, "rotor_inertia": 0.2, "coulomb_friction": 0.2,
     "friction_width": 0.2,
@@ -99,54 +97,30 @@ def true_values(arm):
     }
 
 
-def known_as(arm, known):
-    """A calibration with the true springs and friction."""
-    true = true_values(arm) | {"stribeck_speed": [0.05] * 6, "viscous_friction": [1e-3] * 6}
-    true["damping_time"] = np.divide(arm.drives.gear_damping, arm.drives.gear_stiffness)
-    single = [replace(one, joints=(joint,)) for one in known.modal.parameters for joint in one.joints]
-    parameters = tuple(replace(one, value=float(true[one.quantity][one.joints[0]])) for one in single)
-    return replace(known, modal=replace(known.modal, parameters=parameters))
-
-
-def left_out(arm, mass, declared, known, seed):
+def left_out(arm, mass, declared, known):
     """Median reduction of `elastic` over moves that nothing was tuned on [%]."""
-    variant, methods = (
-        ArmVariant("hidden", "hidden", truly=lambda *_: arm),
-        some(["none", "elastic"], ROBOT, known),
-    )
-    found = []
-    for number, move in enumerate(draw_moves(ROBOT, 8, 7000 + seed, (mass, mass)).moves):
+    variant = ArmVariant("hidden", "hidden", truly=lambda *_: arm)
+    methods, found = some(["none", "elastic"], ROBOT, known), []
+    for number, move in enumerate(draw_moves(ROBOT, 6, 7000 + SEED, (mass, mass)).moves):
         case = Case(ROBOT, move, seed=number, arms=(variant,), payload_error=declared / mass - 1.0)
-        found += [
-            row["reduction_percent"] for row in measure(Job(case, methods)) if row["shaper"] == "elastic"
-        ]
+        rows = [row for row in measure(Job(case, methods)) if row["shaper"] == "elastic"]
+        found += [row["reduction_percent"] for row in rows]
     return float(np.median([one for one in found if one is not None]))
 
 
 @pytest.mark.nightly
-@pytest.mark.timeout(3600)
-def test_robots_that_nobody_knows_are_identified_in_100_seconds_as_well_as_the_intervals_say(measured):
-    inside, behind, ahead = [], [], []
-    for seed in range(FIRST, FIRST + ROBOTS):
-        arm, mass = hidden(seed)
-        payload, known, seconds = identified(arm, mass)
-        found, true = payload.payload.mass, true_values(arm)
-        assert seconds < 100.0
-        assert abs(found - mass) < min(0.3, 3.0 * payload.mass_deviation)
-        for one in known.modal.parameters:
-            if one.status == "identified" and one.quantity in true:
-                value = true[one.quantity][one.joints[0]]
-                inside.append(one.interval[0] * 0.9999 <= value <= one.interval[1] * 1.0001)
-        reduced = [
-            left_out(arm, mass, found, known, seed),
-            left_out(arm, mass, mass, known_as(arm, known), seed),
-        ]
-        behind.append(reduced[1] - reduced[0])
-        ahead.append(reduced[0] - left_out(arm, mass, mass, calibration("ur5e_modal"), seed))
-        measured(
-            f"robot {seed}", f"{seconds:.0f} s, elastic {reduced[0]:.1f}, true calibration {reduced[1]:.1f} %"
-        )
+def test_a_robot_that_nobody_knows_is_identified_in_100_seconds_as_well_as_the_intervals_say(measured):
+    arm, mass = hidden(SEED)
+    payload, known, seconds = identified(arm, mass)
+    found, true, inside = payload.payload.mass, true_values(arm), []
+    assert seconds < 100.0
+    assert abs(found - mass) < min(0.3, 3.0 * payload.mass_deviation)
+    for one in known.modal.parameters:
+        if one.status == "identified" and one.quantity in true:
+            value = true[one.quantity][one.joints[0]]
+            inside.append(one.interval[0] * 0.9999 <= value <= one.interval[1] * 1.0001)
+    own, usual = (left_out(arm, mass, *one) for one in ((found, known), (mass, calibration("ur5e_modal"))))
+    measured("elastic", f"{own:.1f} %, with the calibration of the package {usual:.1f} %")
     measured("inside the intervals", f"{np.mean(inside):.3f} of {len(inside)}")
     assert np.mean(inside) > 0.88
-    assert np.median(behind) < 3.0
-    assert np.median(ahead) > 0.0
+    assert own > max(usual, 90.0)

@@ -3,6 +3,7 @@
 import asyncio
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -92,15 +93,14 @@ def test_the_calibration_says_how_sure_it_is_and_what_it_came_from(done):
         assert not estimator.clipped
 
 
-@pytest.mark.parametrize("wrong", [(2,), pytest.param((1, 6), marks=pytest.mark.nightly)])
-def test_a_ring_down_with_another_payload_than_declared_is_named(done, wrong):
+def test_a_ring_down_with_another_payload_than_declared_is_named(done):
     _, jogs, _ = done
-    mislabelled = tuple(
-        replace(log, payload=PAYLOADS[log.payload == PAYLOADS[0]]) if number in wrong else log
+    mislabelled = [
+        replace(log, payload=PAYLOADS[log.payload == PAYLOADS[0]]) if number == 2 else log
         for number, log in enumerate(jogs.logs)
-    )
-    stops = calibrated(replace(jogs, logs=mislabelled)).stops
-    assert {number for number, stop in enumerate(stops) if stop.reason == CONTRADICTS} == set(wrong)
+    ]
+    stops = calibrated(replace(jogs, logs=tuple(mislabelled))).stops
+    assert [number for number, stop in enumerate(stops) if stop.reason == CONTRADICTS] == [2]
 
 
 @pytest.mark.nightly
@@ -119,8 +119,6 @@ def test_too_few_ring_downs_are_refused_before_the_arm_moves():
 
 
 def test_the_file_of_another_arm_is_refused():
-    import msgspec
-
     other = msgspec.structs.replace(ROBOT, robot=msgspec.structs.replace(ROBOT.robot, model="other"))
     with pytest.raises(IdentificationError, match="is a UR5e"):
         measured(4, seed=0, description=other)
@@ -163,18 +161,13 @@ def test_poses_chosen_say_more_than_the_first_ones_and_none_twice(synthetic):
 
 def test_configurations_are_free_of_collision_at_either_end_of_the_jog():
     model = CollisionModel(ROBOT, body(PAYLOADS[1]))
-    found = free_configurations(ROBOT, PAYLOADS, 30, 2)
-    assert len(found) == 30
-    for q in found:
-        assert model.meeting(q) is None
-        assert model.meeting(q - jog_of(6)) is None
+    for q in free_configurations(ROBOT, PAYLOADS, 20, 2):
+        assert model.meeting(q) is model.meeting(q - jog_of(6)) is None
 
 
 def test_what_ring_downs_do_not_tell_is_said_to_be_not_identifiable(synthetic):
     arm, _, rings = synthetic
     fit = fit_from_many(arm, rings[:1])
-    status = [p.status for p in arm.parameters(fit.logarithms, fit.deviations)]
-    assert status.count("not identifiable") >= 4
-    for parameter in arm.parameters(fit.logarithms, fit.deviations):
-        low, high = parameter.interval
-        assert low <= parameter.value <= high
+    parameters = arm.parameters(fit.logarithms, fit.deviations)
+    assert [one.status for one in parameters].count("not identifiable") >= 4
+    assert all(one.interval[0] <= one.value <= one.interval[1] for one in parameters)

@@ -16,21 +16,19 @@ ROBOT = load("ur5e")
 INERTIA = (0.002, 0.0, 0.0, 0.002, 0.0, 0.002)
 
 
-def found(mass, com, *, declared=2.0, poses=4, seed=0, description=ROBOT):
+def found(mass, com, *, declared=2.0, poses=3, seed=0, description=ROBOT):
     async def run():
         async with robot_in_process(free_setup(seed=seed)) as robot, robot.control("test") as arm:
             await arm.reset(payload=make_payload(mass, com, INERTIA if mass else (0.0,) * 6))
             await arm.set_payload(declared, (0.0, 0.0, 0.04), INERTIA)
-            return await identify_payload(
-                robot, arm, description, poses=poses, seed=seed, progress=lambda _: None
-            )
+            how = {"poses": poses, "seed": seed, "progress": lambda _: None}
+            return await identify_payload(robot, arm, description, **how)
 
     return asyncio.run(run())
 
 
 @pytest.mark.parametrize(
-    ("mass", "com", "seed"),
-    [(3.3, (-0.02, 0.05, 0.06), 1), (0.6, (0.03, 0.0, 0.05), 2), (5.0, (0, 0, 0.0405), 3)],
+    ("mass", "com", "seed"), [(0.6, (0.03, 0.0, 0.05), 2), (5.0, (-0.02, 0.02, 0.03), 3)]
 )
 def test_mass_and_centre_are_found_whatever_is_declared(mass, com, seed):
     payload = found(mass, com, seed=seed)
