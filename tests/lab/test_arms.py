@@ -48,9 +48,4 @@ def test_three_arms_are_stilled_by_auto_out_of_the_box():
         assert found["reduction_percent"]["median"] >= 95.0, one["name"]
         assert np.max(found["f_d_error_percent"]) < 3.0
         assert found["sag_error_percent"] < 1.0
-        assert f"| `{one['name']}` | +0 % |" in page
-
-
-def test_the_page_has_a_row_for_each_arm():
-    page = page_of("robots", {"robots": [about(name, load(name)) for name in robots()]})
-    assert all(f"| `{name}` |" in page for name in robots())
+        assert f"| `{one['name']}` | 1 |" in page

@@ -33,7 +33,7 @@ def _block(request, monkeypatch):
     monkeypatch.setattr(mcap_file, "BLOCK", request.param)
 
 
-@pytest.mark.parametrize("name", ["faults", "live_rtde_inputs"])
+@pytest.mark.parametrize("name", ["faults", "live_lost_lease"])
 def test_the_columns_of_real_recordings(name):
     assert equals_objects(read(JOURNALS / f"{name}.mcap"))
 
