@@ -18,7 +18,7 @@ from benchmarks.served import bridge, reader, robots, rtde
 from benchmarks.start import start
 from tvist_lab.bench.served_robots import one_robot
 from tvist_lab.bench.speed import this_machine
-from tvist_server.ending import end_like_interrupted
+from tvist_server.shutdown import end_like_interrupted
 
 COMPUTED: Mapping[str, Callable[[Tell], dict[str, Figure]]] = {
     "line": line, "streams": streams, "programs": programs,

@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.figure import CONFIDENCE, Tell
 from benchmarks.helpers import asked, helper
 from tvist_lab.bench.served_robots import punctuality
-from tvist_lab.served import Served, served
+from tvist_lab.served import RunningServer, served
 from tvist_plant.plant import PERIOD
 
 SEGMENT = 4.0
@@ -41,14 +41,14 @@ async def lateness(seconds: float, tell: Tell) -> dict[str, dict[str, dict[str, 
     return {"lateness": found}
 
 
-async def _robot(server: Served, segment: float) -> float:
+async def _robot(server: RunningServer, segment: float) -> float:
     """Return the ticks that the robot misses in a segment [% of those due]."""
     await server.robot.advance(SETTLE_TICKS)
     tick, _ = await punctuality(server, segment)
     return 100.0 * tick["missed"] / max(tick["missed"], segment / PERIOD)
 
 
-async def _thread(server: Served, bare: Process, segment: float) -> float:
+async def _thread(server: RunningServer, bare: Process, segment: float) -> float:
     """Return the same for the bare thread, while the robot is halted."""
     # Two halts in a row would outlast the lease, so the robot reads its messages between them.
     await server.robot.advance(SETTLE_TICKS)

@@ -40,7 +40,7 @@ def host_of(text: str) -> Host:
 
 
 @dataclass(frozen=True)
-class Pair:
+class KeyPair:
     """A certificate and its private key."""
 
     certificate: x509.Certificate
@@ -59,7 +59,7 @@ class Pair:
         write_new(certificate, self.certificate.public_bytes(serialization.Encoding.PEM), 0o644)
 
 
-class CertificateAuthority(Pair):
+class CertificateAuthority(KeyPair):
     """An authority that signs certificates."""
 
     @classmethod
@@ -86,7 +86,7 @@ class CertificateAuthority(Pair):
 
     def issue(
         self, name: str, usage: Literal["robot", "client"], *, days: int, hosts: tuple[Host, ...] = ()
-    ) -> Pair:
+    ) -> KeyPair:
         """Sign a certificate that is valid for some days, for a robot under its host names."""
         key = ec.generate_private_key(ec.SECP256R1())
         mine = x509.SubjectKeyIdentifier.from_public_key(self.key.public_key())
@@ -102,7 +102,7 @@ class CertificateAuthority(Pair):
         )
         if hosts:
             builder = builder.add_extension(x509.SubjectAlternativeName(hosts), critical=False)
-        pair = Pair(builder.sign(self.key, hashes.SHA256()), key)
+        pair = KeyPair(builder.sign(self.key, hashes.SHA256()), key)
         if pair.until > self.until:
             raise CertificateError(f"days is {days}: the authority itself expires on {self.until:%Y-%m-%d}")
         return pair

@@ -22,10 +22,10 @@ def interrupted(what: str) -> Failure:
 
 
 @contextmanager
-def told(*errors: type[Exception], code: int = 1) -> Iterator[None]:
+def failing_on(*errors: type[Exception], exit_code: int = 1) -> Iterator[None]:
     """Turn errors of these types, and those of client and protocol, into a `Failure` with the same message.
 
-    A file that exists but has the wrong content always gives exit code 1, whatever `code` is.
+    A file that exists but has the wrong content always gives exit code 1, whatever `exit_code` is.
     """
     kinds: tuple[type[Exception], ...] = (*errors, ClientError, TvistError)
     try:
@@ -33,7 +33,7 @@ def told(*errors: type[Exception], code: int = 1) -> Iterator[None]:
     except UserFileError as error:
         raise Failure(one_line(str(error))) from error
     except kinds as error:
-        raise Failure(one_line(_sentence(error)), code=code) from error
+        raise Failure(one_line(_sentence(error)), code=exit_code) from error
 
 
 def _sentence(error: Exception) -> str:

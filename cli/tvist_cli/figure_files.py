@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import say
 
 if TYPE_CHECKING:
@@ -56,11 +56,11 @@ class FigureOptions:
         if self.style:
             from tvist_lab.figures import StyleError
 
-            with told(StyleError, code=2), self.into(Path()):
+            with failing_on(StyleError, exit_code=2), self.into(Path()):
                 pass
 
 
-AS_USUAL = FigureOptions()
+DEFAULT_FIGURES = FigureOptions()
 
 
 def write(save: Save, figures: "Mapping[str, Figure]") -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from tvist_cli.output import out, print_json, table
 from tvist_lab.identification.calibrate import Found, ModeErrors
-from tvist_lab.identification.jogs import Jog, Measured
+from tvist_lab.identification.jogs import Jog, RingDownLogs
 from tvist_lab.identification.payload import PayloadFound
 from tvist_lab.identification.ring_downs import CONTRADICTS, unused
 from tvist_lab.identification.servo_response import ServoResponse
@@ -37,7 +37,7 @@ FRICTION = {
 
 def report(
     found: Found,
-    measured: Measured,
+    measured: RingDownLogs,
     output: Path,
     options: str,
     true: list[ModeErrors] | None,

@@ -7,7 +7,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 from tvist_cli.connection import Connection
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.figure_files import FigureOptions, write
 from tvist_cli.identified import angles, report, report_payload, report_twin
 from tvist_cli.output import err, say, table, typed, waiting
@@ -18,7 +18,7 @@ from tvist_client.robot import Robot
 from tvist_controller.api.line import Setup, paper_payload
 from tvist_controller.setup import check_rating
 from tvist_lab.identification.calibrate import Found, ModeErrors, calibrate, true_errors
-from tvist_lab.identification.jogs import JogPlan, Measured, make_jogs, plan_jogs
+from tvist_lab.identification.jogs import JogPlan, RingDownLogs, make_jogs, plan_jogs
 from tvist_lab.identification.payload import identify_payload
 from tvist_lab.identification.ring_downs import Progress
 from tvist_lab.identification.twin import fit_twin
@@ -33,7 +33,7 @@ from tvist_protocol.errors import RefusedError
 from tvist_protocol.modes import RobotMode
 from tvist_server.config import from_mapping
 from tvist_server.option_values import StartError
-from tvist_server.watching.place import place_of
+from tvist_server.watching.address import place_of
 
 ROBOT = "ur5e"
 """Robot that is identified unless another one is named."""
@@ -60,12 +60,12 @@ def from_logs(
     arm, logs = robot_logs(
         [*files, *checks], robot, None if masses is None else masses[0], columns, len(files)
     )
-    with told(RecordingError, OSError), waiting("identifying") as step:
+    with failing_on(RecordingError, OSError), waiting("identifying") as step:
         if twin:
             made = fit_twin(arm, logs[: len(files)], logs[len(files) :], step)
             write_whole(output, twin_file(made, typed()).encode())
         else:
-            found = _calibrated(arm, Measured(tuple(logs)), output, step)
+            found = _calibrated(arm, RingDownLogs(tuple(logs)), output, step)
     if twin:
         report_twin(made, output, json=json)
         return
@@ -73,17 +73,22 @@ def from_logs(
         _draw(found, look, figures, arm, None)
     named = robot or arm.robot.name
     report(
-        found, Measured(tuple(logs)), output, "" if named == ROBOT else f" --robot {named}", None, json=json
+        found,
+        RingDownLogs(tuple(logs)),
+        output,
+        "" if named == ROBOT else f" --robot {named}",
+        None,
+        json=json,
     )
 
 
-def _calibrated(arm: RobotDescription, measured: Measured, output: Path, step: Progress) -> Found:
+def _calibrated(arm: RobotDescription, measured: RingDownLogs, output: Path, step: Progress) -> Found:
     found = calibrate(arm, measured, name=output.stem, command=typed(), progress=step)
     write_whole(output, calibration_to_json(found.calibration))
     return found
 
 
-class Place:
+class MovableRobot:
     """A robot that can be moved: served, at ur://, or in this process if there is no source."""
 
     def __init__(
@@ -101,7 +106,7 @@ class Place:
         self._setup: Setup | None = None
         self._positions = isinstance(source, str)
         if isinstance(source, str):
-            with told(ValueError, DescriptionError, code=2):
+            with failing_on(ValueError, DescriptionError, exit_code=2):
                 place_of(source)
                 load(robot or ROBOT)
             if masses is not None and len(masses) > 1:
@@ -121,7 +126,7 @@ class Place:
                 "clock": "free",
                 "seed": seed,
             }
-            with told(StartError, ValueError, code=2):
+            with failing_on(StartError, ValueError, exit_code=2):
                 self._setup = free_setup(from_mapping(content, "options"))
                 check_rating(self._setup.payload, self._setup.description)
 
@@ -136,14 +141,14 @@ class Place:
                     await control.set_payload(new.mass, new.com, new.inertia)
             report_payload(found, declared=declare, json=json)
 
-        with told(OSError), waiting("weighing") as step:
+        with failing_on(OSError), waiting("weighing") as step:
             asyncio.run(run(step))
 
     def identify(self, output: Path, figures: Path | None, look: FigureOptions, *, json: bool) -> None:
         """Make jogs, write the calibration fitted to them, and print its quality."""
         picture = output.with_suffix(".moves.png")
 
-        async def run(step: Progress) -> tuple[RobotDescription, Measured]:
+        async def run(step: Progress) -> tuple[RobotDescription, RingDownLogs]:
             async with self._robot_and_file() as (client, arm):
                 step("planning the moves")
                 masses = self._masses
@@ -164,7 +169,7 @@ class Place:
                 async with client.control("identify") as control:
                     return arm, await make_jogs(client, control, plan, step)
 
-        with told(ServedError, OSError, RecordingError):
+        with failing_on(ServedError, OSError, RecordingError):
             if self._positions:  # the question stands on the same screen
                 arm, measured = asyncio.run(run(say))
                 found = _calibrated(arm, measured, output, say)
@@ -229,7 +234,7 @@ def _draw(
 
 async def _agreed_jogs(
     client: Robot, plan: JogPlan, picture: Path, step: Progress, *, sure: bool
-) -> Measured:
+) -> RingDownLogs:
     """Show the moves, ask for consent, and make them."""
     from tvist_lab.figures import house_style, move_plan_figure, save
 

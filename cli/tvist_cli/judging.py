@@ -10,30 +10,30 @@ if TYPE_CHECKING:
 
     from tvist_lab.recordings import Recording
     from tvist_protocol.stream import Truth
-    from tvist_view.beside import Run, Verdict
+    from tvist_view.beside import MotionRecord, Verdict
 
-MOST = 0.8
+LEAST_TRUTH_SHARE = 0.8
 """Share of ticks that must have a truth message for the truth to be used [-]; a busy machine loses some."""
 
 
-def judge(without: "Run", shaped: "Run") -> "Verdict":
+def judge(without: "MotionRecord", shaped: "MotionRecord") -> "Verdict":
     """Measure one motion without and with a shaper, each with the rest after it; missing values are None."""
-    from tvist_lab.change import Change
+    from tvist_lab.change import MotionChange
     from tvist_lab.metrics.comparison import compare
-    from tvist_lab.metrics.table import Measured
+    from tvist_lab.metrics.table import MeasuredRecording
 
-    first, second = (Measured.of(_recording(run)) for run in (without, shaped))
+    first, second = (MeasuredRecording.of(_recording(run)) for run in (without, shaped))
     motions = compare(first, second).motions
-    change = motions[0].change if motions else Change(None, None, None, None)
+    change = motions[0].change if motions else MotionChange(None, None, None, None)
     return change.as_dict()
 
 
-def _recording(run: "Run") -> "Recording":
+def _recording(run: "MotionRecord") -> "Recording":
     """Return a motion as columns of the truth, or of the sensor if too many truth messages were lost."""
     from tvist_lab.recordings.messages import recording_of_messages
 
     truths = sorted(run.truths, key=lambda truth: truth.tick)
-    if len(truths) < MOST * len(run.states):
+    if len(truths) < LEAST_TRUTH_SHARE * len(run.states):
         return recording_of_messages(run.states, run.events)
     # At both ends, the truth of a state may be missing.
     states = [state for state in run.states if truths[0].tick <= state.tick <= truths[-1].tick]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.offered import ROBOTS
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class LogOptions:
         if self.imu is not None and len(self.imu) != len(files):
             raise Failure(f"{len(self.imu)} --imu for {len(files)} logs: give one for each", code=2)
         needs = ROBOT_OR_SENSOR if sensor and self.imu is None else ROBOT
-        with told(RecordingError):
+        with failing_on(RecordingError):
             logs = [read(file, self.columns, needs) for file in files]
             if self.imu is None:
                 return logs

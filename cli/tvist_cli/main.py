@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tvist_server.ending import end_like_interrupted, ending_signals
+from tvist_server.shutdown import end_like_interrupted, ending_signals
 
 if TYPE_CHECKING:
     import cyclopts
@@ -190,7 +190,7 @@ def _run() -> None:
         sys.exit(
             "tvist: more than the client is needed: pip install 'tvist[server]', for studies 'tvist[lab]'"
         )
-    from tvist_cli.failure import Failure, told
+    from tvist_cli.failure import Failure, failing_on
     from tvist_cli.misuse import readable, sentence
     from tvist_protocol.errors import harmless
 
@@ -198,7 +198,7 @@ def _run() -> None:
     warnings.formatwarning = lambda message, *_, **__: harmless(f"tvist: {message}\n")
     app = application(sys.argv[1:3])
     try:
-        with told(OSError):  # a folder for figures that is none, mostly
+        with failing_on(OSError):  # a folder for figures that is none, mostly
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
         print(

@@ -19,7 +19,7 @@ from tvist_cli.failure import Failure, interrupted
 from tvist_protocol.errors import HARMFUL, harmless
 
 if TYPE_CHECKING:
-    from tvist_lab.report import Page
+    from tvist_lab.report import ReportPage
 
 GAP = " │ "
 WIDTH = 120
@@ -174,7 +174,7 @@ def default_output(path: Path) -> Path:
     return path
 
 
-def write_report(path: Path, page: "Page") -> None:
+def write_report(path: Path, page: "ReportPage") -> None:
     """Write a web page completely or not at all, and print its path."""
     from tvist_lab.report import render
     from tvist_lab.whole_file import write_whole

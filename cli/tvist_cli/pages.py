@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tvist_cli.failure import interrupted, told
+from tvist_cli.failure import failing_on, interrupted
 from tvist_cli.output import err
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ NICE = 5
 
 
 @dataclass(frozen=True)
-class Door:
+class PageAddress:
     """Address and port of a page."""
 
     address: str
@@ -30,7 +30,7 @@ class Door:
 def serve_page(
     page: str,
     meet: "Meet",
-    door: Door,
+    door: PageAddress,
     run: Callable[[], Awaitable[None]] | None = None,
     parts: Callable[[str], bytes | None] = lambda _: None,
 ) -> None:
@@ -49,7 +49,7 @@ def serve_page(
             await (asyncio.Event().wait() if run is None else run())
 
     try:
-        with told(StageError):
+        with failing_on(StageError):
             asyncio.run(served())
     except KeyboardInterrupt:
         raise interrupted("the page has ended") from None

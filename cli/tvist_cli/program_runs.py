@@ -9,24 +9,24 @@ from pathlib import Path
 from typing import Any
 
 from tvist_cli.compiling import compile_if_new
-from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.failure import Failure, failing_on, interrupted
 from tvist_cli.output import err, print_json, say
 from tvist_cli.serving import introduction, say_recorded, say_who_can_reach
-from tvist_controller.programs.checking import Finding, check_program
+from tvist_controller.programs.checking import ProgramFinding, check_program
 from tvist_lab.programs.judging import Run, broken, changes, missed
-from tvist_lab.programs.limits import Limits
+from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.results import Shortcoming, as_dict, summary
 from tvist_lab.programs.running import InputError, ProgramServer, run_in_lockstep
-from tvist_lab.programs.watch import ProgramWatch, Said
+from tvist_lab.programs.watch import ProgramMessage, ProgramWatch
 from tvist_lab.words import counted
 from tvist_plant.user_file import LARGEST, UserFileError, read_text
 from tvist_protocol.errors import harmless
 from tvist_server.config import ServeConfig
-from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
 from tvist_server.option_values import StartError
 from tvist_server.recording import RecorderError
 from tvist_server.server import Server
+from tvist_server.shutdown import Shutdown
 
 SHOWN_EVERY = 0.1
 """Shortest time between two changes of the progress line [s]."""
@@ -53,14 +53,14 @@ def read_script(file: Path) -> str:
         except UnicodeDecodeError as error:
             why = f"the standard input is not text in UTF-8 ({error.reason} at byte {error.start})"
             raise Failure(why, code=2) from error
-    with told(OSError, code=2):
+    with failing_on(OSError, exit_code=2):
         try:
             return read_text(file, "program")
         except UserFileError as error:
             raise Failure(str(error), code=2) from error
 
 
-def placed(file: Path, finding: Finding) -> str:
+def placed(file: Path, finding: ProgramFinding) -> str:
     """Format a finding as FILE:LINE:COLUMN: text, which editors understand."""
     kind = "" if finding.level == "error" else f"{finding.level}: "
     return f"{named(file)}:{finding.line}:{finding.column}: {kind}{finding.text}"
@@ -91,7 +91,7 @@ def _is_stdin(file: Path) -> bool:
 
 
 @dataclass(frozen=True)
-class Ran:
+class ProgramOutcome:
     """How a program's run ended."""
 
     result: dict[str, Any]
@@ -104,7 +104,7 @@ class Ran:
     """The robot's server; None in lockstep."""
 
 
-class Tell:
+class ProgramConsole:
     """Prints a program's messages as they come, and on a terminal a progress line; `quiet` suppresses the messages."""
 
     def __init__(self, *, quiet: bool) -> None:
@@ -137,7 +137,7 @@ class Tell:
             self._visible = False
 
 
-def _print(said: Said) -> None:
+def _print(said: ProgramMessage) -> None:
     """Print a message on stdout, a warning on stderr."""
     match said.kind:
         case "text":
@@ -156,18 +156,18 @@ class Runner:
     config: ServeConfig
     inputs: Sequence[str]
     timeout: float | None
-    limits: Limits
+    limits: RunLimits
     baseline: Mapping[str, Run] | None
     """Earlier runs by program name; None if there is no baseline."""
-    tell: Tell
+    tell: ProgramConsole
 
-    def run(self, file: Path, text: str) -> Ran:
+    def run(self, file: Path, text: str) -> ProgramOutcome:
         """Run a program, unless it does not compile."""
         if (refused := _refused(file, text)) is not None:
             return refused
         lockstep = self.config.clock == "free"
         errors, server = list[str](), None
-        with told(StartError, InputError, code=2), told(GatewayError, RecorderError):
+        with failing_on(StartError, InputError, exit_code=2), failing_on(GatewayError, RecorderError):
             if lockstep:
                 watch = self._in_lockstep(text, errors)
             else:
@@ -189,12 +189,12 @@ class Runner:
             parts += [f"missed {counted(len(misplaced), 'expectation')}"] if misplaced else []
             parts += [f"differs from the baseline in {counted(len(changed), 'point')}"] if changed else []
             failure = Failure(f"{named(file)} {' and '.join(parts)}")
-        return Ran(result, summary(watch), failure, server)
+        return ProgramOutcome(result, summary(watch), failure, server)
 
     def _in_lockstep(self, text: str, errors: list[str]) -> ProgramWatch:
         """Run a program in this process; errors of the recording are appended to `errors`."""
         record = self.config.record
-        with told(code=2):
+        with failing_on(exit_code=2):
             setup = self.config.setup()
         compile_if_new()
         watch = run_in_lockstep(
@@ -212,7 +212,7 @@ class Runner:
 
     def _in_real_time(self, file: Path, text: str, errors: list[str]) -> tuple[ProgramWatch, Server]:
         """Serve a robot that runs a program; errors of the recording are appended to `errors`."""
-        config, ending = self.config, Ending()
+        config, ending = self.config, Shutdown()
         with ending.at_once():
             served = ProgramServer(config, text, self.inputs, ending, self.timeout, compile_if_new)
         server = served.server
@@ -229,7 +229,7 @@ class Runner:
         return served.watch, server
 
 
-def _refused(file: Path, text: str) -> Ran | None:
+def _refused(file: Path, text: str) -> ProgramOutcome | None:
     """Print what is wrong with a program before anything starts; None if it can run."""
     findings = check_program(text)
     for finding in findings:
@@ -241,7 +241,7 @@ def _refused(file: Path, text: str) -> Ran | None:
     failures = [{"kind": "compile_error", "line": one.line, "text": one.text} for one in errors]
     result = {"file": named(file), "ok": False, "exit_reason": "compile_error", "error": first}
     why = f"{named(file)} cannot run: it has {counted(len(errors), 'error')}"
-    return Ran({**result, "failures": failures}, failure=Failure(why))
+    return ProgramOutcome({**result, "failures": failures}, failure=Failure(why))
 
 
 def _ended(watch: ProgramWatch, errors: list[str]) -> list[Shortcoming]:

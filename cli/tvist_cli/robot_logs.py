@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import say
 from tvist_controller.setup import paper_payload
 from tvist_lab.identification.ring_downs import Log
@@ -21,7 +21,7 @@ def robot_file(robot: str | None, models: set[str], what: str) -> RobotDescripti
                 f"which robot file? {why}; give --robot, one of {', '.join(robots())} or a file", code=2
             )
         robot = fitting[0]
-    with told(DescriptionError, code=2):
+    with failing_on(DescriptionError, exit_code=2):
         return load(robot)
 
 
@@ -33,7 +33,7 @@ def robot_logs(
     known: int | None = None,
 ) -> tuple[RobotDescription, list[Log]]:
     """Read logs; return the robot's description and the logs with their payloads."""
-    with told(RecordingError):
+    with failing_on(RecordingError):
         recordings = [read(file, columns) for file in files]
     for file, recording in zip(files, recordings, strict=True):
         for note in recording.notes:

@@ -8,7 +8,7 @@ from cyclopts import Group, Parameter
 from msgspec import inspect as types
 from msgspec.structs import FieldInfo, fields
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.misuse import lower
 from tvist_cli.offered import PLANTS, PROFILES, ROBOTS, SHAPERS, WORLDS
 from tvist_protocol.schema import field_docs
@@ -63,7 +63,7 @@ def configuration(given: Mapping[str, Any], file: str | None, **defaults: object
     from tvist_server.config import from_mapping
 
     source = "configuration" if file is None else f"configuration {file}"
-    with told(StartError, code=2):
+    with failing_on(StartError, exit_code=2):
         return from_mapping(defaults | content_of(file) | dict(_plain(given)), source)
 
 

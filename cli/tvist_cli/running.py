@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import print_json, say
-from tvist_cli.program_runs import Ran, Runner, Tell, named, read_script
+from tvist_cli.program_runs import ProgramConsole, ProgramOutcome, Runner, named, read_script
 from tvist_cli.robot_options import configuration, content_of
 from tvist_cli.serving import leave
 from tvist_lab.programs.judging import BaselineError, Run, read_baseline
-from tvist_lab.programs.limits import Limits
+from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.results import junit as junit_of
 from tvist_lab.whole_file import write_whole
 from tvist_server.config import ServeConfig
@@ -27,7 +27,7 @@ def run_programs(
     lockstep: bool,
     inputs: Sequence[str],
     timeout: float | None,
-    limits: Limits,
+    limits: RunLimits,
     junit: Path | None,
     baseline: Path | None,
     config: str | None,
@@ -39,13 +39,13 @@ def run_programs(
         raise Failure(f"timeout is {timeout:g} s: must be finite and more than 0", code=2)
     _check_written(junit, baseline)
     before = None if baseline is None else _baseline(baseline, file, lockstep=lockstep)
-    with told(ValueError, code=2):
+    with failing_on(ValueError, exit_code=2):
         limits.check()
     texts = [read_script(one) for one in file]
     checked = _configuration(given, config, lockstep=lockstep)
     if checked.record is not None and len(file) > 1:
         raise Failure(f"record is {checked.record}: it keeps one run, and these are {len(file)}", code=2)
-    runner = Runner(checked, inputs, timeout, limits, before, Tell(quiet=json))
+    runner = Runner(checked, inputs, timeout, limits, before, ProgramConsole(quiet=json))
     ran = _run_all(runner, file, texts)
     results = [one.result for one in ran]
     failure = ran[0].failure if len(file) == 1 else _of_several(ran, len(file))
@@ -54,7 +54,7 @@ def run_programs(
     elif failure is None:
         say(ran[0].account if len(file) == 1 else f"{len(file)} programs ran as they should")
     if junit is not None:
-        with told(OSError):
+        with failing_on(OSError):
             write_whole(junit, junit_of(results))
         say(f"the results are in {junit}")
     sys.stdout.flush()
@@ -71,9 +71,9 @@ def _leave(server: Server | None, failure: Failure | None) -> None:
         leave(server, 0 if failure is None else failure.code)
 
 
-def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str]) -> list[Ran]:
+def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str]) -> list[ProgramOutcome]:
     """Run programs one after the other; if there are several, print at once how each ended."""
-    ran: list[Ran] = []
+    ran: list[ProgramOutcome] = []
     for number, (file, text) in enumerate(zip(files, texts, strict=True), 1):
         if len(files) > 1:
             runner.tell.which = f"{number} of {len(files)}: "
@@ -96,7 +96,7 @@ def _together(results: list[dict[str, Any]], failure: Failure | None) -> dict[st
     }
 
 
-def _of_several(ran: Sequence[Ran], count: int) -> Failure | None:
+def _of_several(ran: Sequence[ProgramOutcome], count: int) -> Failure | None:
     """Return why the runs of several programs failed; None if none failed."""
     failed = [one for one in ran if one.failure is not None]
     if not failed:
@@ -137,7 +137,7 @@ def _baseline(path: Path, files: Sequence[Path], *, lockstep: bool) -> Mapping[s
         raise Failure(
             "--baseline needs --lockstep, in which equal programs run alike to the last bit", code=2
         )
-    with told(BaselineError, OSError, code=2):
+    with failing_on(BaselineError, OSError, exit_code=2):
         return read_baseline(path, list(map(named, files)))
 
 
@@ -149,7 +149,7 @@ def _configuration(given: dict[str, Any], file: str | None, *, lockstep: bool) -
             raise Failure(
                 f"--lockstep and --{option} exclude each other: in lockstep there is no network", code=2
             )
-    with told(StartError, code=2):
+    with failing_on(StartError, exit_code=2):
         content = content_of(file)
     for key, instead in (("robots", "tvist run has one robot"), ("clock", "tvist run has --lockstep")):
         if key in content:

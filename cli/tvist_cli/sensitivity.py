@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import number, out, table
 from tvist_cli.shapers_of import of_impulses
-from tvist_cli.studying import Figures, Places, give
+from tvist_cli.studying import Figures, ResultFiles, give
 
 if TYPE_CHECKING:
     from tvist_lab.recordings import Floats
@@ -20,7 +20,7 @@ POINTS = 401
 
 
 def print_sensitivity(
-    shapers: Sequence[str], zeta: float, errors: tuple[float, float], places: Places, *, json: bool
+    shapers: Sequence[str], zeta: float, errors: tuple[float, float], places: ResultFiles, *, json: bool
 ) -> None:
     """Compute and print the residual vibration of shapers for a mode whose frequency they assume wrongly."""
     import numpy as np
@@ -38,7 +38,7 @@ def print_sensitivity(
     span = 0.01 * np.linspace(low, high, POINTS)
     curves: list[dict[str, Any]] = []
     for shaper in chosen:
-        with told(ShapingError, code=2):
+        with failing_on(ShapingError, exit_code=2):
             check_mode(1.0, zeta, shaper.zeta_max)
             left = residual_over_error(shaper, zeta, span)
             about = _about(shaper, zeta)

@@ -7,17 +7,17 @@ import time
 from collections.abc import Sequence
 
 from tvist_cli.compiling import compile_if_new, compile_shown
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.main import BEGAN
 from tvist_cli.output import say
 from tvist_controller.setup import Setup
 from tvist_server.config import ServeConfig
-from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
 from tvist_server.kernels import KernelsError
 from tvist_server.option_values import StartError
 from tvist_server.recording import RecorderError
-from tvist_server.server import Recording, Server
+from tvist_server.server import RecordingResult, Server
+from tvist_server.shutdown import Shutdown
 from tvist_server.workers import Workers, WorkersError
 
 
@@ -25,13 +25,13 @@ def serve_robots(config: ServeConfig) -> None:
     """Serve robots until a signal ends this process."""
     gc.freeze()
     gc.enable()
-    with told(StartError, code=2):
-        ending = Ending()
+    with failing_on(StartError, exit_code=2):
+        ending = Shutdown()
         if config.workers > 1:
             _several(config, ending)
             return
         # From here on, a signal must raise an exception, so that the server is closed.
-        with told(GatewayError, RecorderError), ending.at_once():
+        with failing_on(GatewayError, RecorderError), ending.at_once():
             server = Server(config, prepare=compile_if_new)
 
     setups = [robot.setup for robot in server.robots]
@@ -56,13 +56,13 @@ def compile_all(processes: int | None = None) -> None:
     """Compile ahead in this number of processes."""
     if processes is not None and processes < 1:
         raise Failure(f"compile is {processes}: must be at least 1", code=2)
-    with told(KernelsError):
+    with failing_on(KernelsError):
         compile_shown(processes)
     say(f"everything is compiled, after {time.monotonic() - BEGAN:.0f} s")
 
 
-def _several(config: ServeConfig, ending: Ending) -> None:
-    with told(WorkersError, GatewayError):
+def _several(config: ServeConfig, ending: Shutdown) -> None:
+    with failing_on(WorkersError, GatewayError):
         with ending.at_once():
             workers = Workers(config, compile_if_new)
         say_who_can_reach(workers, config, len(workers.setups))
@@ -108,7 +108,7 @@ def say_who_can_reach(server: Server | Workers, config: ServeConfig, robots: int
         say(f"anyone who can reach {endpoint} can move {whom}")
 
 
-def say_recorded(recordings: Sequence[Recording]) -> list[str]:
+def say_recorded(recordings: Sequence[RecordingResult]) -> list[str]:
     """Print where each robot was recorded; return the errors that ended recordings."""
     for recording in recordings:
         if recording.error is None:

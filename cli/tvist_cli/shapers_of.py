@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 
 if TYPE_CHECKING:
     from tvist_controller.sources.own_shapers import OwnShaper
@@ -24,7 +24,7 @@ def load_given(place: str) -> "OwnShaper":
     from tvist_controller.sources.own_files import OwnFileError
     from tvist_controller.sources.own_shapers import load_own
 
-    with told(OwnFileError, code=2):
+    with failing_on(OwnFileError, exit_code=2):
         return load_own(place)
 
 

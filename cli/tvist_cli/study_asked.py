@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.shapers_of import load_given, loaded
 from tvist_cli.study_options import StudyOptions
 from tvist_cli.studying import check_range, check_seed
@@ -21,7 +21,6 @@ from tvist_controller.sources.own_shapers import OwnShaper
 from tvist_lab.studies.presets import PRESETS
 from tvist_lab.studies.sweep import NamedRobot, Spec, SweptRobot, read_spec, study
 from tvist_lab.study.arms import scattered
-from tvist_lab.study.asked import Asked, Preset
 from tvist_lab.study.case import LIMITS
 from tvist_lab.study.catalogue import baselines, some
 from tvist_lab.study.foreign import CandidateError, FromFile, load_shaper
@@ -30,6 +29,7 @@ from tvist_lab.study.menus import UNSHAPED, names
 from tvist_lab.study.method import Method, Named
 from tvist_lab.study.moves import STROKE, Move, MovesError, collisions, draw_moves, read_moves, write_moves
 from tvist_lab.study.recipes import Recipe, RecipeError
+from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Study, StudyError
 from tvist_plant.description import DISTURBANCES, DescriptionError, RobotDescription, load, robots
 from tvist_plant.variants import Variant, hidden_variant, variant
@@ -50,12 +50,12 @@ def preset_study(name: str, options: StudyOptions) -> Study:
         if option in of_others or (option == "baselines" and preset.menu is None):
             raise Failure(f"--{option.replace('_', '-')} is not for {name}: see tvist study --help", code=2)
     _check(options)
-    with told(StudyError, MovesError, DescriptionError, CandidateError, *OF_SHAPERS, code=2):
+    with failing_on(StudyError, MovesError, DescriptionError, CandidateError, *OF_SHAPERS, exit_code=2):
         asked = _asked(preset, name, options)
         made = preset.study(asked)
         made.check()
     if options.save_moves is not None:
-        with told(OSError):
+        with failing_on(OSError):
             write_moves(options.save_moves, asked.moves)
     own = [each.sha256 for one in asked.methods if isinstance(one, Named) for each in one.recipe.own]
     files = [Path(one.path).read_bytes() for one in asked.methods if isinstance(one, FromFile)]
@@ -88,7 +88,7 @@ def _check(options: StudyOptions) -> None:
 
 def _asked(
     preset: Preset, name: str, options: StudyOptions, other: str = "", moves: Sequence[Move] = ()
-) -> Asked:
+) -> StudyRequest:
     """Load what the options request; for an `other` robot, with its own calibration and the given moves."""
     whole = load(other or options.robot)
     masses = _masses(options.payload, whole)
@@ -127,7 +127,7 @@ def _asked(
         "arm": "as described" if kept == DISTURBANCES else f"with {' and '.join(kept)} alone" if kept else "clean",
         "disturbances": list(kept), "held_out": said(options.seed),
     }  # fmt: skip
-    return Asked(
+    return StudyRequest(
         description=description,
         moves=moves,
         methods=list(methods.values()),
@@ -218,7 +218,7 @@ def _arms(options: StudyOptions, description: RobotDescription) -> list[Variant]
     """Return the named plants, the hidden robots of these seeds, and the arm with changed springs."""
     for seed in options.hidden or ():
         check_seed(seed)
-    with told(ValueError, code=2):
+    with failing_on(ValueError, exit_code=2):
         found = [
             *(variant(name.lower()) for name in options.plants or ()),
             *map(hidden_variant, options.hidden or ()),
@@ -285,7 +285,7 @@ def swept(path: Path) -> Study:
 def _robot(path: Path, spec: Spec, place: int, named: str | NamedRobot) -> SweptRobot:
     robot, calibration = (named, None) if isinstance(named, str) else (named.robot, named.calibration)
     try:
-        with told(DescriptionError):
+        with failing_on(DescriptionError):
             arm = load(robot if robot in robots() else path.parent / robot).disturbed_by(spec.disturbances)
     except Failure as failure:
         raise Failure(f"sweep {path}: robots[{place}]: {failure}") from failure
@@ -294,7 +294,7 @@ def _robot(path: Path, spec: Spec, place: int, named: str | NamedRobot) -> Swept
     recipes = []
     for number, shaper in enumerate(spec.shapers):
         try:
-            with told(*OF_SHAPERS):
+            with failing_on(*OF_SHAPERS):
                 recipes.append(_recipe(path, spec, shaper, calibration, arm))
         except Failure as failure:
             raise Failure(f"sweep {path}: shapers[{number}] with robots[{place}]: {failure}") from failure

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.figure_files import FigureOptions, write
 from tvist_cli.output import out, print_json, progress, say, table, typed, words, write_json, write_report
 from tvist_cli.study_asked import preset_study, swept
@@ -35,7 +35,7 @@ LISTED = 12
 
 
 @dataclass(frozen=True)
-class Places:
+class StudyOutputs:
     """Output files and folders of a study, each None if not written."""
 
     rows: Path | None
@@ -48,7 +48,7 @@ def run(
     name: str,
     file: Path | None,
     options: StudyOptions,
-    places: Places,
+    places: StudyOutputs,
     processes: int | None,
     scheduler: str | None,
     *,
@@ -59,7 +59,7 @@ def run(
     places.look.check(places.figures, places.report, options.save_moves)
     study = _study(name, file, options)
     result = _ran(study, places.rows, executor)
-    with told(OSError):
+    with failing_on(OSError):
         if places.rows is not None:
             write_json(places.rows / "result.json", result.values)
         if places.report is not None:
@@ -74,7 +74,7 @@ def run(
 def _study(name: str, file: Path | None, options: StudyOptions) -> Study:
     if file is None:
         return preset_study(name, options)
-    with told(StudyError, OSError):
+    with failing_on(StudyError, OSError):
         return read_study(file) if file.suffix == ".py" else swept(file)
 
 
@@ -130,7 +130,7 @@ def _ran(
         with progress(missing, "moves", kept) as advance:
             yield lambda done: advance(done, None)
 
-    with told(OSError):
+    with failing_on(OSError):
         try:
             ran = engine.run(study, folder, executor, bar)
         except ChildProcessError as error:

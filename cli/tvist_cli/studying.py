@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.failure import Failure, failing_on
+from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, write
 from tvist_cli.output import print_json, table, write_json, write_report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tvist_lab.report import Page
+    from tvist_lab.report import ReportPage
     from tvist_lab.study.columns import Column, Entry
 
 One = TypeVar("One")
@@ -36,12 +36,12 @@ def check_seed(seed: int, bits: int = 62) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Places:
+class ResultFiles:
     """Files and folders for a command's result, each None if not requested."""
 
     output: Path | None = None
     figures: Path | None = None
-    look: FigureOptions = AS_USUAL
+    look: FigureOptions = DEFAULT_FIGURES
     report: Path | None = None
 
     def check(self, *others: Path | None) -> None:
@@ -53,10 +53,10 @@ class Places:
         result: dict[str, Any],
         *,
         draw: Callable[[], Figures] | None = None,
-        web_page: "Callable[[Figures], Page] | None" = None,
+        web_page: "Callable[[Figures], ReportPage] | None" = None,
     ) -> None:
         """Write a result to all places; figures are drawn in the present style."""
-        with told(OSError):
+        with failing_on(OSError):
             if self.output is not None:
                 write_json(self.output, result)
             if draw is None:

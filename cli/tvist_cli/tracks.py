@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.compiling import compile_if_new
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.judging import judge
 from tvist_cli.output import progress
-from tvist_cli.pages import Door, serve_page
+from tvist_cli.pages import PageAddress, serve_page
 
 if TYPE_CHECKING:
     from tvist_lab.recordings.mcap_file import RecordingFile
@@ -44,7 +44,7 @@ class Shows:
 
         return playback(self.tracks, self.title, factor=factor, result=self.result)
 
-    def serve(self, factor: float, door: Door) -> None:
+    def serve(self, factor: float, door: PageAddress) -> None:
         """Serve the page until Control+C."""
         from tvist_view.playback import meet
 
@@ -56,28 +56,30 @@ def recorded(file: Path) -> Shows:
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read_checked
     from tvist_view.look import GeometryError
-    from tvist_view.track import Shown, Track, TrackError
+    from tvist_view.track import ShownRobot, Track, TrackError
 
-    with told(RecordingError, TrackError, GeometryError, ValueError):
+    with failing_on(RecordingError, TrackError, GeometryError, ValueError):
         content = read_checked(file)
-        return Shows(file.stem, [Track(Shown(file.stem, _look_of(content)), content.states, content.truths)])
+        return Shows(
+            file.stem, [Track(ShownRobot(file.stem, _look_of(content)), content.states, content.truths)]
+        )
 
 
 def repeated(file: Path) -> Shows:
     """Return the recorded motion without and with the shaper that brings the tool to rest the most earlier."""
     import numpy as np
 
-    from tvist_lab.metrics import Measured, pairs
+    from tvist_lab.metrics import MeasuredRecording, pairs
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read_checked
     from tvist_plant.plant import PERIOD
     from tvist_view.look import GeometryError
     from tvist_view.playback import said
-    from tvist_view.track import Shown, Track, TrackError
+    from tvist_view.track import ShownRobot, Track, TrackError
 
-    with told(RecordingError, TrackError, GeometryError, ValueError):
+    with failing_on(RecordingError, TrackError, GeometryError, ValueError):
         content = read_checked(file)
-        measured = Measured.of(content.recording)
+        measured = MeasuredRecording.of(content.recording)
         found = [one for one in pairs(measured) if one.change.less_percent is not None]
         if not found:
             raise Failure(
@@ -97,7 +99,7 @@ def repeated(file: Path) -> Shows:
             states = [state for state in content.states if first <= state.tick <= last]
             truths = [truth for truth in content.truths if first <= truth.tick <= last]
             begun = float(content.recording.time[motion.start]) - LEAD * PERIOD
-            tracks.append(Track(Shown(label, look), states, truths, begun))
+            tracks.append(Track(ShownRobot(label, look), states, truths, begun))
     return Shows(f"{file.stem}: {best.name}", tracks, said(best.change.as_dict(), shaper, best.name))
 
 
@@ -107,17 +109,20 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
     from tvist_lab.in_process import run_beside
     from tvist_plant.description import DescriptionError, load
     from tvist_server.option_values import StartError
-    from tvist_view.beside import Run
+    from tvist_view.beside import MotionRecord
     from tvist_view.described import pairs
     from tvist_view.look import Look
     from tvist_view.playback import said
-    from tvist_view.track import Shown, Track
+    from tvist_view.track import ShownRobot, Track
 
     if not 2 <= len(shapers) <= 3:
         raise Failure(f"compare has {len(shapers)} shapers: give two or three", code=2)
     compile_if_new()
     tracks, runs = [], []
-    with told(DescriptionError, StartError, RefusalError, code=2), progress(len(shapers), "runs") as advance:
+    with (
+        failing_on(DescriptionError, StartError, RefusalError, exit_code=2),
+        progress(len(shapers), "runs") as advance,
+    ):
         poses = load(robot).poses
         named = pairs(list(poses))
         if not named:
@@ -128,9 +133,11 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
             assert info.geometry is not None  # of our own server
             label = "without" if shaper == "none" else f"with {shaper}" if "none" in shapers else shaper
             tracks.append(
-                Track(Shown(label, Look(info.geometry, info.payload)), collected.states, collected.truths)
+                Track(
+                    ShownRobot(label, Look(info.geometry, info.payload)), collected.states, collected.truths
+                )
             )
-            runs.append(Run(collected.states, collected.truths, collected.events))
+            runs.append(MotionRecord(collected.states, collected.truths, collected.events))
             advance(1, None)
     result = None
     if len(shapers) == 2 and shapers[0] == "none":

@@ -20,7 +20,7 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.stream import State
 
 
-class Place(NamedTuple):
+class RobotPlace(NamedTuple):
     """A robot's namespace (empty: none) and name."""
 
     namespace: str
@@ -35,10 +35,10 @@ class Place(NamedTuple):
         return keys.within(self.namespace, keys.key(self.robot, leaf))
 
 
-def place_of(text: str) -> Place:
+def place_of(text: str) -> RobotPlace:
     """Parse `NAMESPACE/NAME` or `NAME`."""
     namespace, _, robot = text.rpartition("/")
-    return Place(keys.check_namespace(namespace) if namespace else "", keys.check_robot_name(robot))
+    return RobotPlace(keys.check_namespace(namespace) if namespace else "", keys.check_robot_name(robot))
 
 
 class Across(ABC):
@@ -98,14 +98,14 @@ class ManyStates(Across):
             raise MisuseError(f"{selector} is not a key: write tvist/*/state, or tvist/NAME/state") from error
         super().__init__(endpoint, security=security, namespace=namespace)
         self._key = keys.within(self._within, selector)
-        self._newest: dict[Place, tuple[bytes, int, float]] = {}
+        self._newest: dict[RobotPlace, tuple[bytes, int, float]] = {}
 
     async def _subscribe(self) -> None:
         self._session.declare_subscriber(self._key, Callback(self._on_sample, indirect=False))
 
-    def look(self) -> dict[Place, Newest]:
+    def look(self) -> dict[RobotPlace, Newest]:
         """Return the newest state of each robot that has ever sent one."""
-        found: dict[Place, Newest] = {}
+        found: dict[RobotPlace, Newest] = {}
         for place, (data, received, at) in sorted(self._newest.items()):
             try:
                 found[place] = Newest(decode(State, data), received, at)
@@ -117,8 +117,8 @@ class ManyStates(Across):
     def _on_sample(self, sample: zenoh.Sample) -> None:
         place = keys.place(str(sample.key_expr))
         if place is not None:
-            wake(self._loop, partial(self._keep, Place(*place), sample.payload.to_bytes()))
+            wake(self._loop, partial(self._keep, RobotPlace(*place), sample.payload.to_bytes()))
 
-    def _keep(self, place: Place, data: bytes) -> None:
+    def _keep(self, place: RobotPlace, data: bytes) -> None:
         before = self._newest.get(place, (b"", 0, 0.0))
         self._newest[place] = (data, before[1] + 1, self._loop.time())

@@ -36,7 +36,7 @@ STALE = "check"
 """A token that belongs to no lease."""
 
 
-class Finding(msgspec.Struct, frozen=True):
+class CheckResult(msgspec.Struct, frozen=True):
     """Result of one step of the check."""
 
     what: str
@@ -59,7 +59,7 @@ class CheckReport(msgspec.Struct, frozen=True):
     """Version of the protocol that the robot uses; null if it did not answer."""
     state_rate_hz: float | None
     """States received per second of this machine's clock [Hz]; null in lockstep, or if no state came."""
-    findings: list[Finding]
+    findings: list[CheckResult]
     """One result per step; a step that fails is the last one."""
     ready: bool | None
     """Whether the robot may be moved; null if that was not checked."""
@@ -120,7 +120,7 @@ class _Check:
         self.missed = ""
         self.early = self.starting = False
         """Whether the robot may appear later, and whether it has reported that it is starting."""
-        self.findings: list[Finding] = []
+        self.findings: list[CheckResult] = []
 
     async def run(self) -> CheckReport:
         step = "connect"
@@ -142,9 +142,9 @@ class _Check:
             self.starting = isinstance(error, RefusedError) and error.reply.code == "starting"
             self.early = self.starting or (step == "connect" and isinstance(error, NotConnectedError))
             if isinstance(error, RefusedError) and self.starting:
-                self.findings.append(Finding("start", ok=False, said=error.reply.why))
+                self.findings.append(CheckResult("start", ok=False, said=error.reply.why))
             else:
-                self.findings.append(Finding(step, ok=False, said=str(error)))
+                self.findings.append(CheckResult(step, ok=False, said=str(error)))
         found = self.readiness
         return CheckReport(
             ok=all(finding.ok for finding in self.findings),
@@ -170,7 +170,7 @@ class _Check:
         return f"; also there: {', '.join(others)}" if others else ""
 
     def passed(self, what: str, said: str) -> None:
-        self.findings.append(Finding(what, ok=True, said=said))
+        self.findings.append(CheckResult(what, ok=True, said=said))
 
     async def info(self, robot: Robot) -> str:
         info = await robot.info()

@@ -8,7 +8,7 @@ import msgspec
 import zenoh
 from zenoh.handlers import Callback
 
-from tvist_client.across import Across, Place
+from tvist_client.across import Across, RobotPlace
 from tvist_client.connection import understood
 from tvist_client.errors import ClientError, NotConnectedError
 from tvist_client.readiness import RELIEVE, readiness
@@ -84,8 +84,8 @@ class Fleet(Across):
         self, endpoint: str = ENDPOINT, *, security: Folder | None = None, namespace: str = ""
     ) -> None:
         super().__init__(endpoint, security=security, namespace=namespace)
-        self._told: dict[Place, tuple[float, Telemetry]] = {}
-        self.places: set[Place] = set()
+        self._told: dict[RobotPlace, tuple[float, Telemetry]] = {}
+        self.places: set[RobotPlace] = set()
         """Robots whose liveliness tokens are present."""
 
     async def _subscribe(self) -> None:
@@ -110,7 +110,7 @@ class Fleet(Across):
         answers = await asyncio.gather(*(self._ask(place, "info", None) for place in places))
         return [self._row(place, answer) for place, answer in zip(places, answers, strict=True)]
 
-    async def stop(self, places: Collection[Place]) -> list[StopReport]:
+    async def stop(self, places: Collection[RobotPlace]) -> list[StopReport]:
         """Stop the motions of the robots `places`, all at once and whichever client has control."""
         wanted, data = sorted(places, key=_by_number), encode(Stop())
         answers = await asyncio.gather(*(self._ask(place, "command", data) for place in wanted))
@@ -122,20 +122,20 @@ class Fleet(Across):
         place = keys.place(str(sample.key_expr))
         if place is not None:
             there = sample.kind == zenoh.SampleKind.PUT
-            wake(self._loop, partial(self.places.add if there else self.places.discard, Place(*place)))
+            wake(self._loop, partial(self.places.add if there else self.places.discard, RobotPlace(*place)))
 
     def _on_telemetry(self, sample: zenoh.Sample) -> None:
         place = keys.place(str(sample.key_expr))
         if place is not None:
-            wake(self._loop, partial(self._hear, Place(*place), sample.payload.to_bytes()))
+            wake(self._loop, partial(self._hear, RobotPlace(*place), sample.payload.to_bytes()))
 
-    def _hear(self, place: Place, data: bytes) -> None:
+    def _hear(self, place: RobotPlace, data: bytes) -> None:
         try:
             self._told[place] = (self._loop.time(), decode(Telemetry, data))
         except ProtocolError:  # from another version; its silence is reported
             return
 
-    async def _ask(self, place: Place, leaf: keys.Leaf, data: bytes | None) -> bytes | NotConnectedError:
+    async def _ask(self, place: RobotPlace, leaf: keys.Leaf, data: bytes | None) -> bytes | NotConnectedError:
         """Return a robot's answer, or why there is none: an error would delay the other robots."""
         answer: asyncio.Future[bytes | NotConnectedError] = self._loop.create_future()
 
@@ -159,7 +159,7 @@ class Fleet(Across):
         )
         return await answer
 
-    def _row(self, place: Place, answer: bytes | NotConnectedError) -> FleetRobot:
+    def _row(self, place: RobotPlace, answer: bytes | NotConnectedError) -> FleetRobot:
         heard, telemetry = self._told.get(place, (None, None))
         info, said = _info(answer)
         stands = None if info is None else readiness(info, None, _unlock(place))
@@ -199,7 +199,7 @@ def _info(answer: bytes | NotConnectedError) -> tuple[Info | None, str]:
         return None, str(error)
 
 
-def _stopped(place: Place, answer: bytes | NotConnectedError) -> StopReport:
+def _stopped(place: RobotPlace, answer: bytes | NotConnectedError) -> StopReport:
     if isinstance(answer, NotConnectedError):
         return StopReport(*place, ok=False, said=str(answer))
     try:
@@ -211,10 +211,10 @@ def _stopped(place: Place, answer: bytes | NotConnectedError) -> StopReport:
     return StopReport(*place, ok=True, said="stopped")
 
 
-def _unlock(place: Place) -> str:
+def _unlock(place: RobotPlace) -> str:
     words = ["tvist unlock", "--name", place.robot]
     return " ".join([*words, "--namespace", place.namespace] if place.namespace else words)
 
 
-def _by_number(place: Place) -> list[list[int | str]]:
+def _by_number(place: RobotPlace) -> list[list[int | str]]:
     return [natural(text) for text in place]

@@ -8,12 +8,12 @@ from typing import Any
 
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.rights import NoControlError, is_holders
-from tvist_controller.dispatch.robot import Robot
+from tvist_controller.dispatch.robot import RobotParts
 from tvist_controller.dispatch.table import COMMANDS, HARMLESS
 from tvist_controller.instruments.report import TRUE_MODES_EVERY, Report, true_modes, truth_message
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.setpoints import Unreadable
-from tvist_controller.planning.command_row import Call
+from tvist_controller.planning.command_row import CommandCall
 from tvist_controller.planning.plan import Order, Plan
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.own_controller import REFUSED
@@ -27,7 +27,7 @@ from tvist_protocol.simulation import SimulationStep
 from tvist_protocol.stream import Event, State, Truth
 
 
-class Controller(Robot):
+class Controller(RobotParts):
     """One robot.
 
     Args:
@@ -99,7 +99,9 @@ class Controller(Robot):
         row, planned = COMMANDS[type(command)], partial(self.plans.found, command, plan)
         if row.check is not None:
             row.check(command, self.setup.description)
-        reply = row.handle(self, Call(command, self.tick_number + 1, self.now, session, planned, origin))
+        reply = row.handle(
+            self, CommandCall(command, self.tick_number + 1, self.now, session, planned, origin)
+        )
         self.peripherals.changed |= row.changes_io
         return reply
 

@@ -7,7 +7,7 @@ from tvist_protocol.replies import Code
 from tvist_protocol.stream import EventKind, PopupKind
 
 
-class Told(TypedDict, total=False):
+class StopFields(TypedDict, total=False):
     """Fields of a stop's event; see `tvist_protocol.stream.Event`."""
 
     category: int | None
@@ -15,7 +15,7 @@ class Told(TypedDict, total=False):
     way: float | None
 
 
-class Fields(Told, total=False):
+class Fields(StopFields, total=False):
     """Fields of an event other than its kind; see `tvist_protocol.stream.Event`."""
 
     id: int | None

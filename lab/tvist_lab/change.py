@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Change:
+class MotionChange:
     """Vibration of the same motion without and with a shaper; None if not measurable."""
 
     before: float | None

@@ -106,14 +106,14 @@ class Plucked(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Modes:
+class OneJointModes:
     """The modes of the one-joint arm over its elbow angle."""
 
     description: RobotDescription
     curve: tuple[Plucked, ...]
     """Modes over `ANGLES`, with each of `MASSES`."""
     poses: tuple[Plucked, ...]
-    """Modes at Q1 to Q3 of the robot file, the angles of the paper's figure, with its payload."""
+    """OneJointModes at Q1 to Q3 of the robot file, the angles of the paper's figure, with its payload."""
 
     @property
     def worst_f_d(self) -> float:
@@ -126,13 +126,13 @@ class Modes:
         return max(100.0 * abs(one.simulated_zeta / one.zeta - 1.0) for one in self.curve)
 
 
-def pluck_all() -> Modes:
+def pluck_all() -> OneJointModes:
     """Pluck the arm over its whole range."""
     description = load("one-joint")
     curve = [_plucked(description, mass, elbow) for mass in MASSES for elbow in ANGLES]
     elbows = [description.poses[name][1] for name in ("Q1", "Q2", "Q3")]
     poses = [_plucked(description, description.payload.mass, elbow) for elbow in elbows]
-    return Modes(description, tuple(curve), tuple(poses))
+    return OneJointModes(description, tuple(curve), tuple(poses))
 
 
 def _plucked(description: RobotDescription, mass: float, elbow: float) -> Plucked:

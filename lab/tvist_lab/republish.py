@@ -16,7 +16,7 @@ from tvist_protocol.info import Info
 from tvist_protocol.recorded import TICK_NS
 from tvist_protocol.replies import Refused
 from tvist_protocol.stream import State, Truth
-from tvist_server.gateways.base import Answer, Desk, Gateway, topic_of
+from tvist_server.gateways.base import Answer, CommandIntake, Gateway, topic_of
 from tvist_server.gateways.exposure import guarded
 from tvist_server.gateways.network import Network
 
@@ -32,7 +32,7 @@ REFUSAL = Refused(
 """Answer to every command."""
 
 
-class PlaybackDesk(Desk):
+class PlaybackDesk(CommandIntake):
     """Describes the recorded robot and refuses everything else."""
 
     def __init__(self, info: Info, name: str) -> None:

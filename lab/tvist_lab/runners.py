@@ -13,8 +13,8 @@ from queue import SimpleQueue
 from typing import Any, TypeVar
 
 from tvist_plant.user_file import named
-from tvist_server.ending import end_with_parent
 from tvist_server.punctual import processors
+from tvist_server.shutdown import end_with_parent
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

@@ -34,7 +34,7 @@ def free_endpoint() -> str:
 
 
 @dataclass(frozen=True)
-class Served:
+class RunningServer:
     """A server that has answered."""
 
     endpoint: str
@@ -53,7 +53,7 @@ async def served(
     several: bool = False,
     core: int | None = None,
     patience: float = PATIENCE,
-) -> AsyncIterator[Served]:
+) -> AsyncIterator[RunningServer]:
     """Run `tvist serve` with options and connect a client; at the end, send SIGTERM and check the exit code.
 
     `name` is that of the robot, or with `several` of one that the options name; `core` is the processor to
@@ -72,7 +72,7 @@ async def served(
     reading = asyncio.create_task(_read(process.stderr, told))
     try:
         async with await _connect(process, endpoint, name, told, patience) as robot:
-            yield Served(endpoint, process.pid, loop.time() - began, robot)
+            yield RunningServer(endpoint, process.pid, loop.time() - began, robot)
     finally:
         if process.returncode is None:
             process.terminate()

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from statistics import median
 
-MANY = 20
+QUANTILES_FROM = 20
 """Number of values from which quantiles are meaningful; with fewer, extremes are shown."""
 
 
@@ -14,18 +14,18 @@ def counted(count: int, what: str) -> str:
 
 def sample(count: int, what: str) -> str:
     """Return the basis of a figure of `spread` or `either`: some things, or the median of many."""
-    return f"{'median of ' if count >= MANY else ''}{counted(count, what)}"
+    return f"{'median of ' if count >= QUANTILES_FROM else ''}{counted(count, what)}"
 
 
 def spread(values: Sequence[float], unit: str, digits: int = 0) -> str:
     """Format values with a unit: from smallest to largest if few, the median if many; at least one."""
-    ends = [median(values)] if len(values) >= MANY else [min(values), max(values)]
+    ends = [median(values)] if len(values) >= QUANTILES_FROM else [min(values), max(values)]
     return " to ".join(dict.fromkeys(f"{end:.{digits}f} {unit}" for end in ends))
 
 
 def either(values: Sequence[float], unit: str, words: tuple[str, str]) -> str:
     """Format values, at least one, with words for their sign: "94 % to 95 % less", "from 3 % more to 20 % less"."""
-    low, high = (median(values),) * 2 if len(values) >= MANY else (min(values), max(values))
+    low, high = (median(values),) * 2 if len(values) >= QUANTILES_FROM else (min(values), max(values))
     less, more = words
     if round(low) < 0 < round(high):
         return f"from {-low:.0f} {unit} {more} to {high:.0f} {unit} {less}"

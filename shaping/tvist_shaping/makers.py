@@ -15,7 +15,7 @@ from tvist_shaping.sensitivity import residual
 from tvist_shaping.shaper import Shaper
 from tvist_shaping.specified import specified
 
-SMALL = 1e-6
+ROUNDING = 1e-6
 """Share of V by which rounding may let a residual exceed it [-]."""
 
 
@@ -92,7 +92,7 @@ def si_of(
     train = Train(*specified(low, high, V))
     zeta_max, f = 0.0, np.linspace(low, high, 301)
     for zeta in np.linspace(0.0, 0.99, 100):
-        if residual(f, zeta, train.of(1.0, zeta)).max() > V * (1.0 + SMALL):
+        if residual(f, zeta, train.of(1.0, zeta)).max() > V * (1.0 + ROUNDING):
             break
         zeta_max = float(zeta)
     zeta_max = 1.0 if zeta_max > 0.985 else zeta_max

@@ -25,7 +25,7 @@ AnyShaper: TypeAlias = Shaper | FirShaper
 """Types that a user's own shaper may have."""
 
 
-SLOW = 5.5
+SLOW_HZ = 5.5
 """Lower bound of an arm's frequencies [Hz] below which the designs' times grow with the longest period."""
 LIGHT = 0.040
 """Mean delay at q = 0 of zero-vibration shapers for the two lowest modes above which they grow, too [s].
@@ -192,7 +192,7 @@ class Registry:
         if name in DESIGNS:
             kind = AimedFilter if name == AIMED else SteadyFilter
             slower = max(
-                1.0, SLOW / estimator.f_d_min, _mean_delay(*estimator.settle(np.zeros(joints))) / LIGHT
+                1.0, SLOW_HZ / estimator.f_d_min, _mean_delay(*estimator.settle(np.zeros(joints))) / LIGHT
             )
             return kind(DESIGNS[name](slower), estimator, joints=joints, feed_forward=feed_forward)
         shaper = self.own[name] if name in self.own else SHAPERS[name]

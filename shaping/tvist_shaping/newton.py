@@ -7,7 +7,7 @@ import numpy as np
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import ConvergenceError
 
-STEP = 1e-7
+DIFFERENCE_STEP = 1e-7
 """Step of the difference quotients [-]; all unknowns here are of order one."""
 FARTHEST = 0.2
 """Largest change of an unknown in one step [-]."""
@@ -20,13 +20,13 @@ def solve(equations: Callable[[Floats], Floats], start: Floats) -> Floats:
     x, m = np.array(start, dtype=float), len(start)
     with np.errstate(all="ignore"):  # divergence is detected below
         for _ in range(60):
-            left = equations(np.vstack([x, x + STEP * np.eye(m)]))
+            left = equations(np.vstack([x, x + DIFFERENCE_STEP * np.eye(m)]))
             if not np.isfinite(left).all():
                 break
             if np.abs(left[0]).max() < SOLVED:
                 return x
             try:
-                change = np.linalg.solve((left[1:] - left[0]).T / STEP, -left[0])
+                change = np.linalg.solve((left[1:] - left[0]).T / DIFFERENCE_STEP, -left[0])
             except np.linalg.LinAlgError:
                 break
             x = x + change * min(1.0, FARTHEST / max(float(np.abs(change).max()), 1e-300))

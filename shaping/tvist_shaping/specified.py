@@ -26,7 +26,7 @@ from tvist_shaping.amplitudes import ripple, widening
 from tvist_shaping.errors import DesignError
 from tvist_shaping.newton import solve
 
-MOST = 12
+MAX_IMPULSES = 12
 """Largest number of impulses."""
 STRIDE = 0.02
 """Change of the band's upper end that Newton's method can follow in one step [-]."""
@@ -37,14 +37,16 @@ def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
     if not 0.0 < low <= high < math.inf:
         raise DesignError("band", low, "above 0, its lower end not above its upper")
     ratio = high / low
-    for N in range(2, MOST + 1):
+    for N in range(2, MAX_IMPULSES + 1):
         a = ripple(N - 2, V)
         ends = 2.0 / math.pi * math.acos(1.0 / widening(N - 2, V))
         if ratio <= (2.0 - ends) / ends:
             break
     else:
         widest = low * (2.0 - ends) / ends
-        raise DesignError("band", high, f"at most {widest:g} at its upper end for {MOST} impulses and this V")
+        raise DesignError(
+            "band", high, f"at most {widest:g} at its upper end for {MAX_IMPULSES} impulses and this V"
+        )
     # The equal-ripple shaper, in units of the lower end, so that its band starts at 1.
     x = np.asarray((np.arange(N) - (N - 1) / 2.0) / 2.0 * ends, dtype=float)
     humps = _humps(N, V) / ends

@@ -23,7 +23,7 @@ from tvist_shaping.failures import FAILURES, failure
 from tvist_shaping.fir import EDGE, GAIN, QUICKEST, FirDesign, Programme, solve
 from tvist_shaping.taps import average, length, product_taps
 
-EVERY = 4
+DESIGN_TICKS = 4
 """Ticks between two designs."""
 SMOOTH = 64
 """Ticks of each running mean: with fewer, the variance of the delays changes too fast; with more, taps lag."""
@@ -272,8 +272,8 @@ class SteadyFilter(Filter):
         self._row, self._tick = 0, 0
 
     def _weigh(self) -> None:
-        if self._tick % EVERY == 0:
-            self._ask(self._modes(), EVERY * self.period)
+        if self._tick % DESIGN_TICKS == 0:
+            self._ask(self._modes(), DESIGN_TICKS * self.period)
         self._tick += 1
         if not self.design.constant:
             self._length = average(self._designed, self._past, self._sums, self._row, self._taps)

@@ -19,7 +19,7 @@ NODES = 32
 It is doubled where the equations end at a branch point just beyond the highest damping, since the polynomials converge
 slowly there.
 """
-SMALL = 1e-7
+CONVERGED = 1e-7
 """Largest magnitude of the last coefficients of converged polynomials [-]."""
 MOST_NODES = 256
 
@@ -58,7 +58,7 @@ class Tabulated:
         """Coefficients of amplitudes and times, shape (nodes, 2N), and the unknowns at the last node."""
         nodes = NODES
         coefficients, last = self._tabulate(nodes)
-        while np.abs(coefficients[-3:]).max() > SMALL and nodes < MOST_NODES:
+        while np.abs(coefficients[-3:]).max() > CONVERGED and nodes < MOST_NODES:
             nodes *= 2
             coefficients, last = self._tabulate(nodes)
         return coefficients, last

@@ -119,7 +119,7 @@ class Scale:
             link
             for link in range(1, joints - WRIST)
             if abs(kinematics.a[link]) > abs(kinematics.d[link])
-            and abs(kinematics.a[link]) > LONG * self.length
+            and abs(kinematics.a[link]) > BENDING_LENGTH * self.length
         ]
         return {
             "links": long,
@@ -131,7 +131,7 @@ class Scale:
         }
 
 
-LONG: Final = 0.2
+BENDING_LENGTH: Final = 0.2
 """Length above which a link bends, in an arm as long as the UR5e [m]."""
 
 

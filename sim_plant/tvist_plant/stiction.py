@@ -4,7 +4,7 @@ import math
 
 from tvist_plant._compiled import compiled
 
-LEAST = 1e-9
+MIN_TORQUE = 1e-9
 """Remaining stiction of a fast motor, to avoid a division by zero [N m]."""
 
 
@@ -31,5 +31,5 @@ def stiction_after(
     It dissipates d²/most per angle and so never returns more energy than it stored, however `most` changes.
     """
     slow = speed / stiction_speed
-    most = (stiction + stiction_load * abs(load)) * math.exp(-slow * slow) + LEAST
+    most = (stiction + stiction_load * abs(load)) * math.exp(-slow * slow) + MIN_TORQUE
     return relaxed(d, way, stiffness, most)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tvist_testing.fixture_robot import FixtureRobot
-    from tvist_testing.history import Row
+    from tvist_testing.history import HistoryRow
 
 BAND = 1e-4
 """Distance from its final position within which the tool counts as settled [m]."""
@@ -163,7 +163,7 @@ def assert_within_limits(
         )
 
 
-def _at_rest(robot: "FixtureRobot", seconds: float) -> "list[Row]":
+def _at_rest(robot: "FixtureRobot", seconds: float) -> "list[HistoryRow]":
     """Wait for the shaped reference's rest, then until `seconds` have passed since; return the rows since then."""
     __tracebackhide__ = True
     robot.rest()
@@ -199,7 +199,7 @@ def _each(name: str, given: float | Sequence[float] | None, own: Sequence[float]
 
 
 @dataclass(frozen=True)
-class Settling:
+class ToolSettling:
     """How the tool settled after its reference had come to rest."""
 
     seconds: float
@@ -208,7 +208,7 @@ class Settling:
     """Largest distance from the final position after the stop [m]."""
 
 
-def settling(rows: "Sequence[Row]", band: float) -> Settling:
+def settling(rows: "Sequence[HistoryRow]", band: float) -> ToolSettling:
     """Measure how the flexible arm's flange settles around its final position.
 
     `rows` start at the stop of the reference and last longer than `TAIL`; `band` is a distance [m].
@@ -220,10 +220,10 @@ def settling(rows: "Sequence[Row]", band: float) -> Settling:
     outside = [row.time for row, distance in zip(rows, distances, strict=True) if distance > band]
     last = outside[-1] if outside else stop
     settled = last <= end - TAIL
-    return Settling(last - stop if settled else math.inf, max(distances))
+    return ToolSettling(last - stop if settled else math.inf, max(distances))
 
 
-def vibration(rows: "Sequence[Row]", until: float) -> list[tuple[float, float]]:
+def vibration(rows: "Sequence[HistoryRow]", until: float) -> list[tuple[float, float]]:
     """Return time [s] and |α| [m/s²] of each tick from 10 ms after the stop to the time `until` after it [s].
 
     `rows` start at the stop of the reference.
@@ -246,13 +246,13 @@ class Extreme:
     """Simulation time at which it occurred [s]."""
 
 
-def largest(rows: "Sequence[Row]", quantity: str, joint: int) -> Extreme:
-    """Return the largest absolute value of a joint's quantity, an attribute of `Row`."""
+def largest(rows: "Sequence[HistoryRow]", quantity: str, joint: int) -> Extreme:
+    """Return the largest absolute value of a joint's quantity, an attribute of `HistoryRow`."""
     row = max(rows, key=lambda one: abs(getattr(one, quantity)[joint]))
     return Extreme(abs(getattr(row, quantity)[joint]), row.time)
 
 
-def fastest_tool(rows: "Sequence[Row]") -> Extreme:
+def fastest_tool(rows: "Sequence[HistoryRow]") -> Extreme:
     """Return the largest speed of the tool centre point [m/s]."""
     row = max(rows, key=lambda one: math.hypot(*one.tool_speed[:3]))
     return Extreme(math.hypot(*row.tool_speed[:3]), row.time)

@@ -11,7 +11,7 @@ from tvist_client.errors import AnswerTimeoutError
 from tvist_client.portal import Portal
 from tvist_protocol.stream import Event, State
 from tvist_testing.history import History
-from tvist_testing.robots import ServedRobot
+from tvist_testing.robots import RobotProcess
 
 CLIENT = "test"
 """Name under which the test controls the clock while one of its calls waits."""
@@ -71,7 +71,7 @@ class FixtureRobot(blocking.Robot):
         return f"<{type(self).__name__} {self.name} at {self.endpoint}>"
 
     @classmethod
-    def of(cls, served: ServedRobot, name: str, seed: int, log: Path, recording: Path) -> Self:
+    def of(cls, served: RobotProcess, name: str, seed: int, log: Path, recording: Path) -> Self:
         """Connect to a served robot, and wait for its present state."""
         portal = Portal()
         try:
@@ -131,7 +131,7 @@ class UrRobot(FixtureRobot):
         self.ports: dict[str, int] = {}
 
     @classmethod
-    def of(cls, served: ServedRobot, name: str, seed: int, log: Path, recording: Path) -> Self:
+    def of(cls, served: RobotProcess, name: str, seed: int, log: Path, recording: Path) -> Self:
         """Connect to a served robot, and wait for a state."""
         self = super().of(served, name, seed, log, recording)
         self.host, self.ports = served.host, served.ports

@@ -32,10 +32,10 @@ from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.stream import Event, State
 from tvist_server.config import from_mapping
-from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
 from tvist_server.robot import ServedRobot
 from tvist_server.server import Server
+from tvist_server.shutdown import Shutdown
 from tvist_server.ur_ports import UrPorts
 from tvist_testing.wanted import WantedFault, WantedRobot
 
@@ -138,7 +138,7 @@ def _accepted(reply: Reply) -> Reply:
 def serve(wanted: WantedRobot, connection: socket.socket) -> int:
     """Serve a robot until the test's process ends it; return the exit code of this process."""
     _log_into(wanted.log)
-    ending = Ending()
+    ending = Shutdown()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the test's process handles it, and then ends this one
     preparation = Preparation(wanted)
     try:
@@ -202,7 +202,7 @@ def _free_port(address: str) -> int:
         return int(probe.getsockname()[1])
 
 
-def _obey(connection: socket.socket, server: Server, ending: Ending) -> None:
+def _obey(connection: socket.socket, server: Server, ending: Shutdown) -> None:
     robot = server.robots[0]
     with contextlib.suppress(OSError), connection.makefile("rb") as orders:
         for order in orders:

@@ -18,7 +18,7 @@ EARLY = 256
 """Most truths that wait for the state of their tick."""
 
 
-class Row:
+class HistoryRow:
     """Measured values at a tick."""
 
     __slots__ = (
@@ -61,7 +61,7 @@ class History:
     def __init__(self) -> None:
         self.joint_limits: Limits | None = None  # None before the robot was queried
         self.period = 0.002  # control period [s]
-        self.rows: deque[Row] = deque(maxlen=LONGEST)
+        self.rows: deque[HistoryRow] = deque(maxlen=LONGEST)
         self.events: deque[Event] = deque(maxlen=EVENTS)
         self._early: deque[Truth] = deque(maxlen=EARLY)
 
@@ -79,7 +79,7 @@ class History:
         """Add a state; the one before the first tick measures nothing and is ignored."""
         if state.tick == 0:
             return
-        row = Row(state)
+        row = HistoryRow(state)
         for truth in self._early:
             if truth.tick == row.tick:
                 row.know(truth)
@@ -91,13 +91,13 @@ class History:
         """Add an event."""
         self.events.append(event)
 
-    def since_rest(self) -> list[Row]:
+    def since_rest(self) -> list[HistoryRow]:
         """Return the rows since the shaped reference last came to rest; all if it never moved.
 
         The flange of the flexible arm and the measured tool are different points. So if the truth of any of
         these ticks is known, rows without it are left out.
         """
-        rows: list[Row] = []
+        rows: list[HistoryRow] = []
         for row in reversed(self.rows):
             if row.moving:
                 break

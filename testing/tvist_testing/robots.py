@@ -30,7 +30,7 @@ class CannotServeError(RuntimeError):
     """No robot can be served; the message says why and what to do."""
 
 
-class ServedRobot:
+class RobotProcess:
     """A robot in its own process.
 
     Attributes:
@@ -107,9 +107,9 @@ class Robots:
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._requests: socket.socket | None = None
-        self._served: list[ServedRobot] = []
+        self._served: list[RobotProcess] = []
 
-    def serve(self, wanted: WantedRobot) -> ServedRobot:
+    def serve(self, wanted: WantedRobot) -> RobotProcess:
         """Serve a robot; return it when it answers. Raise CannotServeError if it cannot start."""
         if self._requests is None or (self._process is not None and self._process.poll() is not None):
             self._start()
@@ -124,7 +124,7 @@ class Robots:
         if "endpoint" not in told:
             ours.close()
             raise CannotServeError(str(told.get("error", f"the robot ended at its start: see {wanted.log}")))
-        served = ServedRobot(ours, told)
+        served = RobotProcess(ours, told)
         self._served.append(served)
         return served
 

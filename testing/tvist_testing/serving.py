@@ -14,12 +14,12 @@ from tvist_protocol.errors import TvistError
 from tvist_server.own_folder import OwnFolder
 from tvist_testing.fixture_robot import FixtureRobot
 from tvist_testing.markers import MarkerError, combined
-from tvist_testing.robots import CannotServeError, Robots, ServedRobot
+from tvist_testing.robots import CannotServeError, RobotProcess, Robots
 from tvist_testing.wanted import WantedRobot
 
 NAME = "ur5e"
 """Name of a single robot, for which clients look by default."""
-MOST = 100
+MAX_ROBOTS = 100
 """Most robots of a test."""
 R = TypeVar("R", bound=FixtureRobot)
 LONGEST_NAME = 120
@@ -32,7 +32,7 @@ LOG_LINES = 10
 class RobotOfTest:
     """A robot of a test, which may have ended."""
 
-    served: ServedRobot
+    served: RobotProcess
     recording: Path  # in a folder that is removed after the test
     log: Path  # beside the recording
     kept: Path  # folder to which both are moved if the test fails
@@ -101,9 +101,9 @@ class Serving:
         self, kind: type[R], item: pytest.Item, count: int, before: int
     ) -> list[tuple[R, RobotOfTest]]:
         """Make several robots of a test."""
-        if not isinstance(count, int) or not 1 <= count <= MOST - before:
+        if not isinstance(count, int) or not 1 <= count <= MAX_ROBOTS - before:
             pytest.fail(
-                f"tvist_robots({count!r}): the number of a test's robots is 1 to {MOST}", pytrace=False
+                f"tvist_robots({count!r}): the number of a test's robots is 1 to {MAX_ROBOTS}", pytrace=False
             )
         numbers = range(before, before + count)
         return [self.robot(kind, item, f"{NAME}-{number + 1}", number) for number in numbers]

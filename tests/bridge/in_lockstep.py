@@ -21,7 +21,7 @@ from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.stream import Event
 from tvist_server.moving import program as r
 from tvist_server.moving.program import MARGIN, Window, program
-from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
+from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, ServoSetpoints
 
 TICK = 1e3 * PERIOD
 """Control period [ms]."""
@@ -212,13 +212,13 @@ class Bridge(Side):
         speed = min(description.limits.velocity)
         self.robot.follow(speed)
         reach = np.array(description.limits.position)
-        setpoints = Setpoints(q, ServoLag.simulated(), fastest=(MARGIN - 0.01) * speed, reach=reach)
+        setpoints = ServoSetpoints(q, ServoLag.simulated(), fastest=(MARGIN - 0.01) * speed, reach=reach)
         self.port = Port(self.robot, setpoints, link, seed)
         # The robot's own controller lets motors lead by the gears' wind-up: ours must not do so, too.
         drives = structs.replace(description.drives, windup_feedforward=(0.0,) * description.joints)
         plain = structs.replace(description, drives=drives)
         super().__init__(setup_of(plain, q, payload, shaper, seed), self.port)
-        while self.port.output(r.STATE) != r.State.FOLLOWING:
+        while self.port.output(r.STATE) != r.ProgramState.FOLLOWING:
             self.tick()
 
     @property

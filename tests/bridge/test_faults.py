@@ -19,9 +19,9 @@ from tvist_client import MotionStoppedError, RefusedError
 from tvist_client.blocking import Robot
 from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RobotMode, RuntimeState
-from tvist_server.moving.program import NUMBER, STATE, State
+from tvist_server.moving.program import NUMBER, STATE, ProgramState
 from tvist_server.rtde.client import RtdeClient
-from tvist_server.rtde.wire import Field, Wire
+from tvist_server.rtde.wire import Field, WireType
 
 SEED = 7
 """Of the faults' moments and of what the robot hides."""
@@ -45,8 +45,8 @@ next motion has ended, and way from its rest until the bridge was told to go on.
 
 OUTPUT, INPUT = f"output_int_register_{STATE}", f"input_int_register_{NUMBER}"
 READ = {
-    "timestamp": Wire.DOUBLE, "target_q": Wire.VECTOR6D, "target_qd": Wire.VECTOR6D, "runtime_state": Wire.UINT32,
-    INPUT: Wire.INT32, OUTPUT: Wire.INT32,
+    "timestamp": WireType.DOUBLE, "target_q": WireType.VECTOR6D, "target_qd": WireType.VECTOR6D,
+    "runtime_state": WireType.UINT32, INPUT: WireType.INT32, OUTPUT: WireType.INT32,
 }  # fmt: skip
 STILL = 1e-6
 """Speed below which the target is at rest [rad/s]."""
@@ -84,7 +84,7 @@ class Watch:
     @property
     def follows(self):
         """Whether the program follows set-points."""
-        return int(self.rows[-1][OUTPUT][0]) == State.FOLLOWING
+        return int(self.rows[-1][OUTPUT][0]) == ProgramState.FOLLOWING
 
     @property
     def rests(self):
@@ -111,7 +111,7 @@ class Watch:
         """
         course = self.since(first)
         speed, time = np.abs(course["target_qd"]).max(axis=1), course["timestamp"]
-        said = int(np.argmax(course[OUTPUT] >= State.BRAKING))  # 0 where it does not say so
+        said = int(np.argmax(course[OUTPUT] >= ProgramState.BRAKING))  # 0 where it does not say so
         rest = int(np.argmax(speed[said:] < STILL)) + said
         faster = np.flatnonzero(np.diff(speed[: rest + 1]) >= 0.0)
         begun = max(said, int(faster[-1]) + 1 if len(faster) else 0)

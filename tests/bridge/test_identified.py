@@ -17,7 +17,7 @@ from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.workspace import identified, ranges
 from tvist_plant.description import load
 from tvist_plant.variants import hidden_variant
-from tvist_server.moving.servo_lag import ServoLag, Setpoints
+from tvist_server.moving.servo_lag import ServoLag, ServoSetpoints
 
 SPEED = 0.5
 """Speed cap [rad/s]."""
@@ -54,7 +54,7 @@ async def measured_in_lockstep(description, hidden, every):
     def port(*_):
         robot = HiddenRobot(description, hidden, q, payload)
         robot.follow(SPEED)
-        return Rows(every, robot, Setpoints(q, None, fastest=1.04 * SPEED, reach=reach), Link(), hidden)
+        return Rows(every, robot, ServoSetpoints(q, None, fastest=1.04 * SPEED, reach=reach), Link(), hidden)
 
     limits = with_fields(description.limits, velocity=(SPEED,) * description.joints)
     drives = with_fields(description.drives, windup_feedforward=(0.0,) * description.joints)

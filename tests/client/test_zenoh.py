@@ -19,7 +19,7 @@ from tvist_client import (
     Robot,
     ZenohTransport,
 )
-from tvist_client.across import Place
+from tvist_client.across import RobotPlace
 from tvist_client.fleet import Fleet
 from tvist_client.transports import certificates
 from tvist_client.transports import zenoh as zenoh_transport
@@ -75,7 +75,7 @@ async def test_a_token_whose_name_is_none_is_no_robot(endpoint):
         ]
         assert await robots_at(endpoint) == ["ur3"]
         async with Fleet(endpoint) as fleet:
-            assert fleet.places == {Place("", "ur3")}
+            assert fleet.places == {RobotPlace("", "ur3")}
         assert len(tokens) == 3
 
 

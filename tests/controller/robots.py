@@ -7,7 +7,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.instruments.report import Sink
 from tvist_controller.line.cycle import ControlCycle
-from tvist_controller.line.limits import TorqueRoom
+from tvist_controller.line.limits import StreamTorqueMargin
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.trajectory import JointLine, MotionLimits, SetpointStream, quickest_motion
 from tvist_plant.description import RobotDescription, load
@@ -97,7 +97,7 @@ class Line(ControlCycle):
     def stream(self, stream_period: float, limits: MotionLimits) -> SetpointStream:
         """Follow set-points from rest; no guard watches."""
         spared, reach = self.filter.spared(limits), np.array(self.description.limits.position)
-        torque = TorqueRoom(self.description, self.dynamics)
+        torque = StreamTorqueMargin(self.description, self.dynamics)
         return self.begin(
             SetpointStream(self.reference, stream_period, spared, H, reach=reach, torque=torque)
         )

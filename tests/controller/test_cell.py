@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.own_arm import OwnArm
 
-from tvist_controller.cell.description import Wire
+from tvist_controller.cell.description import CellWire
 from tvist_controller.cell.gripper import CLOSED, OPEN, Gripper, Requests, answer
 from tvist_controller.cell.live_cell import TRANSFER, Wires
 from tvist_controller.host import Host
@@ -23,8 +23,8 @@ from .robots import UR5E, Kept, Robot
 from .scripts import failure, finish, run, said, script, start
 
 WIRES = (
-    Wire(output="standard 1", input="configurable 2", after=0.1),
-    Wire(output="tool 0", input="tool 1", inverted=True),
+    CellWire(output="standard 1", input="configurable 2", after=0.1),
+    CellWire(output="tool 0", input="tool 1", inverted=True),
 )
 
 
@@ -40,7 +40,7 @@ class TestWires:
     @given(st.lists(st.booleans(), max_size=200), st.integers(0, 30), st.booleans())
     def test_an_input_is_its_output_some_ticks_ago_however_short_a_pulse_is(self, signal, ticks, inverted):
         wires = Wires(
-            [Wire(output="standard 0", input="standard 0", after=ticks * PERIOD, inverted=inverted)]
+            [CellWire(output="standard 0", input="standard 0", after=ticks * PERIOD, inverted=inverted)]
         )
         delay, now, inputs = max(1, ticks), int(inverted), []
         for tick, on in enumerate([False, *signal], start=1):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.foresight.stops import STEP, StopPlanner
+from tvist_controller.foresight.stops import DECELERATION_RATIO, StopPlanner
 from tvist_controller.line.differentiator import Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GENTLEST_STOP, TORQUE_SHARE, StopTorque, acceleration_on_way
@@ -117,7 +117,7 @@ def test_of_all_decelerations_that_keep_the_torque_the_hardest_is_taken(seed):
     stop = plan(*state.__reduce__()[1])
     torque = StopTorque(InverseDynamics(UR5E, DISC), state, np.array(LIMITS.torque))
     planner = StopPlanner(UR5E, InverseDynamics(UR5E, DISC), H)
-    tried = [min(LIMITS.acceleration) * STEP**k for k in range(16)]
+    tried = [min(LIMITS.acceleration) * DECELERATION_RATIO**k for k in range(16)]
     held = [a for a in tried if torque.holds(planner.stop(state, a))]
     if held:
         assert stop.acceleration == pytest.approx(max(held))

@@ -13,7 +13,7 @@ from tvist_controller.line import differentiator
 from tvist_controller.line import limits as line_limits
 from tvist_controller.line.differentiator import Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.limits import TORQUE_SHARE, TorqueRoom
+from tvist_controller.line.limits import TORQUE_SHARE, StreamTorqueMargin
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import JointStop, MotionLimits, SetpointStream, limiter, stream
 from tvist_plant.description import load
@@ -344,7 +344,7 @@ def test_a_stream_is_played_alike_in_python_to_the_bit(period, share, in_python)
         MotionLimits(share * PAPER.velocity, share * PAPER.acceleration, share * PAPER.jerk)
     )
     arrivals = network(wanted, period, 1.2, seed=3, jitter=1.2, loss=0.02)
-    room = TorqueRoom(UR5E, InverseDynamics(UR5E, UR5E.payload))
+    room = StreamTorqueMargin(UR5E, InverseDynamics(UR5E, UR5E.payload))
 
     def play():
         stream = SetpointStream(np.zeros(6), period, PAPER, H, reach=np.full(6, 6.28), torque=room)
@@ -360,7 +360,7 @@ def test_the_room_of_the_torque_is_that_of_numpy_to_the_bit(arm, beyond):
     description = load(arm)
     dynamics, random = InverseDynamics(description, description.payload), np.random.default_rng(2)
     limit, n = np.array(description.limits.torque), description.joints
-    room = TorqueRoom(description, dynamics, beyond)
+    room = StreamTorqueMargin(description, dynamics, beyond)
     for q, qd, qdd in random.uniform(-3, 3, (300, 3, n)):
         still = dynamics.effort(q, qd, np.zeros(n))
         inertia = np.abs(dynamics.inertia(q)).sum(axis=1)

@@ -17,12 +17,12 @@ from tests.lab.synthetic_logs import SyntheticLog
 from tvist_cli.commands.log.advise import advise as command_line
 from tvist_cli.failure import Failure
 from tvist_client.errors import MotionStoppedError
-from tvist_lab.advice import EACH, ONE, ROBOT, Stop, advise, as_dict, command, verdict
+from tvist_lab.advice import EACH, ONE, ROBOT, StopWithRest, advise, as_dict, command, verdict
 from tvist_lab.advice.options import options, slowed, smoothed
 from tvist_lab.advice.ripple import WAVES, fitted, poles_of
 from tvist_lab.collect import collect
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_lab.metrics import Measured
+from tvist_lab.metrics import MeasuredRecording
 from tvist_lab.recordings import Recording
 from tvist_lab.report import advice_page, render
 from tvist_lab.study.moves import draw_moves
@@ -36,7 +36,7 @@ MODE = (9.0, 0.05, 1.5)
 def measured_of(made, **changes):
     columns = {"tick": np.arange(len(made.columns["timestamp"]), dtype=float), **made.columns, **changes}
     there = {name: column for name, column in columns.items() if column is not None}
-    return Measured.of(Recording(there, foreign=True))
+    return MeasuredRecording.of(Recording(there, foreign=True))
 
 
 def log_of(*modes, noise=0.005, **how):
@@ -62,7 +62,7 @@ def clean():
     alpha, q = np.outer(wave, [0.6, 0.8, 0.0]), np.zeros((len(time), 6))
     measured = log_of(MODE, motions=1)
     result = replace(measured.results[0], modes=())
-    return Stop(0, 1, measured, measured.motions[0], result, time, alpha, q, 0.0)
+    return StopWithRest(0, 1, measured, measured.motions[0], result, time, alpha, q, 0.0)
 
 
 @examples(40)
@@ -93,7 +93,7 @@ def test_motions_of_different_frequencies_need_modes_of_their_own():
     low, high = (log_of((f_d, 0.03, 2.0), seed=seed) for seed, f_d in ((1, 7.0), (2, 12.0)))
     elsewhere = {name: high.recording[name] + 0.5 for name in ("target_q", "actual_q")}
     shifted = replace(high.recording, columns=high.recording.columns | elsewhere)
-    advice = advise([low, Measured.of(shifted)])
+    advice = advise([low, MeasuredRecording.of(shifted)])
     of_zv = {one.aim.scope: one.left_percent for one in advice.options if one.name == "zv, 1 mode"}
     assert of_zv[EACH] < 10.0 < of_zv[ONE]
 
@@ -139,7 +139,7 @@ def test_logs_of_different_robots_and_no_log_at_all_are_refused(tmp_path):
 
 
 def test_motions_that_were_shaped_are_told_apart(recorded):
-    unshaped, shaped = (Measured.of(recording) for recording, _ in recorded)
+    unshaped, shaped = (MeasuredRecording.of(recording) for recording, _ in recorded)
     both = advise([unshaped, shaped])
     assert [one.file for one in both.ringing] == [0]
     assert [place for place, *_ in both.shaped] == [1]
@@ -259,7 +259,7 @@ async def predicted_and_real(name, seed):
     shaped = await recorded(name, seed, moves, speed, advice)
     made = []
     for stop in advice.ringing:
-        after = Stop.of(shaped, stop.number - 1)
+        after = StopWithRest.of(shaped, stop.number - 1)
         real = 100.0 * (1.0 - replace(after, noise=stop.noise).unshaped.rms / stop.unshaped.rms)
         made.append((100.0 - advice.best.percent[stop], real))
     return made
@@ -282,7 +282,7 @@ async def recorded(name, seed, moves, speed, advice):
                         await aim(arm, best, groups[number])
                     await arm.move_j(target, velocity=speed[0], acceleration=speed[1])
                     await robot.pass_time(round(REST / PERIOD))
-        return Measured.of(collected.recording())
+        return MeasuredRecording.of(collected.recording())
 
 
 async def aim(arm, best, group):

@@ -9,7 +9,7 @@ import pytest
 
 from tvist_controller.api.line import Setup, body, load_calibration, paper_payload
 from tvist_controller.api.robot import Controller
-from tvist_lab.metrics import Measured, changes, motions
+from tvist_lab.metrics import MeasuredRecording, changes, motions
 from tvist_lab.metrics.change_detector import ChangeDetector
 from tvist_lab.metrics.changes import GEAR, MASS, MODES, _of_gear, _of_mass, _of_modes
 from tvist_lab.recordings import Recording
@@ -89,7 +89,7 @@ def recorded(mass=0.0, springs=1.0, before=8, after=4):
     recording = Recording(columns, (), SimpleNamespace(model="UR5e", payload=controller.declared))
     found = motions(recording)
     assert len(found) == before + after
-    return Measured(recording, found, [])
+    return MeasuredRecording(recording, found, [])
 
 
 def test_a_payload_that_was_picked_up_is_told_with_its_mass():
@@ -119,7 +119,7 @@ def by_hand(f_d, poses):
     results = [
         SimpleNamespace(f_d_hz=f, f_d_interval_hz=within) for f, within in zip(f_d, intervals, strict=True)
     ]
-    return changes(Measured(recording, found, results))
+    return changes(MeasuredRecording(recording, found, results))
 
 
 def test_in_a_foreign_log_only_stops_in_one_pose_are_compared_with_each_other():

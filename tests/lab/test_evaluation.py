@@ -12,13 +12,13 @@ from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.sources import calibrations
 from tvist_lab.studies.moves import study
-from tvist_lab.study.asked import Asked
 from tvist_lab.study.catalogue import baselines, some
 from tvist_lab.study.held_out import interval
 from tvist_lab.study.line import PAPER, lengthened, point_to_point
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.moves import Move, MovesError, draw_moves, is_free, read_moves, write_moves
 from tvist_lab.study.recipes import FrequencyError, Recipe, RecipeError
+from tvist_lab.study.request import StudyRequest
 from tvist_lab.study.shaping import shape
 from tvist_lab.study.work import measure
 from tvist_lab.workspace import WORKSPACE
@@ -151,7 +151,7 @@ class TestRecipes:
 def report(ur5e, paper):
     """What is said of moves by the peaks that they leave unshaped and shaped."""
     drawn = draw_moves(ur5e, 1, 0, (0.0, 5.0)).moves
-    made = study(Asked(description=ur5e, moves=drawn, methods=some(["zv"], ur5e, paper), named=1))
+    made = study(StudyRequest(description=ur5e, moves=drawn, methods=some(["zv"], ur5e, paper), named=1))
 
     def of(*peaks):
         rows = [
@@ -197,7 +197,7 @@ class TestReport:
 class TestMoves:
     def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
         methods = (*some(["zv"], ur5e, paper), *baselines(paper, ur5e, (5.0, 5.0)))
-        (job,) = study(Asked(description=ur5e, moves=[move], methods=methods, named=1)).jobs
+        (job,) = study(StudyRequest(description=ur5e, moves=[move], methods=methods, named=1)).jobs
         shaped, waiting, longer, *others = measure(job)
         assert shaped["reduction_percent"] > 80.0
         assert 28.0 <= shaped["delay_ms"] <= 38.0  # half a period at Q3, where the mode is at 15 Hz

@@ -13,8 +13,8 @@ from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.calibrate import agreeing, calibrate, more_jogs
 from tvist_lab.identification.design import free_configurations, jog_of, predicted
-from tvist_lab.identification.forecast import Forecast
-from tvist_lab.identification.jogs import Measured
+from tvist_lab.identification.forecast import ModeForecast
+from tvist_lab.identification.jogs import RingDownLogs
 from tvist_lab.identification.modal_fit import describe, fit_modal, of_masses
 from tvist_lab.identification.observed import mounting_of, observe, repeated
 from tvist_lab.identification.ring_downs import (
@@ -29,7 +29,7 @@ from tvist_lab.identification.ring_downs import (
 from tvist_lab.identification.twin import fit_twin
 from tvist_lab.identification.twin_file import toml_of, twin_file
 from tvist_lab.identification.twin_parameters import TwinParameters
-from tvist_lab.identification.unknowns import SURE, ArmModes
+from tvist_lab.identification.unknowns import Z_95, ArmModes
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.metrics import MotionRows, fit_ring_down, motions, tool_acceleration
 from tvist_lab.recordings import Recording, RecordingError
@@ -150,7 +150,7 @@ def forecast():
         ring = predicted(arm, q, number % 2)
         rings.append(replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape)))
     fit = fit_modal(arm, rings)
-    return Forecast(arm, fit, fit.covariance, of_masses(arm, rings, fit)), rings
+    return ModeForecast(arm, fit, fit.covariance, of_masses(arm, rings, fit)), rings
 
 
 def changed(log, **columns):
@@ -213,8 +213,8 @@ def test_intervals_hold_the_true_modes_of_the_arm_that_was_fitted(forecast):
         f_d, zeta = describe(arm.drivetrain(arm.guess).poles(arm.mass(q, 1))[0][:2])
         there = known.at(q, 1, 2)
         held += [
-            *(np.abs(np.log(there.f_d / f_d)) < SURE * there.f_d_error),
-            *(np.abs(np.log(there.zeta / zeta)) < SURE * there.zeta_error),
+            *(np.abs(np.log(there.f_d / f_d)) < Z_95 * there.f_d_error),
+            *(np.abs(np.log(there.zeta / zeta)) < Z_95 * there.zeta_error),
         ]
     assert np.mean(held) >= 0.9
 
@@ -238,14 +238,14 @@ def test_proposals_are_jogs_that_no_body_is_in_the_way_of_and_leave_less_uncerta
 
 @pytest.mark.nightly
 def test_where_nobody_has_listened_a_hidden_robot_rings_within_the_intervals_that_are_given(logs):
-    found = calibrate(ROBOT, Measured(tuple(logs)), name="x", command="x", progress=lambda _: None)
+    found = calibrate(ROBOT, RingDownLogs(tuple(logs)), name="x", command="x", progress=lambda _: None)
     assert found.used + sum(unused(found.stops).values()) == 20
     assert "38 are needed" in found.no_polynomial
     held, sure = [], []
     for q, declared, f_d in unseen(ROBOT, 21, 20, 0):
         known = found.forecast.at(q, found.forecast.arm.payloads.index(declared), 3)
         error = abs(np.log(known.f_d[0] / f_d))
-        held.append(error < SURE * known.f_d_error[0])
+        held.append(error < Z_95 * known.f_d_error[0])
         if known.f_d_percent[0] <= 5.0:
             sure.append(error)
     assert np.mean(held) >= 0.9

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 from tests.lab.synthetic_logs import SyntheticLog
 
-from tvist_lab.metrics import Measured, MotionResult, analyze, compare, grouped_notes, motions
+from tvist_lab.metrics import MeasuredRecording, MotionResult, analyze, compare, grouped_notes, motions
 from tvist_lab.recordings import RecordingError, read, table
 
 MODE = (9.0, 0.12, 1.0)
@@ -220,7 +220,7 @@ def test_missing_files_and_folders_without_a_bag_are_refused(tmp_path):
 
 def test_motions_that_correspond_are_compared_and_others_are_said(tmp_path):
     def measured_of(log):
-        return Measured.of(read(log.csv(tmp_path / "log.csv")))
+        return MeasuredRecording.of(read(log.csv(tmp_path / "log.csv")))
 
     loud = measured_of(SyntheticLog())
     both = compare(loud, measured_of(SyntheticLog(modes=((9.0, 0.12, 0.25),), seed=2)))
@@ -401,7 +401,7 @@ def test_a_format_of_ones_own_is_a_function_and_its_names_units_and_gaps_are_fou
 
     def read_numbers(path):
         values = np.array(path.read_text().split(), np.float64).reshape(-1, 3)
-        return table.Table(
+        return table.LogTable(
             path, ["time", "q_actual_0", "q_actual_1"], values, np.arange(1.0, len(values) + 1.0)
         )
 

@@ -8,9 +8,9 @@ from scipy.stats import binomtest
 
 from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_lab.studies.match import NEITHER, TOO_FEW, exact_interval, study, verdict
-from tvist_lab.study.asked import Asked
 from tvist_lab.study.catalogue import some
 from tvist_lab.study.moves import draw_moves
+from tvist_lab.study.request import StudyRequest
 from tvist_lab.study.study import StudyError
 from tvist_lab.study.work import measure
 from tvist_plant.variants import variant
@@ -25,7 +25,7 @@ def make(ur5e):
 
     def made(moves):
         drawn = draw_moves(ur5e, moves, 3, (0.0, 5.0)).moves
-        return study(Asked(description=ur5e, moves=drawn, methods=pair, named=2, arms=PLANTS, seed=3))
+        return study(StudyRequest(description=ur5e, moves=drawn, methods=pair, named=2, arms=PLANTS, seed=3))
 
     return made
 

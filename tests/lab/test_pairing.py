@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from tests.lab.conftest import straight_step
 
-from tvist_lab.change import Change
-from tvist_lab.metrics import Measured, pairs
+from tvist_lab.change import MotionChange
+from tvist_lab.metrics import MeasuredRecording, pairs
 from tvist_lab.report.verdict import verdict_on_pairs
 
 TICKS = 1500
@@ -36,7 +36,7 @@ def many(make_recording, ring):
         recording = make_recording(
             reference, target, ticks=len(reference), position=position, alpha=rung, truth=rung, events=events,
         )  # fmt: skip
-        return Measured.of(replace(recording, info=info if named else None))
+        return MeasuredRecording.of(replace(recording, info=info if named else None))
 
     return make
 
@@ -77,5 +77,5 @@ def test_what_does_not_vibrate_or_gets_worse_is_said(many):
     assert "50 % more vibration" in verdict_on_pairs(pairs(worse), worse.results, "x")[0]
     quiet = many(("none", 0, 400, 0.1), ("zv", 37, 400, 0.02))
     assert "though neither is noticeable" in verdict_on_pairs(pairs(quiet), quiet.results, "x")[0]
-    unknown = replace(pairs(quiet)[0], change=Change(None, 0.1, None, 5.0))
+    unknown = replace(pairs(quiet)[0], change=MotionChange(None, 0.1, None, 5.0))
     assert "could not be measured" in verdict_on_pairs([unknown], quiet.results, "x")[0]

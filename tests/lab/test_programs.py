@@ -14,7 +14,7 @@ from tvist_controller.sources.own_plants import OwnPlant
 from tvist_lab.in_process import free_setup
 from tvist_lab.metrics import amplitude, motions, tool_acceleration
 from tvist_lab.programs.judging import BaselineError, broken, changes, read_baseline
-from tvist_lab.programs.limits import Limits
+from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.results import as_dict, junit, largest_peak
 from tvist_lab.programs.running import InputError, run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
@@ -244,7 +244,7 @@ def kept(path, *results):
 
 
 def limits(*most):
-    return Limits(
+    return RunLimits(
         **dict(zip(("max_shake", "max_seconds", "max_joint_speed", "max_tool_speed"), most, strict=True))
     )
 
@@ -256,7 +256,7 @@ def texts(found):
 class TestLimits:
     def test_those_that_are_kept_say_nothing(self, watch):
         assert texts(broken(limits(10.0, 100.0, 3.2, 5.0), watch)) == []
-        assert texts(broken(Limits(), watch)) == []
+        assert texts(broken(RunLimits(), watch)) == []
 
     def test_each_that_is_broken_says_where_and_when(self, watch):
         found = list(broken(limits(0.3, 1.0, 0.5, 0.1), watch))
@@ -271,7 +271,7 @@ class TestLimits:
 
     def test_a_shake_that_nobody_knows_breaks_its_limit(self):
         mute = run(MOVES[0], plant=OwnPlant("mine.py:NoArm", "", lambda *_: NoArm()), truth=False)
-        (found,) = broken(Limits(max_shake=5.0), mute)
+        (found,) = broken(RunLimits(max_shake=5.0), mute)
         assert (found.line, "not known" in found.text) == (2, True)
 
 

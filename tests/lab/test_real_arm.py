@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tvist_lab.advice import advise
-from tvist_lab.metrics import Measured
+from tvist_lab.metrics import MeasuredRecording
 from tvist_lab.recordings import read
 
 RECORDED = Path(__file__).parent / "data" / "ur5_stops.csv.gz"
@@ -28,12 +28,12 @@ def without(*names):
 
 @pytest.fixture(scope="module")
 def found():
-    return Measured.of(read(RECORDED))
+    return MeasuredRecording.of(read(RECORDED))
 
 
 @pytest.mark.parametrize("missing", [(), ("target_",)], ids=["whole", "no target"])
 def test_a_real_arms_frequencies_are_right_whatever_the_log_lacks(found, missing):
-    results = Measured.of(without(*missing)).results if missing else found.results
+    results = MeasuredRecording.of(without(*missing)).results if missing else found.results
     assert len(results) == len(STOPS)
     for result, (stop, (f_d, zeta)) in zip(results, STOPS.items(), strict=True):
         assert result.stop_s == pytest.approx(stop, abs=0.03)

@@ -10,7 +10,7 @@ from tests.lab.synthetic_logs import SyntheticLog
 from tvist_cli.output import write_report
 from tvist_lab.metrics import MotionResult
 from tvist_lab.recordings import RecordingError
-from tvist_lab.report import Page, of_recordings, recordings_page, render
+from tvist_lab.report import ReportPage, of_recordings, recordings_page, render
 from tvist_lab.report.verdict import shaping_of, verdict_on_one
 
 LOUD, QUIET = ((9.0, 0.12, 1.0),), ((9.0, 0.12, 0.2),)
@@ -119,5 +119,5 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path):
 
 
 def test_a_page_is_written_although_a_file_has_a_name_that_is_no_text(tmp_path):
-    write_report(tmp_path / "r.html", Page("bad\udcff.mcap", ["It shook."], []))
+    write_report(tmp_path / "r.html", ReportPage("bad\udcff.mcap", ["It shook."], []))
     assert "bad?.mcap" in (tmp_path / "r.html").read_text(encoding="utf-8")

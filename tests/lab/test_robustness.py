@@ -9,13 +9,13 @@ from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_lab.report import study_figures
 from tvist_lab.studies.robustness import ERRORS, PLANT, cells, errors, study
 from tvist_lab.study.arms import PERTURBED
-from tvist_lab.study.asked import Asked
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import some
 from tvist_lab.study.columns import p5
-from tvist_lab.study.held_out import JUDGING, LEAST, TUNING, said
+from tvist_lab.study.held_out import JUDGING, MIN_MOVES, TUNING, said
 from tvist_lab.study.method import Task
 from tvist_lab.study.moves import Move
+from tvist_lab.study.request import StudyRequest
 from tvist_lab.study.work import measure
 from tvist_plant.variants import hidden_variant
 
@@ -25,7 +25,9 @@ def asked(ur5e, *names, **more):
     start = np.array(ur5e.poses["Q1"])
     move = Move(tuple(start), tuple(start + np.array([0.3, 0.2, 0.3, 0.0, 0.0, 0.0])), 4.0)
     facts = {"seed": 0, "moves_made": 1, "robot": "ur5e"}
-    return Asked(description=ur5e, moves=[move], methods=methods, named=len(methods), facts=facts, **more)
+    return StudyRequest(
+        description=ur5e, moves=[move], methods=methods, named=len(methods), facts=facts, **more
+    )
 
 
 @pytest.fixture(scope="module")
@@ -75,9 +77,9 @@ def test_a_hidden_robot_is_one_more_plant_whose_seed_stands_in_its_name(ur5e):
 
 
 def test_few_moves_have_no_5th_percentile_and_no_published_seed_is_for_tuning():
-    values = pl.DataFrame({"x": [float(one) for one in range(LEAST)]})
-    assert values.select(p5("x", LEAST)).item() == pytest.approx(0.95)
-    assert values[1:].select(p5("x", LEAST)).item() is None
+    values = pl.DataFrame({"x": [float(one) for one in range(MIN_MOVES)]})
+    assert values.select(p5("x", MIN_MOVES)).item() == pytest.approx(0.95)
+    assert values[1:].select(p5("x", MIN_MOVES)).item() is None
     assert not set(JUDGING.values()).intersection(TUNING)
     assert "Nothing is tuned on seed 20261123" in said(JUDGING["robustness"])
 

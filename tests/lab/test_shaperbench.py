@@ -14,15 +14,15 @@ from tvist_lab.metrics import best_tool_acceleration
 from tvist_lab.studies.bench import bend, path_error, study
 from tvist_lab.studies.causality import check_causal, inspect
 from tvist_lab.study.arms import ARMS
-from tvist_lab.study.asked import Asked
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import some
 from tvist_lab.study.foreign import CandidateError, FromFile, load_shaper
 from tvist_lab.study.line import PAPER, ControlLine, point_to_point
 from tvist_lab.study.menus import names
-from tvist_lab.study.method import Named, Stepping, Task
+from tvist_lab.study.method import Named, SampleMethod, Task
 from tvist_lab.study.moves import Move, draw_moves
 from tvist_lab.study.recipes import Recipe
+from tvist_lab.study.request import StudyRequest
 from tvist_lab.study.shaping import ShaperFaultError
 from tvist_lab.study.work import Job, measure, measure_each
 from tvist_plant.plant import PERIOD
@@ -230,7 +230,7 @@ class TestDishonesty:
 class TestElastic:
     def test_the_drives_get_the_stage_with_its_tick_on_every_arm(self, ur5e, modal, task):
         class Bare(Named):
-            driven = Stepping.driven
+            driven = SampleMethod.driven
 
         def made(kind, *arms):
             case = Case(ur5e, task.move, arms=tuple(ARMS[place] for place in arms))
@@ -289,7 +289,7 @@ class TestScores:
         standing = [*bench(ur5e, modal, "zv", "double_s_as_zv"), early]
         moves = draw_moves(ur5e, 1, 0, (0.0, 5.0)).moves
         facts = {"moves_made": 1, "seed": 0, "robot": "UR5e", "calibration": "", "command": ""}
-        asked = Asked(description=ur5e, moves=moves, methods=standing, quick=True, facts=facts)
+        asked = StudyRequest(description=ur5e, moves=moves, methods=standing, quick=True, facts=facts)
         made = study(asked)
         made = replace(made, cases=[replace(case, arms=ARMS[:1]) for case in made.cases])
         done = made.frame([row for job in made.jobs for row in measure_each(job)])

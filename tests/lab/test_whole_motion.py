@@ -14,7 +14,7 @@ from tvist_controller.api.line import (
 from tvist_lab.study.line import PAPER, ControlLine, point_to_point
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
-from tvist_lab.study.shaping import Running, shape
+from tvist_lab.study.shaping import RunningFilter, shape
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, PlantError, SimulatedArm
@@ -48,7 +48,7 @@ def in_one_go(description, recipe, move, seed):
     tvist.reset(start)
     for _ in range(RESTING):  # some filters go on at rest
         tvist.filter(start)
-    shaped = shape(Running(tvist), reference, watched=False)
+    shaped = shape(RunningFilter(tvist), reference, watched=False)
     assert shaped.ended
     line, arm = ControlLine(description, start, carried), FlexibleArm(description, carried)
     following = line.follow(reference, shaped.q, elastic=recipe.elastic(description, tvist))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tvist_controller.cell.description import GripperModel, Part, Tool, Wire
+from tvist_controller.cell.description import CellWire, GripperModel, Tool, Workpiece
 from tvist_controller.setup import Setup
 from tvist_server.config import ServeConfig
 from tvist_server.option_values import StartError
@@ -62,5 +62,5 @@ def test_the_page_has_a_valid_file_and_all_keys(tmp_path):
     file.write_text(re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)[1], encoding="utf-8")
     assert ServeConfig(cell=str(file)).setup().cell.gripper is not None
     rows = [line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `")]
-    keys = [kind.__struct_fields__ for kind in (Wire, Tool, GripperModel, Part)]
+    keys = [kind.__struct_fields__ for kind in (CellWire, Tool, GripperModel, Workpiece)]
     assert set(re.findall(r"`(\w+)`", " ".join(rows))) == {key for some in keys for key in some}

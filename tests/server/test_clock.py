@@ -10,7 +10,7 @@ import pytest
 
 from tvist_plant.plant import PlantError
 from tvist_server import punctual
-from tvist_server.clock import Lockstep, Mailbox, Realtime
+from tvist_server.clock import Lockstep, Realtime, TickedRobot
 
 pytestmark = pytest.mark.realtime
 
@@ -56,7 +56,7 @@ def ticking(*robots, **options):
 
 
 def test_one_thread_ticks_all_robots_and_says_how_late_each_was():
-    robots = [Mailbox(FakeHost()) for _ in range(3)]
+    robots = [TickedRobot(FakeHost()) for _ in range(3)]
     with ticking(*robots) as clock:
         pass
     assert {name for robot in robots for name in robot.host.threads} == {"tvist-tick"}
@@ -67,7 +67,7 @@ def test_one_thread_ticks_all_robots_and_says_how_late_each_was():
 
 
 def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
-    robot, seen = Mailbox(FakeHost()), []
+    robot, seen = TickedRobot(FakeHost()), []
     for number in range(100):
         robot.post(lambda number=number: seen.append((number, robot.host.ticks)))
     with ticking(robot):
@@ -78,7 +78,7 @@ def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
 
 def test_an_arm_that_does_not_begin_its_tick_keeps_no_client_waiting_and_is_told_of_once():
     paces = [True, False, False, True, False]
-    robot = Mailbox(FakeHost(), pace=lambda timeout: paces.pop(0) if paces else time.sleep(timeout))
+    robot = TickedRobot(FakeHost(), pace=lambda timeout: paces.pop(0) if paces else time.sleep(timeout))
     answered = threading.Event()
     robot.host.reached.set()
     with ticking(robot):
@@ -96,7 +96,7 @@ def test_an_arm_that_fails_while_it_begins_its_tick_has_it_from_the_clock_and_st
 
     host, failures = FakeHost(), []
     host.fail = failures.append
-    with ticking(Mailbox(host, pace=fails)):
+    with ticking(TickedRobot(host, pace=fails)):
         pass
     assert set(failures) == {"no cable"}
     assert host.failure is None
@@ -109,7 +109,7 @@ class Failing(FakeHost):
 
 @pytest.mark.parametrize("failing", ["tick", "job"])
 def test_a_tick_or_job_that_fails_ends_its_robot_alone_whose_clients_are_still_answered(caplog, failing):
-    other, robot, answered = Mailbox(FakeHost()), Mailbox(Failing()), threading.Event()
+    other, robot, answered = TickedRobot(FakeHost()), TickedRobot(Failing()), threading.Event()
     robot.host.error = ArithmeticError if failing == "tick" else None
     if failing == "job":
         robot.post(lambda: 1 / 0)
@@ -126,7 +126,7 @@ def test_a_tick_or_job_that_fails_ends_its_robot_alone_whose_clients_are_still_a
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, GeneratorExit])
 def test_what_ends_the_thread_ends_all_robots_and_says_so(caplog, error):
-    robots = [Mailbox(FakeHost()), Mailbox(Failing())]
+    robots = [TickedRobot(FakeHost()), TickedRobot(Failing())]
     robots[1].host.error = error
     clock = Realtime(robots, PERIOD)
     clock.start()
@@ -145,7 +145,7 @@ def test_an_arm_whose_call_never_returns_does_not_keep_the_server_from_ending(ca
             begun.set()
             go_on.wait(WAIT)
 
-    clock = Realtime([Mailbox(Hanging())], PERIOD)
+    clock = Realtime([TickedRobot(Hanging())], PERIOD)
     clock.start()
     assert begun.wait(WAIT)
     clock.close()
@@ -175,7 +175,7 @@ def test_real_time_priority_is_asked_for_by_the_tick_thread_and_next_to_it_for_w
     monkeypatch.setattr(os, "sched_setscheduler", ask)
     for options in ({}, {"priority": True}):
         assert asked == []
-        with ticking(Mailbox(FakeHost()), **options):
+        with ticking(TickedRobot(FakeHost()), **options):
             pass
     policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK  # what a thread with this priority starts has none
     assert asked == [
@@ -189,7 +189,7 @@ def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypa
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    robot = Mailbox(FakeHost())
+    robot = TickedRobot(FakeHost())
     with ticking(robot, priority=True):
         pass
     (record,) = caplog.records
@@ -200,7 +200,7 @@ def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypa
 
 
 def test_in_lockstep_no_tick_comes_by_itself_and_jobs_are_done():
-    robot, done = Mailbox(FakeHost()), threading.Event()
+    robot, done = TickedRobot(FakeHost()), threading.Event()
     clock = Lockstep(robot, lambda: None)
     clock.start()
     robot.post(done.set)
@@ -213,7 +213,7 @@ def test_in_lockstep_no_tick_comes_by_itself_and_jobs_are_done():
 def test_in_lockstep_the_state_is_repeated_however_many_jobs_come(monkeypatch):
     """A new client gets the state although telemetry, say, comes in as often."""
     monkeypatch.setattr("tvist_server.clock.REPEAT_EVERY", 0.01)
-    robot, repeated = Mailbox(FakeHost()), threading.Event()
+    robot, repeated = TickedRobot(FakeHost()), threading.Event()
     clock = Lockstep(robot, repeated.set)
 
     def another():
@@ -243,7 +243,7 @@ def test_an_overload_is_told_to_the_robot_s_clients_when_it_begins_and_when_it_e
         passed[0] += seconds
 
     monkeypatch.setattr("tvist_server.clock.time", SimpleNamespace(monotonic=lambda: passed[0], sleep=sleep))
-    robot = Mailbox(Slow())
+    robot = TickedRobot(Slow())
     robot.host.reached.set()
     with ticking(robot):
         assert told.wait(WAIT)

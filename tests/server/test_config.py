@@ -16,7 +16,7 @@ from tvist_plant.user_file import UserFileError
 from tvist_protocol.calibration import calibration_to_json
 from tvist_server.config import ServeConfig, from_mapping
 from tvist_server.moving.servo_lag import ServoLag
-from tvist_server.option_values import MOST, StartError, members, read_start_file, recording_of
+from tvist_server.option_values import MAX_ROBOTS, StartError, members, read_start_file, recording_of
 from tvist_server.profiles import UR_START
 
 
@@ -90,7 +90,7 @@ def test_one_robot_has_the_name_of_its_file_and_several_have_numbers():
     assert names("ur5e*2,/a/b/other.toml") == ["ur5e-1", "ur5e-2", "other"]
     assert names("ur5e, other.toml*2 ,ur5e") == ["ur5e-1", "other-1", "other-2", "ur5e-2"]
     assert [member.robot for member in members("ur5e,x/other.toml*2")] == ["ur5e", *2 * ["x/other.toml"]]
-    assert len(members(f"ur5e*{MOST}")) == MOST
+    assert len(members(f"ur5e*{MAX_ROBOTS}")) == MAX_ROBOTS
 
 
 def test_each_of_several_robots_has_a_seed_and_a_recording_of_its_own():

@@ -76,17 +76,17 @@ class Followed:
     def until_ended(self, most=2000):
         for _ in range(most):
             self.steps()
-            if self.state is r.State.ENDED:
+            if self.state is r.ProgramState.ENDED:
                 return self
         raise AssertionError("it goes on")
 
     @property
     def state(self):
-        return r.State(self.output(r.STATE))
+        return r.ProgramState(self.output(r.STATE))
 
     @property
     def ended(self):
-        return r.Ended(self.output(r.ENDED))
+        return r.ProgramEnded(self.output(r.ENDED))
 
     def assert_kept(self, last_came):
         """Check all that holds whatever came; `last_came` is the tick of the last new number."""
@@ -98,8 +98,8 @@ class Followed:
         if len(played):
             assert self.output(r.LEFT_OUT) == played[-1] - played[0] + 1 - len(set(played))
         assert (np.diff(played) >= 0).all()
-        if self.state is r.State.ENDED:
-            assert self.ended is not r.Ended.NOT
+        if self.state is r.ProgramState.ENDED:
+            assert self.ended is not r.ProgramEnded.NOT
             assert not self.at or self.at[-1] < last_came + PATIENCE
 
 
@@ -142,7 +142,7 @@ class OnRobot(Followed):
         speeds = np.diff(self.targets, axis=0) / H
         assert np.abs(speeds).max() <= MARGIN * self.speed * (1 + 1e-6)
         assert np.abs(np.diff(speeds, axis=0) / H).max() <= min(limits.acceleration) * (1 + 1e-6)
-        if self.state is r.State.ENDED:
+        if self.state is r.ProgramState.ENDED:
             assert (speeds[-1] == 0.0).all()
             assert self.robot.controller.programs.state != "PLAYING"
 
@@ -246,7 +246,7 @@ def test_what_a_robot_would_not_take_is_refused(name, value):
 def test_numbers_that_begin_anew_change_nothing():
     arrivals = late(np.random.default_rng(1), 200, jitter=1.4, stalls=0.02, longest=6)
     runs = Alone(), Alone()
-    for robot, before in zip(runs, (0, r.MOST - 100), strict=True):
+    for robot, before in zip(runs, (0, r.MAX_NUMBER - 100), strict=True):
         robot.play(packages(swings(200, 0.4), 200, before=before), arrivals[:200])
     first, second = (str((run.told, run.at, run.alone, run.output(r.LEFT_OUT), run.state)) for run in runs)
     assert first == second
@@ -260,11 +260,11 @@ def test_on_a_good_link_it_plays_every_set_point_as_it_is(seed, speed, jitter):
     path = swings(600, 0.99 * speed)
     arrivals = late(np.random.default_rng(seed), 560, base=1.0, jitter=jitter / 2)
     robot, last = followed(path, arrivals[:560], 560, speed=speed)
-    assert robot.state is r.State.FOLLOWING
+    assert robot.state is r.ProgramState.FOLLOWING
     np.testing.assert_allclose(robot.told, of_path(path, robot.numbers), rtol=0.0, atol=1e-9)
     assert np.diff(robot.numbers[40:]).tolist() == [1] * (len(robot.numbers) - 41)
     robot.until_ended().assert_kept(last)
-    assert robot.ended is r.Ended.SILENCE
+    assert robot.ended is r.ProgramEnded.SILENCE
 
 
 @examples(30)
@@ -281,7 +281,7 @@ def test_a_bad_link_shows_by_smooth_detours_that_fade(seed, speed):
     arrivals = [[place for place in come if random.random() >= left_out] for come in arrivals]
     robot = Alone(speed=speed)
     robot.play(packages(path, count + 300), [*arrivals[:count], *([count + k] for k in range(250))])
-    assert robot.state is r.State.FOLLOWING, robot.ended
+    assert robot.state is r.ProgramState.FOLLOWING, robot.ended
     told, own = np.array(robot.told), of_path(path, robot.numbers)
     ways, own_ways = np.diff(told, axis=0), own[1:] - of_path(path, np.array(robot.numbers[1:]) - 1)
     assert np.abs(ways - own_ways).max() <= 2e-3
@@ -336,7 +336,7 @@ def test_it_brakes_within_40_ms_of_the_last_set_point(speed, moment):
     )
     before = np.abs(robot.targets[-1] - robot.targets[-2]).max()
     robot.until_ended(600)
-    assert robot.ended is r.Ended.SILENCE
+    assert robot.ended is r.ProgramEnded.SILENCE
     assert robot.at[-1] < last + PATIENCE
     robot.assert_kept(last)
     ways = np.abs(np.diff(robot.targets, axis=0)).max(axis=1)
@@ -360,7 +360,7 @@ def test_joints_at_their_largest_speed_fall_behind_no_further_once_a_bad_link_is
     newest = np.maximum.accumulate([k - int(by) for k, by in enumerate(LATE)]).tolist()
     arrivals = [[place] if place >= 0 else [] for place in [*newest, *range(len(LATE), count)]]
     robot, _ = followed(path, arrivals, count, speed=speed, step=step)
-    assert robot.state is r.State.FOLLOWING
+    assert robot.state is r.ProgramState.FOLLOWING
     off = np.abs(np.array(robot.told) - of_path(path, robot.numbers)).max(axis=1)
     assert off[len(LATE) + 10 :].max() <= off[: len(LATE) + 10].max()
     assert off[-1] <= 1e-9
@@ -372,7 +372,7 @@ def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lo
     robot, _ = followed(path, [[k] for k in range(200)], 600)
     robot.play(packages(path, 600), [*([] for _ in range(lost)), *([200 + k] for k in range(400))])
     told, numbers = np.array(robot.told), np.array(robot.numbers)
-    assert robot.state is r.State.FOLLOWING
+    assert robot.state is r.ProgramState.FOLLOWING
     assert robot.tick - 2 - lost - 2 <= numbers[-1] <= robot.tick - lost
     assert np.abs(told - of_path(path, numbers))[-1].max() <= 1e-6
     assert robot.output(r.ALONE) <= 2 * lost + 4
@@ -381,14 +381,14 @@ def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lo
 @pytest.mark.parametrize(
     ("come", "change", "why"),
     [
-        ((150, 151, 152), {1: 0}, r.Ended.ORDERED),
-        ((150, 151, 152), {1: -1}, r.Ended.ORDERED),
-        ((150, 151, 152), {0: 3}, r.Ended.LOST),
-        ((150, 151, 152), {0: 190}, r.Ended.LOST),
-        ((150, 151, 152), {12: float("nan")}, r.Ended.TOO_FAST),
-        ((150, 151, 152), {8: 0.3, 14: 0.3, 20: 0.3, 2: 0.3}, r.Ended.TOO_FAST),
+        ((150, 151, 152), {1: 0}, r.ProgramEnded.ORDERED),
+        ((150, 151, 152), {1: -1}, r.ProgramEnded.ORDERED),
+        ((150, 151, 152), {0: 3}, r.ProgramEnded.LOST),
+        ((150, 151, 152), {0: 190}, r.ProgramEnded.LOST),
+        ((150, 151, 152), {12: float("nan")}, r.ProgramEnded.TOO_FAST),
+        ((150, 151, 152), {8: 0.3, 14: 0.3, 20: 0.3, 2: 0.3}, r.ProgramEnded.TOO_FAST),
         *[
-            ((None, None, None, 154), dict.fromkeys(range(14, 20), wrong), r.Ended.TOO_FAST)
+            ((None, None, None, 154), dict.fromkeys(range(14, 20), wrong), r.ProgramEnded.TOO_FAST)
             for wrong in (float("nan"), float("-inf"), 1e300, 3.0)
         ],
     ],
@@ -415,7 +415,7 @@ def test_the_first_set_point_may_be_a_hundredth_of_a_radian_away(away):
     path[:, 2] += away
     robot, last = followed(path, [[k] for k in range(500)], 500)
     if abs(away) > 0.01:
-        assert robot.ended is r.Ended.AWAY
+        assert robot.ended is r.ProgramEnded.AWAY
         assert not robot.told
         return
     told = np.array(robot.told)
@@ -433,27 +433,27 @@ def test_a_program_that_waits_is_ended_at_once(number, waits):
     robot.steps(waits)
     robot.write(*package)
     robot.steps(10)
-    assert robot.state is r.State.ENDED
-    assert robot.ended is r.Ended.ORDERED
+    assert robot.state is r.ProgramState.ENDED
+    assert robot.ended is r.ProgramEnded.ORDERED
     assert not robot.told
 
 
 def test_registers_of_before_move_nothing():
     robot = Alone(before=packages(swings(600, 0.4), 400)[-1])
     robot.steps(1000)
-    assert robot.state is r.State.WAITING
+    assert robot.state is r.ProgramState.WAITING
     assert robot.output(r.RUN) == RUN
     robot.until_ended(5000)
-    assert robot.ended is r.Ended.SILENCE
+    assert robot.ended is r.ProgramEnded.SILENCE
     assert not robot.told
 
 
-@pytest.mark.parametrize(("lag", "why"), [(40, None), (120, r.Ended.STRAYED)])
+@pytest.mark.parametrize(("lag", "why"), [(40, None), (120, r.ProgramEnded.STRAYED)])
 def test_an_arm_that_does_not_follow_ends_it(lag, why):
     path = swings(400, 0.45)
     robot, _ = followed(path, [[k] for k in range(300)], 300, lag=lag)
-    assert robot.state is (r.State.ENDED if why else r.State.FOLLOWING)
-    assert robot.ended is (why or r.Ended.NOT)
+    assert robot.state is (r.ProgramState.ENDED if why else r.ProgramState.FOLLOWING)
+    assert robot.ended is (why or r.ProgramEnded.NOT)
 
 
 @pytest.mark.parametrize(("how", "periods", "moment"), [("pause", 25, 90), ("stop", 25, 160)])
@@ -474,7 +474,7 @@ def test_it_does_not_go_on_after_a_pause(how, periods, moment):
         robot.robot.send(UnlockProtectiveStop)
     robot.robot.send(ProgramPlay)
     robot.play(sent, [[min(robot.tick - 2 + k, 1399)] for k in range(50)])
-    assert robot.state is r.State.ENDED
-    assert robot.ended is r.Ended.LOST
+    assert robot.state is r.ProgramState.ENDED
+    assert robot.ended is r.ProgramEnded.LOST
     assert len(robot.told) == calls
     assert (robot.targets[-50:] == still).all()

@@ -29,23 +29,23 @@ from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.moving import program as r
 from tvist_server.moving.checks import (
     Wanted,
-    answers_trouble,
     halt_by_modes,
     halt_by_program,
     mounting_trouble,
-    state_trouble,
     tells_gravity,
     version_trouble,
+    why_not_by_answers,
+    why_not_by_state,
 )
 from tvist_server.moving.interfaces import Configuration, NoAnswerError, ask, found, narrowed
-from tvist_server.moving.moved_robot import SILENT, MovedRobot, Pace
-from tvist_server.moving.program import Ended
-from tvist_server.moving.run import Run, Upload
+from tvist_server.moving.moved_robot import SILENT, ControlPeriods, MovedRobot
+from tvist_server.moving.program import ProgramEnded
+from tvist_server.moving.run import ProgramRun, Upload
 from tvist_server.rtde.client import RtdeClient, RtdeError
 from tvist_server.rtde.codec import PackageKind, package
-from tvist_server.rtde.wire import Field, Wire
-from tvist_server.watching.connection import Connection
-from tvist_server.watching.place import place_of
+from tvist_server.rtde.wire import Field, WireType
+from tvist_server.watching.address import place_of
+from tvist_server.watching.connection import RtdeConnection
 from tvist_server.watching.variables import NEEDED, OPTIONAL
 from tvist_server.watching.watched_robot import WatchedRobot
 
@@ -80,7 +80,9 @@ def set_up(commanding, types, outputs=b"DOUBLE"):
     ],
 )
 def test_inputs_that_are_not_ours_are_told(types, words):
-    client = RtdeClient({"timestamp": Field(Wire.DOUBLE)}, {}, {"n": Wire.INT32, "q": Wire.DOUBLE})
+    client = RtdeClient(
+        {"timestamp": Field(WireType.DOUBLE)}, {}, {"n": WireType.INT32, "q": WireType.DOUBLE}
+    )
     with pytest.raises(RtdeError, match=words):
         set_up(client, types)
 
@@ -143,7 +145,7 @@ def turned(joint, by, target=Q):
     ],
 )
 def test_a_robot_that_may_not_be_moved_says_why_and_what_to_do(changes, words):
-    assert words in state_trouble(WANTED, replace(GOOD, **changes))
+    assert words in why_not_by_state(WANTED, replace(GOOD, **changes))
 
 
 @pytest.mark.parametrize(
@@ -158,20 +160,22 @@ def test_a_robot_that_may_not_be_moved_says_why_and_what_to_do(changes, words):
     ],
 )
 def test_what_is_said_here_has_to_be_so_there(wanted, words):
-    trouble = state_trouble(WANTED._replace(**wanted), GOOD)
+    trouble = why_not_by_state(WANTED._replace(**wanted), GOOD)
     assert trouble is None if words is None else words in trouble
 
 
 def test_interfaces_that_lack_a_question_leave_it_open(sent):
     own = found(sent)
-    assert answers_trouble(WANTED, {}, None) is None
-    assert answers_trouble(WANTED, {"get robot model": "UR5", "is in remote control": "true"}, own) is None
-    assert "it is a UR10" in answers_trouble(WANTED, {"get robot model": "UR10"}, own)
-    assert "local control" in answers_trouble(WANTED, {"is in remote control": "false"}, own)
+    assert why_not_by_answers(WANTED, {}, None) is None
+    assert why_not_by_answers(WANTED, {"get robot model": "UR5", "is in remote control": "true"}, own) is None
+    assert "it is a UR10" in why_not_by_answers(WANTED, {"get robot model": "UR10"}, own)
+    assert "local control" in why_not_by_answers(WANTED, {"is in remote control": "false"}, own)
     for wrong in (math.nan, 1e-9):
-        assert "largest velocities" in answers_trouble(WANTED, {}, own._replace(velocity=np.full(6, wrong)))
+        assert "largest velocities" in why_not_by_answers(
+            WANTED, {}, own._replace(velocity=np.full(6, wrong))
+        )
     other = WANTED._replace(description=load("ur10e"))
-    assert "dimensions are not those of a UR10e" in answers_trouble(other, {}, own)
+    assert "dimensions are not those of a UR10e" in why_not_by_answers(other, {}, own)
 
 
 def test_a_robot_that_is_mounted_otherwise_is_told_by_its_accelerometer():
@@ -186,12 +190,12 @@ def test_a_robot_that_is_mounted_otherwise_is_told_by_its_accelerometer():
 def test_each_stop_of_the_robot_has_a_reason_of_its_own():
     playing = RobotMode.RUNNING, SafetyMode.NORMAL, RuntimeState.PLAYING
     assert halt_by_modes(playing) is None
-    assert halt_by_program(Ended.NOT, playing) is None
-    reasons = {halt_by_program(ended, playing).why for ended in Ended if ended}
-    reasons |= {halt_by_program(Ended.NOT, (7, 1, runtime)).why for runtime in (1, 4)}
+    assert halt_by_program(ProgramEnded.NOT, playing) is None
+    reasons = {halt_by_program(ended, playing).why for ended in ProgramEnded if ended}
+    reasons |= {halt_by_program(ProgramEnded.NOT, (7, 1, runtime)).why for runtime in (1, 4)}
     reasons |= {halt_by_modes((7, safety, 1)).why for safety in SafetyMode if safety not in {1, 2}}
     reasons |= {halt_by_modes((mode, 1, 1)).why for mode in RobotMode if mode != 7}
-    assert len(reasons) == len(Ended) - 1 + 2 + len(SafetyMode) - 2 + len(RobotMode) - 1
+    assert len(reasons) == len(ProgramEnded) - 1 + 2 + len(SafetyMode) - 2 + len(RobotMode) - 1
     assert all("here" in why for why in reasons)
     assert halt_by_modes((7, 3, 4)).safety_mode == SafetyMode.PROTECTIVE_STOP
 
@@ -200,7 +204,7 @@ def test_each_stop_of_the_robot_has_a_reason_of_its_own():
 @given(st.lists(st.tuples(st.integers(0, 6), st.floats(0.0, 0.3)), max_size=60), st.sampled_from([1, 4]))
 def test_periods_are_those_of_the_robot_s_clock_or_of_ours_while_it_is_silent(gaps, interval):
     """Rows come late and in bunches; each of the robot's periods is computed once, and none twice."""
-    pace, now, tick = Pace(), 10.0, 5000
+    pace, now, tick = ControlPeriods(), 10.0, 5000
     pace.row(tick, now)
     first = pace.tick
     while pace.next(now):
@@ -242,7 +246,7 @@ def new_run(monkeypatch):
     nothing = SimpleNamespace(trouble=None, close=lambda: None)
     monkeypatch.setattr("tvist_server.moving.run.Upload", lambda *_: nothing)
     robot = Written()
-    return Run(robot, FAR, 7, UR5E.limits, None, lambda: None), robot
+    return ProgramRun(robot, FAR, 7, UR5E.limits, None, lambda: None), robot
 
 
 @pytest.fixture
@@ -250,7 +254,7 @@ def running(new_run):
     """A run whose program waits for the first set-point, and its robot."""
     run, robot = new_run
     robot.says(r.RUN, 7)
-    robot.says(r.STATE, r.State.WAITING)
+    robot.says(r.STATE, r.ProgramState.WAITING)
     for _ in range(50):
         run.take(PLAYING)
     return run, robot
@@ -263,7 +267,7 @@ def test_a_period_of_the_robot_gets_one_set_point_and_begins_where_it_stands(run
     run.add(DriveCommand(Q + 1.0, np.zeros(6), np.zeros(6)), played=True)
     run.write()
     assert robot.written[-1] == (1, 7, *(4 * tuple(Q)))
-    robot.says(r.STATE, r.State.FOLLOWING)
+    robot.says(r.STATE, r.ProgramState.FOLLOWING)
     run.take(PLAYING)
     assert not run.ready, "a command that comes before the next tick is of before it followed"
     run.add(DriveCommand(Q + 1.0, np.zeros(6), np.zeros(6)), played=False)
@@ -291,8 +295,8 @@ def test_a_program_that_stops_without_another_reason_is_told_within_20_ms(runnin
 def test_registers_of_an_earlier_run_are_not_taken_for_ours(new_run):
     run, robot = new_run
     robot.says(r.RUN, 6)
-    robot.says(r.STATE, r.State.FOLLOWING)
-    robot.says(r.ENDED, Ended.SILENCE)
+    robot.says(r.STATE, r.ProgramState.FOLLOWING)
+    robot.says(r.ENDED, ProgramEnded.SILENCE)
     for _ in range(50):
         run.take(PLAYING)
     assert run.halt is None
@@ -303,7 +307,7 @@ def test_registers_of_an_earlier_run_are_not_taken_for_ours(new_run):
 def test_a_program_that_takes_the_place_of_ours_is_noticed(running, how):
     """Any other program leaves the registers as ours has left them, and the robot says that it plays."""
     run, robot = running
-    robot.says(r.STATE, r.State.FOLLOWING)
+    robot.says(r.STATE, r.ProgramState.FOLLOWING)
     for number in range(50):
         other = number >= 30
         robot.says(r.PLAYED, 29 if other and how == "any program" else number)
@@ -325,7 +329,7 @@ def test_it_brakes_within_an_eighth_of_a_second_and_within_the_limits(monkeypatc
     texts = []
     monkeypatch.setattr("tvist_server.moving.run.Upload", lambda _, text, __: texts.append(text))
     limits = msgspec.structs.replace(UR5E.limits, velocity=6 * (cap,))
-    Run(Written(), FAR, 7, limits, None, lambda: None)
+    ProgramRun(Written(), FAR, 7, limits, None, lambda: None)
     assert f"stopj({most})" in texts[0]
 
 
@@ -371,7 +375,7 @@ class Far:
 
     def connected(self):
         self.run, self.number, self.q = 0, 0, tuple(Q)
-        client, link = RtdeClient(FIELDS, {}, r.INPUTS), object.__new__(Connection)
+        client, link = RtdeClient(FIELDS, {}, r.INPUTS), object.__new__(RtdeConnection)
         wires = r.INPUTS.values(), [field.wire for field in FIELDS.values()]
         set_up(client, *(",".join(wire.name for wire in one).encode() for one in wires))
         client.receive(package(PackageKind.START, b"\x01"))

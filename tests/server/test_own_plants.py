@@ -22,10 +22,10 @@ from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ServeConfig
-from tvist_server.ending import SignalExit
 from tvist_server.option_values import StartError
 from tvist_server.recording.recorder import Recorder
 from tvist_server.schedule import Followed
+from tvist_server.shutdown import SignalExit
 from tvist_server.workers import _rehearse
 
 ECHO = """
@@ -84,7 +84,7 @@ def test_one_that_cannot_be_made_says_why(place, name, said):
 @pytest.mark.parametrize("kind", ["import", "make"])
 def test_a_signal_that_ends_the_process_meanwhile_is_no_fault_of_its_file(tmp_path, kind):
     file = tmp_path / "slow.py"
-    text = "from tvist_server.ending import SignalExit\ndef make(*_): raise SignalExit(0)\n"
+    text = "from tvist_server.shutdown import SignalExit\ndef make(*_): raise SignalExit(0)\n"
     file.write_text(text + ("make(0, 0)\n" if kind == "import" else ""))
     with pytest.raises(SignalExit):
         load_plant(f"{file}:make").make(UR5E, UR5E.payload)

@@ -15,9 +15,9 @@ from tvist_protocol.codec import encode
 from tvist_protocol.programs import ProgramLoad, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.values import Payload
+from tvist_server.intake import RobotIntake
 from tvist_server.plan_ahead import MAX_WAITING, PlanAhead
 from tvist_server.program_folder import ProgramFolder
-from tvist_server.reception import Reception
 
 WAIT = 20.0
 LIGHT = {"mass": 2.0, "com": (0.0, 0.0, 0.04), "inertia": (0.002, 0.0, 0.0, 0.002, 0.0, 0.002)}
@@ -33,7 +33,7 @@ class Served:
         self.jobs, self.came = deque(), threading.Condition()
         self.ahead = PlanAhead(self.host, Planner(start), self.post, complete)
         self.ahead.start()
-        self.reception = Reception(self.host, self.post, self.ahead.submit)
+        self.reception = RobotIntake(self.host, self.post, self.ahead.submit)
         self.replies = []
         self.token = self.ask(c.TakeControl(client="anna", lease_s=3600.0)).token
 

@@ -45,7 +45,7 @@ def test_a_gateway_that_fails_is_logged_and_the_others_get_each_message_in_order
 def test_what_no_gateway_takes_is_not_made():
     robot, gateway, publisher = Robot(truth=True), NotingGateway(), Publisher()
     publisher.open([gateway])
-    gateway.takes = {"event"}
+    gateway.wanted_topics = {"event"}
     state, report = robot.tick(), copy(robot.controller.report)
     report.made = report.written = None
     publisher.report(report)
@@ -53,6 +53,6 @@ def test_what_no_gateway_takes_is_not_made():
     publisher.event(Event(tick=1, kind="warning"))
     assert [topic for topic, _ in gateway.published] == ["event"]
     assert (report.made, report.written) == (None, None)
-    gateway.takes = {"event", "state"}
+    gateway.wanted_topics = {"event", "state"}
     publisher.report(report)
     assert decode(State, gateway.published[-1][1]) == state

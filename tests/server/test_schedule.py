@@ -5,8 +5,8 @@ from fractions import Fraction
 
 import pytest
 
-from tvist_server.overload import Overload
 from tvist_server.schedule import CATCH_UP, Schedule
+from tvist_server.tick_counts import TickCounts
 
 PERIOD = 0.002
 
@@ -92,7 +92,7 @@ def loaded(overload, schedule, now, seconds, takes):
 def test_more_are_never_missed_than_were_due_and_what_is_due_is_the_wall_clock_s(periods, speed):
     period = PERIOD / speed
     takes = periods * period
-    overload, start = Overload(period), 1000.0
+    overload, start = TickCounts(period), 1000.0
     _, ticks, now = loaded(overload, Schedule(1, period, start), start, 60.0, takes)
     assert ticks <= overload.due
     assert 0.9 * overload.due < overload.missed <= overload.due
@@ -101,7 +101,7 @@ def test_more_are_never_missed_than_were_due_and_what_is_due_is_the_wall_clock_s
 
 
 def test_an_overload_begins_after_two_seconds_and_ends_after_five_good_ones_and_is_told_once_each():
-    overload, schedule, now = Overload(PERIOD), Schedule(1, PERIOD, 0.0), 0.0
+    overload, schedule, now = TickCounts(PERIOD), Schedule(1, PERIOD, 0.0), 0.0
     said, _, now = loaded(overload, schedule, now, 30.0, 1 / 60)
     ((when, why),) = said
     assert 2.0 <= when < 2.5
@@ -123,7 +123,7 @@ def test_between_the_two_limits_nothing_changes():
     def second(overload, missed):
         return [told for tick in range(500) if (told := overload.note(int(tick < missed))) is not None]
 
-    overload = Overload(PERIOD)
+    overload = TickCounts(PERIOD)
     assert not any(second(overload, 50) for _ in range(20))
     assert [bool(second(overload, 100)) for _ in range(2)] == [False, True]
     assert not any(second(overload, 50) for _ in range(20))

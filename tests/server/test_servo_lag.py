@@ -9,10 +9,10 @@ from tests.examples import examples
 
 from tvist_controller.line.differentiator import central_differences
 from tvist_controller.line.limits import arm_limits
-from tvist_controller.trajectory import JointLine, MotionLimits, Servo, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, ServoFollower, quickest_motion
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD
-from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
+from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, ServoSetpoints
 
 REACH = np.array(UR5E.limits.position)
 FAST = 10.0
@@ -38,8 +38,8 @@ def errors(lag, lookahead=LOOKAHEAD, gain=GAIN):
     """Distance of the arm from where it is wanted at each tick [rad]."""
     motion = commands()
     start = motion[0].q
-    servo = Servo((start, 0.0 * start, 0.0 * start), arm_limits(UR5E), REACH, AnyTorque(), PERIOD)
-    setpoints, apart = Setpoints(start, lag, fastest=FAST, reach=REACH), []
+    servo = ServoFollower((start, 0.0 * start, 0.0 * start), arm_limits(UR5E), REACH, AnyTorque(), PERIOD)
+    setpoints, apart = ServoSetpoints(start, lag, fastest=FAST, reach=REACH), []
     for command in motion:
         servo.aim(setpoints.next(command), lookahead, gain)
         apart.append(np.abs(servo.next() - command.q).max())
@@ -65,7 +65,7 @@ def test_a_lag_that_is_wrong_by_a_tenth_leaves_a_tenth_of_it_and_the_arm_ends_wh
 
 def test_rounding_of_positions_grows_by_less_than_ten_thousand():
     random, q = np.random.default_rng(0), np.full(6, 3.0)
-    setpoints = Setpoints(q, ServoLag.simulated(), fastest=FAST, reach=REACH)
+    setpoints = ServoSetpoints(q, ServoLag.simulated(), fastest=FAST, reach=REACH)
     noise = 1e-15 * random.standard_normal((200, 6))
     for before, now, after in zip(noise, noise[1:], noise[2:], strict=False):
         command = DriveCommand(q + now, (after - before) / (2 * PERIOD), np.zeros(6))
@@ -77,7 +77,7 @@ def test_rounding_of_positions_grows_by_less_than_ten_thousand():
 def test_no_set_point_is_beyond_the_range_or_steps_further_than_permitted_and_rest_is_reached(seed, fastest):
     random = np.random.default_rng(seed)
     q = random.uniform(-6.0, 6.0, 6)
-    setpoints, sent = Setpoints(q, ServoLag.simulated(), fastest=fastest, reach=REACH), [q]
+    setpoints, sent = ServoSetpoints(q, ServoLag.simulated(), fastest=fastest, reach=REACH), [q]
     assert (setpoints.next(DriveCommand(q, np.zeros(6), np.zeros(6))) == q).all()
     for _ in range(100):
         velocity = random.uniform(-30.0, 30.0, 6)
@@ -100,7 +100,7 @@ def test_a_motion_at_the_end_of_a_joint_s_range_sends_nothing_beyond_it():
     while not motion.finished:
         q.append(motion.next())
     q, qd, _ = central_differences(np.array([*q, *[end] * 50]), PERIOD)
-    setpoints = Setpoints(q[0], ServoLag.simulated(), fastest=FAST, reach=REACH)
+    setpoints = ServoSetpoints(q[0], ServoLag.simulated(), fastest=FAST, reach=REACH)
     sent = np.array([setpoints.next(DriveCommand(*both, np.zeros(6))) for both in zip(q, qd, strict=True)])
     assert sent.max() <= REACH.max()
     assert setpoints.limited > 0

@@ -19,8 +19,8 @@ from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
+from tvist_server.intake import RobotIntake
 from tvist_server.jobs import Jobs
-from tvist_server.reception import Reception
 
 LEASE = Lease("anna", "anna#1", 30.0, None)
 HOLD = Lease("bert", "bert#clock1", None)
@@ -33,7 +33,7 @@ class Network:
 
     def __init__(self):
         self.host, self.jobs, self.replies = Host(Controller(setup(clock="lockstep")), Sink()), Jobs(), []
-        self.reception = Reception(self.host, self.jobs.post, self.carry_out)
+        self.reception = RobotIntake(self.host, self.jobs.post, self.carry_out)
 
     def carry_out(self, admitted, reply):
         self.jobs.post(lambda: reply(self.host.carry_out(admitted)), admitted.client)

@@ -9,11 +9,11 @@ from tests.examples import examples
 
 from tvist_server.rtde.client import RtdeClient, RtdeError
 from tvist_server.rtde.codec import PackageKind, package
-from tvist_server.rtde.wire import Field, Wire
+from tvist_server.rtde.wire import Field, WireType
 from tvist_server.watching.variables import RowCount
 
-NEEDED = {"timestamp": Field(Wire.DOUBLE), "q": Field(Wire.VECTOR3D)}
-OPTIONAL = {"payload": Field(Wire.DOUBLE)}
+NEEDED = {"timestamp": Field(WireType.DOUBLE), "q": Field(WireType.VECTOR3D)}
+OPTIONAL = {"payload": Field(WireType.DOUBLE)}
 
 
 def answers(types):

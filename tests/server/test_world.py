@@ -8,7 +8,7 @@ import pytest
 from tests.controller.robots import UR5E, Robot
 
 from tvist_lab.programs.judging import is_inside, missed
-from tvist_lab.programs.limits import Limits
+from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.running import run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
@@ -67,7 +67,7 @@ def test_a_program_lifts_a_box_and_its_recording_does_the_same_again(tmp_path):
     (said,) = [said.text for said in watch.said if said.text.startswith("cell")]
     assert re.fullmatch(r"cell: the gripper holds something (59|60)\.\d mm wide", said)
     assert 3.0 < watch.hardest.speed < 100.0
-    expected = Limits(expect=["box in left", "box in nowhere", "ball in left"])
+    expected = RunLimits(expect=["box in left", "box in nowhere", "ball in left"])
     said = [one.text for one in missed(expected, watch.plant)]
     assert "which is not in left" in said[0]
     assert "has no area 'nowhere': it has left" in said[1]
@@ -79,7 +79,7 @@ def test_a_program_lifts_a_box_and_its_recording_does_the_same_again(tmp_path):
     done = replay_file(content)
     assert (done.first_difference, done.notes) == (None, [])
     with pytest.raises(ValueError, match="must be BODY in AREA"):
-        Limits(expect=["box 1"]).check()
+        RunLimits(expect=["box 1"]).check()
 
 
 @pytest.mark.parametrize(

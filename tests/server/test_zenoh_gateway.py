@@ -158,14 +158,14 @@ def test_the_end_of_a_session_is_told_while_its_token_is_held_elsewhere(gateway,
 def taken(gateway, topic, *, taken):
     """Wait until a gateway takes a topic, or does no longer."""
     end = time.monotonic() + WAIT
-    while (topic in gateway.takes) != taken:
+    while (topic in gateway.wanted_topics) != taken:
         assert time.monotonic() < end
         time.sleep(0.002)
 
 
 @pytest.mark.parametrize("key", ["tvist/ur5e/state", "**"])
 def test_in_real_time_states_are_taken_while_somebody_subscribes_to_them(gateway, session, endpoint, key):
-    assert gateway.takes == {"event", "telemetry", "io"}
+    assert gateway.wanted_topics == {"event", "telemetry", "io"}
     with connect(endpoint) as other:
         others = other.declare_subscriber(key, queue.Queue().put)
         taken(gateway, "state", taken=True)
@@ -173,7 +173,7 @@ def test_in_real_time_states_are_taken_while_somebody_subscribes_to_them(gateway
         replies(session, "tvist/ur5e/info")
         others.undeclare()
         replies(other, "tvist/ur5e/info")
-        assert "state" in gateway.takes
+        assert "state" in gateway.wanted_topics
         subscriber.undeclare()
         taken(gateway, "state", taken=False)
         other.declare_subscriber(key, queue.Queue().put)
@@ -190,7 +190,7 @@ def test_who_subscribed_before_the_robot_was_ready_gets_its_states(network, endp
         gateway = network.gateway("ur5e", desk, lockstep=False, truth=False, wanted=told.append)
         taken(gateway, "truth", taken=True)
         assert told == [True]
-        assert "state" not in gateway.takes
+        assert "state" not in gateway.wanted_topics
 
 
 def test_close_ends_what_is_unanswered_and_a_late_reply_goes_nowhere(network, gateway, desk, session):

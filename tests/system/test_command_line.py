@@ -194,7 +194,7 @@ def test_control_c_stops_the_motion_and_says_so(realtime):
         assert err == "tvist: interrupted: the motion was stopped; the robot is at rest\n"
         state = wire.state()
         assert state["runtime_state"] == STOPPED
-        assert 0.1 < state["target_q"][0] < 2.9
+        assert 0.0 < state["target_q"][0] < 2.9
 
 
 @pytest.mark.realtime

@@ -13,7 +13,7 @@ from tests.conformance.served import PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Q1, Wire
 from zenoh.handlers import Callback
 
-from tvist_client.across import ManyStates, Place
+from tvist_client.across import ManyStates, RobotPlace
 from tvist_client.fleet import Fleet
 from tvist_server.gateways import network
 
@@ -43,13 +43,13 @@ def robots(router):
         yield third
 
 
-ALL = [Place("", "ur5e-1"), Place("", "ur5e-2"), Place("hall-3/line-1", "ur5e-1")]
+ALL = [RobotPlace("", "ur5e-1"), RobotPlace("", "ur5e-2"), RobotPlace("hall-3/line-1", "ur5e-1")]
 
 
 def test_all_are_found_and_each_is_known_by_its_namespace(router, robots):
     async def look(namespace):
         async with Fleet(router.endpoint, namespace=namespace) as fleet:
-            return [Place(robot.namespace, robot.name) for robot in await fleet.look() if robot.ready]
+            return [RobotPlace(robot.namespace, robot.name) for robot in await fleet.look() if robot.ready]
 
     assert asyncio.run(look("")) == ALL
     assert asyncio.run(look("hall-3")) == ALL[2:]
@@ -78,7 +78,7 @@ def test_stop_reaches_all_and_a_robot_that_is_not_there_is_no_success(router, ro
 
     async def stop():
         async with Fleet(router.endpoint) as fleet:
-            return await fleet.stop([ALL[2], Place("", "ur5e-9")])
+            return await fleet.stop([ALL[2], RobotPlace("", "ur5e-9")])
 
     reports = [(report.name, report.ok, report.said) for report in asyncio.run(stop())]
     assert reports == [("ur5e-9", False, "it does not answer"), ("ur5e-1", True, "stopped")]
@@ -92,7 +92,7 @@ def test_watch_shows_all_robots_and_of_one_its_states(router, robots):
         process.communicate(timeout=PATIENCE)
         return json.loads(line)
 
-    assert [Place(one["namespace"], one["name"]) for one in first_line()["robots"]] == ALL
+    assert [RobotPlace(one["namespace"], one["name"]) for one in first_line()["robots"]] == ALL
     assert first_line("--namespace", "hall-3")["type"] == "state"
 
 

@@ -188,7 +188,7 @@ class TestProgram:
         endpoint, ring = robot
         anna, wall = (("--security", ring / name) for name in ("anna", "wall"))
         tvist("move", "Q2", "--endpoint", endpoint, *anna).assert_done()
-        watched = tvist("watch", endpoint, *wall, "--seconds", "0.5", "--json").assert_done()
+        watched = tvist("watch", endpoint, *wall, "--seconds", "3", "--json").assert_done()
         assert json.loads(watched.out.splitlines()[0])["type"] == "state"
         file = tmp_path / "seen.mcap"
         tvist("log", "record", file, "--endpoint", endpoint, *wall, "--seconds", "0.5").assert_done()

@@ -15,7 +15,7 @@ from tests.places import free_endpoint
 from tests.system.waiting import eventually
 
 from tvist_cli.main import main
-from tvist_server.ending import ending_signals
+from tvist_server.shutdown import ending_signals
 
 SPEC = 'shapers = ["none"]\nmoves = 4000\npayloads = [1]\nrobots = ["one-joint"]\n'
 """It takes much longer than it is waited for."""

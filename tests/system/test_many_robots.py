@@ -79,7 +79,8 @@ def test_in_lockstep_each_has_its_own_time_and_a_recording_of_its_own_that_repla
         Wire(served.endpoint, "ur5e-1") as one,
         Wire(served.endpoint, "ur5e-2") as two,
     ):
-        first, second = (wire.command("take_control", client="mover")["token"] for wire in (one, two))
+        clients = zip((one, two), ("anna", "otto"), strict=True)
+        first, second = (wire.command("take_control", client=name)["token"] for wire, name in clients)
         assert two.command("move_j", token=first, q=FAR)["code"] == "stale_token"
         two.command("move_j", token=second, q=FAR)
         assert two.step(second, 300)["tick"] == 300

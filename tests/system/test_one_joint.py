@@ -38,7 +38,7 @@ def test_its_moves_are_evaluated_beside_every_baseline():
 
 def test_it_is_identified_at_its_own_poses(tmp_path):
     path = tmp_path / "mine.json"
-    options = ("--ring-downs", 8, "--payload", 1, "--output", path)
+    options = ("--ring-downs", 14, "--payload", 1, "--output", path)
     said = tvist("identify", "--robot", "one-joint", *options).assert_done().out
     assert f"tvist serve --calibration {path} --robot one-joint" in " ".join(said.split())
     calibration = calibration_from_json(path.read_bytes())

@@ -12,7 +12,7 @@ from tests.conformance.wire import PATIENCE, Q1, Wire
 from zenoh.handlers import Callback
 
 from tvist_client import Robot
-from tvist_client.across import Place
+from tvist_client.across import RobotPlace
 from tvist_client.blocking import Robot as BlockingRobot
 from tvist_client.errors import DeniedError, NotConnectedError
 from tvist_client.fleet import Fleet
@@ -219,7 +219,7 @@ class TestViewer:
             assert not await pilot.take(1)
             await pilot.stop()
         async with Fleet(served.endpoint, security=ring / "wall") as fleet:
-            said += [report.said for report in await fleet.stop([Place("", "ur5e")])]
+            said += [report.said for report in await fleet.stop([RobotPlace("", "ur5e")])]
         assert len(said) == 3
         assert all("takes no commands from this client" in sentence for sentence in said)
         assert all("an operator's certificate" in sentence for sentence in said)

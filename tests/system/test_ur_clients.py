@@ -265,9 +265,9 @@ def test_moves_servoing_and_speeds_end_where_they_should(arm, seen):
     eventually(lambda: abs(seen.getActualQ()[0] - HOME[0] - 0.02) < 1e-3)
     assert arm.servoStop(2.0)
     assert arm.speedJ([0.0, 0.0, 0.0, 0.0, 0.0, 0.1], 1.0, 0.5)
+    eventually(lambda: seen.getTargetQ()[5] > HOME[5] + 0.01)
     assert arm.speedStop(2.0)
     eventually(lambda: max(map(abs, seen.getTargetQd())) < 1e-6)
-    assert seen.getTargetQ()[5] > HOME[5] + 0.01
 
 
 @pytest.mark.realtime

@@ -18,7 +18,7 @@ from tvist_protocol.geometry import Capsule, Geometry, Mesh, World
 from tvist_view.look import GeometryError, Look
 from tvist_view.playback import playback
 from tvist_view.stage import open_stage, page
-from tvist_view.track import Shown, Track
+from tvist_view.track import ShownRobot, Track
 
 from .browser import browser
 
@@ -94,7 +94,7 @@ def flanges(tab, angles, bends):
 @pytest.mark.parametrize("name", ["ur5e", SEVEN])
 def test_the_flange_is_where_pinocchio_has_it(opened, moved, name):
     look, description, random = look_of(name), load(name), np.random.default_rng(0)
-    tab = opened(Track(Shown("x", look), standing(moved, look), []))
+    tab = opened(Track(ShownRobot("x", look), standing(moved, look), []))
     q = random.uniform(-3.0, 3.0, (50, look.joints))
     bends = random.uniform(-0.5, 0.5, (50, 2 * len(look.geometry.bending)))
     found = flanges(tab, q, bends)
@@ -116,7 +116,7 @@ def test_the_flange_is_where_pinocchio_has_it(opened, moved, name):
 
 def test_at_factor_one_the_drawn_flange_is_the_truths_and_deflections_are_the_factor_times_it(opened, moved):
     look = look_of("ur5e")
-    tab = opened(Track(Shown("x", look), moved.states, moved.truths))
+    tab = opened(Track(ShownRobot("x", look), moved.states, moved.truths))
     truths = moved.truths[::100]
     rows = [look.row(moved.states[truth.tick - moved.states[0].tick], truth) for truth in truths]
     drawn = tab.evaluate(
@@ -139,7 +139,7 @@ def test_at_factor_one_the_drawn_flange_is_the_truths_and_deflections_are_the_fa
 
 def test_between_two_rows_the_page_draws_what_is_between(opened, moved):
     look = look_of("ur5e")
-    track = Track(Shown("x", look), moved.states, moved.truths)
+    track = Track(ShownRobot("x", look), moved.states, moved.truths)
     tab = opened(track)
     for time in (0.0, 0.5, 0.504, 1e3):
         row = tab.evaluate("(time) => Array.from(tvist.tracks[0].row(time))", time)
@@ -150,7 +150,7 @@ def test_between_two_rows_the_page_draws_what_is_between(opened, moved):
 @pytest.mark.parametrize("name", ARMS)
 def test_every_arm_is_drawn_in_one_piece_and_fills_the_picture(opened, moved, name):
     look = look_of(name)
-    tab = opened(Track(Shown("x", look), standing(moved, look), []))
+    tab = opened(Track(ShownRobot("x", look), standing(moved, look), []))
     found = tab.evaluate(
         "() => { const { arm } = tvist.tracks[0].robot; const [a, b] = [tvist.stage.scene.filled(), arm.outline()];"
         " return { ...a, points: b.map((p) => p.toArray()), parts: arm.frames.map((f) => f.children.length) }; }"
@@ -175,7 +175,7 @@ def test_a_urdfs_own_meshes_stand_in_for_what_is_drawn(chromium, moved, tmp_path
     ]
     look = look_of("ur5e")
     look = Look(replace(look.geometry, meshes=meshes), look.payload)
-    packed = Track(Shown("x", look), standing(moved, look), []).packed(0.0)
+    packed = Track(ShownRobot("x", look), standing(moved, look), []).packed(0.0)
     packed["look"]["meshes"] = ["/mesh/0.stl", "/mesh/1.stl"]
     text = page({"kind": "playback", "title": "x", "factor": 1, "tracks": [packed]})
     files = {f"/mesh/{number}.stl": (tmp_path / f"part{number}.stl").read_bytes() for number in range(2)}

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from tvist_cli.judging import judge
-from tvist_view.beside import Run
+from tvist_view.beside import MotionRecord
 
 
 def verdict(tracks, seed, share):
     random = np.random.default_rng(seed)
     runs = [
-        Run(track._states, [truth for truth in track._truths.values() if random.random() >= share])
+        MotionRecord(track._states, [truth for truth in track._truths.values() if random.random() >= share])
         for track in tracks
     ]
     return judge(*runs)

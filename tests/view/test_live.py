@@ -51,7 +51,7 @@ async def test_a_page_is_connected_to_the_few_robots_that_tabs_show_and_a_tab_le
     monkeypatch.setattr(shown_robot.Robot, "connect", connect)
     monkeypatch.setattr(shown_robot, "robots_at", robots_at)
     monkeypatch.setattr(live, "MOST_SHOWN", 2)
-    page = live.LivePage(shown_robot.Place("tcp/nowhere"), "a", None)
+    page = live.LivePage(shown_robot.RobotPlace("tcp/nowhere"), "a", None)
     running, meeting = (asyncio.create_task(one) for one in (page.run(), page.meet(tab)))
     await heard("robot", '"name": "a"')
     for name in [*(f"r{number}" for number in range(2000)), "b"]:

@@ -11,7 +11,7 @@ from tvist_lab.in_process import free_setup
 from tvist_protocol.info import StopReason
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import Event
-from tvist_view.described import RealArm
+from tvist_view.described import ObservedArm
 
 
 @pytest.fixture(scope="module")
@@ -39,11 +39,11 @@ def event(kind):
 
 
 def test_a_simulated_robot_has_no_steps(info):
-    assert done(RealArm(), info, Seen()) == []
+    assert done(ObservedArm(), info, Seen()) == []
 
 
 def test_a_watched_robot_is_connected_released_moving_and_identified(info):
-    way, there = RealArm(), named(info, watched="ur://robot")
+    way, there = ObservedArm(), named(info, watched="ur://robot")
     assert done(way, there, Seen(RobotMode.DISCONNECTED, SafetyMode.UNDEFINED)) == [False] * 5
     assert done(way, there, Seen(RobotMode.POWER_OFF)) == [True, *[False] * 4]
     assert done(way, there, Seen(speed=0.2)) == [True, True, True, False, False]
@@ -52,7 +52,7 @@ def test_a_watched_robot_is_connected_released_moving_and_identified(info):
 
 
 def test_a_moved_robot_is_held_moved_stopped_and_stopped_by_others(info):
-    way, there = RealArm(), named(info, moved="ur://robot")
+    way, there = ObservedArm(), named(info, moved="ur://robot")
     assert done(way, there, Seen(RobotMode.POWER_OFF)) == [False] * 7
     assert done(way, there, Seen()) == [True, *[False] * 6]
     for kind in ("motion_done", "motion_stopped", "safety_stop"):
@@ -66,7 +66,7 @@ def test_the_cap_and_why_it_is_not_held_are_said(info):
     slow = msgspec.structs.replace(info.limits, velocity=[0.5] * 6)
     stop = StopReason(tick=1, code=None, why="its program was paused")
     there = named(info, moved="ur://robot", limits=slow, stop=stop)
-    steps = RealArm().steps(there, Seen(RobotMode.POWER_OFF), None)
+    steps = ObservedArm().steps(there, Seen(RobotMode.POWER_OFF), None)
     assert steps[0][2] == "its program was paused"
     assert "0.5 rad/s" in steps[2][1]
 

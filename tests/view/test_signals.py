@@ -14,7 +14,7 @@ from tvist_plant.description import load
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_protocol.stream import Truth
 from tvist_view.look import Look
-from tvist_view.signals import LATE, Running, rests_since, signals_of, up_in_flange
+from tvist_view.signals import LATE_TICKS, LatestSignals, rests_since, signals_of, up_in_flange
 
 UR5E = load("ur5e")
 LOOK = Look(geometry_of(UR5E), UR5E.payload)
@@ -62,10 +62,10 @@ def test_what_is_drawn_and_plotted_is_of_one_tick_in_whatever_order_state_and_tr
     random = np.random.default_rng(seed)
     count = 200
     times = np.arange(count) + random.integers(-4, 5, count) + 0.5
-    lost = set(random.integers(0, count - LATE - 10, seed).tolist())
+    lost = set(random.integers(0, count - LATE_TICKS - 10, seed).tolist())
     states = [(float(place), state) for place, state in enumerate(collected.states[:count])]
     truths = [(times[i], truth) for i, truth in enumerate(collected.truths[:count]) if i not in lost]
-    running = Running(LOOK)
+    running = LatestSignals(LOOK)
     assert running.row() is None
     for _, message in sorted(states + truths, key=lambda pair: pair[0]):
         running.add(message)
@@ -87,7 +87,7 @@ def test_what_is_drawn_and_plotted_is_of_one_tick_in_whatever_order_state_and_tr
 
 
 def test_what_is_told_since_a_count_is_told_once(collected):
-    running, told = Running(LOOK), []
+    running, told = LatestSignals(LOOK), []
     count = 0
     for number, state in enumerate(collected.states):
         running.add(state)
@@ -118,6 +118,6 @@ def test_the_acceleration_before_the_shaper_keeps_the_limit_and_none_is_made_up_
 
 
 def test_nothing_is_there_before_the_first_state():
-    found = Running(LOOK).signals()
+    found = LatestSignals(LOOK).signals()
     assert len(found.time) == len(found.alpha) == 0
     assert rests_since(found) is None

@@ -13,9 +13,9 @@ from tvist_controller.host import Host
 from tvist_plant.plant import PlantError
 from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness, Punctuality
-from tvist_server.overload import Overload
 from tvist_server.punctual import PRIORITY, take_priority
 from tvist_server.schedule import Followed, Schedule
+from tvist_server.tick_counts import TickCounts
 
 log = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ SET_TIMER_SLACK = 29
 """`prctl` option: timer slack, the largest delay of a wake-up [ns]."""
 
 
-class Mailbox:
+class TickedRobot:
     """A robot as a clock sees it: its host, and the jobs to do between two ticks."""
 
     def __init__(
@@ -45,7 +45,7 @@ class Mailbox:
         self.ending = False
         """Whether a step in progress must end."""
         self.lateness = Lateness()
-        self.overload: Overload | None = None
+        self.overload: TickCounts | None = None
         """Counts missed ticks; None if a client advances time."""
 
     def post(self, do: Do, client: str | None = None) -> None:
@@ -83,7 +83,7 @@ class Mailbox:
 class Clock(ABC):
     """A thread that runs the robots' jobs and ticks."""
 
-    def __init__(self, robots: Sequence[Mailbox]) -> None:
+    def __init__(self, robots: Sequence[TickedRobot]) -> None:
         self._robots = robots
         self._running = True
         self._thread = threading.Thread(target=self._guarded, name="tvist-tick", daemon=True)
@@ -109,7 +109,7 @@ class Clock(ABC):
                 )
 
     @abstractmethod
-    def punctuality(self, robot: Mailbox) -> Punctuality | None:
+    def punctuality(self, robot: TickedRobot) -> Punctuality | None:
         """Return the lateness of a robot's ticks since the last call; None if a client advances time."""
 
     def _guarded(self) -> None:
@@ -130,12 +130,12 @@ class Lockstep(Clock):
     If nobody steps, `repeat` republishes the last state every second, for new clients.
     """
 
-    def __init__(self, robot: Mailbox, repeat: Do) -> None:
+    def __init__(self, robot: TickedRobot, repeat: Do) -> None:
         super().__init__([robot])
         self._jobs = robot.jobs
         self._repeat = repeat
 
-    def punctuality(self, robot: Mailbox) -> None:
+    def punctuality(self, robot: TickedRobot) -> None:
         """Return None, since a client advances time."""
 
     def _run(self) -> None:
@@ -153,7 +153,7 @@ class Realtime(Clock):
 
     def __init__(
         self,
-        robots: Sequence[Mailbox],
+        robots: Sequence[TickedRobot],
         period: float,  # [s]
         speed: float = 1.0,  # simulation time per real time [-]
         *,
@@ -161,7 +161,7 @@ class Realtime(Clock):
     ) -> None:
         super().__init__(robots)
         self._period = period / speed
-        self._overloads = [Overload(robot.interval or self._period) for robot in robots]
+        self._overloads = [TickCounts(robot.interval or self._period) for robot in robots]
         for robot, overload in zip(robots, self._overloads, strict=True):
             robot.overload = overload
         self._priority = priority
@@ -174,7 +174,7 @@ class Realtime(Clock):
         super().start()
         self._asked.wait()
 
-    def punctuality(self, robot: Mailbox) -> Punctuality:
+    def punctuality(self, robot: TickedRobot) -> Punctuality:
         """Return the lateness since the last call."""
         return robot.lateness.look()
 
@@ -214,7 +214,7 @@ class Realtime(Clock):
         for robot in robots:
             robot.guarded(robot.jobs.do_waiting)
 
-    def _begins(self, robot: Mailbox, pace: Callable[[float], bool]) -> bool:
+    def _begins(self, robot: TickedRobot, pace: Callable[[float], bool]) -> bool:
         """Wait for the arm's next tick. If the arm fails, this clock gives the tick, so that the robot can stop."""
         try:
             return pace(LONGEST_SLEEP)
@@ -223,12 +223,12 @@ class Realtime(Clock):
             time.sleep(self._period)
             return True
 
-    def _do_without_tick(self, robot: Mailbox, silent: bool) -> bool:
+    def _do_without_tick(self, robot: TickedRobot, silent: bool) -> bool:
         """Answer the clients of an arm that does not tick, and warn them once; return True."""
         robot.guarded(robot.jobs.do_waiting)
         if not silent and robot.interval is None:  # a watched robot reports by itself that it is lost
             robot.host.warn(
-                "the arm does not start its next tick: time stands still, and commands have no effect"
+                "the arm does not begin its next tick: time stands still, and commands have no effect"
             )
         return True
 

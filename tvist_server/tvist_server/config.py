@@ -22,7 +22,7 @@ from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.moving.moved_robot import MovedRobot
 from tvist_server.moving.servo_lag import ServoLag
 from tvist_server.option_values import (
-    MOST,
+    MAX_ROBOTS,
     StartError,
     members,
     numbers_of,
@@ -35,7 +35,7 @@ from tvist_server.profiles import PLAIN, PROFILES, Profile
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.start_files import InitialState, calibration_for, read_cell, shaped_by
 from tvist_server.ur_ports import InterfaceName
-from tvist_server.watching.place import is_place, place_of
+from tvist_server.watching.address import is_place, place_of
 from tvist_server.watching.watched_robot import WatchedRobot
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -61,7 +61,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         """Return the initial setup of every robot's controller; raises as `setup` does."""
         if self.robots is None:
             return [self.setup()]
-        found = members(self.robots, MOST * self.workers)
+        found = members(self.robots, MAX_ROBOTS * self.workers)
         # Robots of the same file differ only in name and noise.
         starts: dict[str, Setup] = {}
         for member in found:

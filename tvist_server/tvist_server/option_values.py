@@ -24,7 +24,7 @@ SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 """Seconds in each unit of a duration."""
 LONGEST = 1000.0 * 3600.0
 """Longest accepted duration [s]."""
-MOST = 64
+MAX_ROBOTS = 64
 """Largest number of robots in one process: more than a core can run in real time, and enough for lockstep tests."""
 
 _DURATION = re.compile(r"\s*(?P<number>\d+(\.\d+)?)\s*(?P<unit>s|min|h)\s*", re.IGNORECASE | re.ASCII)
@@ -86,7 +86,7 @@ def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[f
 
 
 @dataclass(frozen=True)
-class Member:
+class RobotEntry:
     """One of the robots listed in `robots`."""
 
     robot: str
@@ -95,7 +95,7 @@ class Member:
     """Name of the robot on the network."""
 
 
-def members(text: str, most: int = MOST) -> list[Member]:
+def members(text: str, most: int = MAX_ROBOTS) -> list[RobotEntry]:
     """Return the robots of a list such as `ur5e*2,other.toml`, named after their files: ur5e-1, ur5e-2, other."""
     robots: list[str] = []
     for entry in text.split(","):
@@ -107,16 +107,16 @@ def members(text: str, most: int = MOST) -> list[Member]:
         robots += [robot] * (_count(entry, count, most) if star else 1)
         if len(robots) > most:
             raise StartError(
-                f"robots is {text!r}: one process serves at most {MOST} robots, and more workers serve more"
+                f"robots is {text!r}: one process serves at most {MAX_ROBOTS} robots, and more workers serve more"
             )
     stems = [Path(robot).stem for robot in robots]
     total, so_far = Counter(stems), Counter[str]()
-    found: list[Member] = []
+    found: list[RobotEntry] = []
     for robot, stem in zip(robots, stems, strict=True):
         so_far[stem] += 1
         name = stem if total[stem] == 1 else f"{stem}-{so_far[stem]}"
         try:
-            found.append(Member(robot, check_robot_name(name)))
+            found.append(RobotEntry(robot, check_robot_name(name)))
         except ProtocolError as error:
             raise StartError(
                 f"robots has {robot!r}, whose file name is not a robot's name: {error.why}"

@@ -11,7 +11,7 @@ from tvist_controller.dispatch.planner import Planner
 from tvist_controller.dispatch.table import COMMANDS
 from tvist_controller.host import Host
 from tvist_controller.planning.plan import Plan
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command, KeepAlive
 from tvist_protocol.replies import Posture, Refused, Reply, ToolPose
@@ -155,9 +155,9 @@ class PlanAhead:
         reply = found.reply if isinstance(found, RefusalError) else found
         self._post(lambda: answer(reply))
 
-    def _present(self) -> Snapshot:
+    def _present(self) -> PlanningState:
         """Return the present state; the controller's thread reads it, just before a tick."""
-        present = SimpleQueue[Snapshot]()
+        present = SimpleQueue[PlanningState]()
         self._post(lambda: present.put(self._host.controller.snapshot()))
         return present.get()
 

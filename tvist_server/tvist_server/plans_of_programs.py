@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.planning.plan import Plan
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import PlanningState
 from tvist_protocol.commands import Command
 
 
@@ -22,7 +22,7 @@ class PlansOfPrograms:
         # If the tick thread started it, it would inherit that thread's priority.
         self._thread.submit(int)
 
-    def order(self, command: Command, now: Snapshot) -> Callable[[], Plan]:
+    def order(self, command: Command, now: PlanningState) -> Callable[[], Plan]:
         """Start planning a command from a state; return a function that waits for the plan."""
         return self._thread.submit(self._planner.plan, command, now).result
 

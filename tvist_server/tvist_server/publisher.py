@@ -32,7 +32,7 @@ class Publisher(Sink):
     def report(self, report: Report) -> None:
         """Publish a tick's state."""
         for gateway in self._gateways:
-            if "state" in gateway.takes:
+            if "state" in gateway.wanted_topics:
                 try:
                     gateway.report(report)
                 except Exception:
@@ -59,7 +59,7 @@ class Publisher(Sink):
 
     def _publish(self, message: Message) -> None:
         topic = topic_of(message)
-        takers = [gateway for gateway in self._gateways if topic in gateway.takes]
+        takers = [gateway for gateway in self._gateways if topic in gateway.wanted_topics]
         if not takers:
             return
         try:

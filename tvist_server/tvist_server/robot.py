@@ -19,9 +19,10 @@ from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import State, Telemetry
 from tvist_server.allowed_hosts import AllowedHosts
-from tvist_server.clock import Clock, Mailbox
+from tvist_server.clock import Clock, TickedRobot
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.gateways.sockets import ProgramSockets
+from tvist_server.intake import RobotIntake
 from tvist_server.kernels import warm_up
 from tvist_server.lateness import Punctuality
 from tvist_server.plan_ahead import PlanAhead
@@ -29,7 +30,6 @@ from tvist_server.plans_of_programs import PlansOfPrograms
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.publisher import Publisher
 from tvist_server.punctual import waited_us
-from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
 from tvist_server.studies import Studies
 
@@ -103,7 +103,7 @@ class ServedRobot:
         knows = plant.truth() is not None
         self.want_truth = self.publisher.want_truth if knows and not setup.truth else None
         """Takes whether a local client wants `truth`; None if it is always published or unknown."""
-        self.driven = Mailbox(
+        self.driven = TickedRobot(
             self._host,
             self.sockets.patience,
             plant.wait if plant.can(Plant.wait) else None,
@@ -114,7 +114,7 @@ class ServedRobot:
             None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post, self._complete)
         )
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
-        self.reception = Reception(
+        self.reception = RobotIntake(
             self._host,
             self.driven.post,
             carry_out,

@@ -16,7 +16,6 @@ from tvist_controller.instruments.report import Sink
 from tvist_server.assembly import check_paces, made_robot, make_clocks, protected, ur_interfaces
 from tvist_server.clock import Realtime
 from tvist_server.config import ServeConfig
-from tvist_server.ending import Ending
 from tvist_server.gateways.base import Gateway
 from tvist_server.gateways.console import Console, ConsoleGateway
 from tvist_server.gateways.endpoints import is_local
@@ -24,6 +23,7 @@ from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.starting import Prepare, Starting
 from tvist_server.robot import ServedRobot
+from tvist_server.shutdown import Shutdown
 from tvist_server.spread import Share, check_together
 from tvist_server.ur_ports import InterfaceName
 
@@ -38,7 +38,7 @@ INSTANCE_BYTES = 4
 """Number of random bytes that distinguish the tokens of this run from earlier ones."""
 
 
-class Recording(NamedTuple):
+class RecordingResult(NamedTuple):
     """Location and completeness of a recording."""
 
     place: str
@@ -196,7 +196,7 @@ class Server:
             with contextlib.suppress(Exception):
                 self._network.close()
 
-    async def run(self, ready: Callable[[], None], ending: Ending) -> None:
+    async def run(self, ready: Callable[[], None], ending: Shutdown) -> None:
         """Serve until a signal comes or all robots have failed (see `failure`); call `ready` once the robots answer."""
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
@@ -230,11 +230,11 @@ class Server:
         return next((robot.failure for robot in self.robots if robot.failure is not None), None)
 
     @property
-    def recordings(self) -> list[Recording]:
+    def recordings(self) -> list[RecordingResult]:
         """The recordings, after `close`."""
         recorders = [robot.recorder for robot in self.robots if robot.recorder is not None]
         return [
-            Recording(
+            RecordingResult(
                 str(recorder.place or f"a file that is no longer {recorder.path}"),
                 recorder.dropped,
                 recorder.error,

@@ -14,7 +14,6 @@ from zenoh.handlers import Callback
 from tvist_plant.user_file import UserFileError
 from tvist_protocol import keys
 from tvist_server.config import ServeConfig
-from tvist_server.ending import Ending, limit_shutdown
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.distant_metrics import DistantMetrics
 from tvist_server.gateways.metrics import Metrics
@@ -22,7 +21,8 @@ from tvist_server.gateways.network import Network
 from tvist_server.gateways.starting import Starting
 from tvist_server.option_values import StartError
 from tvist_server.recording import RecorderError
-from tvist_server.server import Recording, Server
+from tvist_server.server import RecordingResult, Server
+from tvist_server.shutdown import Shutdown, limit_shutdown
 from tvist_server.spread import Share
 from tvist_server.ur_ports import InterfaceName
 
@@ -33,7 +33,7 @@ REACHED = 15.0
 
 
 @dataclass(frozen=True)
-class Refused:
+class WorkerRefused:
     """The robots cannot be served."""
 
     why: str
@@ -52,31 +52,31 @@ class Made:
 
 
 @dataclass(frozen=True)
-class Ready:
+class WorkerReady:
     """The robots tick and answer, or clients reach all of them."""
 
 
 @dataclass(frozen=True)
-class Ended:
+class WorkerEnded:
     """The robots have stopped, and their recordings are closed."""
 
     failure: str | None
     """Why a robot had stopped ticking before."""
-    recordings: list[Recording]
+    recordings: list[RecordingResult]
 
 
-News = Refused | Made | Ready | Ended
+News = WorkerRefused | Made | WorkerReady | WorkerEnded
 
 
 @dataclass(frozen=True)
-class First:
+class ParentPipe:
     """The first process, as seen from another one."""
 
     pipe: Connection
     died: Callable[[], None]
     """Cleans up after it."""
 
-    def told(self) -> Any:
+    def receive(self) -> Any:
         """Wait for its message; False if it has died or wants no robots."""
         try:
             return self.pipe.recv()
@@ -84,7 +84,7 @@ class First:
             self.died()
             return False
 
-    def say(self, news: News) -> None:
+    def send(self, news: News) -> None:
         """Send it news, unless it has died."""
         try:
             self.pipe.send(news)
@@ -93,11 +93,15 @@ class First:
 
 
 def meet_clients(
-    config: ServeConfig, names: Sequence[str], listen: Sequence[str], guard: Mapping[str, Any], first: First
+    config: ServeConfig,
+    names: Sequence[str],
+    listen: Sequence[str],
+    guard: Mapping[str, Any],
+    parent: ParentPipe,
 ) -> None:
     """Run the process that clients connect to: a router, which also answers for robots that are starting.
 
-    It reports `Made`, receives progress, reports `Ready` once it reaches all robots, and `Ended` when told to end.
+    It reports `Made`, then `WorkerReady` once it reaches all robots, and `WorkerEnded` at the end.
     """
     place, starting = config.namespace or "", Starting()
     try:
@@ -112,12 +116,12 @@ def meet_clients(
         network.expect(names, starting, here=False)
         metrics = None if config.metrics is None else Metrics(config.metrics)
     except GatewayError as error:
-        first.say(Refused(str(error), misuse=False))
+        parent.send(WorkerRefused(str(error), misuse=False))
         return
     if metrics is not None:
         for name in names:
             metrics.add(DistantMetrics(network.session, place, name))
-    first.say(Made([], None if metrics is None else metrics.page))
+    parent.send(Made([], None if metrics is None else metrics.page))
     awaited, reached = set(names), threading.Event()
 
     def on_token(sample: zenoh.Sample) -> None:
@@ -128,50 +132,50 @@ def meet_clients(
     network.session.liveliness().declare_subscriber(
         keys.ANY_ALIVE, Callback(on_token, indirect=False), history=True
     )
-    while word := first.told():
+    while word := parent.receive():
         if word is not True:
             starting.note(*word)
             continue
         if not config.connect:  # otherwise clients reach them through another router
             reached.wait(REACHED)
-        network.forget()
-        first.say(Ready())
+        network.stop_answering_for_workers()
+        parent.send(WorkerReady())
     if metrics is not None:
         metrics.close()
     network.close()
-    first.say(Ended(None, []))
+    parent.send(WorkerEnded(None, []))
 
 
-def work(config: ServeConfig, share: Share, first: First) -> None:
+def work(config: ServeConfig, share: Share, parent: ParentPipe) -> None:
     """Serve robots until the first process ends it or dies.
 
-    Told to begin, it makes its robots and reports `Made`; told to go on, it starts them and reports `Ready`; told to
-    end, it reports `Ended`. It ignores signals, which a terminal sends to all processes: the first one handles them.
+    On the first word it makes its robots and reports `Made`; on the next it starts them and reports `WorkerReady`; on
+    the last it reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
     """
-    ending = Ending()
+    ending = Shutdown()
     ending.close()  # ignores signals
-    if not first.told():
+    if not parent.receive():
         return
     try:
         server = Server(config, share=share)
     except (StartError, UserFileError, GatewayError, RecorderError) as error:
-        first.say(Refused(str(error), isinstance(error, StartError)))
+        parent.send(WorkerRefused(str(error), isinstance(error, StartError)))
         return
-    first.say(Made(server.ur))
-    if not first.told():
+    parent.send(Made(server.ur))
+    if not parent.receive():
         server.discard()
         return
 
     def ready() -> None:
-        first.say(Ready())
+        parent.send(WorkerReady())
         threading.Thread(target=end, name="tvist-end", daemon=True).start()
 
     def end() -> None:
-        first.told()
+        parent.receive()
         limit_shutdown()  # the process that would kill this one may have died
         ending.request()
 
     asyncio.run(server.run(ready, ending))
-    first.say(Ended(server.failure, server.recordings))
+    parent.send(WorkerEnded(server.failure, server.recordings))
     if not server.left:  # Zenoh would wait for ten seconds
         os._exit(0)

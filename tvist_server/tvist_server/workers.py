@@ -22,17 +22,27 @@ from tvist_controller.host import Host
 from tvist_controller.setup import Setup
 from tvist_server.assembly import protected
 from tvist_server.config import ServeConfig
-from tvist_server.ending import Ending
 from tvist_server.gateways.access import with_robots_behind
 from tvist_server.gateways.endpoints import protocol
 from tvist_server.gateways.starting import Prepare
 from tvist_server.kernels import warm_up
 from tvist_server.option_values import StartError
 from tvist_server.own_folder import OwnFolder
-from tvist_server.server import Recording
+from tvist_server.server import RecordingResult
+from tvist_server.shutdown import Shutdown
 from tvist_server.spread import LOCAL, Share, check_together, shares
 from tvist_server.ur_ports import InterfaceName
-from tvist_server.worker import END, Ended, First, Made, News, Ready, Refused, meet_clients, work
+from tvist_server.worker import (
+    END,
+    Made,
+    News,
+    ParentPipe,
+    WorkerEnded,
+    WorkerReady,
+    WorkerRefused,
+    meet_clients,
+    work,
+)
 
 
 class WorkersError(Exception):
@@ -45,7 +55,7 @@ class _Worker:
     """Description of the process and its robots."""
     process: multiprocessing.process.BaseProcess
     pipe: Connection
-    told: Ended | None = None
+    told: WorkerEnded | None = None
 
 
 class Workers:
@@ -62,7 +72,7 @@ class Workers:
         self._config = config
         self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
         """Address and ports of each robot's UR interfaces; empty if they are closed."""
-        self.recordings: list[Recording] = []
+        self.recordings: list[RecordingResult] = []
         self._folder = OwnFolder()
         self._front: list[_Worker] = []
         """The process that clients connect to."""
@@ -84,7 +94,7 @@ class Workers:
             self.close()
             raise
 
-    def run(self, ready: Callable[[], None], ending: Ending) -> None:
+    def run(self, ready: Callable[[], None], ending: Shutdown) -> None:
         """Serve until a signal comes; WorkersError if a process or robot stops, after the others have ended."""
         heard, wake = multiprocessing.Pipe(duplex=False)
         ending.hear(lambda: wake.send(None))
@@ -100,7 +110,7 @@ class Workers:
                         return
                     worker = waiting[source]
                     news = self._news(worker)
-                    if not isinstance(news, Ready):
+                    if not isinstance(news, WorkerReady):
                         why = why or self._why(worker, news)
                         continue
                     starting -= 1
@@ -171,7 +181,7 @@ class Workers:
     def _started(
         self,
         who: str,
-        do: Callable[[First], None],
+        do: Callable[[ParentPipe], None],
         ours: Connection,
         theirs: Connection,
         rest: Sequence[Connection],
@@ -193,7 +203,7 @@ class Workers:
         news = self._news(worker)
         if isinstance(news, Made):
             return news
-        if isinstance(news, Refused) and news.misuse:
+        if isinstance(news, WorkerRefused) and news.misuse:
             raise StartError(news.why)
         raise WorkersError(self._why(worker, news))
 
@@ -202,15 +212,15 @@ class Workers:
             news: News = worker.pipe.recv()
         except (EOFError, OSError):
             return None
-        if isinstance(news, Ended):
+        if isinstance(news, WorkerEnded):
             worker.told = news
             self.recordings += news.recordings
         return news
 
     def _why(self, worker: _Worker, news: News | None) -> str:
-        if isinstance(news, Refused):
+        if isinstance(news, WorkerRefused):
             return news.why
-        if isinstance(news, Ended) and news.failure is not None:
+        if isinstance(news, WorkerEnded) and news.failure is not None:
             return news.failure
         worker.process.join(END)
         code = worker.process.exitcode
@@ -236,14 +246,14 @@ class Workers:
 
 
 def _begin(
-    do: Callable[[First], None], first: Connection, others: Sequence[Connection], folder: OwnFolder
+    do: Callable[[ParentPipe], None], first: Connection, others: Sequence[Connection], folder: OwnFolder
 ) -> None:
     """Run in a new process: close the pipes of other processes, ignore signals, then do the work."""
     for end in others:
         end.close()
-    signals = Ending()  # from now on a signal ends only the first process
+    signals = Shutdown()  # from now on a signal ends only the first process
     signals.close()
-    do(First(first, folder.remove))
+    do(ParentPipe(first, folder.remove))
 
 
 def _rehearse(setup: Setup) -> None:

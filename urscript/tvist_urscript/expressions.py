@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from tvist_urscript import tree
 from tvist_urscript.errors import name_not_found
 from tvist_urscript.names import BUILT_IN_ARRAYS, METHOD, Scope
-from tvist_urscript.pieces import DEPTH, MISSING, Position
+from tvist_urscript.pieces import DEPTH, MISSING, AstBuilder
 from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
 
@@ -45,7 +45,7 @@ class Expressions:
         """Translate an expression whose value is needed."""
         match node:
             case tree.Constant():
-                return Position.of(node).constant(node.value)
+                return AstBuilder.of(node).constant(node.value)
             case tree.Name():
                 return self.name(node)
             case tree.Binary():
@@ -63,18 +63,18 @@ class Expressions:
             case tree.Unary(operator="-"):
                 self.cost += 1
                 self.works = True
-                return Position.of(node).call("negate", self.value(node.value))
+                return AstBuilder.of(node).call("negate", self.value(node.value))
             case tree.Unary():
-                return Position.of(node).invert(self.test(node.value))
+                return AstBuilder.of(node).invert(self.test(node.value))
             case tree.Logic():
-                at = Position.of(node)
+                at = AstBuilder.of(node)
                 return at.invert(at.invert(self.test(node)))
 
     def test(self, node: tree.Expression) -> ast.expr:
         """Translate an expression of which only the truth is needed."""
         match node:
             case tree.Logic(operator="xor"):
-                at = Position.of(node)
+                at = AstBuilder.of(node)
                 result = at.invert(self.test(node.values[0]))
                 self.cost += len(node.values) - 1
                 for value in node.values[1:]:
@@ -84,17 +84,17 @@ class Expressions:
                 self.cost += len(node.values) - 1
                 operator = ast.And() if node.operator == "and" else ast.Or()
                 return ast.BoolOp(
-                    operator, [self.test(value) for value in node.values], **Position.of(node).given
+                    operator, [self.test(value) for value in node.values], **AstBuilder.of(node).given
                 )
             case tree.Unary(operator="not"):
                 self.cost += 1
-                return Position.of(node).invert(self.test(node.value))
+                return AstBuilder.of(node).invert(self.test(node.value))
             case _:
                 return self.value(node)
 
     def name(self, node: tree.Name) -> ast.expr:
         """Translate a variable that is read."""
-        at = Position.of(node)
+        at = AstBuilder.of(node)
         variable = self.scope.variable(node.name)
         if variable is None:
             self.report(node, name_not_found(node.name))
@@ -102,7 +102,7 @@ class Expressions:
 
     def binary(self, node: tree.Binary) -> ast.expr:
         """Translate arithmetic or a comparison."""
-        at = Position.of(node)
+        at = AstBuilder.of(node)
         self.cost += 1
         left, right = self.value(node.left), self.value(node.right)
         if node.operator in ARITHMETIC:
@@ -118,7 +118,7 @@ class Expressions:
 
     def listing(self, node: tree.Listing) -> ast.expr:
         """Translate a list; a list of constants is created only once."""
-        at = Position.of(node)
+        at = AstBuilder.of(node)
         if len(node.items) > LONGEST:
             self.report(node, f"a list of {len(node.items)} elements is too long: the limit is {LONGEST}")
             return at.constant(None)
@@ -143,7 +143,7 @@ class Expressions:
     def index(self, node: tree.Index) -> ast.expr:
         """Translate an element, or a pose: `p[...]` with six expressions."""
         value, indices = node.value, node.indices
-        at = Position(*first(indices[0]))
+        at = AstBuilder(*first(indices[0]))
         is_p = isinstance(value, tree.Name) and value.name == "p"
         if is_p and len(indices) == 6:
             return self.pose(node)
@@ -163,7 +163,7 @@ class Expressions:
 
     def pose(self, node: tree.Index) -> ast.expr:
         """Translate a pose of six expressions."""
-        at = Position.of(node.value)
+        at = AstBuilder.of(node.value)
         self.cost += 1
         values = [item.value for item in node.indices if isinstance(item, tree.Constant)]
         if len(values) == 6 and all(type(value) in NUMBERS for value in values):
@@ -184,13 +184,13 @@ class Expressions:
         """Translate an access to an array of the controller, which is a call of a built-in function."""
         if name not in self.signatures:
             self.report(node, name_not_found(name))
-            return Position.of(node).constant(None)
+            return AstBuilder.of(node).constant(None)
         given = [tree.Argument(argument.line, argument.column, None, argument) for argument in arguments]
         return self.call(tree.Call(node.line, node.column, name, given), built_in=True)
 
     def call(self, node: tree.Call, *, built_in: bool = False) -> ast.expr:
         """Translate a call; functions of the script hide those of the controller."""
-        at = Position.of(node)
+        at = AstBuilder.of(node)
         self.cost += 1
         scope = None if built_in else self.scope.find(node.name)
         if node.name == "struct" and scope is None:
@@ -225,7 +225,7 @@ class Expressions:
 
         A parameter is a tuple of its name and the name of its default, or None if it has none.
         """
-        at = Position.of(node)
+        at = AstBuilder.of(node)
         given: dict[str, ast.expr] = {}
         names = [name for name, _ in parameters]
         known = set(names)
@@ -256,7 +256,7 @@ class Expressions:
 
     def run(self, node: tree.Call) -> ast.expr:
         """Translate the start of a thread."""
-        at = Position.of(node)
+        at = AstBuilder.of(node)
         self.cost += START
         scope = self.scope.find(node.name)
         if scope is None and node.name not in self.signatures:
@@ -271,7 +271,7 @@ class Expressions:
 
     def struct(self, node: tree.Call) -> ast.expr:
         """Translate `struct(a=1, b=2)`."""
-        at = Position.of(node)
+        at = AstBuilder.of(node)
         names = [argument.name for argument in node.arguments]
         if not 1 <= len(names) <= LONGEST:
             self.report(node, f"struct takes from 1 to {LONGEST} members, not {len(names)}")
@@ -291,12 +291,12 @@ class Expressions:
     def member(self, node: tree.Member) -> ast.expr:
         """Translate `a.name`."""
         self.cost += 1
-        at = Position.of(node)
+        at = AstBuilder.of(node)
         return at.call("member", self.value(node.value), at.constant(node.name))
 
     def method(self, node: tree.Method) -> ast.expr:
         """Translate `a.name(arguments)`, which only the controller can evaluate."""
-        at = Position.of(node)
+        at = AstBuilder.of(node)
         self.cost += 1 + len(node.arguments)
         value = self.value(node.value)
         arguments = at.tuple([self.value(argument.value) for argument in node.arguments])
@@ -318,7 +318,7 @@ def first(node: tree.Expression | tree.Step) -> tuple[int, int]:
             return node.line, node.column
 
 
-def _arranged(at: Position, given: dict[str, ast.expr], names: list[str]) -> list[ast.expr]:
+def _arranged(at: AstBuilder, given: dict[str, ast.expr], names: list[str]) -> list[ast.expr]:
     """Return the arguments in the order of the parameters; Python computes them in the given order."""
     if list(given) == names or all(isinstance(value, ast.Constant | ast.Name) for value in given.values()):
         return [given[name] for name in names]

@@ -4,7 +4,7 @@ import ast
 
 from tvist_urscript import tree
 from tvist_urscript.names import Scope
-from tvist_urscript.pieces import DEPTH, MISSING, Position
+from tvist_urscript.pieces import DEPTH, MISSING, AstBuilder
 from tvist_urscript.statements import Statements
 
 DEEPEST_CALLS = 200
@@ -37,7 +37,7 @@ class Functions(Statements):
             self.report(twice, f"{twice.name} is defined twice")
         if scope.outer is not None or (_length(function.body) <= PART and _size(function.body) <= PART_NODES):
             return [self.definition(scope.code_name, function, function.body)]
-        at = Position.of(function)
+        at = AstBuilder.of(function)
         self.is_part = True
         parts = [
             self.definition(f"{scope.code_name}_{number}", function, body)
@@ -54,7 +54,7 @@ class Functions(Statements):
 
     def definition(self, name: str, function: tree.Function, body: list[tree.Statement]) -> ast.FunctionDef:
         """Translate a function, or a part of the main function, to a function of Python."""
-        at = Position.of(function)
+        at = AstBuilder.of(function)
         if (length := _length(body)) > MOST_STATEMENTS:
             many = f"{length} statements of {function.name} are too many in one function"
             self.report(function, f"{many}: the limit is {MOST_STATEMENTS}")
@@ -69,7 +69,7 @@ class Functions(Statements):
         defaults: list[ast.stmt] = []
         for parameter, default in function.parameters:
             if default is not None:
-                here, variable = Position.of(parameter), f"v_{parameter.name}"
+                here, variable = AstBuilder.of(parameter), f"v_{parameter.name}"
                 missing = here.compare(here.name(variable), ast.Is(), here.name(MISSING))
                 defaults.append(here.branch(missing, [here.assign(variable, self.value(default))]))
         too_deep = at.branch(
@@ -103,7 +103,7 @@ class Functions(Statements):
         return list(names)
 
 
-def _definition(at: Position, name: str, parameters: list[str], body: list[ast.stmt]) -> ast.FunctionDef:
+def _definition(at: AstBuilder, name: str, parameters: list[str], body: list[ast.stmt]) -> ast.FunctionDef:
     arguments = [ast.arg(parameter, **at.given) for parameter in (DEPTH, *parameters)]
     return ast.FunctionDef(
         name,

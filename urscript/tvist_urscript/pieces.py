@@ -10,7 +10,7 @@ HERE, MISSING, DEPTH = "machine", "MISSING", "depth"
 """Names in compiled functions: the machine, a missing argument, the depth of calls."""
 
 
-class Position:
+class AstBuilder:
     """A position in the script; its methods return nodes of Python's tree with this position."""
 
     __slots__ = ("given",)
@@ -24,7 +24,7 @@ class Position:
         }
 
     @classmethod
-    def of(cls, node: Node) -> "Position":
+    def of(cls, node: Node) -> "AstBuilder":
         """Return the position of a node of a script's tree."""
         return cls(node.line, node.column)
 

@@ -7,7 +7,7 @@ from tvist_urscript import tree
 from tvist_urscript.errors import syntax_error
 from tvist_urscript.expressions import MOST_OPERATIONS, START, Expressions, Report, first
 from tvist_urscript.names import BUILT_IN_ARRAYS
-from tvist_urscript.pieces import Position
+from tvist_urscript.pieces import AstBuilder
 from tvist_urscript.signatures import Signatures
 
 PIECE = 40
@@ -18,7 +18,7 @@ LINK = 15
 """Most branches of one Python `if`; a longer `elif` chain is split, since Python nests each in the one before."""
 
 Branch = tuple[tree.Expression, list[tree.Statement]]
-Link = tuple[Position, ast.expr, list[ast.stmt]]
+Link = tuple[AstBuilder, ast.expr, list[ast.stmt]]
 
 
 class Statements(Expressions):
@@ -40,7 +40,7 @@ class Statements(Expressions):
         result: list[ast.stmt] = []
         piece: list[ast.stmt] = []
 
-        def flush(at: Position) -> None:
+        def flush(at: AstBuilder) -> None:
             nonlocal cost, since
             since += cost
             result.extend(at.charge(cost, check=since >= PIECE))
@@ -50,7 +50,7 @@ class Statements(Expressions):
             piece.clear()
 
         for statement in body:
-            at = Position.of(statement)
+            at = AstBuilder.of(statement)
             self.cost, self.works = 1, False
             match statement:
                 case tree.Function():
@@ -81,7 +81,7 @@ class Statements(Expressions):
                         flush(at)
                         since += PIECE
         if cost:
-            flush(Position.of(body[-1]) if body else Position(1, 1))
+            flush(AstBuilder.of(body[-1]) if body else AstBuilder(1, 1))
         return result, since
 
     def limited(self, statement: tree.Statement) -> int:
@@ -98,7 +98,7 @@ class Statements(Expressions):
 
         Each branch charges the conditions evaluated before it.
         """
-        at = Position.of(statement)
+        at = AstBuilder.of(statement)
         chains = [
             statement.branches[start : start + LINK] for start in range(0, len(statement.branches), LINK)
         ]
@@ -146,12 +146,12 @@ class Statements(Expressions):
                 since += PIECE * self.works
             made, ends = self.block(body, since, cost)
             latest = max(latest, ends)
-            links.append((Position(*first(condition)), test, made))
+            links.append((AstBuilder(*first(condition)), test, made))
         return links, cost, latest, since
 
     def loop(self, statement: tree.While, test: ast.expr, cost: int) -> ast.stmt:
         """Translate a loop, which checks the budget at the start of each iteration."""
-        at = Position.of(statement)
+        at = AstBuilder.of(statement)
         self.loops += 1
         if self.loops > MOST_LOOPS:
             self.report(statement, f"more than {MOST_LOOPS} loops are nested here")
@@ -159,7 +159,7 @@ class Statements(Expressions):
         self.loops -= 1
         return ast.While(test, [*at.charge(cost, check=True), *body], [], **at.given)
 
-    def simple(self, statement: tree.Statement, at: Position) -> list[ast.stmt]:  # noqa: PLR0911  one for each kind
+    def simple(self, statement: tree.Statement, at: AstBuilder) -> list[ast.stmt]:  # noqa: PLR0911  one for each kind
         """Translate a statement that contains no others."""
         match statement:
             case tree.Assign():
@@ -185,7 +185,7 @@ class Statements(Expressions):
             case _:
                 raise AssertionError(statement)
 
-    def word(self, statement: tree.Word, at: Position) -> list[ast.stmt]:
+    def word(self, statement: tree.Word, at: AstBuilder) -> list[ast.stmt]:
         """Translate a statement that consists of a keyword, such as `break`."""
         match statement.word:
             case "pass":
@@ -201,7 +201,7 @@ class Statements(Expressions):
             case _:
                 return [at.statement(at.call(statement.word))]
 
-    def assign(self, statement: tree.Assign, at: Position) -> ast.stmt:
+    def assign(self, statement: tree.Assign, at: AstBuilder) -> ast.stmt:
         """Translate an assignment; the value is computed before the variable is read or declared."""
         name, indices = statement.target.name, statement.indices
         plain = [index for index in indices if not isinstance(index, tree.Step)]
@@ -213,7 +213,7 @@ class Statements(Expressions):
             return at.statement(self.call_built_in(statement, setter, [*plain, statement.value]))
         value = self.value(statement.value)
         if indices:
-            here = Position(*first(indices[0]))
+            here = AstBuilder(*first(indices[0]))
             self.cost += len(indices)
             self.works = True
             places = at.tuple(

@@ -28,7 +28,7 @@ POINTS = 600
 
 
 @dataclass
-class Run:
+class MotionRecord:
     """Everything that the robot published during one motion."""
 
     states: list[State] = field(default_factory=list)
@@ -41,7 +41,7 @@ Verdict = Mapping[str, float | None]
 
 Keys: `before`, `after`, `less_percent`, `earlier_ms`.
 """
-Judge = Callable[[Run, Run], Verdict]
+Judge = Callable[[MotionRecord, MotionRecord], Verdict]
 """Compares a motion without and with the shaper."""
 
 
@@ -86,8 +86,8 @@ def beside(
 
 
 @contextlib.contextmanager
-def _gathered(robot: Robot) -> Iterator[Run]:
-    run = Run()
+def _gathered(robot: Robot) -> Iterator[MotionRecord]:
+    run = MotionRecord()
     ends = (
         robot.on_state(run.states.append),
         robot.on_truth(run.truths.append),
@@ -100,7 +100,7 @@ def _gathered(robot: Robot) -> Iterator[Run]:
             end()
 
 
-def _curves(look: Look, *runs: Run) -> dict[str, Any]:
+def _curves(look: Look, *runs: MotionRecord) -> dict[str, Any]:
     """|α| of both motions over the time since their starts, and when the reference of the first one stopped."""
     signals = [signals_of(look, run.states, {truth.tick: truth for truth in run.truths}) for run in runs]
     spans = [moves(one) or (one.time[0], one.time[0]) for one in signals]

@@ -87,7 +87,7 @@ def _word(kind: type[RobotMode] | type[SafetyMode], number: int) -> str:
         return str(number)
 
 
-class RealArm:
+class ObservedArm:
     """What a real robot has done since the page shows it."""
 
     def __init__(self) -> None:

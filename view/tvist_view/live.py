@@ -7,7 +7,7 @@ import msgspec
 from tvist_view import asked
 from tvist_view.beside import Judge
 from tvist_view.meshes import Meshes
-from tvist_view.shown_robot import Place, ShownRobot
+from tvist_view.shown_robot import RobotPlace, ShownRobot
 from tvist_view.stage import Tab, page
 from tvist_view.watcher import Watcher
 
@@ -18,7 +18,7 @@ MOST_SHOWN = 8
 class LivePage:
     """Serves tabs: each shows one robot, and all tabs that show the same robot share its connection."""
 
-    def __init__(self, place: Place, first: str, judge: Judge, *, factor: float = 100.0) -> None:
+    def __init__(self, place: RobotPlace, first: str, judge: Judge, *, factor: float = 100.0) -> None:
         self._place, self._first, self._judge = place, first, judge
         self._shown: dict[str, ShownRobot] = {}
         self.meshes = Meshes()

@@ -19,11 +19,11 @@ from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import Event
 from tvist_view import asked
 from tvist_view.beside import Doer, Judge
-from tvist_view.described import RealArm, described, state_in_words
+from tvist_view.described import ObservedArm, described, state_in_words
 from tvist_view.look import GeometryError, Look
 from tvist_view.meshes import Meshes
 from tvist_view.pilot import Pilot
-from tvist_view.signals import Running
+from tvist_view.signals import LatestSignals
 from tvist_view.watcher import Watcher
 
 log = logging.getLogger("tvist.view")
@@ -34,12 +34,12 @@ RETRY_S = 2.0
 """Time between two attempts to find the robot [s]."""
 MOST_ASKED = 16
 """Most requests of a tab that are carried out at once; further ones wait."""
-TOLD = {"protective_stop", "safety_stop", "warning", "lease_lost"}
+SHOWN_EVENTS = {"protective_stop", "safety_stop", "warning", "lease_lost"}
 """Kinds of events whose reason the page shows."""
 
 
 @dataclass(frozen=True)
-class Place:
+class RobotPlace:
     """Where robots are found."""
 
     endpoint: str
@@ -53,10 +53,10 @@ class Place:
 class ShownRobot:
     """A robot that tabs show; it is searched until its task is cancelled."""
 
-    def __init__(self, place: Place, name: str, judge: Judge, meshes: Meshes) -> None:
+    def __init__(self, place: RobotPlace, name: str, judge: Judge, meshes: Meshes) -> None:
         self._place, self.name, self._judge, self._meshes = place, name, judge, meshes
-        self.running: Running | None = None
-        self._way = RealArm()
+        self.running: LatestSignals | None = None
+        self._way = ObservedArm()
         self.watchers: set[Watcher] = set()
         self._ends: list[Callable[[], None]] = []
         self._robot: Robot | None = None
@@ -129,7 +129,7 @@ class ShownRobot:
         place = self._place
         self.robots = await robots_at(place.endpoint, place.security, place.namespace)
         self._robot, self._info, self._absent = robot, info, ""
-        self.running, self._way = Running(look), RealArm()
+        self.running, self._way = LatestSignals(look), ObservedArm()
         pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
         self._doer = Doer(robot, look, pilot, self._judge, self._say, self._result)
         self._described = described(info, look, self.robots, self._meshes)
@@ -194,7 +194,7 @@ class ShownRobot:
 
     def _on_event(self, event: Event) -> None:
         self._way.hear(event)
-        if event.kind in TOLD and event.why:
+        if event.kind in SHOWN_EVENTS and event.why:
             self._say(event.why)
 
     def _on_io(self, io: Io) -> None:

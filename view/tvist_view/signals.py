@@ -19,7 +19,7 @@ BRAKES_S = 0.02
 """Time after the stop of the shaped reference during which the tool still decelerates [s]."""
 KEPT = 3000
 """Samples of a running robot that are kept: six seconds."""
-LATE = 50
+LATE_TICKS = 50
 """Ticks after which a missing truth is no longer awaited."""
 
 
@@ -75,7 +75,7 @@ def signals_of(look: Look, states: Sequence[State], truths: Mapping[int, Truth])
     )
 
 
-class Running:
+class LatestSignals:
     """The latest signals and state of a running robot, whose states and truths arrive in any order."""
 
     def __init__(self, look: Look) -> None:
@@ -97,7 +97,7 @@ class Running:
         """Keep a message; a tick earlier than the last one's means that the robot has restarted."""
         if isinstance(message, Truth):
             self._truths[message.tick] = message
-            if len(self._truths) > 4 * LATE:
+            if len(self._truths) > 4 * LATE_TICKS:
                 del self._truths[min(self._truths)]
             return
         if self.state is not None and message.tick <= self.state.tick:
@@ -136,7 +136,7 @@ class Running:
             self._states.popleft()
 
     def _is_late(self, state: State) -> bool:
-        return self.state is not None and state.tick < self.state.tick - LATE
+        return self.state is not None and state.tick < self.state.tick - LATE_TICKS
 
     def since(self, count: int) -> list[list[float]]:
         """Return the samples after the first `count` as columns: time, |α|, |q̈| before and after the shaper."""

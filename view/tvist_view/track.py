@@ -11,7 +11,7 @@ from tvist_protocol.stream import State, Truth
 from tvist_view.look import Look
 from tvist_view.signals import Signals, signals_of
 
-EVERY = 5
+ROW_TICKS = 5
 """Ticks between two rows for the page, which interpolates."""
 MOVES = 1e-7
 """Change of a reference within a tick above which it counts as moving [rad]."""
@@ -26,7 +26,7 @@ class TrackError(ValueError):
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownRobot:
     """A robot's label and shape."""
 
     label: str
@@ -40,7 +40,7 @@ class Track:
     """
 
     def __init__(
-        self, shown: Shown, states: Sequence[State], truths: Sequence[Truth], origin: float = 0.0
+        self, shown: ShownRobot, states: Sequence[State], truths: Sequence[Truth], origin: float = 0.0
     ) -> None:
         if not states:
             raise TrackError("the recording contains no state, so there is nothing to show")
@@ -71,7 +71,7 @@ class Track:
 
     def packed(self, start: float) -> dict[str, Any]:
         """Return the message for the page: rows and signals as base64 of 32-bit floats, times from `start` [s]."""
-        states = self._states[::EVERY]
+        states = self._states[::ROW_TICKS]
         rows = [self.shown.look.row(state, self._truths.get(state.tick)) for state in states]
         signals = vars(self.signals) | {"time": self.signals.time - start}
         return {

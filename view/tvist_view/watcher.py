@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from tvist_view.signals import Running, after_stop
+from tvist_view.signals import LatestSignals, after_stop
 from tvist_view.stage import Tab
 
 FRAME_S = 1.0 / 30.0
@@ -29,7 +29,7 @@ class Watched(Protocol):
     """The robot that a tab shows."""
 
     @property
-    def running(self) -> Running | None:
+    def running(self) -> LatestSignals | None:
         """Its live data; None while the robot is away."""
 
     def status(self, tab: int) -> dict[str, Any] | None:

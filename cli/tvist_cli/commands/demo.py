@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from tvist_cli.compiling import compile_if_new
-from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.failure import Failure, failing_on
+from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, write
 from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, print_json, program, progress, words
-from tvist_cli.pages import Door
+from tvist_cli.pages import PageAddress
 from tvist_cli.paper_tables import print_paper
 from tvist_cli.studying import give
 from tvist_cli.tracks import MAGNIFY, recorded
 
 if TYPE_CHECKING:
-    from tvist_lab.studies.paper.served import Served
+    from tvist_lab.studies.paper.served import ServedExperiment
 
 PORT = 8080
 """Port of the page that --view opens."""
@@ -35,7 +35,7 @@ def demo(
     robot: Annotated[str | None, ROBOTS] = None,
     calibration: str | None = None,
     baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
-    look: FigureOptions = AS_USUAL,
+    look: FigureOptions = DEFAULT_FIGURES,
     json: bool = False,
 ) -> None:
     """Run the paper's motions unshaped and shaped, once over Zenoh in real time, and print the result.
@@ -77,11 +77,14 @@ def demo(
     from tvist_server.option_values import StartError
 
     names = ARMS if robot is calibration is None else (robot or ARMS[0],)
-    with told(StartError, code=2):
+    with failing_on(StartError, exit_code=2):
         setups = [free_setup(robot=name, calibration=calibration, seed=seed) for name in names]
     compile_if_new()
     wanted = [baselines, *(False for _ in names[1:])]
-    with told(code=2), progress(sum(count(runs, baselines=one) for one in wanted), "motions") as bar:
+    with (
+        failing_on(exit_code=2),
+        progress(sum(count(runs, baselines=one) for one in wanted), "motions") as bar,
+    ):
         arms = [
             simulate(setup, runs=runs, seed=seed, baselines=one, progress=lambda what: bar(1, what))
             for setup, one in zip(setups, wanted, strict=True)
@@ -90,7 +93,7 @@ def demo(
     if output is not None:
         from tvist_lab.studies.paper.figures import draw
 
-        with told(OSError), look.into(output) as save:
+        with failing_on(OSError), look.into(output) as save:
             write(save, draw(arms[0], all_figures=True))
     give({**first, "others": others}, print_paper, json=json)
 
@@ -109,7 +112,7 @@ def _in_real_time(
     errors = (RuntimeError, NotMeasurableError, RecordingError, OSError)
     with (
         progress(count(1, baselines=False), "motions", f"the recording so far is in {folder}") as bar,
-        told(*errors),
+        failing_on(*errors),
     ):
         result = serve(recording, seed, lambda what: bar(1, what))
         overview = _figures(result, folder, look)
@@ -122,10 +125,10 @@ def _in_real_time(
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
     if view:
-        recorded(recording).serve(MAGNIFY, Door("127.0.0.1", PORT, insecure=False))
+        recorded(recording).serve(MAGNIFY, PageAddress("127.0.0.1", PORT, insecure=False))
 
 
-def _figures(result: "Served", folder: Path, look: FigureOptions) -> Path:
+def _figures(result: "ServedExperiment", folder: Path, look: FigureOptions) -> Path:
     """Draw the paper's figures and the overview; return the path of the overview."""
     from tvist_lab.studies.paper.figures import draw, overview
 
@@ -135,7 +138,7 @@ def _figures(result: "Served", folder: Path, look: FigureOptions) -> Path:
         return save(overview(result.done, ANSWERED), "vibration-with-and-without-shaping")
 
 
-def _say(result: "Served", overview: Path, recording: Path) -> None:
+def _say(result: "ServedExperiment", overview: Path, recording: Path) -> None:
     """Print the answer and four commands that can be copied as they are, each on one line."""
     from tvist_lab.studies.paper.answer import answer, checks, terms
 

@@ -3,7 +3,7 @@
 import asyncio
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import told
+from tvist_cli.failure import failing_on
 from tvist_cli.output import out, print_json
 from tvist_protocol.io import Io
 
@@ -30,7 +30,7 @@ def forget(
                 await arm.forget()
             return (await robot.info()).name, before
 
-    with told():
+    with failing_on():
         robot, before = asyncio.run(run())
     declared, assumed = before.payload.mass, before.assumed_payload
     if json:

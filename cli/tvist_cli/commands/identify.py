@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure
-from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions
 from tvist_cli.offered import ROBOTS, SOURCES
 from tvist_cli.output import default_output
 
@@ -33,7 +33,7 @@ def identify(
     twin: bool = False,
     check: list[Path] | None = None,
     figures: Path | None = None,
-    look: FigureOptions = AS_USUAL,
+    look: FigureOptions = DEFAULT_FIGURES,
     json: bool = False,
 ) -> None:
     """Fit springs and drives to an arm's ring-downs and write a calibration; or weigh its payload, or fit a twin.
@@ -114,7 +114,7 @@ def identify(
     source: Connection | str | None = places[0] if places else None
     if served or at != LOCAL:
         source = replace(at, endpoint=served[0]) if served else at
-    place = identifying.Place(source, robot, masses, ring_downs, seed, sure=yes)
+    place = identifying.MovableRobot(source, robot, masses, ring_downs, seed, sure=yes)
     if weigh:
         place.weigh(declare=declare, json=json)
     else:

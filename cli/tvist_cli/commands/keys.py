@@ -14,7 +14,7 @@ from tvist_cli.certificates import (
     read_certificate,
     write_new,
 )
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import out, print_json
 from tvist_client.transports import certificates as of_client
 from tvist_protocol.keys import check_robot_name
@@ -61,7 +61,7 @@ def keys(
     """
     if not 1 <= days <= 3650:
         raise Failure(f"days is {days}: must be 1 to 3650", code=2)
-    with told(ValueError, code=2):
+    with failing_on(ValueError, exit_code=2):
         if robot is not None:
             check_robot_name(robot)
         asked = _roles(
@@ -73,7 +73,7 @@ def keys(
             }
         )
         hosts = tuple(dict.fromkeys(host_of(name) for name in host or []))
-    with told(CertificateError, StartError, OSError):
+    with failing_on(CertificateError, StartError, OSError):
         ring = _KeyRing(folder, days)
         ring.look(robot, hosts, asked)
         ring.make(robot, hosts, asked)

@@ -4,7 +4,7 @@ import asyncio
 from typing import Annotated, Any
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.failure import Failure, failing_on, interrupted
 from tvist_cli.offered import POSES, SHAPERS
 from tvist_cli.output import out, print_json, program
 from tvist_cli.poses import pose, tool_numbers
@@ -77,7 +77,7 @@ def move(
                     raise
                 return motion.started or 0, motion.done or 0, motion.limited
 
-    with told():
+    with failing_on():
         try:
             started, done, limited = asyncio.run(run())
         except KeyboardInterrupt:

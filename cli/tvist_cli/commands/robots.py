@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, progress, say, table, words
 from tvist_cli.studying import check_range, check_seed, give, show
@@ -45,7 +45,7 @@ def robots(
     check_seed(seed)
     if vary and not measure:
         raise Failure("vary needs --measure: it changes nothing in a list", code=2)
-    with told(DescriptionError):
+    with failing_on(DescriptionError):
         arms = {name: load(name) for name in robot or shipped()}
     listed = [about(name, description) for name, description in arms.items()]
     for one in listed if measure else ():
@@ -92,7 +92,7 @@ def _print(listed: list[dict[str, Any]], *, in_full: bool) -> None:
     for one in listed if in_full else ():
         out.print(one["name"], style="bold", markup=False)
         origins = one["origins"].items()
-        words({key: f"{kind}: {told}" for kind, keys in origins for key, told in keys.items()})
+        words({key: f"{kind}: {text}" for kind, keys in origins for key, text in keys.items()})
         columns = ("torque_n_m", "velocity_rad_s", "gear_stiffness_n_m_rad")
         table(
             "joints",

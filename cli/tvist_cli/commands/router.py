@@ -2,7 +2,7 @@
 
 import asyncio
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import say
 
 
@@ -28,18 +28,18 @@ def router(
             endpoint is then tls/ADDRESS:PORT.
         insecure: Accept remote connections without TLS; anyone can move the robots, and act as one.
     """
-    from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
     from tvist_server.gateways.router import DEFAULT_ENDPOINT, Rate, Router, robots_of
     from tvist_server.option_values import StartError
+    from tvist_server.shutdown import Shutdown
 
-    with told(StartError, ValueError, code=2):
+    with failing_on(StartError, ValueError, exit_code=2):
         rates = [Rate.read(text) for text in rate or []]
         robots = [place for text in robot or [] for place in robots_of(text)]
         if robots and not rates:
             raise Failure("robot needs --rate HZ: it says whose states are reduced", code=2)
-        ending = Ending()
-        with told(GatewayError), ending.at_once():
+        ending = Shutdown()
+        with failing_on(GatewayError), ending.at_once():
             running = Router(
                 listen or [DEFAULT_ENDPOINT],
                 connect or [],

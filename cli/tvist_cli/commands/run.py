@@ -7,14 +7,14 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure
 from tvist_cli.robot_options import with_robot_options
-from tvist_lab.programs.limits import Limits
+from tvist_lab.programs.limits import RunLimits
 
 OPTIONS = {
     "robot", "profile", "payload", "overload", "adapt", "shaper", "shape_servo", "plant", "hidden", "start",
     "seed", "record", "truth", "listen", "ur", "ur_allow", "cell", "world",
 }  # fmt: skip
 """Options of `tvist serve` that make sense for one robot that ends with its program."""
-NO_LIMITS = Limits()
+NO_LIMITS = RunLimits()
 
 
 @with_robot_options(OPTIONS)
@@ -24,7 +24,7 @@ def run(
     lockstep: bool = False,
     inputs: Annotated[list[str] | None, Parameter(name="--input")] = None,
     timeout: float | None = None,
-    limits: Annotated[Limits, Parameter(name="*")] = NO_LIMITS,
+    limits: Annotated[RunLimits, Parameter(name="*")] = NO_LIMITS,
     junit: Path | None = None,
     baseline: Path | None = None,
     config: str | None = None,

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.failure import Failure, failing_on
+from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions
 from tvist_cli.offered import SHAPERS as OFFERED
 from tvist_cli.output import out, table
 from tvist_cli.sensitivity import print_sensitivity
 from tvist_cli.shapers_of import load_given
-from tvist_cli.studying import Figures, Places, give
+from tvist_cli.studying import Figures, ResultFiles, give
 
 if TYPE_CHECKING:
     from tvist_shaping import Impulses
@@ -37,7 +37,7 @@ def shapers(
     errors: tuple[float, float] = ERRORS,
     output: Path | None = None,
     figures: Path | None = None,
-    look: FigureOptions = AS_USUAL,
+    look: FigureOptions = DEFAULT_FIGURES,
     json: bool = False,
 ) -> None:
     """List the input shapers that a robot can use, with their properties for one mode.
@@ -55,7 +55,7 @@ def shapers(
         look: How to write the figures.
         json: Print one JSON object.
     """
-    places = Places(output=output, figures=figures, look=look)
+    places = ResultFiles(output=output, figures=figures, look=look)
     places.check()
     if sensitivity is None and (output is not None or errors != ERRORS):
         raise Failure("--errors and --output are for --sensitivity: give it, or leave them out", code=2)
@@ -69,7 +69,7 @@ def shapers(
     from tvist_shaping import BUILT_IN, SHAPERS, Registry, ShapingError
     from tvist_shaping.named import OF_SEVERAL_MODES, USES
 
-    with told(ShapingError, code=2):
+    with failing_on(ShapingError, exit_code=2):
         SHAPERS["none"].function(f_d, zeta)
         own = Registry(load_given(place).shaper for place in shaper or []).own
     listed: list[AnyShaper] = [*SHAPERS.values(), *own.values()]

@@ -6,9 +6,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.failure import Failure, failing_on, interrupted
 from tvist_cli.output import out, print_json
-from tvist_client.across import Place, place_of
+from tvist_client.across import RobotPlace, place_of
 from tvist_client.fleet import Fleet, StopReport
 from tvist_client.halt import halt
 
@@ -41,9 +41,9 @@ def stop(
             raise Failure(f"give either --all or the robot {called}", code=2)
         _stop_all(at, json=json)
         return
-    with told(code=2):
-        place = Place(at.namespace, "") if called is None else place_of(called)
-    with told():
+    with failing_on(exit_code=2):
+        place = RobotPlace(at.namespace, "") if called is None else place_of(called)
+    with failing_on():
         within = place.namespace or at.namespace
         report = halt(at.endpoint, place.robot or None, security=at.security, namespace=within)
     if json:
@@ -59,7 +59,7 @@ def _stop_all(at: Connection, *, json: bool) -> None:
         async with Fleet(at.endpoint, security=at.security, namespace=at.namespace) as fleet:
             return await fleet.stop(list(fleet.places))
 
-    with told():
+    with failing_on():
         try:
             reports = asyncio.run(run())
         except KeyboardInterrupt:

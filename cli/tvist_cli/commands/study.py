@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from tvist_cli.failure import Failure
-from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions
 from tvist_cli.offered import NAMES, STUDIES
 from tvist_cli.study_options import AS_SHIPPED, StudyOptions
 
@@ -18,7 +18,7 @@ def study(
     processes: int | None = None,
     scheduler: str | None = None,
     figures: Path | None = None,
-    look: FigureOptions = AS_USUAL,
+    look: FigureOptions = DEFAULT_FIGURES,
     report: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -67,8 +67,14 @@ def study(
         raise Failure(f"--{name} is for {', '.join(NAMES)}: {file} says itself what it is made of", code=2)
     if file is not None and output is None:
         output = file.with_suffix("")
-    from tvist_cli.study_runs import Places, run
+    from tvist_cli.study_runs import StudyOutputs, run
 
     run(
-        study, file, options, Places(output, figures or output, look, report), processes, scheduler, json=json
+        study,
+        file,
+        options,
+        StudyOutputs(output, figures or output, look, report),
+        processes,
+        scheduler,
+        json=json,
     )

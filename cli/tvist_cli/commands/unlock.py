@@ -1,7 +1,7 @@
 """`tvist unlock`: make a stopped robot ready to move again."""
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import out, print_json
 from tvist_client import unlock as client
 
@@ -23,7 +23,7 @@ def unlock(
         power_on: Switch the arm on and release the brakes if it has no power.
         json: Print one JSON object.
     """
-    with told():
+    with failing_on():
         report = client.unlock(
             at.endpoint, at.name, power_on=power_on, security=at.security, namespace=at.namespace
         )

@@ -6,10 +6,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.offered import ROBOTS, SHAPERS
 from tvist_cli.output import err
-from tvist_cli.pages import Door, serve_page
+from tvist_cli.pages import PageAddress, serve_page
 from tvist_cli.tracks import MAGNIFY, Shows, compared, recorded, repeated
 from tvist_client.robot import NAME
 
@@ -49,7 +49,7 @@ def view(
     """
     if not 1.0 <= magnify <= 300.0:
         raise Failure(f"magnify is {magnify:g}: must be 1 to 300", code=2)
-    door = Door(address, port, insecure)
+    door = PageAddress(address, port, insecure)
     shows = _recorded_or_simulated(at.endpoint, compare, robot, both=beside)
     if shows is None:
         if html is not None:
@@ -65,7 +65,7 @@ def view(
         )
     from tvist_lab.whole_file import write_whole
 
-    with told(OSError):
+    with failing_on(OSError):
         write_whole(html, shows.page(magnify).encode())
     err.print(f"wrote {html}")
 
@@ -87,10 +87,10 @@ def _is_file(what: str) -> bool:
     return what.endswith(".mcap") or Path(what).exists()
 
 
-def _live(at: Connection, factor: float, door: Door) -> None:
+def _live(at: Connection, factor: float, door: PageAddress) -> None:
     from tvist_cli.judging import judge
     from tvist_view.live import LivePage
-    from tvist_view.shown_robot import Place
+    from tvist_view.shown_robot import RobotPlace
 
-    live = LivePage(Place(at.endpoint, at.security, at.namespace), at.name or NAME, judge, factor=factor)
+    live = LivePage(RobotPlace(at.endpoint, at.security, at.namespace), at.name or NAME, judge, factor=factor)
     serve_page(live.page, live.meet, door, live.run, live.meshes.content)

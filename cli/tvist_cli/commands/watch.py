@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.failure import Failure, failing_on, interrupted
 from tvist_cli.output import number, out, print_json, waiting
 from tvist_client.across import ManyStates
 from tvist_client.errors import MisuseError
@@ -23,7 +23,7 @@ from tvist_client.robot import Robot
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import Event, State, Telemetry
 
-EVERY = 0.1
+REFRESH_S = 0.1
 """Time between two readings of states [s]."""
 FLEET_EVERY = 1.0
 """Time between two readings of a fleet [s]."""
@@ -57,7 +57,7 @@ def watch(
     if states is not None:
         if at.name is not None:
             raise Failure("--states is about many robots: leave --name out", code=2)
-        with told(MisuseError, code=2):
+        with failing_on(MisuseError, exit_code=2):
             many = ManyStates(states, at.endpoint, security=at.security, namespace=at.namespace)
         _watch_for(seconds, _watch_states(many, json=json), "the robots keep running")
         return
@@ -78,7 +78,7 @@ def _only_robot(at: Connection) -> Connection | None:
             return None
         return dataclasses.replace(at, name=places[0].robot, namespace=places[0].namespace)
 
-    with told():
+    with failing_on():
         try:
             return asyncio.run(find())
         except KeyboardInterrupt:
@@ -102,7 +102,7 @@ async def _watch_robot(at: Connection, *, json: bool) -> None:
                     live.update(_robot_screen(state, events[-5:], await standing.line(state), load))
                 else:
                     print_json(state)
-                await asyncio.sleep(EVERY)
+                await asyncio.sleep(REFRESH_S)
 
 
 async def _watch_fleet(at: Connection, *, json: bool) -> None:
@@ -125,7 +125,7 @@ async def _watch_states(states: ManyStates, *, json: bool) -> None:
         with contextlib.nullcontext() if json else Live(console=out, auto_refresh=False) as live:
             since = time.monotonic()
             while True:
-                await asyncio.sleep(EVERY)
+                await asyncio.sleep(REFRESH_S)
                 now, since = time.monotonic() - since, time.monotonic()
                 if live is not None:
                     live.update(_states_table(states, now), refresh=True)
@@ -161,8 +161,8 @@ class _Standing:
             self._modes = None
 
 
-def _load(told: list[Telemetry]) -> Text:
-    one = told[0] if told else None
+def _load(telemetry: list[Telemetry]) -> Text:
+    one = telemetry[0] if telemetry else None
     if one is None or one.due_ticks is None or one.load is None:
         return Text("no load is told: a client steps the time, or no telemetry has come yet", style="dim")
     said = (
@@ -172,7 +172,7 @@ def _load(told: list[Telemetry]) -> Text:
     return Text(f"{said}   overloaded", style="bold red") if one.overloaded else Text(said)
 
 
-def _robot_screen(state: State, events: list[Event], standing: Text, told: list[Telemetry]) -> Group:
+def _robot_screen(state: State, events: list[Event], standing: Text, telemetry: list[Telemetry]) -> Group:
     joints = _columns("joint", "reference rad", "target rad", "actual rad", "target rad/s²", "moment N m")
     for joint in range(len(state.actual_q)):
         joints.add_row(
@@ -187,7 +187,7 @@ def _robot_screen(state: State, events: list[Event], standing: Text, told: list[
     )
     return Group(
         standing,
-        _load(told),
+        _load(telemetry),
         Text(f"tick {state.tick}   {state.timestamp:.3f} s   estimated {estimates}"),
         joints,
         Text(
@@ -257,7 +257,7 @@ def _columns(*numbers: str, words: tuple[str, ...] = ()) -> Table:
 def _watch_for(seconds: float | None, watching: Coroutine[Any, Any, None], meanwhile: str) -> None:
     """Watch for `seconds`, or with None until Control+C, which raises a Failure that tells what keeps running."""
     began = time.monotonic()
-    with told(), contextlib.suppress(TimeoutError):
+    with failing_on(), contextlib.suppress(TimeoutError):
         try:
             asyncio.run(asyncio.wait_for(watching, seconds))
         except KeyboardInterrupt:

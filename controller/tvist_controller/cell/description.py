@@ -31,7 +31,7 @@ class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
     """A table of the file."""
 
 
-class Wire(_Table, frozen=True, kw_only=True):
+class CellWire(_Table, frozen=True, kw_only=True):
     """A wire from a digital output to a digital input, or a valve, relay or sensor that acts like one."""
 
     output: Terminal
@@ -63,7 +63,7 @@ class Tool(_Table, frozen=True, kw_only=True):
     inertia: Inertia6 = (0.0,) * 6
     """Moments of inertia xx xy xz yy yz zz about the centre of gravity, flange axes [kg m²]."""
     while_on: Terminal | None = None
-    """Digital output of a tool changer (see `Wire.output`): while on, this tool replaces the first one."""
+    """Digital output of a tool changer (see `CellWire.output`): while on, this tool replaces the first one."""
 
 
 def as_declared(tool: Tool) -> Payload:
@@ -91,7 +91,7 @@ class GripperModel(_Table, frozen=True, kw_only=True):
         return STROKES[self.model]
 
 
-class Part(_Table, frozen=True, kw_only=True):
+class Workpiece(_Table, frozen=True, kw_only=True):
     """A box that can be gripped."""
 
     name: Name
@@ -115,13 +115,13 @@ class Part(_Table, frozen=True, kw_only=True):
 class Cell(_Table, frozen=True, kw_only=True):
     """The cell around one robot."""
 
-    wires: Annotated[tuple[Wire, ...], Meta(max_length=MAX_THINGS)] = ()
+    wires: Annotated[tuple[CellWire, ...], Meta(max_length=MAX_THINGS)] = ()
     """Wires between terminals."""
     tools: Annotated[tuple[Tool, ...], Meta(max_length=MAX_THINGS)] = ()
     """Tools; the first is mounted on the flange."""
     gripper: GripperModel | None = None
     """Gripper; None for none."""
-    parts: Annotated[tuple[Part, ...], Meta(max_length=MAX_THINGS)] = ()
+    parts: Annotated[tuple[Workpiece, ...], Meta(max_length=MAX_THINGS)] = ()
     """Parts that the gripper can grip."""
     world: Annotated[str, Meta(min_length=1, max_length=4096)] | None = None
     """Scene around the arm, as `tvist serve --world`; its bodies are gripped, and `parts` stays empty."""

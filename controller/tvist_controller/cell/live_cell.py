@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.cell.description import Cell, Part, Tool, Wire, bit_of
+from tvist_controller.cell.description import Cell, CellWire, Tool, Workpiece, bit_of
 from tvist_controller.cell.gripper import PORT, Gripper, answer
 from tvist_controller.events import Emit
 from tvist_controller.kinematics.arm import Arm
@@ -19,7 +19,7 @@ from tvist_protocol.values import Pose
 
 TRANSFER = 100
 """Ticks (0.2 s) in which a part's weight moves to the arm and back, as when lifted off its support."""
-NEAR = 0.1
+MISSED_BY = 0.1
 """Distance up to which a missed part causes a warning [m]."""
 THIS_MACHINE = ("127.0.0.1", "localhost", "::1")
 """Names by which programs address the machine of the URCap."""
@@ -46,7 +46,7 @@ class Terminals(Protocol):
 class Wires:
     """The delayed wires of a cell."""
 
-    def __init__(self, wires: Sequence[Wire]) -> None:
+    def __init__(self, wires: Sequence[CellWire]) -> None:
         self._wires = [(bit_of(one.output), bit_of(one.input), one.ticks, one.inverted) for one in wires]
         self._outputs: int | None = None
         """Outputs of the last tick; None before the first."""
@@ -231,7 +231,12 @@ class LiveCell:
     def _tell_missed(self, q: Floats) -> None:
         limits = self._cell.gripper
         away = [(*self._away(number, q), part.name) for number, part in enumerate(self._cell.parts)]
-        if limits is None or self._tool is not self._cell.gripping_tool or not away or min(away)[0] > NEAR:
+        if (
+            limits is None
+            or self._tool is not self._cell.gripping_tool
+            or not away
+            or min(away)[0] > MISSED_BY
+        ):
             return
         distance, angle, name = min(away)
         self._emit(
@@ -245,7 +250,7 @@ def _tool_body(tool: Tool) -> Payload:
     return Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
 
 
-def _part_body(part: Part, place: Placement) -> Payload:
+def _part_body(part: Workpiece, place: Placement) -> Payload:
     own = Payload(mass=part.mass, com=part.cog, inertia=part.inertia)
     return _payload(pin.SE3(place.rotation, place.position).act(payload_inertia(own)))
 

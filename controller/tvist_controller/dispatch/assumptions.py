@@ -7,7 +7,7 @@ from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.line.inverse_dynamics import SLEW
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.filter_planner import FilterChoice
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.refusal import RefusalError
@@ -54,17 +54,17 @@ class Assumptions:
 
     # ------------------------------------------------------------------ filter
 
-    def choose(self, chosen: PlannedFilter) -> None:
+    def choose(self, chosen: FilterChoice) -> None:
         """Use a filter from now on, or refuse it if the rest of the motion would collide."""
         self._motion.ahead.check_filter(chosen.tvist)
         self.use(chosen)
 
-    def estimate(self, chosen: PlannedFilter) -> None:
+    def estimate(self, chosen: FilterChoice) -> None:
         """Use other modes from now on, as `choose`."""
         self.choose(chosen)
         self._warn_of_payload()
 
-    def use(self, chosen: PlannedFilter) -> None:
+    def use(self, chosen: FilterChoice) -> None:
         """Use a filter from now on."""
         before, idle = self.source, self._idle
         self.source = chosen.source

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.dispatch.robot import Robot
-from tvist_controller.planning.command_row import Call, Row
+from tvist_controller.dispatch.robot import RobotParts
+from tvist_controller.planning.command_row import CommandCall, CommandRow
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import Planning
@@ -60,31 +60,31 @@ def _check_path(command: MovePath, description: RobotDescription) -> None:
     check_pace(SLOWEST["velocity"], SLOWEST["acceleration"], command.jerk)
 
 
-def _move(robot: Robot, call: Call[Any]) -> Reply:
+def _move(robot: RobotParts, call: CommandCall[Any]) -> Reply:
     robot.motion.check(tag(type(call.command)))
     planned: PlannedMove = call.planned()
     limited = None if planned.limited is None else planned.limited[1]
     return Accepted(id=robot.motion.move(planned), limited=limited)
 
 
-def _servo_start(robot: Robot, call: Call[c.ServoStart]) -> None:
+def _servo_start(robot: RobotParts, call: CommandCall[c.ServoStart]) -> None:
     command = call.command
     limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
     robot.motion.follow(command.period, limits, call.now)
 
 
-def _stop(robot: Robot, call: Call[c.Stop]) -> None:
+def _stop(robot: RobotParts, call: CommandCall[c.Stop]) -> None:
     why = "a stop was commanded"
     robot.programs.stop_moving(why)
     robot.motion.stop(call.command.deceleration, why)
 
 
-def _pause(robot: Robot, _: Call[c.Pause]) -> None:
+def _pause(robot: RobotParts, _: CommandCall[c.Pause]) -> None:
     robot.motion.pause()
     robot.safety.stay_paused()
 
 
-def _power_off(robot: Robot, _: Call[c.PowerOff]) -> None:
+def _power_off(robot: RobotParts, _: CommandCall[c.PowerOff]) -> None:
     why = "power_off was commanded"
     robot.programs.end(why)
     robot.motion.end("power_off", why, category=1)
@@ -98,19 +98,19 @@ def _check_speed(command: m.SpeedJ, description: RobotDescription) -> None:
     check_acceleration(command.acceleration, description)
 
 
-def _servo_j(robot: Robot, call: Call[m.ServoJ]) -> Reply:
+def _servo_j(robot: RobotParts, call: CommandCall[m.ServoJ]) -> Reply:
     command = call.command
     q = np.array(command.q, dtype=float)
     return Accepted(id=robot.guidance.servo(q, command.lookahead, command.gain, shaped=command.shaped))
 
 
-def _speed_j(robot: Robot, call: Call[m.SpeedJ]) -> Reply:
+def _speed_j(robot: RobotParts, call: CommandCall[m.SpeedJ]) -> Reply:
     command = call.command
     qd = np.array(command.qd, dtype=float)
     return Accepted(id=robot.guidance.move_joints(qd, command.acceleration, shaped=command.shaped))
 
 
-def _speed_l(robot: Robot, call: Call[m.SpeedL]) -> Reply:
+def _speed_l(robot: RobotParts, call: CommandCall[m.SpeedL]) -> Reply:
     command = call.command
     twist = np.array(command.xd, dtype=float)
     return Accepted(id=robot.guidance.move_tool(twist, *_accelerations(command), shaped=command.shaped))
@@ -121,17 +121,17 @@ def _accelerations(command: m.SpeedL | m.StopL) -> tuple[float, float]:
     return command.acceleration, command.acceleration if angular is None else angular
 
 
-def _stop_j(robot: Robot, call: Call[m.StopJ]) -> None:
+def _stop_j(robot: RobotParts, call: CommandCall[m.StopJ]) -> None:
     robot.programs.stop_moving("stop_j was commanded")
     robot.guidance.stop_joints(call.command.acceleration)
 
 
-def _stop_l(robot: Robot, call: Call[m.StopL]) -> None:
+def _stop_l(robot: RobotParts, call: CommandCall[m.StopL]) -> None:
     robot.programs.stop_moving("stop_l was commanded")
     robot.guidance.stop_tool(*_accelerations(call.command))
 
 
-def _force_mode(robot: Robot, call: Call[f.ForceMode]) -> Reply:
+def _force_mode(robot: RobotParts, call: CommandCall[f.ForceMode]) -> Reply:
     command = call.command
     compliant, wrench, limits = (
         np.array(value, dtype=float) for value in (command.compliant, command.wrench, command.limits)
@@ -140,11 +140,11 @@ def _force_mode(robot: Robot, call: Call[f.ForceMode]) -> Reply:
     return Accepted(id=robot.force_control.begin(task, command.frame or "base", command.frame_type))
 
 
-def _freedrive(robot: Robot, call: Call[f.Freedrive]) -> Reply:
+def _freedrive(robot: RobotParts, call: CommandCall[f.Freedrive]) -> Reply:
     return Accepted(id=robot.force_control.free(np.array(call.command.free, dtype=float), call.command.frame))
 
 
-def _end_force_mode(robot: Robot, _: Call[f.EndForceMode]) -> None:
+def _end_force_mode(robot: RobotParts, _: CommandCall[f.EndForceMode]) -> None:
     if robot.guidance.compliant is None:
         why = "neither force_mode nor freedrive is on"
         guided = robot.motion.activity is Activity.GUIDED
@@ -152,40 +152,42 @@ def _end_force_mode(robot: Robot, _: Call[f.EndForceMode]) -> None:
     robot.force_control.end()
 
 
-def _zero(robot: Robot, _: Call[f.ZeroFtsensor]) -> None:
+def _zero(robot: RobotParts, _: CommandCall[f.ZeroFtsensor]) -> None:
     robot.force_control.check_sensor()
     robot.forces.zero()
 
 
-ROWS: tuple[Row, ...] = (
-    Row(c.MoveJ, _move, check=_check_move, plan=_STRAIGHT),
-    Row(MoveL, _move, check=_check_tool_move, plan=_ALONG_PATH),
-    Row(MoveC, _move, check=_check_tool_move, plan=_ALONG_PATH),
-    Row(MovePath, _move, check=_check_path, plan=_ALONG_PATH, long=True),
-    Row(c.ServoStart, _servo_start, check=_check_limits),
-    Row(c.ServoStop, lambda robot, _: robot.motion.end_stream()),
-    Row(c.Stop, _stop, lease="if named", stops=True),
-    Row(c.Pause, _pause),
-    Row(c.Resume, lambda robot, _: robot.motion.resume()),
-    Row(
+ROWS: tuple[CommandRow, ...] = (
+    CommandRow(c.MoveJ, _move, check=_check_move, plan=_STRAIGHT),
+    CommandRow(MoveL, _move, check=_check_tool_move, plan=_ALONG_PATH),
+    CommandRow(MoveC, _move, check=_check_tool_move, plan=_ALONG_PATH),
+    CommandRow(MovePath, _move, check=_check_path, plan=_ALONG_PATH, long=True),
+    CommandRow(c.ServoStart, _servo_start, check=_check_limits),
+    CommandRow(c.ServoStop, lambda robot, _: robot.motion.end_stream()),
+    CommandRow(c.Stop, _stop, lease="if named", stops=True),
+    CommandRow(c.Pause, _pause),
+    CommandRow(c.Resume, lambda robot, _: robot.motion.resume()),
+    CommandRow(
         c.SetSpeed,
         lambda robot, call: robot.motion.motions.set_speed(call.command.fraction),
         changes_io=True,
     ),
-    Row(c.PowerOn, lambda robot, call: robot.safety.power_on(release_brakes=call.command.release_brakes)),
-    Row(c.PowerOff, _power_off, stops=True),
-    Row(c.UnlockProtectiveStop, lambda robot, _: robot.safety.unlock()),
-    Row(c.RestartSafety, lambda robot, _: robot.motion.safety.restart()),
-    Row(m.ServoJ, _servo_j, check=lambda command, description: check_joints(command.q, description)),
-    Row(m.SpeedJ, _speed_j, check=_check_speed),
-    Row(m.SpeedL, _speed_l),
-    Row(m.StopJ, _stop_j, stops=True),
-    Row(m.StopL, _stop_l, stops=True),
-    Row(f.ForceMode, _force_mode),
-    Row(f.Freedrive, _freedrive),
-    Row(f.EndForceMode, _end_force_mode, stops=True),
-    Row(f.ZeroFtsensor, _zero, changes_io=True),
-    Row(
+    CommandRow(
+        c.PowerOn, lambda robot, call: robot.safety.power_on(release_brakes=call.command.release_brakes)
+    ),
+    CommandRow(c.PowerOff, _power_off, stops=True),
+    CommandRow(c.UnlockProtectiveStop, lambda robot, _: robot.safety.unlock()),
+    CommandRow(c.RestartSafety, lambda robot, _: robot.motion.safety.restart()),
+    CommandRow(m.ServoJ, _servo_j, check=lambda command, description: check_joints(command.q, description)),
+    CommandRow(m.SpeedJ, _speed_j, check=_check_speed),
+    CommandRow(m.SpeedL, _speed_l),
+    CommandRow(m.StopJ, _stop_j, stops=True),
+    CommandRow(m.StopL, _stop_l, stops=True),
+    CommandRow(f.ForceMode, _force_mode),
+    CommandRow(f.Freedrive, _freedrive),
+    CommandRow(f.EndForceMode, _end_force_mode, stops=True),
+    CommandRow(f.ZeroFtsensor, _zero, changes_io=True),
+    CommandRow(
         f.SetExternalWrench,
         lambda robot, call: robot.force_control.external.sense(np.array(call.command.wrench, dtype=float)),
     ),

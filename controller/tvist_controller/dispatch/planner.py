@@ -8,7 +8,7 @@ from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import Found, Plan
 from tvist_controller.planning.reachable import Reachable
-from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.planning.snapshot import FilterState, PlanningState
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
@@ -42,7 +42,7 @@ class Planner:
         return Plan({"filter": present}, found)
 
     def plan(
-        self, command: Command, now: Snapshot, *, within_tick: bool = False, checked: bool = False
+        self, command: Command, now: PlanningState, *, within_tick: bool = False, checked: bool = False
     ) -> Plan:
         """Plan a command, or its refusal, on the present state; `checked`: its row's check has passed."""
         row = COMMANDS[type(command)]

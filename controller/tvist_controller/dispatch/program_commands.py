@@ -1,7 +1,7 @@
 """Commands that load, play, pause, stop and extend programs."""
 
-from tvist_controller.dispatch.robot import Robot
-from tvist_controller.planning.command_row import Call, Row
+from tvist_controller.dispatch.robot import RobotParts
+from tvist_controller.planning.command_row import CommandCall, CommandRow
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.snapshot import SCRIPT
 from tvist_controller.programs.compiling import Kept, ScriptCompiler
@@ -19,7 +19,7 @@ _COMPILED_AFTER = Planning(
 )
 
 
-def _load(robot: Robot, call: Call[p.ProgramLoad]) -> None:
+def _load(robot: RobotParts, call: CommandCall[p.ProgramLoad]) -> None:
     name, script, kept = call.command.name, call.planned(), robot.programs.kept
     if call.command.text is not None:
         kept.keep(name, Kept(script, call.origin))
@@ -27,7 +27,7 @@ def _load(robot: Robot, call: Call[p.ProgramLoad]) -> None:
     robot.programs.load(name, loaded, "another program was loaded")
 
 
-def _run(robot: Robot, call: Call[p.ProgramRun]) -> None:
+def _run(robot: RobotParts, call: CommandCall[p.ProgramRun]) -> None:
     script = call.planned()
     _check_power(robot, "program.run")
     if script.secondary:
@@ -37,7 +37,7 @@ def _run(robot: Robot, call: Call[p.ProgramRun]) -> None:
         robot.programs.play(call.origin)
 
 
-def _play(robot: Robot, call: Call[p.ProgramPlay]) -> None:
+def _play(robot: RobotParts, call: CommandCall[p.ProgramPlay]) -> None:
     programs, motion = robot.programs, robot.motion
     if programs.loaded is None:
         raise RefusalError("wrong_mode", "", "no program is loaded: send program.load first")
@@ -54,19 +54,19 @@ def _play(robot: Robot, call: Call[p.ProgramPlay]) -> None:
         programs.play(call.origin if call.origin == programs.loaded.origin else None)
 
 
-def _pause(robot: Robot, _: Call[p.ProgramPause]) -> None:
+def _pause(robot: RobotParts, _: CommandCall[p.ProgramPause]) -> None:
     if robot.programs.state != "PLAYING":
         raise RefusalError("wrong_mode", "", "no program is playing: there is nothing to pause")
     robot.programs.hold()
 
 
-def _stop(robot: Robot, _: Call[p.ProgramStop]) -> None:
+def _stop(robot: RobotParts, _: CommandCall[p.ProgramStop]) -> None:
     why = "the program was stopped"
     robot.programs.end(why)
     robot.motion.stop(None, why)
 
 
-def _check_power(robot: Robot, command: str) -> None:
+def _check_power(robot: RobotParts, command: str) -> None:
     """Refuse to start a program without power or in a protective stop."""
     activity = robot.motion.activity
     if activity.robot_mode is not RobotMode.RUNNING or activity.protective:
@@ -74,21 +74,21 @@ def _check_power(robot: Robot, command: str) -> None:
     robot.motion.safety.check("move_j", activity)
 
 
-ROWS: tuple[Row, ...] = (
-    Row(p.ProgramLoad, _load, lease="if named", changes_io=True, plan=_COMPILED, long=True),
-    Row(p.ProgramRun, _run, changes_io=True, plan=_COMPILED, long=True),
-    Row(p.ProgramPlay, _play, changes_io=True),
-    Row(p.ProgramPause, _pause, changes_io=True),
-    Row(p.ProgramStop, _stop, lease="if named", changes_io=True, stops=True),
-    Row(p.ProgramClosePopup, lambda robot, _: robot.programs.popups.close(), lease="none"),
-    Row(
+ROWS: tuple[CommandRow, ...] = (
+    CommandRow(p.ProgramLoad, _load, lease="if named", changes_io=True, plan=_COMPILED, long=True),
+    CommandRow(p.ProgramRun, _run, changes_io=True, plan=_COMPILED, long=True),
+    CommandRow(p.ProgramPlay, _play, changes_io=True),
+    CommandRow(p.ProgramPause, _pause, changes_io=True),
+    CommandRow(p.ProgramStop, _stop, lease="if named", changes_io=True, stops=True),
+    CommandRow(p.ProgramClosePopup, lambda robot, _: robot.programs.popups.close(), lease="none"),
+    CommandRow(
         p.ProgramInterpret,
         lambda robot, call: Accepted(id=robot.programs.statements.interpret(call.planned())),
         changes_io=True,
         plan=_COMPILED_AFTER,
         long=True,
     ),
-    Row(
+    CommandRow(
         p.ProgramSkip, lambda robot, call: robot.programs.statements.skip(call.command.what), changes_io=True
     ),
 )

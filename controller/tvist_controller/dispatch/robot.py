@@ -21,13 +21,13 @@ from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitor import Monitor
-from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.filter_planner import FilterChoice
 from tvist_controller.planning.plan import MakesPlans, Order, Plan, Plans
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.safety.faults import Faults
-from tvist_controller.safety.monitors import Overload, ShaperMonitor
+from tvist_controller.safety.monitors import ShaperMonitor, TorqueOverload
 from tvist_controller.safety.own_controller import Supervision, Watching
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
@@ -41,7 +41,7 @@ from tvist_protocol.stream import Event, EventKind, State
 from tvist_protocol.values import Payload
 
 
-class Robot(ABC):
+class RobotParts(ABC):
     """The parts of one robot, on which commands act; a `Controller` creates them."""
 
     def __init__(self, setup: Setup, plant: Plant | None, planner: MakesPlans, order: Order | None) -> None:
@@ -97,7 +97,7 @@ class Robot(ABC):
 
     def _monitors(self) -> tuple[Monitor, ...]:
         description = self.setup.description
-        overload = Overload(description.robot.joints, description.limits.torque)
+        overload = TorqueOverload(description.robot.joints, description.limits.torque)
         # A driven arm's own controller monitors its torques; those reported here may be estimates from currents.
         drives = () if self.cycle.plant.supervised else (overload,)
         return *drives, ShaperMonitor(self.cycle), self.force_control, self.assumed.monitor
@@ -135,7 +135,7 @@ class Robot(ABC):
         """Fingerprint of the arm that the robot file describes."""
         return fingerprint(self.setup.description)
 
-    def snapshot(self, time: float | None = None) -> Snapshot:
+    def snapshot(self, time: float | None = None) -> PlanningState:
         """Return the state that plans depend on; with a time, of a path that continues the motion."""
         return self.motion.snapshot(self.assumed.present(), self.programs.statements.last, time)
 
@@ -173,7 +173,7 @@ class Robot(ABC):
         self.motion.interrupt(why)
 
 
-def _cycle(setup: Setup, first: PlannedFilter, plant: Plant | None) -> ControlCycle:
+def _cycle(setup: Setup, first: FilterChoice, plant: Plant | None) -> ControlCycle:
     """Create the control line with its arm; raise ValueError for an invalid start or a missing truth."""
     try:
         cycle = ControlCycle(

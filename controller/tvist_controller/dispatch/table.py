@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from tvist_controller.dispatch import motion_commands, program_commands
-from tvist_controller.dispatch.robot import Robot
-from tvist_controller.planning.command_row import Call, Row
+from tvist_controller.dispatch.robot import RobotParts
+from tvist_controller.planning.command_row import CommandCall, CommandRow
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import Planning
 from tvist_controller.planning.reachable import Reachable
@@ -32,24 +32,28 @@ def _check_version(command: c.TakeControl | c.TakeClock, _: RobotDescription) ->
         raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)
 
 
-def _take_control(robot: Robot, call: Call[c.TakeControl]) -> Reply:
+def _take_control(robot: RobotParts, call: CommandCall[c.TakeControl]) -> Reply:
     lease = robot.session.take(call.command.client, call.command.lease_s, call.now, call.session)
     return Accepted(token=lease.token, lease_s=lease.seconds)
 
 
 _RIGHTS = (
-    Row(c.TakeControl, _take_control, lease="none", check=_check_version),
-    Row(c.KeepAlive, lambda _, __: None),  # every command renews the lease
+    CommandRow(c.TakeControl, _take_control, lease="none", check=_check_version),
+    CommandRow(c.KeepAlive, lambda _, __: None),  # every command renews the lease
     # The new holder takes control with its own token.
-    Row(c.HandOver, lambda robot, call: robot.session.hand_over(call.command.client, call.now, call.session)),
-    Row(c.ReleaseControl, lambda robot, _: robot.session.release()),
-    Row(
+    CommandRow(
+        c.HandOver, lambda robot, call: robot.session.hand_over(call.command.client, call.now, call.session)
+    ),
+    CommandRow(c.ReleaseControl, lambda robot, _: robot.session.release()),
+    CommandRow(
         c.TakeClock,
         lambda robot, call: Accepted(token=robot.session.take_clock(call.command.client, call.session)),
         lease="none",
         check=_check_version,
     ),
-    Row(c.ReleaseClock, lambda robot, call: robot.session.release_clock(call.command.token), lease="none"),
+    CommandRow(
+        c.ReleaseClock, lambda robot, call: robot.session.release_clock(call.command.token), lease="none"
+    ),
 )
 
 # ---------------------------------------------------------------------- filter, payload, terminals
@@ -65,7 +69,7 @@ def _filter(make: Any) -> Planning:
 
 
 _FILTERS = (
-    Row(
+    CommandRow(
         c.SetShaper,
         lambda robot, call: robot.assumed.choose(call.planned()),
         plan=_filter(
@@ -74,7 +78,7 @@ _FILTERS = (
             )
         ),
     ),
-    Row(
+    CommandRow(
         c.SetEstimator,
         lambda robot, call: robot.assumed.estimate(call.planned()),
         plan=Planning(FILTER, FilterPlanner, FilterPlanner.estimate),
@@ -82,28 +86,30 @@ _FILTERS = (
     ),
 )
 _SETTINGS = (
-    Row(
+    CommandRow(
         c.SetPayload,
         lambda robot, call: robot.assumed.declare(call.command, call.planned()),
         changes_io=True,
         check=_check_payload,
         plan=_filter(lambda planner, command, now: planner.with_payload(payload_of(command), now)),
     ),
-    Row(
+    CommandRow(
         c.Forget,
         lambda robot, call: robot.assumed.forget(call.planned),
         changes_io=True,
         plan=_filter(lambda planner, _, now: planner.with_payload(now.given, now)),
     ),
-    Row(io.SetIo, lambda robot, call: robot.peripherals.set_outputs(call.command), changes_io=True),
-    Row(
+    CommandRow(io.SetIo, lambda robot, call: robot.peripherals.set_outputs(call.command), changes_io=True),
+    CommandRow(
         io.SetRegisters,
         lambda robot, call: robot.peripherals.write_registers(call.command, call.tick),
         lease="if named",
         changes_io=True,
     ),
-    Row(io.SetTcp, lambda robot, call: robot.peripherals.set_tcp(call.command.offset), changes_io=True),
-    Row(
+    CommandRow(
+        io.SetTcp, lambda robot, call: robot.peripherals.set_tcp(call.command.offset), changes_io=True
+    ),
+    CommandRow(
         io.SimulationSetInputs,
         lambda robot, call: robot.peripherals.set_inputs(call.command),
         changes_io=True,
@@ -120,7 +126,7 @@ def _check_reset(command: SimulationReset, description: RobotDescription) -> Non
         check_body(command.payload, "payload")
 
 
-def _place(robot: Robot, call: Call[SimulationReset]) -> Reply:
+def _place(robot: RobotParts, call: CommandCall[SimulationReset]) -> Reply:
     command, chosen, cycle = call.command, call.planned(), robot.cycle
     plant, motion, cell = cycle.plant, robot.motion, robot.cell
     if not isinstance(plant, SimulatedArm):
@@ -159,7 +165,7 @@ def _place(robot: Robot, call: Call[SimulationReset]) -> Reply:
     return Done(tick=robot.tick_number)
 
 
-def _check_step(robot: Robot, call: Call[SimulationStep]) -> Reply:
+def _check_step(robot: RobotParts, call: CommandCall[SimulationStep]) -> Reply:
     """Check that a client may advance time; the host then does so."""
     command = call.command
     robot.session.check_step(command, call.now)
@@ -177,7 +183,7 @@ def _check_step(robot: Robot, call: Call[SimulationStep]) -> Reply:
 
 
 _SIMULATION = (
-    Row(
+    CommandRow(
         SimulationReset,
         _place,
         check=_check_reset,
@@ -186,19 +192,19 @@ _SIMULATION = (
             else planner.choose(command.shaper, 1, now.source, now.declared)
         ),
     ),
-    Row(SimulationStep, _check_step, lease="none", long=True),
-    Row(
+    CommandRow(SimulationStep, _check_step, lease="none", long=True),
+    CommandRow(
         SimulationInject,
         lambda robot, call: robot.faults.inject(call.command, call.tick),
         check=check_fault,
     ),
 )  # fmt: skip
 _QUESTIONS = tuple(
-    Row(kind, lambda _, call: call.planned(), lease="none", plan=Planning(TOOL, Reachable, make))
+    CommandRow(kind, lambda _, call: call.planned(), lease="none", plan=Planning(TOOL, Reachable, make))
     for kind, make in ((InverseKinematics, Reachable.posture), (ForwardKinematics, Reachable.pose))
 )
 
-COMMANDS: dict[type[c.Command], Row] = {
+COMMANDS: dict[type[c.Command], CommandRow] = {
     row.message: row
     for row in (
         *_RIGHTS, *motion_commands.ROWS, *_FILTERS, *_SETTINGS, *program_commands.ROWS,

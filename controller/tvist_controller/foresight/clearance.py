@@ -20,7 +20,7 @@ of columns. The floor's row has the link `FLOOR` and its height."""
 FLOOR = -1.0
 ONE, OTHER, ARMS = 0, 1, 2
 """Columns of a pair: numbers of its bodies, then for each joint the bound of their approach [m/rad]."""
-LOOKS = 16
+MAX_POSTURES = 16
 """Largest number of postures checked per stop."""
 
 
@@ -112,7 +112,7 @@ def stop_has_room(
     now, fastest, left = np.empty(n), np.empty(n), np.empty(n)
     waiting = np.arange(pairs.shape[0])  # pairs that are not known to stay apart until the end
     count = waiting.shape[0]
-    for _ in range(LOOKS):
+    for _ in range(MAX_POSTURES):
         for j in range(n):
             phases = stop_phases(qd[j], qdd[j], limit, jerk)
             turned, v, a = after(qd[j], qdd[j], phases, time)

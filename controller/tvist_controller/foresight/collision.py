@@ -21,20 +21,20 @@ from tvist_controller.foresight.clearance import (
 )
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.refusal import RefusalError
-from tvist_controller.trajectory import Way
+from tvist_controller.trajectory import CheckedMotion
 from tvist_plant.chain import AXES, chain_of
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, link_frame, rigid_model
 
 CLEARANCE = 0.005
 """Smallest permitted distance between two bodies [m]."""
-FAR = 0.05
+FAR_APART = 0.05
 """Distance above which long steps between checks are allowed [m]."""
 SHORT = 0.004
 """Travel of the arm between two checks at the smallest permitted distance [m]."""
 ROUNDING = 1e-9
 """Distance changes below this are rounding errors [m]."""
-SURE = 1e-5
+BOUND_MARGIN = 1e-5
 """Margin of bounds beyond the clearance, above the accuracy of distances [m]."""
 PAYLOAD = "payload"
 
@@ -110,7 +110,7 @@ class CollisionModel:
             why = f"{met}: choose a posture in which the arm and its payload are clear"
             raise RefusalError("collision", field, why, CLEARANCE)
 
-    def on_way(self, way: Way, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
+    def on_way(self, way: CheckedMotion, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
         """Return the first meeting on a path with its position (share of the path), or None.
 
         Steps are long where all bodies are far apart. Pairs that are too close at the start, or at a posture
@@ -125,10 +125,10 @@ class CollisionModel:
             least = np.maximum(np.minimum(gaps, CLEARANCE), least)
             if share >= 1.0:
                 return None
-            nearest = min(float(gaps.min(initial=np.inf)), FAR)
+            nearest = min(float(gaps.min(initial=np.inf)), FAR_APART)
             share = 1.0 if travel <= 0.0 else min(share + max(nearest - CLEARANCE, SHORT) / travel, 1.0)
 
-    def nearest(self, postures: Floats, far: float = FAR) -> float:
+    def nearest(self, postures: Floats, far: float = FAR_APART) -> float:
         """Return the smallest distance at k postures, shape (k, n) [rad], at most `far` [m]."""
         return min((far, *(float(self._gaps(q).min(initial=far)) for q in postures)))
 
@@ -138,11 +138,11 @@ class CollisionModel:
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
         """Return whether turning the joints by these angles around a posture certainly avoids meetings."""
-        return rooms(*self._parts, q, turned, self._found) > CLEARANCE + SURE
+        return rooms(*self._parts, q, turned, self._found) > CLEARANCE + BOUND_MARGIN
 
     def stop_is_spacious(self, state: Target, acceleration: float, jerk: float) -> bool:
         """Return whether a joint stop within these limits certainly avoids meetings."""
-        least = CLEARANCE + SURE
+        least = CLEARANCE + BOUND_MARGIN
         return stop_has_room(*self._parts, state.q, state.qd, state.qdd, acceleration, jerk, least)
 
     def declare(self, payload: Payload) -> None:

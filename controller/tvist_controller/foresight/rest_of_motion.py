@@ -11,9 +11,9 @@ from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import TorqueRoom
+from tvist_controller.line.limits import StreamTorqueMargin
 from tvist_controller.refusal import RefusalError
-from tvist_controller.trajectory import JointStop, PlannedMotion, Way
+from tvist_controller.trajectory import CheckedMotion, JointStop, PlannedMotion
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
@@ -25,7 +25,7 @@ class RemainingMotion:
     def __init__(self, cycle: ControlCycle, stopper: Stopper, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
         self._stopper = stopper
-        room = TorqueRoom(cycle.description, cycle.dynamics)
+        room = StreamTorqueMargin(cycle.description, cycle.dynamics)
         self._guard = StreamGuard(collisions, stopper.stops, room)
         reach = np.array(cycle.description.limits.position)
         self._guide_guard = StreamGuard(collisions, stopper.stops, room, reach=reach)
@@ -82,7 +82,7 @@ class RemainingMotion:
         guard.take(cycle.newest, stop)
         return None
 
-    def _first(self, ways: Sequence[Way]) -> Meeting | None:
+    def _first(self, ways: Sequence[CheckedMotion]) -> Meeting | None:
         return next((found[1] for way in ways if (found := self._collisions.on_way(way))), None)
 
     def check_payload(self, payload: Payload, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> None:
@@ -125,5 +125,5 @@ class RemainingMotion:
             return None
         steps = np.abs(np.diff(ahead, axis=0)).max(axis=0)
         last = len(ahead) - 1
-        found = self._collisions.on_way(Way(lambda share: ahead[round(share * last)], steps * last))
+        found = self._collisions.on_way(CheckedMotion(lambda share: ahead[round(share * last)], steps * last))
         return None if found is None else found[1]

@@ -6,8 +6,8 @@ from tvist_controller.foresight.collision import CollisionModel, Meeting
 from tvist_controller.foresight.stops import StopPlanner
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.guard import Guard, Obstacle
-from tvist_controller.line.limits import GENTLEST_STOP, TorqueRoom
-from tvist_controller.trajectory import JointStop, Way
+from tvist_controller.line.limits import GENTLEST_STOP, StreamTorqueMargin
+from tvist_controller.trajectory import CheckedMotion, JointStop
 
 MARGIN = 0.8
 """Fraction of the acceleration that torque permits at the start of a stop; the margin is for changes on the way [-]."""
@@ -25,7 +25,7 @@ class StreamGuard(Guard):
         self,
         collisions: CollisionModel,
         stops: StopPlanner,
-        room: TorqueRoom,
+        room: StreamTorqueMargin,
         *,
         reach: Floats | None = None,  # shape (n,) [rad]
     ) -> None:
@@ -74,7 +74,7 @@ class StreamGuard(Guard):
         if self._collisions.is_spacious(q, turned):
             return True
         before = None if self._before is None else self._before[0].q
-        way = Way(
+        way = CheckedMotion(
             lambda share: stop.at(share * stop.duration)[0], _fastest(qd, qdd, stop.jerk) * stop.duration
         )
         found = self._collisions.on_way(way, before=before)

@@ -11,11 +11,11 @@ from tvist_controller.foresight.stops import StopPlan, StopPlanner
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.trajectory import AnyStop, Forecast, JointStop, StuckError, Trajectory
+from tvist_controller.trajectory import AnyStop, BrakingForecast, JointStop, StuckError, Trajectory
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
-LONG = 0.2
+LONG_STOP = 0.2
 """Duration above which slower playback along a curve is tried as a stop [s]."""
 EVEN = 1e-12
 """Differences between steps below this are rounding errors [rad]."""
@@ -86,7 +86,7 @@ class Stopper:
             stop = self.stops.stop(cycle.newest, hardest) if guard is None else guard.fallback()
         return self._plan(stop, deceleration, stop.duration, stop.end)
 
-    def _on_path(self, forecast: Forecast, deceleration: float | None) -> StopPlan | None:
+    def _on_path(self, forecast: BrakingForecast, deceleration: float | None) -> StopPlan | None:
         cycle, forecast = self._cycle, self._shaped(forecast)
         # Try the cheapest search first: bounds only, then simulation of a stop's duration, then of the whole motion.
         state, newest = cycle.along.published, cycle.along.position
@@ -109,7 +109,7 @@ class Stopper:
                 lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
             curved = forecast.path.posture_of is not None
             lasts = math.inf if lets_run_out.duration is None else lets_run_out.duration
-            if stop is None and curved and lasts > LONG and cycle.mode is not LineMode.STOPPING:
+            if stop is None and curved and lasts > LONG_STOP and cycle.mode is not LineMode.STOPPING:
                 slowed = self.stops.slowed(ahead, state, forecast, deceleration, asked)
                 if slowed is not None and slowed.duration < lasts:
                     return self._plan(slowed, deceleration, slowed.duration, slowed.end)
@@ -128,7 +128,7 @@ class Stopper:
         way = float(np.abs(end - self._cycle.position).max())
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
 
-    def _shaped(self, forecast: Forecast) -> Forecast:
+    def _shaped(self, forecast: BrakingForecast) -> BrakingForecast:
         """Return the forecast of a motion behind the filter."""
         cycle = self._cycle
         if cycle.mode is LineMode.STOPPING:

@@ -12,17 +12,24 @@ from tvist_controller.foresight.line_copy import LineSimulation
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GENTLEST_STOP, StopTorque, torque_along
-from tvist_controller.trajectory import AnyStop, Forecast, JointStop, MotionLimits, PathStop, SlowedStop
+from tvist_controller.trajectory import (
+    AnyStop,
+    BrakingForecast,
+    JointStop,
+    MotionLimits,
+    PathStop,
+    SlowedStop,
+)
 from tvist_plant.description import RobotDescription
 
 S = TypeVar("S", JointStop, PathStop, SlowedStop)
 
-STEP = 0.8
+DECELERATION_RATIO = 0.8
 """Ratio of consecutive trial decelerations [-]."""
 HARDER = 1.05
 """Factor by which a stop must brake harder than the motion to be never ahead of it, since a varying filter
 may brake slightly harder than its reference [-]."""
-SLOW = 3e-3
+TURN_BACK_SPEED = 3e-3
 """Speed below which interpolation may turn a shaped motion back slightly [rad/s]."""
 SOON = 0.02
 """A motion that brakes later than this is by then ahead of a stop [s]."""
@@ -64,7 +71,7 @@ class StopPlanner:
         self,
         state: Target,  # of the path's parameter, a tick before `newest`
         newest: Floats,  # parameter of the newest shaped reference, shape (m,) [rad]
-        forecast: Forecast,
+        forecast: BrakingForecast,
         wanted: float | None,  # requested deceleration [rad/s^2]; None for the largest possible
         *,
         certain: bool = True,
@@ -83,7 +90,7 @@ class StopPlanner:
         in_time = forecast.steady + COUNTED * max(speed, 0.0) / forecast.braking
         # A very slow motion may turn back a little; braking with a stop's jerk may end as soon as the stop; and a
         # motion about to rest ends sooner than any stop within the limits.
-        creeps = speed < SLOW
+        creeps = speed < TURN_BACK_SPEED
         jerks = HARDER * forecast.jerk > hardest.jerk and forecast.steady < SOON
         rests = rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * hardest.jerk)
         if certain and (creeps or jerks or rests or forecast.turns):
@@ -98,7 +105,7 @@ class StopPlanner:
         self,
         ahead: LineSimulation,  # simulated for as long as a stop lasts; until rest if the motion may turn back
         state: Target,  # for this and the next two see `on_path`
-        forecast: Forecast,
+        forecast: BrakingForecast,
         wanted: float | None,
         asked: Floats | None = None,  # largest torques of the uninterrupted motion, shape (n,) [N m]
     ) -> PathStop | None:
@@ -119,7 +126,7 @@ class StopPlanner:
         self,
         ahead: LineSimulation,
         state: Target,
-        forecast: Forecast,
+        forecast: BrakingForecast,
         wanted: float | None,
         asked: Floats | None,
     ) -> SlowedStop | None:
@@ -127,7 +134,7 @@ class StopPlanner:
         samples, path = np.array(ahead.samples), forecast.path
         joints = Target(*path.states(state.q, state.qd, state.qdd))
         fastest = float(np.abs(joints.qd).max())
-        if fastest < SLOW or len(samples) < 4:
+        if fastest < TURN_BACK_SPEED or len(samples) < 4:
             return None
         torque = StopTorque(
             self._dynamics, joints, self._torque, np.zeros_like(joints.q) if asked is None else asked
@@ -179,7 +186,7 @@ class StopPlanner:
         self,
         state: Target,
         newest: Floats,
-        forecast: Forecast,
+        forecast: BrakingForecast,
         wanted: float | None,
         permitted: Callable[[PathStop], bool],
         asked: Floats | None = None,
@@ -198,7 +205,7 @@ class StopPlanner:
         )  # fmt: skip
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
-    def _keeping(self, state: Target, forecast: Forecast, acceleration: float) -> MotionLimits | None:
+    def _keeping(self, state: Target, forecast: BrakingForecast, acceleration: float) -> MotionLimits | None:
         """Return limits of a stop's parameter that keep all joints within an acceleration and the stops' jerk."""
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
         fastest = speed + self.period * rise + rise * rise / self.jerk
@@ -210,12 +217,12 @@ class StopPlanner:
         down = first
         while down > GENTLEST_STOP:
             yield down
-            down *= STEP
+            down *= DECELERATION_RATIO
         yield GENTLEST_STOP
-        up = first / STEP
+        up = first / DECELERATION_RATIO
         while up < self.highest:
             yield up
-            up /= STEP
+            up /= DECELERATION_RATIO
         if first < self.highest:
             yield self.highest
 

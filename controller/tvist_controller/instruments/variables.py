@@ -182,7 +182,7 @@ def _joint_mode(r: Reading) -> int:
 
 _ROWS = (
     _state("target_q", "VECTOR6D",
-           "reference before shaping, which is what the program or the client asks for [rad].",
+           "reference before shaping, from the program or client [rad].",
            lambda r: r.state.target_q if r.state.unshaped_q is None else r.state.unshaped_q),
     _state("target_qd", "VECTOR6D", "velocity of the reference before shaping [rad/s].",
            lambda r: r.state.target_qd if r.state.unshaped_qd is None else r.state.unshaped_qd),
@@ -194,7 +194,7 @@ _ROWS = (
            lambda r: START + r.state.timestamp),
     _state("control_step", "UINT64", "number of the control period.", lambda r: r.state.tick),
     _constant("actual_execution_time", "DOUBLE",
-              "0; telemetry has the duration of a tick, which differs between equal runs [ms].", 0.0),
+              "0; use telemetry for the duration of a tick, which differs between equal runs [ms].", 0.0),
     _constant("target_execution_time", "DOUBLE", "2, the control period [ms].", 2.0),
     _state("robot_mode", "INT32", "RTDE's number; 3 is POWER_OFF, 5 IDLE, 7 RUNNING."),
     _computed("joint_mode", "VECTOR6INT32",
@@ -205,21 +205,21 @@ _ROWS = (
     _state("safety_status", "INT32", "the safety mode again; the additional numbers of RTDE do not occur.",
            lambda r: r.state.safety_mode),
     _computed("runtime_state", "UINT32",
-              "that of the program; of the motion if no program runs; 1 is STOPPED, 2 PLAYING, 4 PAUSED. "
+              "state of the program, or of the motion if no program runs; 1 is STOPPED, 2 PLAYING, 4 PAUSED. "
               "A paused program whose arm still moves is PAUSING, 3.", _runtime_state),
     _computed("robot_status_bits", "UINT32",
               "from the modes; bit 0 is power on, bit 1 running; bits 2 and 3, of two buttons, are 0.",
               lambda r: int(r.powered) | (r.runtime_state in _RUNNING) << 1),
     _computed("safety_status_bits", "UINT32",
-              "from the safety mode, which has a bit of its own; stops also set bit 10, emergency stops bit 7.",
+              "one bit per safety mode; stops also set bit 10, emergency stops bit 7.",
               lambda r: SAFETY_BITS.get(r.state.safety_mode, 0)),
     _computed("speed_scaling", "DOUBLE",
-              "what limits the speed besides the slider, as reduced mode does [-]; 0 while a program is paused.",
+              "further speed factor besides the slider, as of reduced mode [-]; 0 while a program is paused.",
               _speed_scaling),
     _io("target_speed_fraction", "DOUBLE", "the speed slider [-]."),
-    _constant("time_scale_source", "INT32", "0; the cause of a slower motion is not distinguished."),
+    _constant("time_scale_source", "INT32", "0; the cause of slower motion is not reported."),
     _io("script_control_line", "UINT32",
-        "line of the program, counted from 1; 0 if no program runs. It is up to date to a tenth of a second.",
+        "line of the program, counted from 1; 0 if no program runs. It may be 0.1 s old.",
         lambda r: r.io.program_line),
     _constant("actual_main_voltage", "DOUBLE", "48, the safety board's supply [V].", BUS_VOLTAGE),
     Variable("actual_robot_voltage", "DOUBLE", "constant", "48 while the arm has power, else 0 [V].",
@@ -236,18 +236,17 @@ _ROWS = (
 
     # Motion, torque and electricity of the joints.
     _state("shaped_q", "VECTOR6D",
-           "reference after shaping, which the drives follow; a variable that only TVIST has [rad].",
+           "reference after shaping, which the drives follow; only in TVIST [rad].",
            lambda r: r.state.target_q),
     _state("shaped_qd", "VECTOR6D",
-           "velocity of the reference after shaping; a variable that only TVIST has [rad/s].",
+           "velocity of the reference after shaping; only in TVIST [rad/s].",
            lambda r: r.state.target_qd),
     _state("shaped_qdd", "VECTOR6D",
-           "acceleration of the reference after shaping; a variable that only TVIST has [rad/s²].",
+           "acceleration of the reference after shaping; only in TVIST [rad/s²].",
            lambda r: r.state.target_qdd),
     _computed("target_moment", "VECTOR6D",
-              "torque that the rigid model with the declared payload needs for the target motion [N m]. It is "
-              "that of the state, which belongs to the shaped reference, plus the difference between the two "
-              "references.",
+              "torque of the rigid model with the declared payload for the target motion [N m]: the state's "
+              "torque, for the shaped reference, plus the difference between both references.",
               _target_moment),
     _computed("target_current", "VECTOR6D",
               "target torque over torque constant; zero while the brakes hold the arm [A].", _target_current),
@@ -257,13 +256,13 @@ _ROWS = (
               "measured torque over torque constant; zero while the brakes hold the arm [A].",
               attrgetter("current")),
     Variable("actual_current_window", "VECTOR6D", "constant",
-             "allowed difference of the two currents, from a tenth of the joint's largest torque [A].",
+             "allowed difference between both currents: a tenth of the joint's largest torque [A].",
              lambda r: [rating.window for rating in r.ratings]),
     _state("actual_current_as_torque", "VECTOR6D",
            "measured torque; zero while the brakes hold the arm [N m].",
            lambda r: r.state.actual_moment if r.driven else [0.0] * len(r.ratings)),
     _computed("joint_control_output", "VECTOR6D",
-              "the measured currents, since a simulated motor has the current that its drive asks for [A].",
+              "the measured currents, since simulated drives have no current error [A].",
               attrgetter("current")),
     Variable("actual_joint_voltage", "VECTOR6D", "constant", "48 while the arm has power, else 0 [V].",
              lambda r: [BUS_VOLTAGE if r.powered else 0.0] * len(r.ratings)),
@@ -275,47 +274,46 @@ _ROWS = (
 
     # Motion and forces of tool and payload, in the base frame unless stated otherwise.
     _io("tcp_offset", "VECTOR6D", "tool centre point in the flange frame [m, rad]."),
-    _state("actual_TCP_pose", "VECTOR6D", "kinematics of the measured angles with the TCP offset [m, rad]."),
+    _state("actual_TCP_pose", "VECTOR6D", "TCP pose at the measured angles [m, rad]."),
     _state("actual_TCP_speed", "VECTOR6D",
-           "kinematics of measured angles and velocities with the TCP offset [m/s, rad/s]."),
+           "TCP velocity from measured angles and velocities [m/s, rad/s]."),
     _state("actual_tool_accelerometer", "VECTOR3D",
            "specific force in the flange frame; at rest it points up with 9.81 [m/s²]."),
-    _computed("target_TCP_pose", "VECTOR6D", "kinematics of the target angles with the TCP offset [m, rad].",
+    _computed("target_TCP_pose", "VECTOR6D", "TCP pose at the target angles [m, rad].",
               lambda r: r.target[:6].tolist()),
     _computed("target_TCP_speed", "VECTOR6D",
-              "kinematics of target angles and velocities with the TCP offset [m/s, rad/s].",
+              "TCP velocity from target angles and velocities [m/s, rad/s].",
               lambda r: r.target[6:12].tolist()),
     _computed("target_TCP_acceleration", "VECTOR6D",
-              "kinematics of target angles, velocities and accelerations with the TCP offset [m/s², rad/s²].",
+              "TCP acceleration from target angles, velocities and accelerations [m/s², rad/s²].",
               lambda r: r.target[12:].tolist()),
     _computed("actual_TCP_acceleration", "VECTOR6D",
-              "the accelerometer's value without gravity, in the base frame and at the TCP [m/s², rad/s²]. "
-              "The angular acceleration is that of the shaped reference, since no sensor measures it.",
+              "accelerometer's value without gravity, converted to base frame and TCP [m/s², rad/s²]. "
+              "The angular acceleration is not measured but computed from the shaped reference.",
               _tool_acceleration),
     _computed("actual_TCP_force", "VECTOR6D",
-              "force at the TCP by the sensor in the flange, without the declared payload's weight [N, N m]. "
-              "Without a sensor, it is the force that explains the measured torques, through the Jacobian. "
-              "The torque that the shaped motion needs (rigid arm with the declared payload, rotors, friction) is "
-              "subtracted first. Near a singularity part of the force cannot be measured and is left out. It is "
-              "zero while the arm is braked. "
-              "In either case, the force that a program has taken as zero is subtracted last.", _tool_force),
-    _computed("tcp_force_scalar", "DOUBLE", "length of the TCP force's linear part [N].",
+              "force at the TCP from the flange's sensor, without the declared payload's weight [N, N m]. "
+              "Without a sensor, it is estimated from the measured torques with the Jacobian. "
+              "The torque of the shaped motion (rigid arm with the declared payload, rotors, friction) is "
+              "subtracted first. Near a singularity, the unmeasurable part is omitted. It is zero while the arm "
+              "is braked. In both cases, the force of `zero_ftsensor` is subtracted last.", _tool_force),
+    _computed("tcp_force_scalar", "DOUBLE", "magnitude of the TCP force [N].",
               lambda r: _length(r.actual_TCP_force)),
     _computed("wrench_calc_from_currents", "VECTOR6D",
-              "force at the TCP that explains the measured torques; see `actual_TCP_force` [N, N m].",
+              "force at the TCP, estimated from the measured torques; see `actual_TCP_force` [N, N m].",
               _force_from_currents),
     _computed("ft_raw_wrench", "VECTOR6D",
-              "wrench that the sensor between flange and payload measures, in the flange frame [N, N m]. "
+              "wrench measured by the sensor between flange and payload, in the flange frame [N, N m]. "
               "Without a sensor, it is the weight and inertial force of the declared payload, from the "
-              "accelerometer and without the effect of rotation, plus the TCP force.", _raw_wrench),
+              "accelerometer (neglecting rotation), plus the TCP force.", _raw_wrench),
     _computed("collision_detection_ratio", "DOUBLE",
-              "largest share of a joint's torque limit by which measured torque differs from expected [-].",
+              "largest deviation of measured from expected torque, as a share of a joint's torque limit [-].",
               _collision_ratio),
     _computed("actual_momentum", "DOUBLE",
-              "length of the linear momentum of links and declared payload, as measured [kg m/s].",
+              "magnitude of the measured linear momentum of links and declared payload [kg m/s].",
               lambda r: r.rigid.momentum(r.motion[ACTUAL_Q], r.motion[ACTUAL_QD], r.io.payload)),
     _computed("elbow_position", "VECTOR3D",
-              "measured position where upper arm and forearm meet on the elbow's axis [m]. "
+              "measured position of the elbow, where upper arm and forearm meet on its axis [m]. "
               "For an arm with fewer than three joints, it is the flange.", lambda r: r.elbow[0]),
     _computed("elbow_velocity", "VECTOR3D", "velocity of the elbow's position [m/s].", lambda r: r.elbow[1]),
     _io("payload", "DOUBLE", "declared mass [kg].", lambda r: r.io.payload.mass),
@@ -325,9 +323,9 @@ _ROWS = (
         "declared inertia about the centre of mass: xx yy zz xy xz yz [kg m²].",
         _payload_inertia),
     _constant("target_gravity", "VECTOR3D",
-              "0 0 9.81, the acceleration that is equivalent to gravity, for a robot on the floor [m/s²].",
+              "0 0 9.81, gravity as an equivalent acceleration of the base [m/s²].",
               [0.0, 0.0, GRAVITY]),
-    _constant("target_base_acceleration", "VECTOR6D", "zero; the base stands [m/s², rad/s²].", [0.0] * 6),
+    _constant("target_base_acceleration", "VECTOR6D", "zero; the base does not move [m/s², rad/s²].", [0.0] * 6),
     _computed("target_base_wrench", "VECTOR6D",
               "force and torque at the base of the arm with the declared payload, for the target motion "
               "[N, N m]. The weight of the base itself is not included.",
@@ -350,7 +348,7 @@ _ROWS = (
         lambda r: r.io.standard_analog_output[0]),
     _io("standard_analog_output1", "DOUBLE", "analogue output 1 [A or V].",
         lambda r: r.io.standard_analog_output[1]),
-    _constant("io_current", "DOUBLE", "0; nothing draws current from the terminals [mA].", 0.0),
+    _constant("io_current", "DOUBLE", "0; the terminals' load is not simulated [mA].", 0.0),
     _computed("tool_mode", "UINT32", "from the robot's mode, with the numbers of `joint_mode`.", _joint_mode),
     _io("tool_analog_input_types", "UINT32",
         "types of the tool's analogue inputs, bits 0–1; 0 is current, 1 voltage."),
@@ -359,11 +357,11 @@ _ROWS = (
     _io("tool_analog_input1", "DOUBLE", "analogue input 1 of the tool [A or V].",
         lambda r: r.io.tool_analog_input[1]),
     _io("tool_output_voltage", "INT32", "voltage of the tool's supply; 0 if it is off [V]."),
-    _constant("tool_output_current", "DOUBLE", "0; nothing draws current from it [mA].", 0.0),
+    _constant("tool_output_current", "DOUBLE", "0; the tool's load is not simulated [mA].", 0.0),
     _computed("tool_temperature", "DOUBLE",
               "temperature of the last joint, which holds the tool's electronics [°C].",
               lambda r: r.temperatures[-1]),
-    _io("tool_output_mode", "UINT8", "0, the tool's outputs are digital ones; 1, they are a second supply."),
+    _io("tool_output_mode", "UINT8", "0, the tool's outputs are digital; 1, they are a second supply."),
     _io("tool_digital_output0_mode", "UINT8", "1, the output sinks; 2, it sources; 3, both."),
     _io("tool_digital_output1_mode", "UINT8", "1, the output sinks; 2, it sources; 3, both."),
     _constant("euromap67_input_bits", "UINT32", "0; no Euromap 67 interface is fitted."),

@@ -72,7 +72,7 @@ def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Flo
     return least
 
 
-class TorqueRoom:
+class StreamTorqueMargin:
     """Acceleration of a stream or guided motion within the joint torques left by gravity and velocity.
 
     A guided motion may change suddenly, as no filter smooths it. The flexible arm's torque then overshoots by

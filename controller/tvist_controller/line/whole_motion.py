@@ -8,7 +8,7 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.line_tick import all_to_drives
-from tvist_controller.trajectory import Known
+from tvist_controller.trajectory import SampledPositions
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, Measurement, Response, SimulatedArm
@@ -109,7 +109,7 @@ class DrivenLine:
         targets, commands = np.empty((2, ticks, 3, shaped.shape[1]))
         for tick in range(ticks):
             if tick == resting:
-                self._cycle.begin(Known(list(shaped), PERIOD))
+                self._cycle.begin(SampledPositions(list(shaped), PERIOD))
             sample = self._cycle.step()
             target, command = sample.target, sample.command
             targets[tick] = target.q, target.qd, target.qdd

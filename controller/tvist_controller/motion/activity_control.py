@@ -6,7 +6,7 @@ from typing import Unpack
 import numpy as np
 from msgspec.structs import replace
 
-from tvist_controller.events import Emit, Told
+from tvist_controller.events import Emit, StopFields
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.foresight.rest_of_motion import RemainingMotion
 from tvist_controller.foresight.stopper import Stopper
@@ -14,7 +14,7 @@ from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import TorqueRoom
+from tvist_controller.line.limits import StreamTorqueMargin
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.arm_power import ArmPower
@@ -22,7 +22,7 @@ from tvist_controller.motion.motions import Motions
 from tvist_controller.motion.safety_system import PUT, RUNTIME, SafetySystem
 from tvist_controller.motion.setpoints import Setpoints
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.planning.snapshot import FilterState, PlanningState
 from tvist_controller.refusal import RefusalError, out_of_turn
 from tvist_controller.trajectory import MotionLimits, SetpointStream
 from tvist_plant.plant import PERIOD
@@ -89,11 +89,11 @@ class MotionControl:
         """Whether the robot follows a stream of set-points."""
         return self.streams.stream is not None
 
-    def snapshot(self, filter_now: FilterState, script: Script | None, time: float | None) -> Snapshot:
+    def snapshot(self, filter_now: FilterState, script: Script | None, time: float | None) -> PlanningState:
         """Return the state that plans depend on, from rest, or of a motion to be extended in `time` [s]."""
         cycle = self.cycle
         tvist = cycle.tvist
-        now = Snapshot(
+        now = PlanningState(
             filter=filter_now,
             movable=after(self.activity, "move_j") is not None,
             q=cycle.sample.reference,
@@ -194,7 +194,7 @@ class MotionControl:
             cycle.filter.spared(limits),
             PERIOD,
             reach=np.array(cycle.description.limits.position),
-            torque=TorqueRoom(cycle.description, cycle.dynamics),
+            torque=StreamTorqueMargin(cycle.description, cycle.dynamics),
         )
         return cycle.begin(stream, LineMode.GUARDED, self.ahead.guard_of_stream())
 
@@ -256,7 +256,7 @@ class MotionControl:
         if kind is None and not self.motions.running and not self.streaming:
             return
         duration, way = (0.0, 0.0) if self.cycle.mode.at_rest else self.ahead.until_rest(plan)
-        told = Told(category=category, duration=duration, way=way)
+        told = StopFields(category=category, duration=duration, way=way)
         if kind is not None:
             self._emit(kind, code=code, why=why, **told)
         self._end_stream(why, code, **told)
@@ -300,6 +300,6 @@ class MotionControl:
         """Whether the target has rested for half a second since the arm was placed."""
         return min(self._still, len(self.past)) >= STEADY
 
-    def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:
+    def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[StopFields]) -> None:
         if self.streams.end():
             self._emit("stream_stopped", code=code, why=why, **told)

@@ -12,7 +12,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.force_sensing import SILENT, ContactWatch, ExternalSensor
 from tvist_controller.motion.guidance import Guidance
-from tvist_controller.motion.monitor import Finding, Monitor
+from tvist_controller.motion.monitor import Monitor, MonitorFinding
 from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import Compliant, ForceTask
 from tvist_controller.trajectory.compliant import CRAWL, FREE_DAMPING
@@ -20,7 +20,7 @@ from tvist_plant.plant import PERIOD
 
 Feature = tuple[float, ...] | Literal["base", "tool"]
 """Pose of a frame in the base frame, x y z [m] and rotation vector [rad], or the frame of base or tool."""
-NEAR = 1e-3
+FRAME_DEADBAND = 1e-3
 """Distance of the tool from the frame's origin, and speed, below which axes stay unchanged [m, m/s]."""
 SMOOTHED = 0.04
 """Time constant for a wrench estimated from drive torques, which the arm's elasticity disturbs [s]."""
@@ -29,7 +29,7 @@ HAND_SPEED = np.repeat([0.5, 1.5], 3)
 LIGHT, HEAVY = (30.0, 150.0), (70.0, 700.0)
 """Virtual mass [kg] and damping [N s/m] of freedrive, with a sensor and with an estimate. Light values with
 the disturbed estimate would oscillate when a hand presses the arm against something hard."""
-MOST = 250.0
+MAX_FORCE = 250.0
 """Force at the tool that causes a protective stop, the widest limit of UR robots [N]."""
 DRIVES = "the drives' torques"
 """Source of the force without a sensor."""
@@ -143,7 +143,7 @@ class ForceControl(Monitor):
             self._smooth = found
         return found
 
-    def look(self, sample: Sample) -> Finding | None:
+    def look(self, sample: Sample) -> MonitorFinding | None:
         """Detect excessive force, and deviation in an axis that is not compliant."""
         # Without sensor and compliance there is nothing to monitor: sleep.
         leads = isinstance(self._cycle.trajectory, Compliant)
@@ -168,7 +168,7 @@ class ForceControl(Monitor):
         if why is None or self._beyond <= TICKS:
             return None
         self._beyond = 0
-        return Finding(why, "limit_force", "protective_stop")
+        return MonitorFinding(why, "limit_force", "protective_stop")
 
     def _note_contact(self, contact: ContactWatch, sample: Sample, pressed: Sequence[Floats]) -> None:
         """Pass the force to the contact watch, which restarts if the force's reference changes."""
@@ -186,7 +186,7 @@ class ForceControl(Monitor):
             return "the external force sensor"
         return DRIVES if sample.wrench is None else "the arm's force sensor"
 
-    def _follow_source(self, source: str) -> Finding | None:
+    def _follow_source(self, source: str) -> MonitorFinding | None:
         """End force control if the source of the force changes, which makes the zero meaningless."""
         if source == self._source:
             return None
@@ -196,12 +196,12 @@ class ForceControl(Monitor):
         if self.external.awaited:
             why = f"the external force sensor has told nothing for {1e3 * SILENT:g} ms: {why}"
         if self._guidance.compliant is not None:
-            return Finding(why, then="interruption")
-        return Finding(why) if self.external.awaited else None
+            return MonitorFinding(why, then="interruption")
+        return MonitorFinding(why) if self.external.awaited else None
 
     def _excess(self, sample: Sample, force: float) -> str | None:
-        if not force <= MOST:
-            return f"force at the tool is {force:.0f} N, above {MOST:g} N for more than 10 ms"
+        if not force <= MAX_FORCE:
+            return f"force at the tool is {force:.0f} N, above {MAX_FORCE:g} N for more than 10 ms"
         lead = self._guidance.compliant
         if lead is None or self._by_hand:
             return None
@@ -235,7 +235,7 @@ def frame_of(feature: Feature, kind: int) -> Callable[[tuple[Floats, Floats], Fl
 
         def along(_: tuple[Floats, Floats], velocity: Floats) -> Floats:
             flat = velocity - axes[:, 2] * (axes[:, 2] @ velocity)
-            if np.linalg.norm(flat) > NEAR:
+            if np.linalg.norm(flat) > FRAME_DEADBAND:
                 x = flat / np.linalg.norm(flat)
                 latest[0] = np.column_stack((x, np.cross(axes[:, 2], x), axes[:, 2]))
             return latest[0]
@@ -247,7 +247,7 @@ def frame_of(feature: Feature, kind: int) -> Callable[[tuple[Floats, Floats], Fl
 def _turned_to(axes: Floats, axis: int, direction: Floats) -> Floats:
     """Turn one axis of a frame into a direction by the shortest rotation."""
     length = np.linalg.norm(direction)
-    if length < NEAR:
+    if length < FRAME_DEADBAND:
         return axes
     turned: Floats = (
         np.asarray(pin.Quaternion.FromTwoVectors(axes[:, axis], direction / length).matrix()) @ axes

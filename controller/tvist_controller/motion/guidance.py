@@ -7,11 +7,11 @@ import numpy as np
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import turn, turned
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.limits import GENTLEST_STOP, REBOUND, TorqueRoom, arm_limits
+from tvist_controller.line.limits import GENTLEST_STOP, REBOUND, StreamTorqueMargin, arm_limits
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.refusal import RefusalError
-from tvist_controller.trajectory import Compliant, Guided, MotionLimits, Servo, Speed
+from tvist_controller.trajectory import Compliant, Guided, MotionLimits, ServoFollower, Speed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity
 
@@ -31,7 +31,7 @@ class Guidance:
         self.limits = arm_limits(motion.cycle.description)
         self.reach = np.array(motion.cycle.description.limits.position)
         """Position limit of each joint, shape (n,) [rad]."""
-        self.torque = TorqueRoom(motion.cycle.description, motion.cycle.dynamics, REBOUND)
+        self.torque = StreamTorqueMargin(motion.cycle.description, motion.cycle.dynamics, REBOUND)
         """Accelerations that torque permits."""
         self._rehearse()
 
@@ -45,9 +45,9 @@ class Guidance:
         arm.near((turned(rotation, turn(rotation, rotation)), position), q)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:
-        """Follow a posture, see `Servo`, and return the motion's number; RefusalError as in `check`."""
+        """Follow a posture, see `ServoFollower`, and return the motion's number; RefusalError as in `check`."""
         self.check("servo_j", shaped=shaped)
-        servo = self._present(Servo, shaped) or Servo(
+        servo = self._present(ServoFollower, shaped) or ServoFollower(
             self._start(shaped), self._most(shaped), self.reach, self.torque, PERIOD
         )
         servo.aim(q, lookahead, gain)

@@ -7,7 +7,7 @@ from tvist_controller.line.sample import Sample
 from tvist_protocol.replies import Code
 
 
-class Finding(NamedTuple):
+class MonitorFinding(NamedTuple):
     """A monitor's finding and its consequence."""
 
     why: str
@@ -28,7 +28,7 @@ class Monitor(ABC):
     """False to skip ticks without a measured force."""
 
     @abstractmethod
-    def look(self, sample: Sample) -> Finding | None:
+    def look(self, sample: Sample) -> MonitorFinding | None:
         """Return a finding about the latest tick, else None."""
 
     def restart(self) -> None:  # noqa: B027  most have no memory

@@ -5,7 +5,7 @@ from typing import Protocol, Unpack
 
 import numpy as np
 
-from tvist_controller.events import Emit, Told
+from tvist_controller.events import Emit, StopFields
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.limits import REDUCED_SHARE, acceleration_on_way, rate_of
@@ -250,7 +250,7 @@ class Motions:
             self._emit("motion_done", id=self._started)
             self._running = None
 
-    def stopped(self, why: str, code: Code | None, **told: Unpack[Told]) -> None:
+    def stopped(self, why: str, code: Code | None, **told: Unpack[StopFields]) -> None:
         """Report that the motion ended before its target."""
         if self._running is not None:
             self._emit("motion_stopped", id=self._started, code=code, why=why, **told)

@@ -73,7 +73,7 @@ class JointWay:
 
 
 @dataclass(frozen=True)
-class Pacing:
+class LegSpeed:
     """Speed limits of a part of a path."""
 
     velocity: float
@@ -85,7 +85,7 @@ class Pacing:
     even: bool = False
     """Whether blends keep the tool's speed, so that only the joints limit acceleration."""
 
-    def meeting(self, other: "Pacing") -> "Pacing":
+    def meeting(self, other: "LegSpeed") -> "LegSpeed":
         """Return the pacing of a blend between two parts."""
         return replace(
             self,
@@ -104,7 +104,7 @@ class Leg:
     """The joints' motion along the whole part."""
     corner: Placement
     """Pose of the tool at its end."""
-    pacing: Pacing
+    pacing: LegSpeed
     blend: float
     """Radius of the blend at its end [m]."""
     where: str
@@ -117,7 +117,7 @@ class Leg:
         return start
 
 
-class Meeting(NamedTuple):
+class BlendJunction(NamedTuple):
     """Point of a leg where the blends before and behind it meet."""
 
     s: float
@@ -126,10 +126,10 @@ class Meeting(NamedTuple):
     """Second derivatives of the tool's position and turn, shape (6,) [1/m, rad/m^2]."""
 
 
-def meetings(legs: Sequence[Leg]) -> list[Meeting | None]:
+def meetings(legs: Sequence[Leg]) -> list[BlendJunction | None]:
     """Return for each leg the point where its blends meet, or None."""
     corners = [_corner(*pair) for pair in pairwise(legs)]
-    found: list[Meeting | None] = [None] * len(legs)
+    found: list[BlendJunction | None] = [None] * len(legs)
     for number in range(1, len(legs) - 1):
         before, behind = corners[number - 1], corners[number]
         if before is not None and behind is not None:
@@ -148,7 +148,7 @@ def _corner(leg: Leg, then: Leg) -> Floats | None:
     return bend
 
 
-def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> Meeting | None:
+def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> BlendJunction | None:
     assert isinstance(leg.way, ToolLine)
     way = leg.way
     start, end = way.within(blend), way.length - way.within(leg.blend)
@@ -160,7 +160,7 @@ def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> Meeting 
     speed = float(along @ along)
     if speed > 0.0:  # the path is curved there, and not sped up
         bend[:3] -= (bend[:3] @ along / speed) * along
-    return Meeting(0.5 * (start + end), bend)
+    return BlendJunction(0.5 * (start + end), bend)
 
 
 def _between(one: Floats, other: Floats) -> Floats:

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.paths.legs import Pacing
+from tvist_controller.paths.legs import LegSpeed
 from tvist_controller.paths.route import Piece, Run
 from tvist_controller.paths.tool_curves import PER_RADIAN
 from tvist_controller.trajectory.limits import Floats
-from tvist_controller.trajectory.retiming import Cells, RetimedLaw, Way, longer_law, quickest_law
+from tvist_controller.trajectory.retiming import Cells, RetimedLaw, RetimingLimits, longer_law, quickest_law
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 
 FINEST, CELLS = 5e-4, 400
@@ -27,7 +27,7 @@ TRIES = 4
 """Attempts to plan an extended motion more slowly after slightly exceeding limits."""
 MOMENTS = 500
 """Number of moments at which a motion's velocity is checked."""
-LEAST = 1e-3
+MIN_DERIVATIVE = 1e-3
 """Smallest derivative by which a speed is divided [-]."""
 CLOSE = 1e-6
 """Permitted relative error of a duration [-]."""
@@ -58,7 +58,7 @@ def joined(run: Run, before: Knots | None = None) -> Knots:
 def law_of(
     run: Run,
     curve: SplineCurve,  # the joints' way along it
-    ground: "Ground",
+    ground: "PathLimits",
     limits: JointLimits,
     jerk: float,  # largest along the path [m/s^3]
     window: float,  # time over which the shaper mixes moments of the motion [s]
@@ -82,7 +82,7 @@ def law_of(
 def going_on(
     before: RetimedLaw,
     edges: tuple[int, int],  # number of its edge with which the law begins, and of equal ones behind that
-    ground: "Ground",  # from that edge on
+    ground: "PathLimits",  # from that edge on
     curve: SplineCurve,
     limits: JointLimits,
     jerk: float,
@@ -134,7 +134,7 @@ def fastest(law: RetimedLaw, curve: SplineCurve) -> float:
     return float(np.abs(curve.derivatives(s)[1] * sd[:, None]).max())
 
 
-class Ground(NamedTuple):
+class PathLimits(NamedTuple):
     """Limits of a run, cell by cell, before speeding up."""
 
     places: Floats
@@ -152,25 +152,25 @@ class Ground(NamedTuple):
     third: Floats
     """Bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]."""
 
-    def then(self, first: int, last: int, run: Run, curve: SplineCurve) -> "Ground":
+    def then(self, first: int, last: int, run: Run, curve: SplineCurve) -> "PathLimits":
         """Return the limits of the part between two edges followed by a run, on a curve."""
         further = ground_of(run, curve, float(self.places[last]))
         places = np.concatenate((self.places[first : last + 1], further.places[1:]))
         pairs = zip(self[1:], further[1:], strict=True)
-        ground = Ground(places, *(np.concatenate((own[first:last], other)) for own, other in pairs))
+        ground = PathLimits(places, *(np.concatenate((own[first:last], other)) for own, other in pairs))
         if last > first:  # a spline's third derivative at a knot is that behind it, which is another one now
             looks = _looks(self.places[last - 1 : last + 1])
             ground.third[last - first - 1] = _largest(np.abs(curve.third(looks))).max()
         return ground
 
-    def way(self, limits: JointLimits, hurry: float) -> Way:
+    def way(self, limits: JointLimits, hurry: float) -> RetimingLimits:
         """Return the limits of the motion sped up by the factor `hurry`."""
         # Joint jerk: q''' ṡ³ + 3 q'' ṡ s̈ + q' s⃛; each of the first two terms gets a share.
-        smooth = np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(self.third, LEAST))
+        smooth = np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(self.third, MIN_DERIVATIVE))
         even = np.minimum(hurry * self.speed, smooth)
-        fastest = (limits.velocity / np.maximum(self.slope, LEAST)).min(axis=1)
+        fastest = (limits.velocity / np.maximum(self.slope, MIN_DERIVATIVE)).min(axis=1)
         bent = 3.0 * self.second.max(axis=1) * np.minimum(even, fastest) / (JOLT_SHARE * limits.jerk)
-        return Way(
+        return RetimingLimits(
             self.places,
             Cells(fastest, self.slope / limits.acceleration, self.second / limits.acceleration),
             Cells(
@@ -183,7 +183,7 @@ class Ground(NamedTuple):
         )
 
 
-def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> Ground:
+def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> PathLimits:
     """Return the limits of a run that starts at a place of a curve [m]."""
     largest = max((float(curve.end[0]) - start) / CELLS, FINEST)
     starts = start + np.concatenate(([0.0], np.cumsum([piece.knots.s[-1] for piece in run])))
@@ -200,7 +200,7 @@ def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> Ground:
     slope, second = (_largest(np.abs(values)) for values in curve.derivatives(looks)[1:])
     third = _largest(np.abs(curve.third(looks))).max(axis=1)
     speed, p, q = (np.concatenate(values) for values in zip(*tool, strict=True))
-    return Ground(places, speed, p, q, slope, second, third)
+    return PathLimits(places, speed, p, q, slope, second, third)
 
 
 def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:
@@ -209,14 +209,14 @@ def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:
     if piece.bent is None:
         return np.ones(count), np.zeros(count)
     along, bent = (_largest(values[:, None])[:, 0] for values in piece.bent.shape(_looks(places)))
-    return np.maximum(along, LEAST), bent
+    return np.maximum(along, MIN_DERIVATIVE), bent
 
 
 def _joints(curve: SplineCurve, places: Floats) -> tuple[Floats, Floats]:
     """Return `_tool` for the joints' motion, with turns counted as lengths."""
     _, slope, second = curve.derivatives(_looks(places))
     along, bent = (PER_RADIAN * _largest(np.abs(values)).max(axis=1) for values in (slope, second))
-    return np.maximum(along, LEAST), bent
+    return np.maximum(along, MIN_DERIVATIVE), bent
 
 
 def _looks(places: Floats) -> Floats:
@@ -233,10 +233,10 @@ def _largest(values: Floats) -> Floats:
     return found
 
 
-def timed(pacing: Pacing, length: float) -> Pacing:
+def timed(pacing: LegSpeed, length: float) -> LegSpeed:
     """Return a leg's pacing; a duration becomes a trapezoid with ramps of a third each."""
     if pacing.duration is None:
         return pacing
     duration = max(pacing.duration, BRIEFEST)
     velocity = 1.5 * length / duration
-    return Pacing(velocity, 3.0 * velocity / duration, duration, pacing.even)
+    return LegSpeed(velocity, 3.0 * velocity / duration, duration, pacing.even)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.paths.legs import JointWay, Leg, Meeting, Pacing, meetings
+from tvist_controller.paths.legs import BlendJunction, JointWay, Leg, LegSpeed, meetings
 from tvist_controller.paths.tool_curves import EvenBlend, ToolBlend, ToolCurve, ToolPart, ToolState, evenly
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.trajectory.limits import Floats
@@ -33,7 +33,7 @@ class Piece:
 
     knots: Knots
     """The joints' motion."""
-    pacing: Pacing
+    pacing: LegSpeed
     bent: ToolBlend | EvenBlend | None
     """Tool blend whose curvature affects acceleration."""
     by_joints: bool
@@ -70,7 +70,7 @@ class Branch:
     q: Floats
     """Joint positions there, shape (n,) [rad]."""
     bend: Floats | None = None
-    """Curvature of two blends that meet there, see `Meeting`; else None."""
+    """Curvature of two blends that meet there, see `BlendJunction`; else None."""
 
 
 class Route(NamedTuple):
@@ -92,7 +92,7 @@ def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None)
         if here is None:
             here = Branch(0.0, (leg,), 0.0, leg.q)
         elif here.bend is not None:
-            meets[number] = Meeting(here.begun, here.bend)
+            meets[number] = BlendJunction(here.begun, here.bend)
         cut = _cut_at(number, legs, meets, here, route, tracker)
         if number == last:
             route.branches.append(replace(here, s=length_of(route.runs[-1])))
@@ -121,7 +121,7 @@ def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None)
 def _cut_at(
     number: int,
     legs: Sequence[Leg],
-    meets: list[Meeting | None],
+    meets: list[BlendJunction | None],
     here: Branch,
     route: Route,
     tracker: Tracker,
@@ -174,7 +174,11 @@ def _rest_of(leg: Leg, start: float, end: float, q: Floats, tracker: Tracker) ->
 
 
 def _cut(
-    leg: Leg, then: Leg, meets: tuple[Meeting | None, Meeting | None], here: Branch, tracker: Tracker
+    leg: Leg,
+    then: Leg,
+    meets: tuple[BlendJunction | None, BlendJunction | None],
+    here: Branch,
+    tracker: Tracker,
 ) -> _Cut:
     """Return the blend between two legs, or raise _NoBlendError."""
     radius, left = leg.blend, leg.way.length - here.begun
@@ -212,7 +216,7 @@ def _blend(
     leg: Leg,
     then: Leg,
     lengths: tuple[float, float],
-    meets: tuple[Meeting | None, Meeting | None],
+    meets: tuple[BlendJunction | None, BlendJunction | None],
     q: Floats,
     tracker: Tracker,
 ) -> tuple[Piece, ToolCurve | None]:

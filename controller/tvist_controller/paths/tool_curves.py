@@ -17,7 +17,7 @@ SHORTEST = 1e-6
 """Length below which a part of a path is no motion [m]."""
 STRAIGHT = 1e-6
 """Sine of the angle below which three points are collinear [-]."""
-STEP = 1e-5
+DIFFERENCE_STEP = 1e-5
 """Step of numerical differences relative to a blend's length [-]."""
 SLOWEST = 0.25
 """Tool speed per parameter below which a blend is too sharp to be reparametrized [-]."""
@@ -151,7 +151,7 @@ class ToolBlend(ToolCurve):
     def at(self, s: float) -> ToolState:
         """Return the state at a length from the start [m]."""
         value, first, second = self._polynomial(s)
-        step = STEP * self.length
+        step = DIFFERENCE_STEP * self.length
         angular = (self._angular(s + step) - self._angular(s - step)) / (2.0 * step)
         pose = Placement(turned(self._corner, value[3:]), value[:3])
         return ToolState(

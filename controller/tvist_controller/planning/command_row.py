@@ -12,7 +12,7 @@ from tvist_protocol.replies import Reply
 C = TypeVar("C", bound=Command)
 
 
-class Call(NamedTuple, Generic[C]):
+class CommandCall(NamedTuple, Generic[C]):
     """A command being carried out between two ticks."""
 
     command: C
@@ -28,14 +28,14 @@ class Call(NamedTuple, Generic[C]):
     """IP address of the sender; None if unknown."""
 
 
-class Row(NamedTuple):
+class CommandRow(NamedTuple):
     """One type of command: how a controller carries it out, and what that needs.
 
     The protocol's table of transitions defines which commands move the arm, and when each is allowed.
     """
 
     message: type[Command]
-    handle: Callable[[Any, Call[Any]], Reply | None]
+    handle: Callable[[Any, CommandCall[Any]], Reply | None]
     """Carries out a checked command on a `Robot`. Raises `RefusalError` or `NoControlError` before any
     change; None means the reply `Done`."""
     lease: Literal["needed", "if named", "none"] = "needed"

@@ -7,7 +7,7 @@ import numpy as np
 
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.planning.snapshot import FilterState, PlanningState
 from tvist_controller.planning.surplus import surplus_of
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, paper_payload
@@ -31,7 +31,7 @@ ESTIMATORS = ("fixed", "polynomial", "modal")
 
 
 @dataclass(frozen=True)
-class PlannedFilter:
+class FilterChoice:
     """A filter and what it needs."""
 
     source: ModeSource
@@ -50,7 +50,7 @@ class FilterPlanner:
         self._setup, self._known = setup, setup.registry
         self._modal = modal_source(setup.description, setup.calibration)
 
-    def first(self) -> PlannedFilter:
+    def first(self) -> FilterChoice:
         """Return the robot's initial filter; raise ValueError if its shaper does not exist."""
         setup = self._setup
         try:
@@ -60,7 +60,7 @@ class FilterPlanner:
 
     def choose(
         self, name: str, modes: int, source: ModeSource, declared: Payload, where: str = "shaper"
-    ) -> PlannedFilter:
+    ) -> FilterChoice:
         """Return a filter by name for a number of modes to suppress; `where` is the field of the name.
 
         It uses the chosen source, or the arm's modal estimator if it needs more modes. Raise RefusalError if
@@ -73,7 +73,7 @@ class FilterPlanner:
         _rehearse(tvist)
         return self._with_feed_forward(source, tvist, where)
 
-    def estimate(self, command: SetEstimator, now: Snapshot) -> PlannedFilter:
+    def estimate(self, command: SetEstimator, now: PlanningState) -> FilterChoice:
         """Return the present filter with modes of another source, or raise RefusalError."""
         source, present = choose_source(command, self._setup), now.filter
         where = "f_d" if source.calibration is None else "calibration"
@@ -114,7 +114,7 @@ class FilterPlanner:
         SURPLUSES.append((source, own, name, modes, found))
         return found
 
-    def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> PlannedFilter:
+    def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> FilterChoice:
         """Add known friction and the feed-forward that a filter needs; raise RefusalError if impossible."""
         known = source if source.knows_payload else self._modal
         try:
@@ -123,7 +123,7 @@ class FilterPlanner:
         except EstimatorError as error:
             raise RefusalError("out_of_range", where, str(error)) from error
         if tvist.feed_forward == "rigid":
-            return PlannedFilter(source, tvist, None, law)
+            return FilterChoice(source, tvist, None, law)
         if tvist.feed_forward == "elastic" and self._setup.positions:
             why = (
                 f"{tvist.name} feeds torques forward, and this robot's controller takes positions only: choose one "
@@ -137,7 +137,7 @@ class FilterPlanner:
             elastic = elastic_feed_forward(tvist, self._setup.description, known.calibration)
         except EstimatorError as error:
             raise RefusalError("out_of_range", where, f"{tvist.name}: {error}") from error
-        return PlannedFilter(source, tvist, elastic, law)
+        return FilterChoice(source, tvist, elastic, law)
 
 
 def _rehearse(tvist: Filter) -> None:

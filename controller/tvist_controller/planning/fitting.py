@@ -14,7 +14,7 @@ from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.line.shaped_reference import ShapedReference
 from tvist_controller.planning.slower import Binding, Limited, lasts, limit_of
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, quickest_motion
 from tvist_plant.plant import PERIOD
@@ -32,13 +32,13 @@ HASTE = 0.001
 """The first such fraction [-]."""
 SPLIT = 6
 """Number of trials that reduce either velocity or acceleration, before both."""
-LOOKS = 64
+SAMPLES = 64
 """Number of evenly spaced moments checked, in addition to those of the law, if not shaped in advance."""
 BLUNTED = 1.05
 """Largest ratio of the shaped motion's torque to the unshaped motion's, due to the lag [-]."""
 ROUNDING = 1e-6
 """Relative excess of a limit that counts as rounding [-]."""
-LEAST = 0.01
+MIN_TORQUE_SHARE = 0.01
 """Smallest usable fraction of a motion's own torque; below it, gravity alone exceeds the limit [-]."""
 
 
@@ -93,7 +93,7 @@ class Fitter:
     def fit(
         self,
         make: Callable[[Slower], PlannedMotion],
-        now: Snapshot,
+        now: PlanningState,
         tvist: Callable[[], Filter] | None,
         limits: MotionLimits | None = None,
     ) -> Fitted:
@@ -130,7 +130,9 @@ class Fitter:
             what = f"{which} is {most * getattr(slower, which):.4g} of {most:.4g} {unit}"
         return Fitted(motion, slower, need.binding.makes(what), need.q)
 
-    def _need(self, motion: PlannedMotion, now: Snapshot, tvist: Callable[[], Filter] | None) -> Need | None:
+    def _need(
+        self, motion: PlannedMotion, now: PlanningState, tvist: Callable[[], Filter] | None
+    ) -> Need | None:
         """Return how much slower a motion must be: bounded by the filter's surplus first, then as shaped."""
         q, qd, qdd = _states(motion)
         faster, harder = (1.0 + more for more in now.surplus)
@@ -143,7 +145,7 @@ class Fitter:
         return self._exceeded(q, qd, qdd, np.diff(ahead, axis=0) / PERIOD, now, 1.0)
 
     def _exceeded(
-        self, q: Floats, qd: Floats, qdd: Floats, speeds: Floats, now: Snapshot, blunted: float
+        self, q: Floats, qd: Floats, qdd: Floats, speeds: Floats, now: PlanningState, blunted: float
     ) -> Need | None:
         """Return how much slower a motion must be for all limits; `speeds` are those between ticks."""
         needs = self._kinematic(q, speeds, qdd), self._dynamic(q, qd, qdd, blunted, now)
@@ -164,7 +166,7 @@ class Fitter:
         binding = limit_of("velocity" if by_velocity else "acceleration", joint, self._description)
         return Need(slower, binding, q[min(int(np.argmax(np.abs(values))), len(q) - 1)])
 
-    def _dynamic(self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: Snapshot) -> Need | None:
+    def _dynamic(self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: PlanningState) -> Need | None:
         """Return how much slower a motion must be for torques, in velocity or acceleration as they depend."""
         dynamics, limits, factors = self._dynamics, self._torque, [1.0, 1.0]
         worst, need = 1.0, None
@@ -177,13 +179,15 @@ class Fitter:
             if not beyond.any():
                 continue
             share = np.where(
-                beyond, (limits - np.sign(moving) * gravity) / np.maximum(np.abs(moving), LEAST), 1.0
+                beyond,
+                (limits - np.sign(moving) * gravity) / np.maximum(np.abs(moving), MIN_TORQUE_SHARE),
+                1.0,
             )
             least, joint = float(share.min()), int(np.argmin(share.min(axis=0)))
             if least < worst:
                 worst, which = least, limit_of("torque", joint, self._description)
                 need = Need(AS_ASKED, which, q[int(np.argmin(share[:, joint]))])
-            if need is not None and least < LEAST:
+            if need is not None and least < MIN_TORQUE_SHARE:
                 limit, most = limits[joint], float(effort[:, joint].max())
                 exceeds = (
                     f"torque of joint {self._description.robot.joints[joint]} will reach {most:.0f} N m, "
@@ -204,7 +208,7 @@ def _states(motion: PlannedMotion) -> tuple[Floats, Floats, Floats]:
     """Return unshaped positions, velocities, accelerations, each (k, n), also at the law's own moments."""
     moments = motion.law.moments
     known = (moments > motion.law.begins) & (moments < motion.duration)
-    return motion.states(np.union1d(motion.evenly(LOOKS), moments[known]))
+    return motion.states(np.union1d(motion.evenly(SAMPLES), moments[known]))
 
 
 def keeping_motion(

@@ -11,14 +11,14 @@ from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitter, Slower, keeping_motion
 from tvist_controller.planning.slower import Limited, longer_joint_motion, slower_joint_motion
-from tvist_controller.planning.snapshot import Course, Snapshot
+from tvist_controller.planning.snapshot import Course, PlanningState
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
+    CheckedMotion,
     JointLine,
     MotionLimits,
     PlannedMotion,
-    Way,
     at_least,
     quickest_motion,
 )
@@ -63,7 +63,7 @@ class MovePlanner(Fitter):
         self._filters = filters
         self._collisions = CollisionModel(setup.description, body(setup.payload))
 
-    def move(self, command: MoveJ, now: Snapshot, *, at_once: bool = False) -> PlannedMove:
+    def move(self, command: MoveJ, now: PlanningState, *, at_once: bool = False) -> PlannedMove:
         """Plan a motion from rest, or raise RefusalError; `at_once` omits shaping in advance to save time."""
         path, duration = JointLine(now.q, np.array(command.q, dtype=float)), command.duration
         limits, agility = MotionLimits(command.velocity, command.acceleration, command.jerk), None
@@ -107,7 +107,7 @@ class MovePlanner(Fitter):
             surplus=now.surplus,
         )
 
-    def _lasting(self, path: JointLine, duration: float, now: Snapshot) -> MotionLimits:
+    def _lasting(self, path: JointLine, duration: float, now: PlanningState) -> MotionLimits:
         """Return limits with which a motion takes a duration [s], or the arm's if it takes longer anyway."""
         limits = arm_limits(self._description)
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - now.excess))
@@ -118,7 +118,7 @@ class MovePlanner(Fitter):
             limits.velocity * slower, limits.acceleration * slower**2, limits.jerk * slower**3
         )
 
-    def meeting(self, way: Way, now: Snapshot) -> tuple[float, Meeting] | None:
+    def meeting(self, way: CheckedMotion, now: PlanningState) -> tuple[float, Meeting] | None:
         """Return the position of the first meeting on a way (share of it) and the bodies, else None."""
         if self._collisions.declared is not now.body:
             self._collisions.declare(now.body)

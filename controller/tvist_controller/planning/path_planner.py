@@ -7,7 +7,15 @@ import numpy as np
 from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.paths.legs import Leg
-from tvist_controller.paths.pacing import Ground, JointLimits, fastest, going_on, ground_of, joined, law_of
+from tvist_controller.paths.pacing import (
+    JointLimits,
+    PathLimits,
+    fastest,
+    going_on,
+    ground_of,
+    joined,
+    law_of,
+)
 from tvist_controller.paths.route import Branch, Route, Run, length_of, route_of
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.filter_planner import FilterPlanner
@@ -15,10 +23,17 @@ from tvist_controller.planning.fitting import Fitted, Slower
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.slower import Limited, slower_path
-from tvist_controller.planning.snapshot import Course, Snapshot
+from tvist_controller.planning.snapshot import Course, PlanningState
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
-from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Way, at_least, quickest_motion
+from tvist_controller.trajectory import (
+    CheckedMotion,
+    JointLine,
+    MotionLimits,
+    PlannedMotion,
+    at_least,
+    quickest_motion,
+)
 from tvist_controller.trajectory.retiming import RetimedLaw
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 from tvist_plant.plant import PERIOD
@@ -27,7 +42,7 @@ from tvist_shaping.base import Filter
 
 POSTURES = 9
 """Number of postures of a run at which the shaper's delay is computed."""
-LOOKS = 1000
+SAMPLES = 1000
 """Number of places of a run searched for the one hardest for a joint."""
 SPARED = 0.99
 """Fraction of joint limits that paths use; a shaper with varying weights may exceed its reference a little [-]."""
@@ -48,7 +63,7 @@ class PathPlanner:
         self._description, self._filters, self._moves = setup.description, filters, moves
         self._reachable = reachable
 
-    def plan(self, command: MoveL | MoveC | MovePath, now: Snapshot) -> PlannedMove | None:
+    def plan(self, command: MoveL | MoveC | MovePath, now: PlanningState) -> PlannedMove | None:
         """Plan a motion from rest, or an extension, None if too late; raise RefusalError if impossible."""
         tracker = Tracker(self._description, now.tcp)
         legs = list(self._reachable.legs(command, tracker, now))
@@ -69,14 +84,16 @@ class PathPlanner:
         told = next((move.limited for move in moves if move.limited is not None), None)
         return _joined(moves, route, told, range(count))
 
-    def _route(self, legs: list[Leg], tracker: Tracker, now: Snapshot, start: Branch | None = None) -> Route:
+    def _route(
+        self, legs: list[Leg], tracker: Tracker, now: PlanningState, start: Branch | None = None
+    ) -> Route:
         try:
             return route_of(legs, tracker, start)
         except WayError as error:
             raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, now.tcp) from error
 
     def _further(
-        self, jerk: float, legs: list[Leg], count: int, tracker: Tracker, now: Snapshot
+        self, jerk: float, legs: list[Leg], count: int, tracker: Tracker, now: PlanningState
     ) -> PlannedMove | None:
         """Plan the extension of a motion to further legs; None if its end is too near."""
         before, tvist = now.after, self._filters.like(now.filter)
@@ -117,7 +134,9 @@ class PathPlanner:
             moves.append(move)
         return _joined(moves, route, told, range(before.segments - 1, count), branch.s)
 
-    def _check_clear(self, way: Way, run: Run, part: tuple[float, float], now: Snapshot) -> None:
+    def _check_clear(
+        self, way: CheckedMotion, run: Run, part: tuple[float, float], now: PlanningState
+    ) -> None:
         """Refuse a path with a collision; `part` is the start on the whole path and the latter's length."""
         found = self._moves.meeting(way, now)
         if found is None:
@@ -140,7 +159,7 @@ class PathPlanner:
         route: Route,
         jerk: float,
         tvist: Filter,
-        now: Snapshot,
+        now: PlanningState,
         count: int,
         *,
         goes_on: bool = False,
@@ -171,7 +190,9 @@ class PathPlanner:
         velocity, told = highest * fitted.slower.rate, _told(fitted, run) or slower
         return PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak, course=course)
 
-    def _curve(self, knots: Knots, run: Run, tvist: Filter, now: Snapshot) -> tuple[SplineCurve, JointLimits]:
+    def _curve(
+        self, knots: Knots, run: Run, tvist: Filter, now: PlanningState
+    ) -> tuple[SplineCurve, JointLimits]:
         """Return the joints' motion along a run, checked for range, and their limits."""
         self._reachable.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         limits, peak = self._description.limits, tvist.peak
@@ -199,7 +220,7 @@ def _told(fitted: Fitted, run: Run, start: float = 0.0) -> Limited | None:
     told, q, path = fitted.limited, fitted.q, fitted.motion.path
     if told is None or q is None or not isinstance(path, SplineCurve) or not run[0].where:
         return told
-    s = np.linspace(start, float(path.end[0]), LOOKS)
+    s = np.linspace(start, float(path.end[0]), SAMPLES)
     at = float(s[int(np.argmin(np.abs(path.derivatives(s)[0] - q).max(axis=1)))])
     ends = start + np.cumsum([piece.knots.s[-1] for piece in run])
     piece = run[min(int(np.searchsorted(ends, at)), len(run) - 1)]
@@ -228,7 +249,7 @@ def _course(
     run: Run,  # the last one of the route
     route: Route,
     curve: SplineCurve,
-    ground: Ground,
+    ground: PathLimits,
     law: RetimedLaw,
     segments: int,
     window: float,

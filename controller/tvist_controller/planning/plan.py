@@ -5,9 +5,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
+from tvist_controller.planning.filter_planner import FilterChoice, FilterPlanner
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.planning.snapshot import FilterState, Snapshot
+from tvist_controller.planning.snapshot import FilterState, PlanningState
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command
 from tvist_protocol.lessons import PayloadLesson
@@ -15,7 +15,7 @@ from tvist_protocol.replies import Posture, ToolPose
 from tvist_shaping.base import Filter
 from tvist_urscript import Script
 
-Found = PlannedMove | PlannedFilter | Filter | Posture | ToolPose | Script | None
+Found = PlannedMove | FilterChoice | Filter | Posture | ToolPose | Script | None
 """Possible results of a plan; None if nothing changes."""
 
 
@@ -26,9 +26,9 @@ class Planning(NamedTuple):
     """Fields of the snapshot that the plan depends on."""
     by: type
     """Class of the planner; a `Planner` has one instance."""
-    make: Callable[[Any, Any, Snapshot], Found]
+    make: Callable[[Any, Any, PlanningState], Found]
     """Returns the plan for planner, command and state; raises `RefusalError`."""
-    within_tick: Callable[[Any, Any, Snapshot], Found] | None = None
+    within_tick: Callable[[Any, Any, PlanningState], Found] | None = None
     """Makes a possibly worse plan quickly enough for a tick; None if there is only `make`."""
 
 
@@ -40,7 +40,7 @@ class Plan(NamedTuple):
     found: Found | RefusalError
     """What was planned, or the refusal; None if no motion may start."""
     until: float = 0.0
-    """See `Snapshot.until`."""
+    """See `PlanningState.until`."""
 
 
 def _same(one: Any, other: Any) -> bool:
@@ -51,7 +51,7 @@ def _same(one: Any, other: Any) -> bool:
     return one is other or one == other
 
 
-Order = Callable[[Command, Snapshot], Callable[[], Plan]]
+Order = Callable[[Command, PlanningState], Callable[[], Plan]]
 """Orders a plan on a state; returns a function that waits for it."""
 
 
@@ -64,7 +64,7 @@ class MakesPlans(Protocol):
         """Plan the present filter for a payload that the robot has learnt."""
 
     def plan(
-        self, command: Command, now: Snapshot, *, within_tick: bool = False, checked: bool = False
+        self, command: Command, now: PlanningState, *, within_tick: bool = False, checked: bool = False
     ) -> Plan:
         """Plan a command on a state."""
 
@@ -79,7 +79,7 @@ class Plans:
     def __init__(
         self,
         plan: Callable[..., Plan],
-        snapshot: Callable[[float | None], Snapshot],
+        snapshot: Callable[[float | None], PlanningState],
         order: Order | None = None,
     ) -> None:
         self._plan, self._snapshot = plan, snapshot

@@ -6,12 +6,12 @@ import numpy as np
 
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.paths.legs import JointWay, Leg, Pacing
+from tvist_controller.paths.legs import JointWay, Leg, LegSpeed
 from tvist_controller.paths.pacing import timed
 from tvist_controller.paths.poses import Placement, placement
 from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolLine, ToolWay
 from tvist_controller.paths.tracking import Tracker, WayError
-from tvist_controller.planning.snapshot import Snapshot
+from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.refusal import RefusalError, check_joints
 from tvist_controller.trajectory.spline import Knots
 from tvist_plant.description import RobotDescription
@@ -36,7 +36,7 @@ class Reachable:
         self._description = description
         self._inverse = InverseKinematics(description)
 
-    def posture(self, question: k.InverseKinematics, now: Snapshot) -> Posture:
+    def posture(self, question: k.InverseKinematics, now: PlanningState) -> Posture:
         """Return the nearest joint positions for a tool pose; raise RefusalError without any in range."""
         near = now.q
         if question.near is not None:
@@ -51,7 +51,7 @@ class Reachable:
             raise RefusalError(error.code, "pose", f"pose {_shown(goal)}: {error}", error.limit) from error
         return Posture(q=tuple(q.tolist()))
 
-    def pose(self, question: k.ForwardKinematics, now: Snapshot) -> ToolPose:
+    def pose(self, question: k.ForwardKinematics, now: PlanningState) -> ToolPose:
         """Return the tool pose at joint positions; raise RefusalError if invalid or out of range."""
         q = now.q
         if question.q is not None:
@@ -79,7 +79,7 @@ class Reachable:
         why = f"{at}, the arm passes a singular posture (near [{near}] rad): go round it, or move there with move_j"
         return RefusalError("singular", field, why)
 
-    def legs(self, command: MoveL | MoveC | MovePath, tracker: Tracker, now: Snapshot) -> Iterator[Leg]:
+    def legs(self, command: MoveL | MoveC | MovePath, tracker: Tracker, now: PlanningState) -> Iterator[Leg]:
         """Yield the parts of a command's path that move the arm; raise RefusalError if impossible."""
         frame, q = placement(command.frame), now.q
         before = 0 if now.after is None else now.after.segments
@@ -115,7 +115,7 @@ class Reachable:
             raise RefusalError("out_of_range", field, why) from error
 
     def _along(
-        self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, now: Snapshot
+        self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, now: PlanningState
     ) -> Knots:
         """Return the joints' motion along a leg, checked for range."""
         if isinstance(way, JointWay):
@@ -159,11 +159,13 @@ def _segments(
         yield segment, f"segments[{before + number}]"
 
 
-def _pacing(segment: MoveL | MoveC | Segment) -> Pacing:
+def _pacing(segment: MoveL | MoveC | Segment) -> LegSpeed:
     match segment:
         case JointSegment():
-            return Pacing(PER_RADIAN * segment.velocity, PER_RADIAN * segment.acceleration, segment.duration)
+            return LegSpeed(
+                PER_RADIAN * segment.velocity, PER_RADIAN * segment.acceleration, segment.duration
+            )
         case LineSegment() | MoveL():
-            return Pacing(segment.velocity, segment.acceleration, segment.duration)
+            return LegSpeed(segment.velocity, segment.acceleration, segment.duration)
         case ProcessSegment() | ArcSegment() | MoveC():
-            return Pacing(segment.velocity, segment.acceleration, even=True)
+            return LegSpeed(segment.velocity, segment.acceleration, even=True)

@@ -16,13 +16,13 @@ REACHED = 0.9
 """Fraction of the speed that counts as reached; a peak between two acceleration ramps stays a little lower [-]."""
 BLUNTED = 3.0
 """The same as a ratio if the way is too short for the speed, since ramps take much of a few millimetres [-]."""
-LATE = 1.01
+DURATION_TOLERANCE = 1.01
 """Ratio of durations up to which a motion counts as on time [-]."""
 USED_UP = 0.95
 """Fraction of a limit above which it is responsible [-]."""
-LOOKS = 65
+SAMPLES = 65
 """Number of places of a curve at which the joints' permitted speed is computed."""
-LEAST = 1e-9
+MIN_DERIVATIVE = 1e-9
 """Smallest derivative by which a speed is divided [rad/m]."""
 
 
@@ -67,7 +67,7 @@ def slower_path(
     """Return the limit that prevents the speed or duration of a one-segment motion; None if just too short."""
     pacing, way = run[0].pacing, float(curve.end[0])
     if pacing.duration is not None:
-        if law.duration <= LATE * pacing.duration:
+        if law.duration <= DURATION_TOLERANCE * pacing.duration:
             return None
         what = lasts(law.duration, pacing.duration)
     else:
@@ -75,8 +75,8 @@ def slower_path(
         if fastest >= REACHED * pacing.velocity:
             return None
         what = f"velocity is {fastest:.4g} of {pacing.velocity:.4g} m/s"
-        slope = np.abs(curve.derivatives(np.linspace(0.0, way, LOOKS))[1])
-        permitted = float((limits.velocity / np.maximum(slope, LEAST)).min(axis=1).max())
+        slope = np.abs(curve.derivatives(np.linspace(0.0, way, SAMPLES))[1])
+        permitted = float((limits.velocity / np.maximum(slope, MIN_DERIVATIVE)).min(axis=1).max())
         within_reach = min(pacing.velocity, (pacing.acceleration * way) ** 0.5)
         if within_reach < pacing.velocity and within_reach <= min(permitted, BLUNTED * fastest):
             return None
@@ -100,7 +100,9 @@ def slower_joint_motion(motion: PlannedMotion, asked: MotionLimits) -> Limited |
 
 def longer_joint_motion(motion: PlannedMotion, asked: float) -> Limited | None:
     """Return a message if the arm's limits make a joint motion longer than requested [s]."""
-    return None if motion.duration <= LATE * asked else ARMS.makes(lasts(motion.duration, asked))
+    return (
+        None if motion.duration <= DURATION_TOLERANCE * asked else ARMS.makes(lasts(motion.duration, asked))
+    )
 
 
 def lasts(duration: float, asked: float) -> str:

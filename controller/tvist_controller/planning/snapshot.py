@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Struct
 
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.paths.pacing import Ground
+from tvist_controller.paths.pacing import PathLimits
 from tvist_controller.paths.route import Branch
 from tvist_controller.sources.mode_source import ModeSource
 from tvist_controller.trajectory.retiming import RetimedLaw
@@ -40,7 +40,7 @@ class Course:
 
     curve: SplineCurve
     """The joints' motion."""
-    ground: Ground
+    ground: PathLimits
     """Limits along the curve."""
     law: RetimedLaw
     branches: tuple[Branch, ...]
@@ -98,7 +98,7 @@ class FilterState(NamedTuple):
     """Payload declared by a client; differs from it if the robot has learnt another."""
 
 
-class Snapshot(Struct, frozen=True, eq=False, gc=False):
+class PlanningState(Struct, frozen=True, eq=False, gc=False):
     """State that plans depend on."""
 
     filter: FilterState

@@ -14,7 +14,7 @@ from tvist_shaping.filter import QUICKEST
 
 POSTURES = 40
 """Number of postures at which modes are computed."""
-STEP = 0.03
+HALF_STEP = 0.03
 """Half the travel over which their change is measured [rad]."""
 TIME = 0.01
 """Time over which the quickest change of modes is measured [s]."""
@@ -67,8 +67,8 @@ def _hastens(tvist: Filter, estimator: Estimator, q: Floats, velocity: float) ->
         higher, change = f_d * (1.0 + QUICKEST[0] * TIME), QUICKEST[1] * TIME
         least = min(delay(higher, np.maximum(zeta + sign * change, 0.0)) for sign in (-1.0, 1.0))
         return (delay(f_d, zeta) - least) / TIME
-    steps = STEP * np.eye(len(q))
+    steps = HALF_STEP * np.eye(len(q))
     ways = [
         abs(delay(*estimator.estimate(q + step)) - delay(*estimator.estimate(q - step))) for step in steps
     ]
-    return sum(ways) * velocity / (2.0 * STEP)
+    return sum(ways) * velocity / (2.0 * HALF_STEP)

@@ -16,7 +16,7 @@ _UNKNOWN = re.compile(r"compile_error_name_not_found:(\.?\w+):")
 
 
 @dataclass(frozen=True)
-class Finding:
+class ProgramFinding:
     """A place in a program that needs attention."""
 
     line: int
@@ -29,7 +29,7 @@ class Finding:
     """Message."""
 
 
-def check_program(text: str) -> list[Finding]:
+def check_program(text: str) -> list[ProgramFinding]:
     """Return the findings in a program's text, in order.
 
     Errors are the compiler's: syntax, unknown names, wrong calls. Warnings are calls of functions that are not
@@ -46,18 +46,18 @@ def check_program(text: str) -> list[Finding]:
         subject = SUBJECTS.get(name if name == unknown[1] else METHOD)
         if subject is not None:
             text_of_it = f"{name}: this controller does not simulate {subject[1]}"
-            findings.append(Finding(error.line, error.column, "warning", text_of_it))
+            findings.append(ProgramFinding(error.line, error.column, "warning", text_of_it))
     if not known:
-        findings += [Finding(one.line, one.column, "warning", one.text) for one in unportable(text)]
+        findings += [ProgramFinding(one.line, one.column, "warning", one.text) for one in unportable(text)]
         if compile_script(text, known_signatures()).idle:
             why = "the text only defines functions: as a program, it ends at once"
-            findings.append(Finding(1, 1, "warning", why))
+            findings.append(ProgramFinding(1, 1, "warning", why))
     return sorted(findings, key=lambda finding: (finding.line, finding.column))
 
 
-def _error(error: ScriptError) -> Finding:
+def _error(error: ScriptError) -> ProgramFinding:
     """Return the compiler's error, with the function closest to an unknown name."""
     unknown = _UNKNOWN.fullmatch(error.text)
     near = [] if unknown is None else get_close_matches(unknown[1].lower(), _NAMES, n=1, cutoff=0.75)
     said = f"{error.text} did you mean {_NAMES[near[0]]}?" if near else error.text
-    return Finding(error.line, error.column, "error", said)
+    return ProgramFinding(error.line, error.column, "error", said)

@@ -30,7 +30,7 @@ MAX_FURTHER = 25
 """Largest number of moves per extension of a running motion."""
 AHEAD = 150
 """Number of moves ahead of the arm from which on no more are planned."""
-SPARE = 4
+SPARE_TICKS = 4
 """Further ticks for which the running motion stays unchanged, since rate changes look ahead."""
 PAUSE = 300
 """Ticks charged for a stop or a `movej` planned within a tick. These take longest in a tick, so fewer than
@@ -231,7 +231,7 @@ class Journey:
         if not legs or under_way >= AHEAD or self._ends or self.legs[under_way - 1].blend == 0.0:
             return
         ticks = FURTHER + FURTHER_PER_PART * len(legs)
-        ordered = self._access.plans.further(command_of(legs, goes_on=True), (ticks + SPARE) * PERIOD)
+        ordered = self._access.plans.further(command_of(legs, goes_on=True), (ticks + SPARE_TICKS) * PERIOD)
         if ordered is not None:
             self._further = ordered, self._access.latest().tick + ticks, len(legs)
 

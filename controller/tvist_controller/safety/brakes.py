@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_controller.line.differentiator import Target
-from tvist_controller.trajectory import Known
+from tvist_controller.trajectory import SampledPositions
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, payload_inertia, rigid_model
 
@@ -14,7 +14,7 @@ LONGEST = 5.0
 """Time after which the arm counts as stopped [s]."""
 
 
-def brake(description: RobotDescription, carried: Payload, state: Target, period: float) -> Known:
+def brake(description: RobotDescription, carried: Payload, state: Target, period: float) -> SampledPositions:
     """Simulate the rigid arm under its brakes from a state of motion, in ticks of `period` seconds.
 
     Each joint is slowed down by its brake, assumed as strong as its drive, and stays at rest afterwards. With rotors:
@@ -46,4 +46,4 @@ def brake(description: RobotDescription, carried: Payload, state: Target, period
         qd = new
         q = q + period * qd
         positions.append(q)
-    return Known(positions[1:] or positions, period)
+    return SampledPositions(positions[1:] or positions, period)

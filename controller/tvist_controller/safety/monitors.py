@@ -10,7 +10,7 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
-from tvist_controller.motion.monitor import Finding, Monitor
+from tvist_controller.motion.monitor import Monitor, MonitorFinding
 from tvist_plant.plant import PERIOD
 
 ALLOWED = 0.01
@@ -27,7 +27,7 @@ def exceeds(values: Floats, limits: Floats) -> bool:
     return False
 
 
-class Overload(Monitor):
+class TorqueOverload(Monitor):
     """Detects a joint whose drive exceeds its torque limit [N m] for longer than `ALLOWED`."""
 
     needs: ClassVar = "drives"
@@ -38,7 +38,7 @@ class Overload(Monitor):
         self._any = False
         exceeds(self._limits, self._limits)  # loads compiled code, which takes many ticks
 
-    def look(self, sample: Sample) -> Finding | None:
+    def look(self, sample: Sample) -> MonitorFinding | None:
         """Return the longest overload if too long, and restart the count."""
         moment = sample.measured.moment
         if not exceeds(moment, self._limits):
@@ -55,7 +55,7 @@ class Overload(Monitor):
             f"torque of joint {self._joints[joint]} is {moment[joint]:.0f} N m, beyond its limit of "
             f"{self._limits[joint]:g} for more than 10 ms"
         )
-        return Finding(why, "limit_torque", "protective_stop")
+        return MonitorFinding(why, "limit_torque", "protective_stop")
 
     def restart(self) -> None:
         """Restart the count."""
@@ -70,18 +70,18 @@ class ShaperMonitor(Monitor):
         self._cycle = cycle
         self._clipped = self._limited = False
 
-    def look(self, sample: Sample) -> Finding | None:
+    def look(self, sample: Sample) -> MonitorFinding | None:
         """Return a fault of the filter, or a limit on its feed-forward."""
         line_filter, mode = self._cycle.filter, self._cycle.mode
         if (fault := line_filter.fault) is not None:  # the filter continues with old weights
-            return Finding(fault, None, "protective_stop")
+            return MonitorFinding(fault, None, "protective_stop")
         began, self._clipped = line_filter.tvist.clipped and not self._clipped, line_filter.tvist.clipped
         if began:
             why = (
                 f"{line_filter.tvist.name} cannot meet its specification here: it needs a longer delay line, or "
                 "leaves more vibration. Choose another shaper for these poses, or a pose in which the arm is stiffer"
             )
-            return Finding(why, "out_of_range")
+            return MonitorFinding(why, "out_of_range")
         limited = sample.motors is not None and sample.motors.limited
         told, self._limited = self._limited, self._limited and not mode.at_rest
         if not limited or told or mode in {LineMode.STOPPING, LineMode.REST}:
@@ -91,4 +91,4 @@ class ShaperMonitor(Monitor):
             "the torque limits keep the motors from leading enough: the arm will vibrate more after this motion. "
             "Move with less acceleration, or choose a shaper without feed-forward, such as auto"
         )
-        return Finding(why, "limit_torque")
+        return MonitorFinding(why, "limit_torque")

@@ -10,13 +10,13 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.inverse_dynamics import SLEW
 from tvist_controller.line.line_tick import QD, QDD, Q
 from tvist_controller.line.sample import Sample
-from tvist_controller.motion.monitor import Finding, Monitor
+from tvist_controller.motion.monitor import Monitor, MonitorFinding
 from tvist_plant.chain import BODY, torques
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import carries_weight
 from tvist_plant.plant import GRAVITY, PERIOD
 
-EVERY = 10
+TICKS_AVERAGED = 10
 """Ticks averaged per measurement."""
 MEMORY = 2.0
 """Time constant of the memory, many periods of a vibration [s]."""
@@ -49,7 +49,7 @@ def correlate(
     qdd: Floats,
     scratch: Floats,  # shape (n+1, 28)
     friction: Floats,  # F of each joint, shape (n,) [N m]
-    feedback: Floats,  # sum of r over `EVERY` ticks, shape (n,) [N m]; set to zero
+    feedback: Floats,  # sum of r over `TICKS_AVERAGED` ticks, shape (n,) [N m]; set to zero
     fade: Floats,  # what is left of each memory after these ticks, shape (2,) [-]
     sums: Floats,  # yᵀ W y [1/kg²], yᵀ W r and φ Σ |y_j| W_j F_j [1/kg] in each memory, shape (3, 2); changed
 ) -> None:
@@ -65,7 +65,7 @@ def correlate(
         feedback[j] = 0.0
     for memory in range(fade.shape[0]):
         sums[0, memory] = fade[memory] * sums[0, memory] + square
-        sums[1, memory] = fade[memory] * sums[1, memory] + product / EVERY
+        sums[1, memory] = fade[memory] * sums[1, memory] + product / TICKS_AVERAGED
         sums[2, memory] = fade[memory] * sums[2, memory] + FRICTION * bound
 
 
@@ -100,7 +100,7 @@ class PayloadMonitor(Monitor):
         self._sum = np.zeros(description.joints)
         # Without this floor, a joint without friction would dominate the estimate.
         self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
-        self._fade = np.exp(-EVERY * PERIOD / np.array([MEMORY, RECENT]))
+        self._fade = np.exp(-TICKS_AVERAGED * PERIOD / np.array([MEMORY, RECENT]))
         self.declare(declared, SLEW)
         still = np.zeros_like(self._sum)  # the first calls load compiled code, which takes many ticks
         add(still, still, still)
@@ -137,19 +137,19 @@ class PayloadMonitor(Monitor):
         square, product, bound = self._sums[:, memory].tolist()
         return (0.0, np.inf) if square <= 0.0 else (product / square, bound / square)
 
-    def look(self, sample: Sample) -> Finding | None:
+    def look(self, sample: Sample) -> MonitorFinding | None:
         """Return once that the payload cannot be right, until another is set."""
         if self._wait > 0:
             self._wait -= 1
             return None
         add(self._sum, sample.measured.moment, sample.command.torque)
         self._ticks += 1
-        if self._ticks < EVERY:
+        if self._ticks < TICKS_AVERAGED:
             return None
         self._correlate(sample.signals, self._sums)
-        self._ticks, self._time = 0, float(self._fade[0]) * self._time + EVERY * PERIOD
+        self._ticks, self._time = 0, float(self._fade[0]) * self._time + TICKS_AVERAGED * PERIOD
         why = self._judge(sample.mode.at_rest)
-        return None if why is None else Finding(why, "payload_mismatch")
+        return None if why is None else MonitorFinding(why, "payload_mismatch")
 
     def _correlate(self, signals: Floats, sums: Floats) -> None:
         arm, q, qd, qdd = self._arm, signals[Q], signals[QD], signals[QDD]
@@ -179,8 +179,8 @@ class PayloadMonitor(Monitor):
         )
 
     def _waits(self, at_rest: bool) -> bool:
-        """Add `EVERY` ticks of doubt; return whether learning may still find the payload."""
-        span = EVERY * PERIOD
+        """Add `TICKS_AVERAGED` ticks of doubt; return whether learning may still find the payload."""
+        span = TICKS_AVERAGED * PERIOD
         self._doubted += span
         self._moved = self._moved or not at_rest
         self._rested = self._rested + span if at_rest and self._moved else 0.0

@@ -26,7 +26,7 @@ from tvist_protocol.values import Payload
 
 BLOCK = 10
 """Ticks averaged per block."""
-LEAST = 20
+MIN_BLOCKS = 20
 """Smallest number of blocks of a motion."""
 UNKNOWN = {
     "friction": 0.2,
@@ -57,7 +57,7 @@ LIGHT = 0.25
 """Mass below which the centre of mass is not estimated [kg]."""
 DEAD = 0.25
 """Smallest change of mass that is reported [kg]."""
-SURE = 2.0
+SURE_DEVIATIONS = 2.0
 """Number of standard deviations for a certain change [-]."""
 VAGUE = 0.35
 """Deviation of the mass above which a motion teaches nothing [kg]."""
@@ -146,7 +146,7 @@ class PayloadStudent:
     def study(self, motion: MotionRecord) -> PayloadLesson | None:
         """Return the carried payload if it certainly differs from the assumed one by more than `DEAD`."""
         believed = motion.beliefs.declared
-        if not motion.whole or len(motion.moments) < LEAST * BLOCK:
+        if not motion.whole or len(motion.moments) < MIN_BLOCKS * BLOCK:
             return None
         centre = np.array(believed.com if believed.mass >= LIGHT else self._own.com)
         known = self._known
@@ -158,15 +158,17 @@ class PayloadStudent:
         if alone is None or alone.deviation > VAGUE:
             return None
         now = Estimate(known.x, known.covariance + _independent(known.x, *DRIFT).covariance)
-        changed = abs(alone.x[0] - known.x[0]) > SURE * np.hypot(alone.deviation, now.deviation)
+        changed = abs(alone.x[0] - known.x[0]) > SURE_DEVIATIONS * np.hypot(alone.deviation, now.deviation)
         found = alone if changed else equations.solve(now)
-        if found is None or found.x[0] < -SURE * found.deviation - DEAD:  # something holds the arm up
+        if (
+            found is None or found.x[0] < -SURE_DEVIATIONS * found.deviation - DEAD
+        ):  # something holds the arm up
             return None
         self._known = found
         return self._lesson(believed, found)
 
     def _lesson(self, believed: Payload, found: Estimate) -> PayloadLesson | None:
-        mass, certain = float(found.x[0]), SURE * found.deviation
+        mass, certain = float(found.x[0]), SURE_DEVIATIONS * found.deviation
         beyond = mass > self._rated + certain
         assumed = round(min(max(mass, 0.0), self._rated), 3)
         if not abs(assumed - believed.mass) > max(DEAD, certain):

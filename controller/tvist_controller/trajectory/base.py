@@ -11,7 +11,7 @@ from tvist_controller.trajectory.path import Path
 
 
 @dataclass(frozen=True)
-class Forecast:
+class BrakingForecast:
     """When and how hard a trajectory will brake, in its path's parameter, as known without simulation."""
 
     path: Path
@@ -62,7 +62,7 @@ class Trajectory(ABC):
         return self.finished
 
     @property
-    def forecast(self) -> Forecast | None:
+    def forecast(self) -> BrakingForecast | None:
         """Forecast of its motion; None without a path."""
         return None
 
@@ -87,7 +87,7 @@ class Rest(Trajectory):
         return True
 
 
-class Known(Trajectory):
+class SampledPositions(Trajectory):
     """A list of positions, shape (n,) [rad], one per tick of `period` seconds; keeps the last."""
 
     def __init__(self, positions: Sequence[Floats], period: float) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import turn, turned
-from tvist_controller.trajectory.guided import Following, Guided, StuckError
-from tvist_controller.trajectory.limiter import TorqueRoom
+from tvist_controller.trajectory.guided import Guided, LimitedFollower, StuckError
+from tvist_controller.trajectory.limiter import TorqueMargin
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.speed import abrupt
 
@@ -86,7 +86,7 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats, period: 
     return result
 
 
-class Compliant(Following):
+class Compliant(LimitedFollower):
     """Moves the tool by force control in compliant axes, and as another reference does in stiff ones.
 
     The tracked pose P is integrated from twists along the task's axes: the force law's velocity where compliant, that
@@ -99,7 +99,7 @@ class Compliant(Following):
         state: tuple[Floats, Floats, Floats],
         limits: MotionLimits,
         reach: Floats,
-        torque: TorqueRoom,
+        torque: TorqueMargin,
         period: float,
         *,
         tool: Callable[[], Arm],  # of the tool centre point, which may change at any time

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from tvist_controller.trajectory.base import Trajectory
-from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
+from tvist_controller.trajectory.limiter import Limiter, TorqueMargin
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 LOOKAHEAD = (0.03, 0.2)
@@ -55,7 +55,7 @@ class Guided(Trajectory):
         """Set the programmed speed fraction [-] and the velocity limit of reduced mode, if active [rad/s]."""
 
 
-class Following(Guided):
+class LimitedFollower(Guided):
     """Passes a client's signal, timed by the client, through a `Limiter`; reduced mode limits velocity."""
 
     def __init__(
@@ -63,7 +63,7 @@ class Following(Guided):
         state: tuple[Floats, Floats, Floats],  # to continue from, q, q̇ and q̈, each of shape (n,)
         limits: MotionLimits,
         reach: Floats,  # largest |q| of each joint, shape (n,) [rad]
-        torque: TorqueRoom | None,  # None for no limit
+        torque: TorqueMargin | None,  # None for no limit
         period: float,  # tick [s]
     ) -> None:
         self.limits = self._arm = limits
@@ -93,7 +93,7 @@ class Following(Guided):
             self._follow(self.state)
 
 
-class Servo(Following):
+class ServoFollower(LimitedFollower):
     """Follows the posture p of the latest command like a damped spring: q̈ = k (p - q - T q̇).
 
     At constant velocity the lag is T for any gain k. T is the lookahead plus 1.5 ticks, so that `target_q`
@@ -106,7 +106,7 @@ class Servo(Following):
         state: tuple[Floats, Floats, Floats],
         limits: MotionLimits,
         reach: Floats,
-        torque: TorqueRoom,
+        torque: TorqueMargin,
         period: float,
     ) -> None:
         super().__init__(state, limits, reach, torque, period)

@@ -76,7 +76,7 @@ def judge(
     return found + FIT if fit else found
 
 
-class TorqueRoom(Protocol):
+class TorqueMargin(Protocol):
     """Motion that joint torques permit."""
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
@@ -113,7 +113,7 @@ class Limiter:
         limits: MotionLimits,
         period: float,  # tick [s]
         reach: Floats,  # largest |q| of each joint, shape (n,) [rad]
-        torque: TorqueRoom | None,  # None for no limit
+        torque: TorqueMargin | None,  # None for no limit
     ) -> None:
         (q, qd, qdd), n = state, len(state[0])
         self._limits, self._period = limits, period

@@ -6,9 +6,9 @@ from typing import Protocol, Self
 import numpy as np
 import ruckig
 
-from tvist_controller.trajectory.base import Forecast, Trajectory
+from tvist_controller.trajectory.base import BrakingForecast, Trajectory
 from tvist_controller.trajectory.limits import Floats, MotionLimits
-from tvist_controller.trajectory.pace import Pace
+from tvist_controller.trajectory.pace import TimeScaling
 from tvist_controller.trajectory.path import Path
 from tvist_controller.trajectory.spline import SplineCurve
 
@@ -113,7 +113,7 @@ class PlannedMotion(Trajectory):
         """Duration at full speed [s]."""
         self.speed = speed
         """Target time rate, 0 to 1 [-]."""
-        self._pace = Pace(self.agility, period, speed)
+        self._pace = TimeScaling(self.agility, period, speed)
         # Time on the path, as whole ticks since the rate last changed, so that rounding errors do not add up.
         self._since, self._ticks = 0.0, 0
 
@@ -182,12 +182,12 @@ class PlannedMotion(Trajectory):
         return self.finished or (self.rate == 0.0 and self.steady)
 
     @property
-    def forecast(self) -> Forecast:
+    def forecast(self) -> BrakingForecast:
         """Forecast of its motion; the time of braking is known only at constant rate."""
         time, rate = self.time, self._pace.rate
         known = rate > 0.0 and self.steady
         limits = self.limits if self.steady else self.agility
-        return Forecast(
+        return BrakingForecast(
             self.path,
             self.path.end,
             limits.acceleration,
@@ -236,7 +236,7 @@ class PlannedMotion(Trajectory):
     def paced_at(self, rate: float) -> Self:
         """Return a copy that has not started, at another rate [-]."""
         other = self.fork()
-        other.speed, other._pace = rate, Pace(self.agility, self._period, rate)  # noqa: SLF001  one of its own kind
+        other.speed, other._pace = rate, TimeScaling(self.agility, self._period, rate)  # noqa: SLF001  one of its own kind
         return other
 
     @property

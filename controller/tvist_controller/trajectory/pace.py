@@ -13,7 +13,7 @@ QUICKEST = 20.0
 """Largest change of the rate; from standstill to full speed takes at least 1/20 s [1/s]."""
 
 
-class Pace:
+class TimeScaling:
     """Time rate r of a trajectory, 0 to 1, whose changes keep the motion's limits.
 
     Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. ṙ may have any value that keeps |q̈| within

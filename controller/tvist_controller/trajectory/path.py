@@ -10,7 +10,7 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_shaping.base import Posture
 
 
-class Way(NamedTuple):
+class CheckedMotion(NamedTuple):
     """Motion to check for collisions."""
 
     at: Callable[[float], Floats]
@@ -58,11 +58,11 @@ class Path(ABC):
         """Return the parameter's limits in a stop from x, (m,), at up to `velocity` [1/s]; None for none."""
 
     @abstractmethod
-    def way(self, start: Floats, end: Floats) -> Way:
+    def way(self, start: Floats, end: Floats) -> CheckedMotion:
         """Return the part between two parameters, shape (m,), for collision checks."""
 
     @property
-    def whole(self) -> Way:
+    def whole(self) -> CheckedMotion:
         """The whole path for collision checks."""
         return self.way(self.start, self.end)
 
@@ -92,7 +92,7 @@ class JointLine(Path):
         """Return the joints' limits unchanged."""
         return limits
 
-    def way(self, start: Floats, end: Floats) -> Way:
+    def way(self, start: Floats, end: Floats) -> CheckedMotion:
         """Return the straight line between two postures."""
         way = end - start
-        return Way(lambda share: start + share * way, way)
+        return CheckedMotion(lambda share: start + share * way, way)

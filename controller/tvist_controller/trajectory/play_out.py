@@ -9,7 +9,7 @@ WINDOW = 128
 """Number of set-points over which lateness is observed, in four parts."""
 MAX_PERIODS, MAX_SECONDS = 2.0, 0.02
 """Longest wait for late set-points relative to the earliest; the larger value applies."""
-SPARE = 1
+SPARE_PERIODS = 1
 """Additional delay of a stream slower than the tick, for jitter at the start [periods]."""
 SLACK = 0.3
 """Tolerated excess delay, which avoids constant changes [periods]."""
@@ -17,7 +17,7 @@ SHARE = 0.05
 """Fraction of the limits available to a change of delay [-]."""
 CALM = 0.5
 """Time after which a delay required by the limits is reduced if no longer needed [s]."""
-SLOW = 0.05
+SLOW_SHARE = 0.05
 """Fraction of the velocity limit below which the stream must be for that [-]."""
 CLOSE = 1e-6
 """Difference below which the delay equals its target [ticks]."""
@@ -42,7 +42,7 @@ class PlayOut:
         period: float,  # tick [s]
     ) -> None:
         self._limits, self._period, self._ticks = limits, period, ticks
-        self._base = (look_ahead + SPARE * (ticks > 1.0)) * ticks - 1.0
+        self._base = (look_ahead + SPARE_PERIODS * (ticks > 1.0)) * ticks - 1.0
         self._most = max(MAX_PERIODS * ticks, MAX_SECONDS / period)
         self._origin, self._now = first, 0
         self._parts: deque[tuple[float, float]] = deque(maxlen=4)
@@ -97,7 +97,7 @@ class PlayOut:
             self._calm = 0
         else:
             self._calm += 1
-            if self._calm > CALM / self._period and speed < SLOW * self._limits.velocity:
+            if self._calm > CALM / self._period and speed < SLOW_SHARE * self._limits.velocity:
                 self._held = self._base
         goal = max(self._wanted, self._held)
         if delay == goal and self._rate == 0.0:

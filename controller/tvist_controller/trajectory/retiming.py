@@ -19,7 +19,7 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 TOOL_SHARE = 0.25
 """Fraction of the shaper's window for which tool limits hold [-]. The speed changes so little within it that the shaped
 tool exceeds its acceleration in a bend by a hundredth; the whole window would cost half a second on some bends."""
-LEAST = 1e-9
+MIN_DIVISOR = 1e-9
 """Smallest divisor."""
 ROUNDS = 3
 """Rounds of applying windowed limits to a motion, an odd number."""
@@ -44,7 +44,7 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class Way:
+class RetimingLimits:
     """All limits of a motion along a curve."""
 
     edges: Floats
@@ -60,7 +60,7 @@ class Way:
 
 
 @compiled
-def passes(
+def forward_backward_pass(
     edges: Floats, highest: Floats, p: Floats, q: Floats, known: Floats
 ) -> Floats:  # pragma: no cover  compiled
     """Return the largest b = ṡ² at the c + 1 edges, zero at the last; `p` and `q` as in `Cells`.
@@ -90,7 +90,7 @@ def passes(
 
 
 @compiled
-def widened(
+def window_max(
     times: Floats, window: float, values: Floats, lowest: bool
 ) -> Floats:  # pragma: no cover  compiled
     """Return for each cell the largest (or lowest) value of all cells passed within ± a time window [s].
@@ -113,7 +113,7 @@ def widened(
 
 
 @compiled
-def level(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
+def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
     """Insert constant speed for a ramp [s] between acceleration and braking, which halves their jerk.
 
     The motion is unchanged up to edge `known`, and first constant if it brakes there; `b` is ṡ² at the edges, (c + 1,).
@@ -235,7 +235,7 @@ def arrivals(edges: Floats, b: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(2.0 * np.diff(edges) / (speeds[:-1] + speeds[1:]))))
 
 
-def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False) -> RetimedLaw:
+def quickest_law(way: RetimingLimits, jerk: float, window: float, *, goes_on: bool = False) -> RetimedLaw:
     """Return the quickest law within the limits along a curve.
 
     The jerk limit is that of s [1/s^3]; within the window [s], a shaper mixes moments of the motion. A law
@@ -246,7 +246,7 @@ def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False)
     accelerations = np.abs(0.5 * np.diff(b) / lengths)
     ramp = float(max(accelerations.max() / jerk, (way.slope * accelerations).max() / way.jerk))
     b = _lastingly(way, b, ramp, window, AT_REST)
-    law = RetimedLaw(way.edges, level(way.edges, b, ramp, 0) if goes_on else b, ramp)
+    law = RetimedLaw(way.edges, flatten_peaks(way.edges, b, ramp, 0) if goes_on else b, ramp)
     if law.limits.jerk > jerk * (1.0 + 1e-6):  # it goes from acceleration to braking within a ramp
         ramp *= law.limits.jerk / jerk
         law = RetimedLaw(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp)
@@ -254,7 +254,7 @@ def quickest_law(way: Way, jerk: float, window: float, *, goes_on: bool = False)
 
 
 def longer_law(
-    way: Way, jerk: float, window: float, before: RetimedLaw, first: int, known: int
+    way: RetimingLimits, jerk: float, window: float, before: RetimedLaw, first: int, known: int
 ) -> RetimedLaw | None:
     """Return the quickest law equal to another up to an edge and continuing behind that one's end.
 
@@ -267,11 +267,11 @@ def longer_law(
     tool = replace(way.tool, p=np.maximum(way.tool.p, 1.0 / (jerk * ramp)))
     way = replace(way, joints=joints, tool=tool)
     b = _lastingly(way, _passed(way.edges, joints, tool, fixed), ramp, window, fixed)
-    b = level(way.edges, b, ramp, known)
+    b = flatten_peaks(way.edges, b, ramp, known)
     return RetimedLaw(way.edges, b, ramp, before.rate, start) if _goes_on(way, b, known) else None
 
 
-def _lastingly(way: Way, b: Floats, ramp: float, window: float, known: Floats) -> Floats:
+def _lastingly(way: RetimingLimits, b: Floats, ramp: float, window: float, known: Floats) -> Floats:
     """Return the largest ṡ² at the edges within windowed limits; `b` is that without window.
 
     A faster motion comes farther within the window, so more limits apply. Planning on the times of a faster
@@ -289,13 +289,13 @@ def _lastingly(way: Way, b: Floats, ramp: float, window: float, known: Floats) -
 def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
     """Return limits that hold for a time window around a motion with these edge times."""
     return Cells(
-        widened(times, window, cells.fastest[:, None], True)[:, 0],
-        widened(times, window, cells.p, False),
-        widened(times, window, cells.q, False),
+        window_max(times, window, cells.fastest[:, None], True)[:, 0],
+        window_max(times, window, cells.p, False),
+        window_max(times, window, cells.q, False),
     )
 
 
-def _goes_on(way: Way, b: Floats, known: int) -> bool:
+def _goes_on(way: RetimingLimits, b: Floats, known: int) -> bool:
     """Return whether a motion fixed up to an edge keeps the limits in the cell behind it."""
     cell = slice(known, known + 1)
     acceleration = 0.5 * (b[known + 1] - b[known]) / (way.edges[known + 1] - way.edges[known])
@@ -306,7 +306,9 @@ def _goes_on(way: Way, b: Floats, known: int) -> bool:
 
 
 def _passed(edges: Floats, joints: Cells, tool: Cells, known: Floats) -> Floats:
-    """Return the largest ṡ² at the edges within limits of joints and tool; see `passes`."""
+    """Return the largest ṡ² at the edges within limits of joints and tool; see `forward_backward_pass`."""
     p, q = np.hstack((joints.p, tool.p)), np.hstack((joints.q, tool.q))
     highest = np.minimum(joints.fastest, tool.fastest) ** 2
-    return passes(edges, np.minimum(highest, 1.0 / np.maximum(q.max(axis=1), LEAST)), p, q, known)
+    return forward_backward_pass(
+        edges, np.minimum(highest, 1.0 / np.maximum(q.max(axis=1), MIN_DIVISOR)), p, q, known
+    )

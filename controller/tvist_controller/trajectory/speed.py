@@ -6,7 +6,7 @@ import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.trajectory.guided import Guided, StuckError
-from tvist_controller.trajectory.limiter import TorqueRoom
+from tvist_controller.trajectory.limiter import TorqueMargin
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.speed_step import FOUND, SINGULAR, speed_step
 from tvist_plant.chain import WIDTH
@@ -45,7 +45,7 @@ class Speed(Guided):
         self,
         state: tuple[Floats, Floats, Floats],  # to continue from, q, q̇ and q̈, each of shape (n,)
         limits: MotionLimits,  # of every joint; the jerk is that of stops
-        torque: TorqueRoom,
+        torque: TorqueMargin,
         period: float,  # tick [s]
         *,
         rate: float = 1.0,  # of its time, 0 to 1 [-]; more if the joints are too fast for it at the start

@@ -6,7 +6,7 @@ import numpy as np
 
 from tvist_controller._compiled import compiled
 from tvist_controller.trajectory.limits import Floats, MotionLimits
-from tvist_controller.trajectory.path import Path, Way
+from tvist_controller.trajectory.path import CheckedMotion, Path
 
 SAMPLES = np.linspace(0.0, 1.0, 9)
 """Places in each interval at which derivatives are sampled for bounds."""
@@ -14,7 +14,7 @@ ENOUGH = 1.05
 """Factor from a derivative's largest sample to its bound [-]."""
 CURVED_SHARE = 0.5
 """Largest fraction of joint acceleration and jerk that the curve itself may use in a motion [-]."""
-LOOKS = 12
+MAX_WIDENINGS = 12
 """Number of times a stop's range is widened before the whole rest of the curve is used."""
 
 
@@ -172,8 +172,8 @@ class SplineCurve(Path):
         """Return the limits that the curve leaves at this velocity for a stop from x."""
         start, end = float(x[0]), float(self.end[0])
         span = 0.1 * velocity
-        for look in range(LOOKS):
-            to = start + span if look < LOOKS - 1 else end
+        for look in range(MAX_WIDENINGS):
+            to = start + span if look < MAX_WIDENINGS - 1 else end
             kept = kept_by(self.bends_within(start, to), limits, velocity)
             if kept is None or to >= end:
                 return kept
@@ -183,11 +183,11 @@ class SplineCurve(Path):
             span = 1.25 * needed
         raise AssertionError("the last look reaches the end")
 
-    def way(self, start: Floats, end: Floats) -> Way:
+    def way(self, start: Floats, end: Floats) -> CheckedMotion:
         """Return the part of the curve between two parameters."""
         along = end - start
         slope = self.bends_within(float(start[0]), float(end[0])).slope
-        return Way(lambda share: self.posture(start + share * along), abs(float(along[0])) * slope)
+        return CheckedMotion(lambda share: self.posture(start + share * along), abs(float(along[0])) * slope)
 
     def _posture(self, x: Floats) -> Floats:
         assert x.shape == (1,), "a parameter is one number, and compiled code does not check"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import ruckig
 
-from tvist_controller.trajectory.base import Forecast, Trajectory
+from tvist_controller.trajectory.base import BrakingForecast, Trajectory
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.path import Path
 
@@ -136,9 +136,9 @@ class PathStop(Slowing):
         return self.path.states(self._origin + x, xd, xdd)
 
     @property
-    def forecast(self) -> Forecast:
-        """Forecast of its motion, which brakes from the start."""
-        return Forecast(self.path, self._sample(self.duration), self.braking, self.jerk, 0.0)
+    def forecast(self) -> BrakingForecast:
+        """BrakingForecast of its motion, which brakes from the start."""
+        return BrakingForecast(self.path, self._sample(self.duration), self.braking, self.jerk, 0.0)
 
     @property
     def end(self) -> Floats:
@@ -211,13 +211,13 @@ class SlowedStop(Trajectory):
         return self._ticks >= len(self._samples) - 1
 
     @property
-    def forecast(self) -> Forecast:
-        """Forecast of its motion, which brakes from the start."""
+    def forecast(self) -> BrakingForecast:
+        """BrakingForecast of its motion, which brakes from the start."""
         along = self._samples[:, self.path.leading]
         braking, jerk = (
             float(np.abs(np.diff(along, order)).max(initial=0.0)) / self._period**order for order in (2, 3)
         )
-        return Forecast(self.path, self._samples[-1], braking, jerk, 0.0)
+        return BrakingForecast(self.path, self._samples[-1], braking, jerk, 0.0)
 
     @property
     def end(self) -> Floats:

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.trajectory.guided import Following
-from tvist_controller.trajectory.limiter import TorqueRoom
+from tvist_controller.trajectory.guided import LimitedFollower
+from tvist_controller.trajectory.limiter import TorqueMargin
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.play_out import PlayOut
 from tvist_controller.trajectory.stop import JointStop
@@ -17,7 +17,7 @@ BRIDGED = 2
 """Largest number of consecutive missing set-points that are extrapolated."""
 
 
-class SetpointStream(Following):
+class SetpointStream(LimitedFollower):
     """A reference generated from a client's set-points.
 
     At the controller's rate, set-points pass unchanged. Slower ones are control points of a cubic B-spline,
@@ -36,7 +36,7 @@ class SetpointStream(Following):
         period: float,  # tick [s]
         *,
         reach: Floats | None = None,  # largest |q| of each joint, shape (n,) [rad]; None for no limit
-        torque: TorqueRoom | None = None,  # None for no limit
+        torque: TorqueMargin | None = None,  # None for no limit
     ) -> None:
         self._rest, still = np.array(q, dtype=float), np.zeros(len(q))
         reach = np.full(len(q), np.inf) if reach is None else reach

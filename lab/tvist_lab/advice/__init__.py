@@ -3,7 +3,7 @@
 from tvist_lab.advice.advise import Advice, RingingMode, advise
 from tvist_lab.advice.in_words import as_dict, command, verdict
 from tvist_lab.advice.options import EACH, ONE, ROBOT, Option
-from tvist_lab.advice.stops import Left, Stop
+from tvist_lab.advice.stops import Left, StopWithRest
 
 __all__ = [
     "EACH",
@@ -13,7 +13,7 @@ __all__ = [
     "Left",
     "Option",
     "RingingMode",
-    "Stop",
+    "StopWithRest",
     "advise",
     "as_dict",
     "command",

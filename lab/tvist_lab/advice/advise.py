@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_lab.advice.options import EACH, ONE, ROBOT, Option, options, slowed, smoothed
-from tvist_lab.advice.stops import Stop, grouped
-from tvist_lab.metrics import Measured, NotMeasurableError, shaper_of
-from tvist_lab.metrics.agreed_modes import NEAR, agreed_modes
+from tvist_lab.advice.stops import StopWithRest, grouped
+from tvist_lab.metrics import MeasuredRecording, NotMeasurableError, shaper_of
+from tvist_lab.metrics.agreed_modes import SAME_MODE, agreed_modes
 from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.ring_down import SKIP, WINDOWS
 from tvist_lab.recordings.recording import MissingColumnError
@@ -50,9 +50,9 @@ class RingingMode(NamedTuple):
 class Advice:
     """Vibration found in logs, and the recommended shaper."""
 
-    ringing: Sequence[Stop]
+    ringing: Sequence[StopWithRest]
     """Unshaped stops whose vibration stands out."""
-    quiet: Sequence[Stop]
+    quiet: Sequence[StopWithRest]
     """Unshaped stops without noticeable vibration."""
     shaped: Sequence[tuple[int, int, str]]
     """Motions that already had a shaper: index of the file, number in it, and the shaper's name if known."""
@@ -77,7 +77,7 @@ class Advice:
         return median(one.unshaped.still for one in self.ringing)
 
 
-def advise(logs: Sequence[Measured]) -> Advice:
+def advise(logs: Sequence[MeasuredRecording]) -> Advice:
     """Recommend a shaper from logs of one robot."""
     stops, shaped, refused = _sorted_out(logs)
     loud = [one for one in stops if one.rings]
@@ -95,8 +95,8 @@ def advise(logs: Sequence[Measured]) -> Advice:
 
 
 def _sorted_out(
-    logs: Sequence[Measured],
-) -> tuple[list[Stop], list[tuple[int, int, str]], list[tuple[int, int, str]]]:
+    logs: Sequence[MeasuredRecording],
+) -> tuple[list[StopWithRest], list[tuple[int, int, str]], list[tuple[int, int, str]]]:
     """Return unshaped stops, motions that had a shaper, and motions that cannot be measured."""
     stops, shaped, refused = [], [], []
     for file, log in enumerate(logs):
@@ -109,7 +109,7 @@ def _sorted_out(
                 refused.append((file, place + 1, "it was stopped before its target"))
                 continue
             try:
-                stops.append(Stop.of(log, place, file))
+                stops.append(StopWithRest.of(log, place, file))
             except NotMeasurableError as error:
                 refused.append((file, place + 1, str(error)))
             except MissingColumnError as error:
@@ -131,13 +131,13 @@ def recommended(found: Sequence[Option], still: float) -> Option | None:
     return min(fair, key=lambda one: (SIMPLE.index(one.aim.scope), one.added_s, one.left_percent))
 
 
-def ringing_modes(stops: Sequence[Stop]) -> list[RingingMode]:
+def ringing_modes(stops: Sequence[StopWithRest]) -> list[RingingMode]:
     """Group the modes of stops that differ by at most 7 % in frequency; the mode of most motions comes first."""
     pool = [(place, mode) for place, one in enumerate(stops) for mode in one.result.modes]
     found = []
     while pool:
         near = [
-            [one for one in pool if abs(one[1]["f_d_hz"] / middle["f_d_hz"] - 1.0) <= NEAR]
+            [one for one in pool if abs(one[1]["f_d_hz"] / middle["f_d_hz"] - 1.0) <= SAME_MODE]
             for _, middle in pool
         ]
         group = max(
@@ -162,19 +162,19 @@ def _median(values: Iterable[float | None]) -> float | None:
     return median(known) if known else None
 
 
-def frequency_of_joints(logs: Sequence[Measured]) -> tuple[float, int] | None:
+def frequency_of_joints(logs: Sequence[MeasuredRecording]) -> tuple[float, int] | None:
     """Return f_d [Hz] seen in encoders or currents after stops, and the number of motions that show it.
 
     This is weak evidence, since joints hardly feel the tool. None if no two motions agree within 7 %.
     """
     seen = [(place, f_d) for place, found in enumerate(_swings(logs)) for f_d in found]
-    groups = [[one for one in seen if abs(one[1] / middle - 1.0) <= NEAR] for _, middle in seen]
+    groups = [[one for one in seen if abs(one[1] / middle - 1.0) <= SAME_MODE] for _, middle in seen]
     best = max(groups, key=lambda group: len({place for place, _ in group}), default=[])
     count = len({place for place, _ in best})
     return (median(f_d for _, f_d in best), count) if count >= AGREED else None
 
 
-def _swings(logs: Sequence[Measured]) -> Iterator[list[float]]:
+def _swings(logs: Sequence[MeasuredRecording]) -> Iterator[list[float]]:
     """Yield the frequencies that the joints show after each motion [Hz]."""
     for log in logs:
         recording = log.recording

@@ -7,7 +7,7 @@ from typing import Any
 
 from tvist_lab.advice.advise import Advice
 from tvist_lab.advice.options import ANY, EACH, ROBOT, Modes, Option
-from tvist_lab.metrics import Measured
+from tvist_lab.metrics import MeasuredRecording
 from tvist_lab.words import counted, spread
 
 NEVER = "ring longer than the recorded rest"
@@ -15,7 +15,7 @@ NAMED = 3
 """Largest number of modes that a sentence names."""
 
 
-def verdict(advice: Advice, logs: Sequence[Measured]) -> list[str]:
+def verdict(advice: Advice, logs: Sequence[MeasuredRecording]) -> list[str]:
     """Return the advice and its reasons as sentences."""
     said = [_first(advice)]
     if advice.ringing:
@@ -34,7 +34,7 @@ def verdict(advice: Advice, logs: Sequence[Measured]) -> list[str]:
     return said
 
 
-def _untold(log: Measured) -> bool:
+def _untold(log: MeasuredRecording) -> bool:
     return log.recording.foreign and "reference_q" not in log.recording
 
 
@@ -122,7 +122,7 @@ def _against(modes: Modes) -> str:
     return f"against {' and '.join(f'{f_d:.1f} Hz (ζ {zeta:.2f})' for f_d, zeta in modes)}"
 
 
-def command(advice: Advice, logs: Sequence[Measured]) -> list[str]:
+def command(advice: Advice, logs: Sequence[MeasuredRecording]) -> list[str]:
     """Return the lines that apply an advice; none if there is nothing to apply."""
     # A robot of this controller gets the shaper over the network; the reference of another robot goes through
     # the library.
@@ -152,12 +152,12 @@ def command(advice: Advice, logs: Sequence[Measured]) -> list[str]:
     return ["from tvist_shaping import Fixed, make_filter", *lines]
 
 
-def _joints(logs: Sequence[Measured]) -> int:
+def _joints(logs: Sequence[MeasuredRecording]) -> int:
     recording = logs[0].recording
     return int(recording["target_q" if "target_q" in recording else "actual_q"].shape[1])
 
 
-def as_dict(advice: Advice, logs: Sequence[Measured]) -> dict[str, Any]:
+def as_dict(advice: Advice, logs: Sequence[MeasuredRecording]) -> dict[str, Any]:
     """Convert an advice to plain values for `tvist log advise --json`."""
     return {
         "verdict": verdict(advice, logs),

@@ -9,7 +9,7 @@ from statistics import median
 import numpy as np
 from scipy.optimize import minimize
 
-from tvist_lab.advice.stops import Left, Stop, followed, shaped_by
+from tvist_lab.advice.stops import Left, StopWithRest, followed, shaped_by
 from tvist_lab.metrics import NotMeasurableError
 from tvist_lab.metrics.ring_down import decay_rate
 from tvist_lab.recordings import Floats
@@ -43,9 +43,9 @@ class Aim:
     """`ONE`, `EACH` or `ROBOT`."""
     modes: Mapping[int, Modes]
     """Modes to use from now on, by number of the motion."""
-    judged: Mapping[Stop, Modes]
+    judged: Mapping[StopWithRest, Modes]
     """Modes by which each stop is judged, found without it if there are repetitions."""
-    optimistic: frozenset[Stop] = frozenset()
+    optimistic: frozenset[StopWithRest] = frozenset()
     """Stops that are judged by modes found in themselves, since nothing else was recorded."""
 
 
@@ -55,12 +55,12 @@ class Option:
 
     shaper: str
     aim: Aim
-    left: Mapping[Stop, Left]
+    left: Mapping[StopWithRest, Left]
     """Predicted vibration after each stop, by convolution."""
-    by_modes: Mapping[Stop, float]
+    by_modes: Mapping[StopWithRest, float]
     """Vibration left according to each stop's modes, as root of the share of their energy [-]; only where
     modes are known."""
-    added: Mapping[Stop, float]
+    added: Mapping[StopWithRest, float]
     """Time by which each motion ends later [s]."""
 
     @property
@@ -74,7 +74,7 @@ class Option:
         return f"{self.shaper}, {self.count} mode{'' if self.count == 1 else 's'}"
 
     @cached_property
-    def percent(self) -> Mapping[Stop, float]:
+    def percent(self) -> Mapping[StopWithRest, float]:
         """Vibration left after each stop, rms over that without a shaper [%]."""
         return {stop: 100.0 * left.rms / stop.unshaped.rms for stop, left in self.left.items()}
 
@@ -109,7 +109,7 @@ def impulses_of(shaper: str, modes: Modes) -> Impulses:
     return product([SHAPERS[shaper].function(f_d, zeta) for f_d, zeta in modes])
 
 
-def options(stops: Sequence[Stop]) -> list[Option]:
+def options(stops: Sequence[StopWithRest]) -> list[Option]:
     """Judge every shaper of the catalogue on stops that ring (at least one); shapers that fit none are left out."""
     return [
         option
@@ -136,12 +136,12 @@ def _judged(name: str, aim: Aim) -> Option | None:
     return Option(name, aim, left, by_modes, added)
 
 
-def by_the_modes(stop: Stop, impulses: Impulses) -> float | None:
+def by_the_modes(stop: StopWithRest, impulses: Impulses) -> float | None:
     """Return the root of the share of energy that impulses leave of a stop's modes [-]; None if no modes are known."""
     return left_of_modes(stop, lambda f_d, zeta: float(residual(f_d, zeta, impulses)))
 
 
-def left_of_modes(stop: Stop, left: Callable[[float, float], float]) -> float | None:
+def left_of_modes(stop: StopWithRest, left: Callable[[float, float], float]) -> float | None:
     """Return the root of the share of energy left of a stop's modes [-]; None if no modes are known.
 
     `left` gives for f_d [Hz] and ζ of a mode the share of its amplitude that is left [-].
@@ -155,7 +155,7 @@ def left_of_modes(stop: Stop, left: Callable[[float, float], float]) -> float | 
     return math.sqrt(after / before) if before > 0.0 else None
 
 
-def smoothed(stop: Stop, added: float) -> float | None:
+def smoothed(stop: StopWithRest, added: float) -> float | None:
     """Return the vibration left if a running mean as long as `added` [s] smooths the reference [%].
 
     The mean lowers the jerk, and the motion ends later by `added`. None if too little rest was recorded.
@@ -167,7 +167,7 @@ def smoothed(stop: Stop, added: float) -> float | None:
     return 100.0 * left.rms / stop.unshaped.rms
 
 
-def slowed(stop: Stop, added: float) -> float | None:
+def slowed(stop: StopWithRest, added: float) -> float | None:
     """Return the vibration left of a stop's modes if the whole motion took `added` [s] longer [%].
 
     A mode with poles λ is left with an amplitude in proportion to |∫ v(t) exp(λ* (t - T)) dt|, where v is the
@@ -187,7 +187,7 @@ def slowed(stop: Stop, added: float) -> float | None:
     return None if share is None else 100.0 * share
 
 
-def _speed(stop: Stop) -> tuple[Floats, Floats]:
+def _speed(stop: StopWithRest) -> tuple[Floats, Floats]:
     """Return times until the reference stops [s], and the speed of the joint that moves farthest [rad/s]."""
     recording, motion = stop.measured.recording, stop.motion
     rows = slice(motion.start, motion.reference_stop + 2)
@@ -196,7 +196,7 @@ def _speed(stop: Stop) -> tuple[Floats, Floats]:
     return time, np.asarray(np.gradient(q[:, joint], time))
 
 
-def _aims(stops: Sequence[Stop]) -> list[Aim]:
+def _aims(stops: Sequence[StopWithRest]) -> list[Aim]:
     groups = {group: [one for one in stops if one.group == group] for group in {one.group for one in stops}}
     aims = []
     for count in (1, 2):
@@ -214,7 +214,7 @@ def _aims(stops: Sequence[Stop]) -> list[Aim]:
     return aims
 
 
-def _estimated(stop: Stop) -> Modes:
+def _estimated(stop: StopWithRest) -> Modes:
     """Return the modes that the robot itself estimated at the end of a motion; none without a calibration."""
     recording, row = stop.measured.recording, stop.motion.shaped_stop
     f_d, zeta = (recording[name][row] for name in ("estimated_f_d", "estimated_zeta"))
@@ -223,7 +223,9 @@ def _estimated(stop: Stop) -> Modes:
     return tuple(zip(f_d.tolist(), zeta.tolist(), strict=True)) if known else ()
 
 
-def _held_out(stops: Sequence[Stop], count: int) -> tuple[dict[Stop, Modes], frozenset[Stop]]:
+def _held_out(
+    stops: Sequence[StopWithRest], count: int
+) -> tuple[dict[StopWithRest, Modes], frozenset[StopWithRest]]:
     """Return each stop's modes, found in the other half of the stops, and the stop itself if it is the only one."""
     if len(stops) == 1:
         return {stops[0]: best_modes(stops, count)}, frozenset(stops)
@@ -233,7 +235,7 @@ def _held_out(stops: Sequence[Stop], count: int) -> tuple[dict[Stop, Modes], fro
     return {stop: found[halves[stop]] for stop in stops}, frozenset()
 
 
-def best_modes(stops: Sequence[Stop], count: int) -> Modes:
+def best_modes(stops: Sequence[StopWithRest], count: int) -> Modes:
     """Find the modes for which ZV shapers would leave least after some stops, in the order of frequency."""
     # These modes suit shaping better than fitted ones: if an arm has more modes than a shaper, the best aim lies
     # between them.

@@ -14,16 +14,16 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_lab.advice.ripple import Ripple, fitted, poles_of
-from tvist_lab.metrics import Measured, MotionResult, MotionRows, NotMeasurableError
+from tvist_lab.metrics import MeasuredRecording, MotionResult, MotionRows, NotMeasurableError
 from tvist_lab.metrics.common_clock import NOISE_PEAK, RINGS, STILL
-from tvist_lab.metrics.comparison import Way
-from tvist_lab.metrics.felt import felt
+from tvist_lab.metrics.comparison import MotionEnds
+from tvist_lab.metrics.felt import acceleration_of
 from tvist_lab.metrics.ring_down import fit_ring_down
 from tvist_lab.metrics.vibration import low_pass_at
 from tvist_lab.recordings import Floats, Recording
 from tvist_shaping import Impulses
 
-LATE = 0.02
+COUNTED_FROM = 0.02
 """Time after a stop from which vibration counts [s]; until then a filtered sensor still shows the braking."""
 COUNTED = (0.2, 0.5)
 """Shortest and longest time for which vibration counts [s]."""
@@ -49,13 +49,13 @@ class Left(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Stop:
+class StopWithRest:
     """The end of a motion with the rest after it."""
 
     file: int
     number: int
     """Number of the motion in its file, from 1."""
-    measured: Measured
+    measured: MeasuredRecording
     motion: MotionRows
     result: MotionResult
     time: Floats
@@ -70,15 +70,15 @@ class Stop:
     """Index of the motion of which this is a repetition."""
 
     @classmethod
-    def of(cls, measured: Measured, place: int, file: int = 0) -> "Stop":
+    def of(cls, measured: MeasuredRecording, place: int, file: int = 0) -> "StopWithRest":
         """Cut a motion out of a measured log; raise NotMeasurableError if too little rest was recorded."""
         recording, motion = measured.recording, measured.motions[place]
-        time, alpha = felt(recording, motion, slice(motion.start, motion.end))
+        time, alpha = acceleration_of(recording, motion, slice(motion.start, motion.end))
         time = time - recording.time[motion.arm_stop(recording)]
-        if not len(time) or time[-1] < LATE + COUNTED[0] + TAIL:
+        if not len(time) or time[-1] < COUNTED_FROM + COUNTED[0] + TAIL:
             rest = max(time[-1], 0.0) if len(time) else 0.0
             raise NotMeasurableError(
-                f"only {rest:.2f} s of rest were recorded, {LATE + COUNTED[0] + TAIL:g} s are needed"
+                f"only {rest:.2f} s of rest were recorded, {COUNTED_FROM + COUNTED[0] + TAIL:g} s are needed"
             )
         if not np.ptp(alpha[time > 0.0], axis=0).any():
             raise NotMeasurableError("the accelerometer shows the same value throughout the rest")
@@ -94,16 +94,16 @@ class Stop:
         return cls(file, place + 1, measured, motion, measured.results[place], time, alpha, q, noise)
 
     @cached_property
-    def way(self) -> Way:
+    def way(self) -> MotionEnds:
         """Start and target of the motion."""
-        return Way.of(self.measured.recording, self.motion)
+        return MotionEnds.of(self.measured.recording, self.motion)
 
     @property
     def duration(self) -> float:
         """Duration of the reference [s]."""
         return self.motion.duration(self.measured.recording)
 
-    def repeats(self, other: "Stop") -> bool:
+    def repeats(self, other: "StopWithRest") -> bool:
         """Whether both are the same motion at the same speed."""
         longer = bool(abs(self.duration / other.duration - 1.0) >= SAME_DURATION)
         return not longer and self.way.corresponds(other.way)
@@ -149,7 +149,7 @@ class Stop:
 
     def left(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> Left:
         """Return the predicted vibration, see `after`; raise NotMeasurableError if too little rest remains."""
-        shaped, late = self.after(sizes, delays, gears=gears), self.time - float(delays[-1]) - LATE
+        shaped, late = self.after(sizes, delays, gears=gears), self.time - float(delays[-1]) - COUNTED_FROM
         counts = (late > 0.0) & (late <= COUNTED[1])
         if late[-1] < COUNTED[0]:
             raise NotMeasurableError("too little rest is left after the shaped stop")
@@ -180,17 +180,17 @@ def _at(times: Floats, time: Floats, values: Floats) -> Floats:
     return np.column_stack([np.interp(times, time, axis) for axis in values.T])
 
 
-def shaped_by(stop: Stop, impulses: Impulses, *, gears: bool = True) -> Left:
-    """Predict the vibration after a stop with a shaper; see `Stop.left`."""
+def shaped_by(stop: StopWithRest, impulses: Impulses, *, gears: bool = True) -> Left:
+    """Predict the vibration after a stop with a shaper; see `StopWithRest.left`."""
     return stop.left(np.asarray(impulses.A), np.asarray(impulses.tau), gears=gears)
 
 
-def grouped(stops: Sequence[Stop]) -> list[Stop]:
+def grouped(stops: Sequence[StopWithRest]) -> list[StopWithRest]:
     """Number the stops by motion, and give them the smallest noise of each file's sensor."""
     noise = {
         file: min(one.noise for one in stops if one.file == file) for file in {one.file for one in stops}
     }
-    firsts: list[Stop] = []
+    firsts: list[StopWithRest] = []
     found = []
     for stop in stops:
         group = next((place for place, first in enumerate(firsts) if first.repeats(stop)), len(firsts))

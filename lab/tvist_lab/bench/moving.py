@@ -39,7 +39,7 @@ Run = Callable[[], float]
 """Makes one run and returns its result, here the processor time of a tick [µs]."""
 
 
-class Arm(Protocol):
+class MeasuredArm(Protocol):
     """An arm moved by drives."""
 
     def reset(self, command: DriveCommand) -> object:
@@ -107,7 +107,7 @@ def plant_tick() -> Run:
     return arm_tick(FlexibleArm(setup.description, body(setup.payload)))
 
 
-def arm_tick(arm: Arm) -> Run:
+def arm_tick(arm: MeasuredArm) -> Run:
     """Measure a tick of an arm that makes the motion."""
     setup = free_setup(truth=False)
     dynamics = InverseDynamics(setup.description, body(setup.payload))

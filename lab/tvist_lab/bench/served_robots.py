@@ -19,7 +19,7 @@ from zenoh.handlers import Callback
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_client.transports.session import close_session, open_session
-from tvist_lab.served import Served, ServedError, served
+from tvist_lab.served import RunningServer, ServedError, served
 from tvist_plant.plant import PERIOD
 from tvist_protocol import keys
 from tvist_protocol.codec import decode
@@ -70,7 +70,7 @@ async def one_robot(
     }
 
 
-async def punctuality(server: Served, seconds: float) -> tuple[dict[str, float], float]:
+async def punctuality(server: RunningServer, seconds: float) -> tuple[dict[str, float], float]:
     """Return the lateness of the ticks, and the share of a core that the server uses."""
     robot = server.robot
     heard: list[Telemetry] = []

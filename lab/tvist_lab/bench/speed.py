@@ -26,7 +26,7 @@ LIBRARIES = ("tvist", "eclipse-zenoh", "mcap", "msgspec", "mujoco", "numba", "nu
 """Distributions whose versions affect speed."""
 
 
-class Machine(Struct, frozen=True):
+class MachineInfo(Struct, frozen=True):
     """The machine on which figures depend."""
 
     cpu: str
@@ -66,9 +66,9 @@ def _usual(run: Run) -> float:
     return median(run() for _ in range(REPETITIONS))
 
 
-def this_machine() -> Machine:
+def this_machine() -> MachineInfo:
     """Describe this machine as it is now."""
-    return Machine(
+    return MachineInfo(
         cpu=_processor(),
         cores=processors(),
         system=f"{platform.system()} {platform.release()} {platform.machine()}",

@@ -1,6 +1,6 @@
 """The paper's figures, drawn from recordings and from the shaping library."""
 
-from tvist_lab.figures.after_stop import Shown, after_stop_figure, compared_figure, vibration_figure
+from tvist_lab.figures.after_stop import ComparedPanel, after_stop_figure, compared_figure, vibration_figure
 from tvist_lab.figures.calibration import identified_figure, workspace_map_figure
 from tvist_lab.figures.flexibility import figure_1
 from tvist_lab.figures.move_plan import move_plan_figure
@@ -20,8 +20,8 @@ from tvist_lab.figures.wrong_frequency import (
 )
 
 __all__ = [
+    "ComparedPanel",
     "Recorded",
-    "Shown",
     "StyleError",
     "after_stop_figure",
     "catalogue_figure",

@@ -29,7 +29,7 @@ SHOWN = (-100.0, 1000.0)
 """Time shown before and after the stop [ms]."""
 NAMED = 4
 """Number of shapers on the front that are named besides the recommended one."""
-LEAST = 0.5
+MIN_DRAWN_PERCENT = 0.5
 """Lowest share that is drawn [%]."""
 OTHERS = np.linspace(0.01, 1.0, 30)
 """Durations of smoothing, as shares of the longest shaper's [-]."""
@@ -84,7 +84,7 @@ def _costs(advice: Advice) -> Figure:
         strong = {"color": color, "fontweight": "bold", "ha": "center", "bbox": None}
         note(panel, _short(advice.best), _place(advice.best), (0, -24), **strong)
     panel.set_yscale("log")
-    lowest = 0.7 * max(min(one.left_percent for one in fair), LEAST)
+    lowest = 0.7 * max(min(one.left_percent for one in fair), MIN_DRAWN_PERCENT)
     panel.set(xlim=(0.0, 1.05e3 * longest), ylim=(lowest, 110.0))
     panel.set(xlabel="Time added to a motion (ms)", ylabel="Shake that is left (%)")
     decades(panel, "y")

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tvist_lab.change import Change
+from tvist_lab.change import MotionChange
 from tvist_lab.figures.recorded import Recorded
 from tvist_lab.figures.style import (
     ALPHA,
@@ -36,7 +36,7 @@ from tvist_lab.metrics import (
     still_after,
 )
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL
-from tvist_lab.metrics.felt import felt
+from tvist_lab.metrics.felt import acceleration_of
 from tvist_lab.recordings import Floats, Recording
 
 SHOWN = (-50.0, 350.0)
@@ -62,7 +62,7 @@ def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure
     top = HEADROOM * max(*peaks, STILL)
     said = (
         f"without shaping: {peaks[0]:.2f} m/s²",
-        f"with shaping: {peaks[1]:.2f} m/s², {Change(peaks[0], peaks[1], None, None).less()}",
+        f"with shaping: {peaks[1]:.2f} m/s², {MotionChange(peaks[0], peaks[1], None, None).less()}",
     )
     rests: list[float | None] = []
     for (recording, motion), words, height, style in zip(
@@ -108,7 +108,7 @@ def _compare_rest(panel: Axes, before: float | None, after: float | None) -> Non
     note(panel, words, (SHOWN[1], STILL), (0, 5), ha="right")
 
 
-class Shown(NamedTuple):
+class ComparedPanel(NamedTuple):
     """A panel of `compared_figure`."""
 
     name: str
@@ -117,7 +117,7 @@ class Shown(NamedTuple):
     said: str = ""
 
 
-def compared_figure(motions: Sequence[Shown], unshaped: Sequence[str] = ()) -> Figure:
+def compared_figure(motions: Sequence[ComparedPanel], unshaped: Sequence[str] = ()) -> Figure:
     """Draw |α| of several motions, one panel each, on one scale; time 0 is the start of the motion.
 
     Motions that cannot be drawn are left out; of more than eight curve names, the rest is. Curves named in
@@ -161,7 +161,7 @@ def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, tuple[Floats, Fl
     stop = float(first.time[motion.arm_stop(first)] - first.time[motion.start])
     for name, (recording, its) in recorded.items():
         with suppress(NotMeasurableError):
-            time, alpha = felt(recording, its, slice(its.start, its.end), smooth=True)
+            time, alpha = acceleration_of(recording, its, slice(its.start, its.end), smooth=True)
             size, rests = amplitude(alpha), time >= recording.time[its.arm_stop(recording)] + AFTER_STOP
             late = time - recording.time[its.start] - stop
             curves[name] = (late, size, float(np.max(size[rests], initial=STILL)))
@@ -171,4 +171,4 @@ def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, tuple[Floats, Fl
 def vibration_figure(unshaped: Recording, shaped: Recording, number: int) -> Figure:
     """Draw |α| of one move around its stop, unshaped and shaped."""
     curves = {name: (one, motions(one)[0]) for name, one in (("Unshaped", unshaped), ("Shaped", shaped))}
-    return compared_figure([Shown(f"Move {number}", curves)], ["Unshaped"])
+    return compared_figure([ComparedPanel(f"Move {number}", curves)], ["Unshaped"])

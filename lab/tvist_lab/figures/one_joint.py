@@ -18,7 +18,7 @@ from tvist_lab.figures.style import (
     remark,
     title,
 )
-from tvist_lab.one_joint import Modes, Plucked
+from tvist_lab.one_joint import OneJointModes, Plucked
 
 APART = 0.62
 """Distance between the shoulders of neighbouring poses in the figure [m]."""
@@ -27,7 +27,7 @@ WORDS = ("\nincreased inertia", "", "\ndecreased inertia")
 SPRING_TURNS = 2.5
 
 
-def figure_2(modes: Modes) -> Figure:
+def figure_2(modes: OneJointModes) -> Figure:
     """Draw the arm at three elbow angles, and its frequency and damping over that angle.
 
     Top: the arm from above, with its inertia about the shoulder. Below: f_d and ζ, as lines from the formula

@@ -43,7 +43,7 @@ SYMBOLS = {
 }
 LEAD, TAIL = 0.1, 0.4
 """Time shown in figure 16 before the unshaped reference's stop and after the shaped one's [s]."""
-QUIET = 0.2
+NOISE_TIME = 0.2
 """Time at the end of the recorded rest from which the noise is found [s]."""
 LOUD = 1.2
 """Ratio to the largest noise above which a peak belongs to a vibration [-]; a decay needs two such peaks."""
@@ -143,7 +143,7 @@ def _draw(panel: Axes, recorded: Recorded, style: Series, label: str) -> tuple[R
     rows = slice(motion.start, motion.end)
     panel.plot(recording.time[rows] - start, alpha[rows], **style.line(1.1, label=label))
     # At the end of the recorded rest, only the sensor's noise is left.
-    quiet = int(np.searchsorted(recording.time, recording.time[motion.end - 1] - QUIET))
+    quiet = int(np.searchsorted(recording.time, recording.time[motion.end - 1] - NOISE_TIME))
     noise = np.max(alpha[max(quiet, motion.shaped_stop + 1) : motion.end])
     if np.count_nonzero(rv.peaks > LOUD * noise) <= 1:
         return rv, ", fitted to noise" if rv.fitted else ", largest value"

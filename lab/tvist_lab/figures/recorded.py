@@ -25,7 +25,7 @@ from tvist_lab.recordings import Floats, Recording
 
 LEAD, REST = 0.1, 1.0
 """Time shown before the reference's start and after the shaped reference's stop [s]."""
-NEAR = 0.15
+POSITION_RANGE_MM = 0.15
 """Largest distance to the final position on the axis [mm]; five times the repeatability."""
 SYMBOLS = {
     r"$\ddot q^*$": "acceleration of the shaped reference",
@@ -72,7 +72,9 @@ def motion_figure(name: str, *recorded: Recorded) -> Figure:
     where = {"xycoords": ("axes fraction", "data"), "color": MUTED}
     note(errors, f"repeatability, {limit:g} mm", (0.0, limit), (3, 2), **where)
     accelerations.set_ylabel(r"$\ddot q^*$ (rad/s²)")
-    errors.set(ylabel=r"$E$ (mm)", ylim=(0.0, NEAR), yticks=np.linspace(0.0, NEAR, 4))
+    errors.set(
+        ylabel=r"$E$ (mm)", ylim=(0.0, POSITION_RANGE_MM), yticks=np.linspace(0.0, POSITION_RANGE_MM, 4)
+    )
     alphas.set_ylabel(ALPHA)
     alphas.set_ylim(bottom=0.0)
     symbols = dict(SYMBOLS)

@@ -20,7 +20,7 @@ from tvist_lab.figures.style import (
     title,
 )
 from tvist_lab.metrics import NotMeasurableError
-from tvist_lab.metrics.felt import felt
+from tvist_lab.metrics.felt import acceleration_of
 from tvist_lab.metrics.ring_down import WINDOWS, RingDown
 from tvist_lab.metrics.table import ring_down_of
 from tvist_lab.recordings import Floats
@@ -45,7 +45,7 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
     """
     recording, motion = recorded
     period = recording.period
-    late, alpha = felt(recording, motion, slice(motion.start, motion.end))
+    late, alpha = acceleration_of(recording, motion, slice(motion.start, motion.end))
     late = late - float(recording.time[motion.arm_stop(recording)])
     # Resample at even times around the stop, which fills in missing samples.
     ends = max(late[0], -BEFORE - BLOCK), min(late[-1], AFTER)

@@ -22,11 +22,11 @@ from tvist_lab.figures.style import (
 )
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.work import Row
-from tvist_lab.words import MANY
+from tvist_lab.words import QUANTILES_FROM
 
 EACH = 0.22
 """Height for each setting of a sweep [inch]."""
-LONG = 16
+LONG_NAME = 16
 """Length from which a name takes two lines [letters]."""
 FLOOR = 1e-4
 """Smaller peaks are drawn at this value [m/s²]."""
@@ -160,13 +160,13 @@ def _label(name: str) -> str:
     """Break a long shaper name into two lines."""
     words = name.split("_")
     half = (len(words) + 1) // 2
-    return name if len(name) < LONG else "_".join(words[:half]) + "_\n" + "_".join(words[half:])
+    return name if len(name) < LONG_NAME else "_".join(words[:half]) + "_\n" + "_".join(words[half:])
 
 
 def residual_by_move_figure(rows: Sequence[Row]) -> Figure:
     """Draw peak |α| after the stop, shaped against unshaped, by move, and the distribution of the reductions."""
     reductions = np.sort([row["reduction_percent"] for row in rows if row["reduction_percent"] is not None])
-    several = reductions.size >= MANY
+    several = reductions.size >= QUANTILES_FROM
     figure, (above, *rest) = panels(
         2 if several else 1,
         6.0 if several else 3.6,

@@ -35,7 +35,7 @@ ALPHA = r"$|\alpha|$ (m/s²)"
 OF_ALPHA = {r"$|\alpha|$": "acceleration of the tool, without gravity"}
 USUAL = {"lines.linewidth": 1.4, "lines.markersize": 4.0, "font.size": 8.0}
 """Sizes of the default style, to which those in this package are relative [pt]."""
-NEAR = 0.035
+SHARED_LABEL_DISTANCE = 0.035
 """Share of the axis below which neighbouring points share a name [-]."""
 
 
@@ -204,7 +204,7 @@ def name_over(
     panel: Axes, x: NDArray[np.float64], highest: NDArray[np.float64], names: Sequence[str]
 ) -> None:
     """Write names upwards from the highest point at each x, both of shape (N,); close names share a line."""
-    near = NEAR * float(np.ptp(x))
+    near = SHARED_LABEL_DISTANCE * float(np.ptp(x))
     groups: list[list[int]] = []
     for place in map(int, np.argsort(x, kind="stable")):
         if groups and x[place] - x[groups[-1][0]] <= near:

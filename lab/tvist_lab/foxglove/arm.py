@@ -22,7 +22,7 @@ THIN = 0.04
 
 
 @dataclass(frozen=True)
-class Arm:
+class FoxgloveArm:
     """An arm of n joints; a link's frame is at its far end, the last one is the flange."""
 
     frames: tuple[str, ...]
@@ -59,7 +59,7 @@ def _about(axis: Floats, angles: Floats) -> Rotation:
     return Rotation.from_rotvec(np.outer(angles, axis))
 
 
-def arm_of(content: RecordingFile) -> Arm:
+def arm_of(content: RecordingFile) -> FoxgloveArm:
     """Return the arm of a recording from its robot file, which servers record."""
     if "description" not in (content.start or {}):
         raise RecordingError(
@@ -82,7 +82,7 @@ def arm_of(content: RecordingFile) -> Arm:
         bodies += (
             Body(name=PAYLOAD, link=robot.joints - 1, start=(0.0, 0.0, 0.0), end=(x, y, z), radius=radius),
         )
-    return Arm(
+    return FoxgloveArm(
         frames=(BASE, *(f"{joint}_link" for joint in robot.robot.joints[:-1]), "flange"),
         turns=Rotation.from_matrix([link.rotation for link in links]),
         shifts=np.array([link.translation for link in links]),

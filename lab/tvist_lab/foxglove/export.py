@@ -15,7 +15,7 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import LIBRARY_IDENTIFIER, Writer
 from scipy.spatial.transform import Rotation
 
-from tvist_lab.foxglove.arm import PAYLOAD, Arm, Z, arm_of
+from tvist_lab.foxglove.arm import PAYLOAD, FoxgloveArm, Z, arm_of
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration
 from tvist_lab.recordings import Floats, Recording, RecordingError
@@ -69,7 +69,7 @@ def export(content: RecordingFile, path: Path) -> list[str]:
     return [*stiff, *lacking]
 
 
-def _layout(robot: str, arm: Arm) -> str:
+def _layout(robot: str, arm: FoxgloveArm) -> str:
     text = resources.files("tvist_lab.foxglove").joinpath("layout.json").read_text("utf-8")
     layout = json.loads(text.replace("tvist/ROBOT/", f"tvist/{robot}/"))
     view, reach = layout["configById"]["3D!arm"], float(np.linalg.norm(arm.shifts, axis=1).sum())
@@ -132,7 +132,7 @@ def _schema_of(example: Any) -> dict[str, Any]:
     return {"type": kinds.get(type(example), "string")}
 
 
-def _entity(arm: Arm, body: Body) -> dict[str, Any]:
+def _entity(arm: FoxgloveArm, body: Body) -> dict[str, Any]:
     start, end = np.array(body.start), np.array(body.end)
     length, wide = float(np.linalg.norm(end - start)), 2.0 * body.radius
     colour = dict(zip("rgb", DARK if body.link < 0 or body.name == PAYLOAD else LIGHT, strict=True)) | {
@@ -155,7 +155,7 @@ def _entity(arm: Arm, body: Body) -> dict[str, Any]:
     }
 
 
-def _stood(content: RecordingFile, arm: Arm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
+def _stood(content: RecordingFile, arm: FoxgloveArm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
     """Return ticks, joint angles and bends of the first row in each ten ticks, and notes on what is missing."""
     # Values are true if the truth was recorded, else measured, without bending.
     recording = content.recording
@@ -180,7 +180,7 @@ def _stood(content: RecordingFile, arm: Arm) -> tuple[tuple[Floats, Floats, Floa
 
 
 def _transforms(
-    arm: Arm, first: int, ticks: Floats, q: Floats, bends: Floats
+    arm: FoxgloveArm, first: int, ticks: Floats, q: Floats, bends: Floats
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     places, turns = (np.round(values, DIGITS) for values in arm.steps(q, bends))
     names = list(zip(arm.frames, arm.frames[1:], strict=False))

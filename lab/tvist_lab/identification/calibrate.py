@@ -12,8 +12,8 @@ from msgspec.structs import replace as with_fields
 from tvist_controller.api.line import body, modal_estimator, paper_payload
 from tvist_lab.identification.agreement import contradicting, cross_validate
 from tvist_lab.identification.design import free_configurations
-from tvist_lab.identification.forecast import Forecast, Known, LeftOut
-from tvist_lab.identification.jogs import LEAST, Jog, Measured, plan_ways
+from tvist_lab.identification.forecast import ForecastModes, LeftOut, ModeForecast
+from tvist_lab.identification.jogs import MIN_RING_DOWNS, Jog, RingDownLogs, plan_ways
 from tvist_lab.identification.modal_fit import (
     MODES,
     ModalFit,
@@ -28,8 +28,8 @@ from tvist_lab.identification.ring_downs import (
     IdentificationError,
     Log,
     Progress,
+    RingDownStop,
     Ringing,
-    Stop,
     stops_of,
     unused,
 )
@@ -49,9 +49,9 @@ from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
-TOLD = 3
+REPORTED_MODES = 3
 """Number of modes whose errors are reported."""
-MOST = 48
+MAX_RING_DOWNS = 48
 """Number of ring-downs to which springs and drives are fitted; more take longer and add little."""
 WORKSPACE = 200
 """Number of configurations over which the range of the modes is determined."""
@@ -81,14 +81,14 @@ class Found:
     """A calibration from ring-downs, and its accuracy."""
 
     calibration: Calibration
-    stops: tuple[Stop, ...]
+    stops: tuple[RingDownStop, ...]
     """All stops; those that were not used have a reason, also if they contradict others."""
     left: tuple[LeftOut, ...]
     """The fitted ring-downs, with their modes from fits without them."""
-    forecast: Forecast
+    forecast: ModeForecast
     known_percent: float
     """Share of the workspace in which the lowest f_d is known within `KNOWN` with the heaviest payload [%]."""
-    least_known: tuple[Floats, Known]
+    least_known: tuple[Floats, ForecastModes]
     """Configuration of the workspace with the least known mode, and that mode."""
     proposals: tuple[Jog, ...]
     """Jogs that would add most information."""
@@ -102,8 +102,8 @@ class Found:
 
     @property
     def modes(self) -> int:
-        """Number of reported modes: at most `TOLD`, fewer where fewer vibrate."""
-        return min(TOLD, *(len(one.f_d) for one in self.left))
+        """Number of reported modes: at most `REPORTED_MODES`, fewer where fewer vibrate."""
+        return min(REPORTED_MODES, *(len(one.f_d) for one in self.left))
 
     @property
     def lowest_mode(self) -> tuple[Floats, Floats]:
@@ -117,12 +117,14 @@ class Found:
     @property
     def amplitudes(self) -> list[float | None]:
         """Median initial |α| at which each reported mode was measured [m/s²]."""
-        own = [[one.own.amplitude[k] for one in self.left if k in one.own.certain] for k in range(TOLD)]
+        own = [
+            [one.own.amplitude[k] for one in self.left if k in one.own.certain] for k in range(REPORTED_MODES)
+        ]
         return [float(np.median(one)) if one else None for one in own]
 
 
 def calibrate(
-    description: RobotDescription, measured: Measured, *, name: str, command: str, progress: Progress
+    description: RobotDescription, measured: RingDownLogs, *, name: str, command: str, progress: Progress
 ) -> Found:
     """Fit springs and drives to all ring-downs that agree, and polynomials if they cover the workspace.
 
@@ -133,7 +135,7 @@ def calibrate(
     progress("fitting springs and drives")
     fit = fit_from_many(arm, ringings)
     left, jackknife = cross_validate(arm, ringings, fit)
-    forecast = Forecast(arm, fit, fit.covariance + jackknife, of_masses(arm, ringings, fit)).widened(left)
+    forecast = ModeForecast(arm, fit, fit.covariance + jackknife, of_masses(arm, ringings, fit)).widened(left)
     deviations = np.sqrt(
         np.maximum(np.diag(fit.covariance), np.diag(jackknife)) + np.sum(forecast.moved**2, axis=1)
     )
@@ -201,23 +203,26 @@ def calibrate(
 
 def agreeing(
     description: RobotDescription, logs: Sequence[Log], progress: Progress
-) -> tuple[list[Stop], ArmModes, list[Ringing]]:
-    """Return all stops, the arm with their payloads, and at most `MOST` ring-downs that agree."""
+) -> tuple[list[RingDownStop], ArmModes, list[Ringing]]:
+    """Return all stops, the arm with their payloads, and at most `MAX_RING_DOWNS` ring-downs that agree."""
     # The ring-downs have the gear hysteresis that explains all of them best.
     check_logs(description, logs)
     progress("looking for stops")
     stops, payloads = stops_of(logs)
     usable = [number for number, stop in enumerate(stops) if stop.ringing is not None]
-    if len(usable) < LEAST:
+    if len(usable) < MIN_RING_DOWNS:
         why = "; ".join(f"{count}: {reason}" for reason, count in unused(stops).items())
         raise IdentificationError(
-            f"{len(usable)} of {len(stops)} stops can be used, at least {LEAST} are needed"
+            f"{len(usable)} of {len(stops)} stops can be used, at least {MIN_RING_DOWNS} are needed"
             + (f" ({why})" if why else "")
             + ". Record motions of the unshaped robot, as by tvist move --shaper none, each with half a second of rest"
         )
     progress("comparing ring-downs")
     arm = ArmModes(description, payloads)
-    fitted = [usable[k * len(usable) // min(len(usable), MOST)] for k in range(min(len(usable), MOST))]
+    fitted = [
+        usable[k * len(usable) // min(len(usable), MAX_RING_DOWNS)]
+        for k in range(min(len(usable), MAX_RING_DOWNS))
+    ]
     ringings = softened(arm, [ringing for number in fitted if (ringing := stops[number].ringing) is not None])
     wrong = contradicting(arm, ringings)
     for number in wrong:
@@ -240,7 +245,7 @@ def check_logs(description: RobotDescription, logs: Sequence[Log]) -> None:
             )
 
 
-def more_jogs(forecast: Forecast, last: Ringing) -> tuple[Jog, ...]:
+def more_jogs(forecast: ModeForecast, last: Ringing) -> tuple[Jog, ...]:
     """Propose jogs that would add most information, starting from where the last ring-down was recorded."""
     arm = forecast.arm
     counts = [PROPOSED if number == last.payload else 0 for number in range(len(arm.payloads))]
@@ -272,13 +277,13 @@ def _with_polynomials(
 def _errors(left: Sequence[LeftOut]) -> list[ModeErrors | None]:
     """Return the errors of each mode at configurations whose ring-down is accurate enough."""
     errors: list[ModeErrors | None] = []
-    for mode in range(TOLD):
+    for mode in range(REPORTED_MODES):
         pairs = [
             (one.f_d[mode], one.own.f_d[mode], one.zeta[mode], one.own.zeta[mode])
             for one in left
             if mode in one.own.certain
         ]
-        if len(pairs) < LEAST - 1:
+        if len(pairs) < MIN_RING_DOWNS - 1:
             errors.append(None)
             continue
         f_d, own_f_d, zeta, own_zeta = np.array(pairs).T
@@ -291,7 +296,7 @@ def true_errors(
     calibration: Calibration,
     payloads: Sequence[Payload],
     seed: int,
-    modes: int = TOLD,
+    modes: int = REPORTED_MODES,
 ) -> list[ModeErrors]:
     """Return the errors against the true modes of the robot file's arm, at configurations not used before."""
     pairs = []

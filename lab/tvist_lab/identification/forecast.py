@@ -7,12 +7,12 @@ import numpy as np
 
 from tvist_lab.identification.modal_fit import MODES, ModalFit, OwnPoles, describe
 from tvist_lab.identification.ring_downs import Ringing
-from tvist_lab.identification.unknowns import SURE, ArmModes
+from tvist_lab.identification.unknowns import Z_95, ArmModes
 from tvist_lab.recordings import Floats
 
-STEP = 1e-3
+DIFFERENCE_STEP = 1e-3
 """Step of a logarithm for finite differences [-]."""
-LEAST = (0.015, 0.06)
+MIN_ERRORS = (0.015, 0.06)
 """Smallest assumed errors of f_d and ζ [-]: joints that share a parameter differ; friction and gears are nonlinear."""
 FEWEST = 6
 """Number of modes in left-out ring-downs needed to check the intervals."""
@@ -32,7 +32,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
-class Known:
+class ForecastModes:
     """Modes at a configuration, each an array with one entry per mode, the lowest first."""
 
     f_d: Floats
@@ -47,11 +47,11 @@ class Known:
     @property
     def f_d_percent(self) -> Floats:
         """Half-width of the 95 % interval of f_d [%]."""
-        return 100.0 * SURE * self.f_d_error
+        return 100.0 * Z_95 * self.f_d_error
 
 
 @dataclass(frozen=True)
-class Forecast:
+class ModeForecast:
     """Fitted springs and drives with their uncertainty."""
 
     arm: ArmModes
@@ -63,7 +63,7 @@ class Forecast:
     wider: tuple[float, float] = (1.0, 1.0)
     """Factors on the errors of f_d and ζ, at least 1, found from ring-downs left out of fits [-]."""
 
-    def at(self, q: Floats, payload: int, modes: int = 1) -> Known:
+    def at(self, q: Floats, payload: int, modes: int = 1) -> ForecastModes:
         """Return the lowest modes at a configuration with one of the payloads."""
         # An error of the masses shifts the modes, but it also shifted the fitted parameters, which mostly
         # compensates.
@@ -76,15 +76,18 @@ class Forecast:
 
         found = logarithms(here, mass)
         slopes = np.array(
-            [(logarithms(here + step, mass) - found) / STEP for step in STEP * np.eye(len(here))]
+            [
+                (logarithms(here + step, mass) - found) / DIFFERENCE_STEP
+                for step in DIFFERENCE_STEP * np.eye(len(here))
+            ]
         )
         heavier = np.array([logarithms(here, other) - found for other in arm.heavier(q, payload)])
         by_mass = heavier + np.einsum("pm,pvk->mvk", self.moved, slopes)
         variance = np.einsum("pvk,pr,rvk->vk", slopes, self.covariance, slopes) + np.sum(by_mass**2, axis=0)
-        errors = np.sqrt(variance + np.square(LEAST)[:, None]) * np.array(self.wider)[:, None]
-        return Known(*np.exp(found), *errors)
+        errors = np.sqrt(variance + np.square(MIN_ERRORS)[:, None]) * np.array(self.wider)[:, None]
+        return ForecastModes(*np.exp(found), *errors)
 
-    def widened(self, left: Sequence[LeftOut]) -> "Forecast":
+    def widened(self, left: Sequence[LeftOut]) -> "ModeForecast":
         """Return the same with errors as large as those found at ring-downs left out of fits."""
         squares: list[tuple[float, float]] = []
         for one in left:

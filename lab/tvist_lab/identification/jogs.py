@@ -42,15 +42,15 @@ from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
 
 RING_DOWNS = 12
-LEAST = 4
+MIN_RING_DOWNS = 4
 """Smallest useful number of ring-downs; with fewer, the model would be mostly guesses."""
-FEW = 37
+MAX_CHOSEN = 37
 """Largest number of ring-downs chosen as the most informative; more are spread over the workspace."""
 CANDIDATES = 60
 """Smallest number of configurations to choose from."""
-SPARE = 3
+CANDIDATES_PER_JOG = 3
 """Number of candidates for each jog, since the way to some is not free."""
-STEP = 0.03
+CHECK_STEP = 0.03
 """Step of the fastest joint between postures at which a way is checked [rad]."""
 GENTLEST = 0.4
 """Smallest quickness of a jog relative to the quickest [-]."""
@@ -123,7 +123,7 @@ class JogPlan:
 
 
 @dataclass(frozen=True)
-class Measured:
+class RingDownLogs:
     """Data of jogs or logs for an identification."""
 
     logs: tuple[Log, ...]
@@ -160,7 +160,7 @@ async def plan_jogs(
             f"the robot is a {info.model}, its description of a {description.robot.model}: name its file"
         )
     carried = payloads or (info.payload,)
-    least = max(LEAST, len(carried))
+    least = max(MIN_RING_DOWNS, len(carried))
     if ring_downs < least:
         raise IdentificationError(
             f"{ring_downs} ring-downs with {len(carried)} payloads are too few for springs and drives: "
@@ -173,7 +173,9 @@ async def plan_jogs(
 
     def planned() -> JogPlan:
         at, arm = np.array(state.target_q), ArmModes(description, carried)
-        candidates = free_configurations(description, carried, max(CANDIDATES, SPARE * ring_downs), seed, at)
+        candidates = free_configurations(
+            description, carried, max(CANDIDATES, CANDIDATES_PER_JOG * ring_downs), seed, at
+        )
         counts = [len(range(number, ring_downs, len(carried))) for number in range(len(carried))]
         jogs = plan_ways(arm, candidates, at, counts)
         turned = at + TURN * np.eye(len(at))[-1] * (-1.0 if at[-1] > 0.0 else 1.0) if positions else None
@@ -202,8 +204,8 @@ def plan_ways(
     `known` holds the logarithms of the parameters and their covariance; None means the guess.
     """
     order = [(number, payload) for number in range(len(candidates)) for payload in range(len(counts))]
-    if sum(counts) <= FEW:
-        order = choose(arm, candidates, [SPARE * count for count in counts], known)
+    if sum(counts) <= MAX_CHOSEN:
+        order = choose(arm, candidates, [CANDIDATES_PER_JOG * count for count in counts], known)
     here, joints, torque = at, arm.description.joints, np.array(arm.description.limits.torque)
     upright = here * np.array([joint not in (1, 2, 3) for joint in range(joints)])
     upright[[joint for joint in (1, 3) if joint < joints]] = -np.pi / 2
@@ -242,7 +244,7 @@ def _quickness(dynamics: InverseDynamics, start: Floats, end: Floats, torque: Fl
 def is_free(collisions: CollisionModel, *postures: Floats) -> bool:
     """Whether the straight ways between postures, in joint space, are free of collision."""
     for before, after in pairwise(postures):
-        steps = max(int(np.ceil(np.max(np.abs(after - before)) / STEP)), 1)
+        steps = max(int(np.ceil(np.max(np.abs(after - before)) / CHECK_STEP)), 1)
         if any(
             collisions.meeting(before + (after - before) * k / steps) is not None for k in range(steps + 1)
         ):
@@ -250,13 +252,13 @@ def is_free(collisions: CollisionModel, *postures: Floats) -> bool:
     return True
 
 
-async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) -> Measured:
+async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) -> RingDownLogs:
     """Sweep slowly for friction, and make the jogs, each just strong enough for a clear ring-down."""
     # A robot that takes only positions turns its last joint instead, to find its lag; its torques are
     # unknown.
     info, began = await robot.info(), (await robot.state()).tick
     await control.set_shaper("none")
-    found = Measured((), seed=plan.seed)
+    found = RingDownLogs((), seed=plan.seed)
     try:
         if plan.turned is not None:
             found = replace(found, servo=await _lag(robot, control, plan, progress))
@@ -285,7 +287,7 @@ async def _lag(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) ->
 
 
 async def _jogs(
-    robot: Robot, control: Arm, plan: JogPlan, info: Info, known: Measured, progress: Progress
+    robot: Robot, control: Arm, plan: JogPlan, info: Info, known: RingDownLogs, progress: Progress
 ) -> list[Log]:
     """Return the recordings of all jogs that the robot did not refuse."""
     servo = known.servo

@@ -37,7 +37,7 @@ RAYLEIGH = 2.0 / (3.0 * np.pi) + 0.5j
 """Change of damping ratio (real) and frequency (imaginary) per share by which hysteresis softens [-]."""
 SMOOTHED = 0.03
 """Width of the window in which the amplitude is determined [s]."""
-STEP = 1e-4
+DIFFERENCE_STEP = 1e-4
 """Step of a logarithm for finite differences [-]."""
 INSIDE = 1e-3
 """Distance of a starting point from the bounds of the search [-]."""
@@ -117,7 +117,7 @@ class _Signal:
             moved, scratch = poles.copy(), np.zeros((L + len(poles), L + 1), dtype=complex)
             if not follow(self.mass, drivetrain.rows, moved, shapes.copy(), scratch):
                 moved = drivetrain.poles(self.mass)[0][:MODES]
-            columns.append((self.left(moved) - here) / STEP)
+            columns.append((self.left(moved) - here) / DIFFERENCE_STEP)
         return np.column_stack(columns)
 
 
@@ -212,7 +212,7 @@ def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floa
 def sensitivity(arm: ArmModes, signal: _Signal, logarithms: Floats) -> Floats:
     """Return the derivative of a ring-down's residual by each parameter, shape (samples, P)."""
     poles, shapes = (part[:MODES] for part in arm.drivetrain(logarithms).poles(signal.mass))
-    steps = STEP * np.eye(len(logarithms))
+    steps = DIFFERENCE_STEP * np.eye(len(logarithms))
     return signal.change([arm.drivetrain(logarithms + step) for step in steps], poles, shapes)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from tvist_controller.api.line import DrivenLine, body, respond
-from tvist_lab.identification.ring_downs import INEXACT, Log, Stop, noise_of, objection
+from tvist_lab.identification.ring_downs import INEXACT, Log, RingDownStop, noise_of, objection
 from tvist_lab.metrics import MotionRows, motions
 from tvist_lab.metrics.vibration import SENSOR
 from tvist_lab.recordings import Floats, RecordingError
@@ -22,7 +22,7 @@ AFTER = 0.5
 """Time after a stop that is compared, if the arm rests that long [s]."""
 BEFORE = 0.1
 """Time before a stop from which the acceleration is compared [s]."""
-LATE = 0.01
+COUNTED_FROM = 0.01
 """Time after a stop from which the vibration counts as residual [s]."""
 LEAST_AFTER = 0.15
 """Shortest rest after a stop that can be compared [s]."""
@@ -76,7 +76,7 @@ class Observed:
         return float(np.sqrt(max(self.residual_of(self.felt[1]) ** 2 - 3.0 * self.noise**2, 0.0)))
 
 
-def observe(logs: Sequence[Log], payloads: Sequence[Payload]) -> tuple[list[Observed], list[Stop]]:
+def observe(logs: Sequence[Log], payloads: Sequence[Payload]) -> tuple[list[Observed], list[RingDownStop]]:
     """Return the motions that a twin can repeat, and the others with the reason."""
     found, others = [], []
     for log in logs:
@@ -89,7 +89,9 @@ def observe(logs: Sequence[Log], payloads: Sequence[Payload]) -> tuple[list[Obse
             one = None if reason else _observed(log, number, motion, payloads)
             if one is None:
                 others.append(
-                    Stop(log.name, number, None, reason or f"the arm rested for less than {LEAST_AFTER:g} s")
+                    RingDownStop(
+                        log.name, number, None, reason or f"the arm rested for less than {LEAST_AFTER:g} s"
+                    )
                 )
             else:
                 found.append(one)
@@ -111,7 +113,7 @@ def _observed(log: Log, number: int, motion: MotionRows, payloads: Sequence[Payl
     rows = np.arange(motion.start + 1, past)
     ticks = np.round((time[rows] - begin) / PERIOD) - 1.0
     near = (time[rows] >= time[stop] - BEFORE) & np.isfinite(recording[SENSOR][rows]).all(axis=1)
-    after = int(np.searchsorted(time[rows[near]], time[stop] + LATE))
+    after = int(np.searchsorted(time[rows[near]], time[stop] + COUNTED_FROM))
     force, noise = recording[SENSOR][rows[near]], noise_of(recording, motion)
     if len(force) - after < 0.5 * LEAST_AFTER / recording.period:
         return None

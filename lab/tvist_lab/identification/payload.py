@@ -43,7 +43,7 @@ SWING = 0.5
 """Length of the short motion [rad]."""
 BLOCK = 10
 """Number of ticks over which a motion's torques are averaged."""
-LEAST = 3
+MIN_POSES = 3
 LEAST_ERROR = 0.01
 """Smallest assumed error of a torque, relative to the joint's friction [-]."""
 ROTOR = 3.0
@@ -101,9 +101,9 @@ async def identify_payload(
         rows.append(arm.static(at))
         rested_at.append(at)
         torques.append(torque - arm.torque(at, np.zeros_like(at), np.zeros_like(at)))
-    if rested < LEAST:
+    if rested < MIN_POSES:
         raise IdentificationError(
-            f"only {rested} of {poses} poses could be reached, {LEAST} are needed: give the arm more room"
+            f"only {rested} of {poses} poses could be reached, {MIN_POSES} are needed: give the arm more room"
         )
     matrix = np.vstack(rows)
     found, deviations = arm.solve(matrix, np.concatenate(torques))
@@ -144,8 +144,10 @@ def _check(info: Info, description: RobotDescription, poses: int) -> None:
         raise IdentificationError(
             f"no joint of a {info.model} carries weight, so its torques at rest say nothing of the payload: weigh it"
         )
-    if poses < LEAST:
-        raise IdentificationError(f"{poses} poses do not tell mass and centre of mass: at least {LEAST} do")
+    if poses < MIN_POSES:
+        raise IdentificationError(
+            f"{poses} poses do not tell mass and centre of mass: at least {MIN_POSES} do"
+        )
 
 
 class _Regressor:

@@ -24,7 +24,7 @@ SLOWEST = 0.01
 """Longest sampling period that shows an arm's vibration [s]."""
 LEAST_NOISE = 0.01
 """Smallest assumed noise, since no model is more accurate [m/s²]."""
-QUIET = 1.15
+SIGNAL_TO_NOISE = 1.15
 """Smallest rms of a ring-down over its noise to contain information [-]."""
 BEFORE = 0.15
 """Time before a motion in which the noise is measured [s]."""
@@ -109,7 +109,7 @@ class Log:
 
 
 @dataclass(frozen=True)
-class Stop:
+class RingDownStop:
     """A motion's stop, and the ring-down after it if it is usable."""
 
     log: str
@@ -120,7 +120,7 @@ class Stop:
     """Why it is not usable, worded alike for stops of the same kind."""
 
 
-def stops_of(logs: Sequence[Log]) -> tuple[list[Stop], tuple[Payload, ...]]:
+def stops_of(logs: Sequence[Log]) -> tuple[list[RingDownStop], tuple[Payload, ...]]:
     """Return the stops of all motions, and the payloads to which the ring-downs refer by index.
 
     Raises RecordingError if a log has no joint angles, or if its payload is unknown.
@@ -134,7 +134,7 @@ def stops_of(logs: Sequence[Log]) -> tuple[list[Stop], tuple[Payload, ...]]:
     return stops, tuple(payloads)
 
 
-def unused(stops: Sequence[Stop]) -> dict[str, int]:
+def unused(stops: Sequence[RingDownStop]) -> dict[str, int]:
     """Return the number of unused stops for each reason, the most frequent first."""
     return dict(Counter(stop.reason for stop in stops if stop.ringing is None).most_common())
 
@@ -157,11 +157,11 @@ def objection(recording: Recording, motion: MotionRows) -> str:
     return ""
 
 
-def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> Stop:
+def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> RingDownStop:
     recording = log.recording
     reason = objection(recording, motion)
     if reason:
-        return Stop(log.name, number, None, reason)
+        return RingDownStop(log.name, number, None, reason)
     stop, begin = motion.arm_stop(recording), log.begins
     if recording.foreign:
         begin = max(begin, still_driven(recording, motion.start, stop))
@@ -170,7 +170,7 @@ def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> Stop:
     rows = seen[(after >= 0.0) & (after < LONGEST) & (seen < motion.end)]
     rows = rows[np.isfinite(recording[SENSOR][rows]).all(axis=1)]
     if len(rows) < 2 or time[rows[-1]] - time[rows[0]] < SHORTEST - 1.5 * recording.period:
-        return Stop(
+        return RingDownStop(
             log.name, number, None, f"the arm rested for less than {SHORTEST:g} s, or states were lost"
         )
     q = recording["target_q" if "target_q" in recording else "actual_q"][stop]
@@ -178,9 +178,9 @@ def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> Stop:
     ringing = Ringing(
         q, payload, recording[SENSOR][rows], noise_of(recording, motion), late, driven=log.driven
     )
-    if ringing.rms < QUIET * ringing.noise:
-        return Stop(log.name, number, None, "the vibration does not stand out of the noise")
-    return Stop(log.name, number, replace(ringing, inexact=log.inexact * ringing.rms))
+    if ringing.rms < SIGNAL_TO_NOISE * ringing.noise:
+        return RingDownStop(log.name, number, None, "the vibration does not stand out of the noise")
+    return RingDownStop(log.name, number, replace(ringing, inexact=log.inexact * ringing.rms))
 
 
 def fresh(recording: Recording) -> NDArray[np.intp]:

@@ -18,7 +18,7 @@ LATEST = 0.2
 """Longest delay in the search [s]."""
 FOLLOWS = 0.02
 """Largest rms error of an arm that follows like this, relative to its way [-]."""
-SURE = 0.3
+MAX_DEVIATION = 0.3
 """Largest deviation of the logarithms of T and k with which a lag counts as known [-]."""
 
 
@@ -68,7 +68,7 @@ def servo_response(moves: Sequence[Recording]) -> ServoResponse | None:
         return None
     covariance = left**2 * np.linalg.pinv(found.jac.T @ found.jac)
     errors = np.sqrt(np.diag(covariance))[1:].tolist()
-    if max(errors) > SURE:
+    if max(errors) > MAX_DEVIATION:
         return None
     lag, gain = np.exp(found.x[1:]).tolist()
     return ServoResponse(float(found.x[0]), lag, gain, (errors[0], errors[1]))

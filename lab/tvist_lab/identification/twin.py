@@ -14,8 +14,8 @@ import numpy as np
 from tvist_lab.identification.calibrate import agreeing, check_logs
 from tvist_lab.identification.modal_fit import fit_from_many
 from tvist_lab.identification.observed import Observed, apart, felt_by, mounting_of, observe, repeated
-from tvist_lab.identification.ring_downs import CONTRADICTS, IdentificationError, Log, Progress, Stop
-from tvist_lab.identification.twin_parameters import TOLD, TwinParameters
+from tvist_lab.identification.ring_downs import CONTRADICTS, IdentificationError, Log, Progress, RingDownStop
+from tvist_lab.identification.twin_parameters import FITTED_BELOW, TwinParameters
 from tvist_lab.identification.unknowns import FURTHEST
 from tvist_lab.metrics import motions
 from tvist_lab.recordings import Floats
@@ -24,7 +24,7 @@ from tvist_plant.plant import PERIOD, Response
 from tvist_protocol.calibration import ModalParameter
 from tvist_protocol.values import Payload
 
-STEP = 1e-3
+DIFFERENCE_STEP = 1e-3
 """Step for finite differences, relative to a number's deviation before the fit [-]."""
 ROUNDS = 5
 """Largest number of computations of derivatives."""
@@ -68,7 +68,7 @@ class Twin:
     """Index of the payload that was declared last."""
     motions: int
     """Number of motions that were repeated."""
-    others: tuple[Stop, ...]
+    others: tuple[RingDownStop, ...]
     """Motions that were not repeated, with reasons."""
     predictions: tuple[Prediction, ...]
     """Predictions of motions that the fit has not seen."""
@@ -87,7 +87,7 @@ class Twin:
     @property
     def told(self) -> list[bool]:
         """Whether the logs determine each number."""
-        return [bool(told) for told in self.deviations < TOLD * self.parameters.deviation]
+        return [bool(told) for told in self.deviations < FITTED_BELOW * self.parameters.deviation]
 
     def error_percent(self, share: float) -> float | None:
         """Return a quantile of the errors of the predicted residual [%]; None without predictions."""
@@ -126,7 +126,7 @@ class _Fit:
         """Return the derivatives of each motion's differences, shape (samples, P)."""
         found = [np.zeros((len(one), len(values))) for one in left]
         for number, entry in enumerate(self.parameters.entries):
-            step = STEP * entry.deviation
+            step = DIFFERENCE_STEP * entry.deviation
             moved = values.copy()
             moved[number] += step
             for place, motion in enumerate(self.seen):

@@ -30,12 +30,12 @@ MASS = 0.1
 CENTRE = 0.03
 """Standard deviation of each coordinate of its centre of mass [m]."""
 DIGITS = 9
-TOLD = 0.5
+FITTED_BELOW = 0.5
 """A parameter counts as fitted if the logs reduce its deviation below this share [-]."""
 
 
 @dataclass(frozen=True)
-class Entry:
+class TwinParameter:
     """A fitted number: a factor on the robot file's value, or an addition to a payload's."""
 
     table: str
@@ -58,22 +58,22 @@ class TwinParameters:
         every = tuple(range(description.joints))
         drives, links = description.drives, description.link_flexibility
         entries = [
-            Entry("drives", key, (joint,), deviation)
+            TwinParameter("drives", key, (joint,), deviation)
             for key, deviation in EACH.items()
             for joint in every
             if getattr(drives, key)[joint] > 0.0
         ]
-        entries += [Entry("drives", key, every, deviation) for key, deviation in TOGETHER.items()]
+        entries += [TwinParameter("drives", key, every, deviation) for key, deviation in TOGETHER.items()]
         if links.links:
             entries += [
-                Entry("link_flexibility", "stiffness", (place,), LINKS["stiffness"])
+                TwinParameter("link_flexibility", "stiffness", (place,), LINKS["stiffness"])
                 for place in range(len(links.links))
             ]
-            entries.append(Entry("link_flexibility", "damping_time", (0,), LINKS["damping_time"]))
+            entries.append(TwinParameter("link_flexibility", "damping_time", (0,), LINKS["damping_time"]))
         for number, payload in enumerate(self.payloads):
-            entries.append(Entry("payload", "mass", (number, 0), MASS * description.limits.payload))
+            entries.append(TwinParameter("payload", "mass", (number, 0), MASS * description.limits.payload))
             if payload.mass > 0.0:
-                entries += [Entry("payload", "com", (number, axis), CENTRE) for axis in range(3)]
+                entries += [TwinParameter("payload", "com", (number, axis), CENTRE) for axis in range(3)]
         self.entries = tuple(entries)
         self.deviation: Floats = np.array([entry.deviation for entry in entries])
         """Standard deviations before the fit, shape (P,)."""

@@ -39,7 +39,7 @@ FURTHEST = 3.0
 """Deviations by which a parameter may differ from the robot file; beyond, it would absorb model errors [-]."""
 STEEL = 7850.0
 """Density from which a payload's size is estimated [kg/m³]."""
-SURE = 1.959963984540054
+Z_95 = 1.959963984540054
 """Number of standard deviations that contain a normal variable with 95 % probability [-]."""
 
 
@@ -169,7 +169,7 @@ def parameter(unknown: Unknown, value: float, deviation: float) -> ModalParamete
         joints=unknown.joints,
         value=value,
         deviation=deviation,
-        interval=(value * float(np.exp(-SURE * deviation)), value * float(np.exp(SURE * deviation))),
+        interval=(value * float(np.exp(-Z_95 * deviation)), value * float(np.exp(Z_95 * deviation))),
         status=status,
     )
 

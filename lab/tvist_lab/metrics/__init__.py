@@ -12,7 +12,7 @@ from tvist_lab.metrics.common_clock import (
     still_after,
     vibration_after_stop,
 )
-from tvist_lab.metrics.comparison import ComparedMotion, Comparison, Pair, compare, pairs, shaper_of
+from tvist_lab.metrics.comparison import ComparedMotion, Comparison, MotionPair, compare, pairs, shaper_of
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
@@ -20,7 +20,7 @@ from tvist_lab.metrics.residual import Residual, residual
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
 from tvist_lab.metrics.table import (
-    Measured,
+    MeasuredRecording,
     MotionResult,
     Runs,
     Table,
@@ -36,11 +36,11 @@ __all__ = [
     "SLOW_POLE",
     "ComparedMotion",
     "Comparison",
-    "Measured",
+    "MeasuredRecording",
+    "MotionPair",
     "MotionResult",
     "MotionRows",
     "NotMeasurableError",
-    "Pair",
     "Residual",
     "RingDown",
     "Runs",

@@ -24,7 +24,7 @@ from tvist_lab.recordings import Floats
 
 STARTS = 5
 """Number of moments at which a fit starts."""
-STEP = 0.04
+MAX_SPACING = 0.04
 """Longest time between these moments [s]; the vibration must be audible at all of them."""
 ORDERS = (1, 2, 3, 4)
 """Numbers of modes to try."""
@@ -32,11 +32,11 @@ LONGEST = 0.6
 """Duration of a fit [s]; over a longer one, f_d rises too much."""
 AUDIBLE = 2.5
 """Smallest amplitude of a mode at the start of its fit, over the rms of the residual [-]."""
-NEAR = 0.07
+SAME_MODE = 0.07
 """Largest difference of f_d between fits of one mode, and smallest one between two modes [-]."""
 FOUND_IN = 0.7
 """Smallest share of the fits that must have found a mode [-]."""
-MOST = 3
+MAX_MODES = 3
 """Largest number of modes that are returned."""
 FAINT = 0.1
 """Smallest amplitude of a mode relative to the strongest [-]."""
@@ -48,7 +48,7 @@ RISE = 0.03
 """Share by which f_d of a real arm rises while a mode decays [-]."""
 FALL = 0.7
 """Share by which ζ falls meanwhile [-]."""
-LATE = 2.0 / 9.0
+DRIFT_SHARE = 2.0 / 9.0
 """Share of such a change by which a fit with constant f_d and ζ errs [-].
 
 Let f_d change as e^(-σt), like the amplitude. Its mean, weighted by the squared amplitude, has made 1/3 of
@@ -78,7 +78,7 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
         )
     starts, fits, step = [begin], list(_fits(whole.cut(LONGEST))), 0.0
     heard = max((_audible(mode, rms, begin) for modes, rms in fits for mode in modes), default=0.0)
-    step = max(min(STEP, heard / (STARTS + 1), (whole.length - WINDOWS[0]) / (STARTS - 1)), period)
+    step = max(min(MAX_SPACING, heard / (STARTS + 1), (whole.length - WINDOWS[0]) / (STARTS - 1)), period)
     starts *= len(fits)
     for start in begin + step * np.arange(1, STARTS):
         first = int(np.searchsorted(time, start - 1e-9))
@@ -111,10 +111,10 @@ def _fits(ring: Ring) -> Iterator[_Fit]:
         if inside.any():
             start = np.column_stack([f_d[inside], np.clip(zeta[inside], 2.0 * DAMPING[0], 0.6)])
             start = start[np.argsort(start[:, 0])]
-            apart = np.flatnonzero(np.diff(np.log(start[:, 0])) > NEAR) + 1
+            apart = np.flatnonzero(np.diff(np.log(start[:, 0])) > SAME_MODE) + 1
             merged = [one.mean(axis=0) for one in np.split(start, apart)]
             cost, found = ring.refine(np.concatenate(merged))
-            if np.all(np.diff(np.log(np.sort(found[::2]))) > NEAR):
+            if np.all(np.diff(np.log(np.sort(found[::2]))) > SAME_MODE):
                 fits.append((cost, found))
     chosen = 0
     for index in range(1, len(fits)):
@@ -161,7 +161,7 @@ def _groups(heard: Sequence[Sequence[Mode]]) -> Iterator[list[Mode]]:
         groups = []
         for candidate in candidates:
             nearest = [min(modes, key=lambda m: abs(m.f_d - candidate.f_d)) for modes in pool if modes]
-            groups.append([m for m in nearest if abs(m.f_d / candidate.f_d - 1.0) <= NEAR])
+            groups.append([m for m in nearest if abs(m.f_d / candidate.f_d - 1.0) <= SAME_MODE])
         group = max(groups, key=lambda one: (len(one), -float(np.std([m.f_d for m in one]) / one[0].f_d)))
         if len(group) < least:
             return
@@ -173,8 +173,8 @@ def _mean(group: Sequence[Mode], fits: int, middle: float) -> Mode:
     """Return the mean mode of a group; its amplitude is the lower quartile, with 0 for fits that missed it."""
     f_d, f_d_error = _weighted([mode.f_d for mode in group], [mode.f_d_error for mode in group])
     zeta, zeta_error = _weighted([mode.zeta for mode in group], [mode.zeta_error for mode in group])
-    f_d_error = math.hypot(f_d_error, LATE * RISE * f_d / CERTAIN)
-    zeta_error = math.hypot(zeta_error, LATE * FALL * zeta / CERTAIN)
+    f_d_error = math.hypot(f_d_error, DRIFT_SHARE * RISE * f_d / CERTAIN)
+    zeta_error = math.hypot(zeta_error, DRIFT_SHARE * FALL * zeta / CERTAIN)
     amplitudes = [mode.amplitude_at(middle) for mode in group] + [0.0] * (fits - len(group))
     amplitude = float(np.quantile(amplitudes, 0.25)) * math.exp(decay_rate(f_d, zeta) * middle)
     return Mode(f_d, zeta, amplitude, f_d_error, zeta_error)
@@ -196,7 +196,7 @@ def _ordered(modes: Sequence[Mode], middle: float) -> list[Mode]:
     loud = [mode for mode in certain if mode.amplitude >= FAINT * loudest]
     return sorted(
         loud, key=lambda mode: (lighter_beside(mode, loud) is not None, -mode.amplitude_at(middle))
-    )[:MOST]
+    )[:MAX_MODES]
 
 
 def lighter_beside(mode: Mode, modes: Sequence[Mode]) -> Mode | None:

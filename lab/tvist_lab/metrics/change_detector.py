@@ -9,10 +9,10 @@ from tvist_lab.recordings import Floats
 
 WINDOWS = (2, 3, 5, 8)
 """Numbers of latest measurements compared with earlier ones: one may be an outlier, small changes need more."""
-LEAST = 3
+MIN_MEASUREMENTS = 3
 """Number of earlier measurements that a comparison needs."""
 KEPT = 40
-SURE = 3.7
+SURE_DEVIATIONS = 3.7
 """Standard deviations beyond which a change is reported if the scatter is known well: more than normal
 measurements need (1 in 5,000), since those of real motions have heavier tails."""
 SHOWN, CLEAR = 2.0, 2.5
@@ -26,7 +26,7 @@ OUTLYING = 2.5
 
 
 @dataclass(frozen=True)
-class Change:
+class DetectedChange:
     """A change of the measured quantity."""
 
     before: float
@@ -53,13 +53,13 @@ class ChangeDetector:
         self._prior, self._scatter, self._least = prior, scatter, least
         self._kept: list[tuple[float, float]] = []
 
-    def take(self, value: float, error: float) -> Change | None:
+    def take(self, value: float, error: float) -> DetectedChange | None:
         """Take a measurement with its standard error; return the change that it reveals, if any."""
         self._kept = [*self._kept[1 - KEPT :], (value, error)]
         found, surest = None, 0.0
         for number in WINDOWS:
             past = len(self._kept) - number
-            if past < LEAST:
+            if past < MIN_MEASUREMENTS:
                 break
             mean, scatter, variance = self._past(np.array(self._kept[:past]))
             latest, errors = np.array(self._kept[past:]).T
@@ -68,15 +68,18 @@ class ChangeDetector:
             moved = float(np.average(np.clip(latest - mean, -farthest, farthest), weights=1.0 / own))
             error_of_it = float(np.sqrt(1.0 / np.sum(1.0 / own) + variance))
             # With few measurements the scatter is uncertain, so require a larger change.
-            sure = SURE * math.sqrt(1.0 + BELIEVED / (BELIEVED + past))
+            sure = SURE_DEVIATIONS * math.sqrt(1.0 + BELIEVED / (BELIEVED + past))
             if abs(moved) > max(max(sure, surest) * error_of_it, self._least):
                 off = (latest - mean) * np.sign(moved)
                 new = off > 0.5 * off.max()  # a window may begin before the change
                 after = float(np.average(latest[new], weights=1.0 / own[new]))
                 error_since = float(np.sqrt(1.0 / np.sum(1.0 / own[new]) + variance))
-                surest, found = abs(moved) / error_of_it, Change(mean, after, error_since, int(new.sum()))
+                surest, found = (
+                    abs(moved) / error_of_it,
+                    DetectedChange(mean, after, error_since, int(new.sum())),
+                )
                 if abs(after - mean) < CLEAR * error_since:  # the farthest ones alone say too little
-                    found = Change(mean, mean + moved, error_of_it, number)
+                    found = DetectedChange(mean, mean + moved, error_of_it, number)
         if found is not None:
             self._kept = self._kept[-found.lasting :]
         return found

@@ -7,11 +7,11 @@ from functools import cache, partial
 import numpy as np
 import pinocchio as pin
 
-from tvist_lab.metrics.change_detector import SHOWN, Change, ChangeDetector
+from tvist_lab.metrics.change_detector import SHOWN, ChangeDetector, DetectedChange
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.ring_down import CERTAIN
 from tvist_lab.metrics.ring_listener import RingListener
-from tvist_lab.metrics.table import Measured, MotionResult
+from tvist_lab.metrics.table import MeasuredRecording, MotionResult
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription, load, robots
 from tvist_plant.model import carries_weight, rigid_model
@@ -43,7 +43,7 @@ UNKNOWN = 0.4
 """Share of Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
 
 
-def changes(measured: Measured) -> list[str]:
+def changes(measured: MeasuredRecording) -> list[str]:
     """Return sentences on what has changed about the arm, in the order of the motions.
 
     In a recording of this controller, the arm is compared with its model, see `FitMonitor`. In a log of another robot,
@@ -166,12 +166,12 @@ def _weight(model: pin.Model, q: Floats) -> Floats:
     return np.asarray(pin.computeGeneralizedGravity(model, model.createData(), q))
 
 
-def _told(change: Change | None, why: Callable[[Change], str]) -> Iterator[str]:
+def _told(change: DetectedChange | None, why: Callable[[DetectedChange], str]) -> Iterator[str]:
     if change is not None:
         yield why(change)
 
 
-def _of_mass(change: Change) -> str:
+def _of_mass(change: DetectedChange) -> str:
     more = change.after - change.before
     return (
         f"the arm carries about {abs(more):.1f} kg {'more' if more > 0.0 else 'less'} than in the motions before "
@@ -180,7 +180,7 @@ def _of_mass(change: Change) -> str:
     )
 
 
-def _of_gear(change: Change, joint: str) -> str:
+def _of_gear(change: DetectedChange, joint: str) -> str:
     size, within = _percent(change.before - change.after, change.error)
     return (
         f"the gear of the {joint} is {size:.0f} % {'softer' if change.after > change.before else 'stiffer'} than in "
@@ -189,7 +189,7 @@ def _of_gear(change: Change, joint: str) -> str:
     )
 
 
-def _of_modes(change: Change) -> str:
+def _of_modes(change: DetectedChange) -> str:
     size, within = _percent(change.after - change.before, change.error)
     return (
         f"what rings after stops is {size:.0f} % {'higher' if change.after > change.before else 'lower'} in frequency "

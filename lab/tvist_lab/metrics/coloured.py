@@ -4,7 +4,7 @@ import numpy as np
 
 from tvist_lab.recordings import Floats
 
-MOST = 0.97
+MAX_CORRELATION = 0.97
 """Largest assumed correlation; beyond it, a residual is a drift [-]."""
 
 
@@ -19,5 +19,5 @@ def widening(residual: Floats, fitted: int = 0) -> float:
     if energy <= 0.0:
         return 1.0
     r = float(np.sum(residual[1:] * residual[:-1])) / energy
-    r = min(max(r + fitted * (1.0 + 3.0 * r) / len(residual), 0.0), MOST)
+    r = min(max(r + fitted * (1.0 + 3.0 * r) / len(residual), 0.0), MAX_CORRELATION)
     return float(np.sqrt((1.0 + r) / (1.0 - r)))

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import hilbert
 
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.felt import felt
+from tvist_lab.metrics.felt import acceleration_of
 from tvist_lab.metrics.motion import DIFFERENTIATOR_TICKS, MotionRows
 from tvist_lab.metrics.ring_down import fit_ring_down
 from tvist_lab.metrics.vibration import amplitude, band_pass, best_tool_acceleration, tool_acceleration
@@ -31,7 +31,7 @@ Kinematics = Callable[[Floats], tuple[Floats, Floats]]
 def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[float, float]:
     """Return the largest |α| and envelope after the unshaped stop plus the declared delay [m/s²]."""
     # In a log of another controller, the arm's own stop plus 10 ms counts.
-    _, alpha = felt(recording, motion, _after_declared_stop(recording, motion), smooth=True)
+    _, alpha = acceleration_of(recording, motion, _after_declared_stop(recording, motion), smooth=True)
     if len(alpha) < 2:
         raise NotMeasurableError("nothing was recorded after the stop")
     return float(np.max(amplitude(alpha))), float(np.max(envelope(alpha, recording.period)))
@@ -40,7 +40,7 @@ def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[floa
 def still_after(recording: Recording, motion: MotionRows, threshold: float = STILL) -> float:
     """Return the last time |α| exceeds a threshold [m/s²], from the start of the unshaped reference [s]."""
     # Use the truth channel if there is one, otherwise the sensor below 60 Hz.
-    time, alpha_xyz = felt(recording, motion, slice(motion.start, motion.end), smooth=True)
+    time, alpha_xyz = acceleration_of(recording, motion, slice(motion.start, motion.end), smooth=True)
     alpha = amplitude(alpha_xyz)
     if recording.foreign and (noise := _noise(time, alpha_xyz)) * NOISE_PEAK > threshold:
         tail = time >= time[-1] - 2.0 * NOISE_TAIL

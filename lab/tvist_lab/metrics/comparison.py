@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from tvist_lab.change import Change
+from tvist_lab.change import MotionChange
 from tvist_lab.metrics.common_clock import peak_after_stop
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.motion import MotionRows
-from tvist_lab.metrics.table import IMPACTS, Measured, MotionResult, impact_percent
+from tvist_lab.metrics.table import IMPACTS, MeasuredRecording, MotionResult, impact_percent
 from tvist_lab.metrics.vibration import TRUTH
 from tvist_lab.recordings import Floats, Recording
 
@@ -47,10 +47,10 @@ class ComparedMotion:
         }
 
     @property
-    def change(self) -> Change:
-        """Change of the vibration after the stop."""
+    def change(self) -> MotionChange:
+        """MotionChange of the vibration after the stop."""
         both = self.first, self.second
-        return Change(*(one.peak_m_s2 for one in both), *(one.still_after_ms for one in both))
+        return MotionChange(*(one.peak_m_s2 for one in both), *(one.still_after_ms for one in both))
 
     def as_dict(self) -> dict[str, Any]:
         """Convert to plain values for `tvist log analyze A B`."""
@@ -73,10 +73,10 @@ class Comparison:
     """Numbers of motions, from 1, that only the second recording has."""
 
 
-def compare(first: Measured, second: Measured) -> Comparison:
-    """Pair as many motions of two recordings as possible, in order."""
+def compare(first: MeasuredRecording, second: MeasuredRecording) -> Comparison:
+    """MotionPair as many motions of two recordings as possible, in order."""
     # Motions correspond if they start and end at the same joint angles within 0.02 rad.
-    ways = [[Way.of(one.recording, motion) for motion in one.motions] for one in (first, second)]
+    ways = [[MotionEnds.of(one.recording, motion) for motion in one.motions] for one in (first, second)]
     pairs = _pairs(*ways)
     compared = tuple(ComparedMotion(a + 1, b + 1, first.results[a], second.results[b]) for a, b in pairs)
     taken = [{pair[side] for pair in pairs} for side in (0, 1)]
@@ -85,19 +85,19 @@ def compare(first: Measured, second: Measured) -> Comparison:
 
 
 @dataclass(frozen=True)
-class Way:
+class MotionEnds:
     """Joint angles at both ends of a motion."""
 
     start: Floats
     end: Floats
 
     @classmethod
-    def of(cls, recording: Recording, motion: MotionRows, column: str = "") -> "Way":
+    def of(cls, recording: Recording, motion: MotionRows, column: str = "") -> "MotionEnds":
         """Return the ends of a motion in a column of joint angles; by default, in the target."""
         q = recording[column or ("target_q" if "target_q" in recording else "actual_q")]
         return cls(q[motion.start], q[motion.arm_stop(recording)])
 
-    def corresponds(self, other: "Way") -> bool:
+    def corresponds(self, other: "MotionEnds") -> bool:
         """Whether both ends are the same, within 0.02 rad."""
         if self.start.shape != other.start.shape:
             return False
@@ -105,7 +105,7 @@ class Way:
         return bool(np.max(away) <= SAME)
 
 
-def _pairs(first: Sequence[Way], second: Sequence[Way]) -> list[tuple[int, int]]:
+def _pairs(first: Sequence[MotionEnds], second: Sequence[MotionEnds]) -> list[tuple[int, int]]:
     """Return the longest sequence of corresponding motions in the order of both recordings."""
     same = np.array([[a.corresponds(b) for b in second] for a in first], dtype=bool).reshape(
         len(first), len(second)
@@ -130,7 +130,7 @@ def _pairs(first: Sequence[Way], second: Sequence[Way]) -> list[tuple[int, int]]
 
 
 @dataclass(frozen=True)
-class Pair:
+class MotionPair:
     """The same motion without and with a shaper."""
 
     unshaped: int
@@ -140,11 +140,11 @@ class Pair:
     """Name of the shaper; empty if the recording does not name it."""
     name: str
     """Named poses at its ends, `Q1 → Q3`, else the numbers of both motions."""
-    change: Change
+    change: MotionChange
 
 
-def pairs(measured: Measured) -> list[Pair]:
-    """Pair each unshaped motion with the same one by each shaper, in the order in which they were made."""
+def pairs(measured: MeasuredRecording) -> list[MotionPair]:
+    """MotionPair each unshaped motion with the same one by each shaper, in the order in which they were made."""
     # Motions are the same if their references before shaping start and end at the same joint angles within
     # 0.02 rad, and last equally long within 2 %. Events tell whether a motion was shaped, else its delay
     # does.
@@ -166,12 +166,12 @@ def pairs(measured: Measured) -> list[Pair]:
                 peaks = (_peak(measured, one) for one in (other, place))
                 rests = (measured.results[one].still_after_ms for one in (other, place))
                 name = _name(recording, unshaped) or f"motions {other + 1} and {place + 1}"
-                made.append(Pair(other, place, shaper, name, Change(*peaks, *rests)))
+                made.append(MotionPair(other, place, shaper, name, MotionChange(*peaks, *rests)))
                 break
     return sorted(made, key=lambda pair: (pair.unshaped, pair.shaped))
 
 
-def _peak(measured: Measured, place: int) -> float | None:
+def _peak(measured: MeasuredRecording, place: int) -> float | None:
     """Return the largest |α| after a motion, true if recorded, else from the sensor [m/s²]."""
     if TRUTH not in measured.recording:
         return measured.results[place].peak_m_s2
@@ -196,7 +196,7 @@ def shaper_of(recording: Recording, motion: MotionRows, delay: float | None) -> 
 
 
 def _same(recording: Recording, one: MotionRows, other: MotionRows) -> bool:
-    first, second = (Way.of(recording, motion, REFERENCE) for motion in (one, other))
+    first, second = (MotionEnds.of(recording, motion, REFERENCE) for motion in (one, other))
     lasts = one.duration(recording)
     share, least = SAME_DURATION
     differs = abs(other.duration(recording) - lasts)

@@ -12,7 +12,7 @@ REST = (0.2, 1.0)
 """Shortest and longest time at the end of a rest from which gravity is found [s]."""
 
 
-def felt(
+def acceleration_of(
     recording: Recording, motion: MotionRows, rows: slice, *, smooth: bool = False
 ) -> tuple[Floats, Floats]:
     """Return times, shape (T,) [s], and the tool's acceleration without gravity, shape (T, 3) [m/s²], in some rows.

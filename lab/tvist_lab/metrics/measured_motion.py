@@ -10,7 +10,7 @@ from tvist_lab.recordings import Floats, Recording
 
 SMOOTHED = 20.0
 """Cut-off frequency of the angles before they are differentiated [Hz]."""
-SLOW = 0.01
+REST_SPEED = 0.01
 """Speed below which a joint may be at rest [rad/s]."""
 FAST = 2.0
 """Smallest speed that a motion must reach, relative to the speed that ends it [-]."""
@@ -27,7 +27,7 @@ SMALLEST = 0.005
 FEWEST = 16
 """Smallest number of rows in which motions are sought."""
 TAPER = 0.03
-"""Longest time for which a joint may have moved below `SLOW` before and after [s]."""
+"""Longest time for which a joint may have moved below `REST_SPEED` before and after [s]."""
 
 
 def measured_spans(recording: Recording, name: str = "actual_q") -> list[tuple[int, int]]:
@@ -44,7 +44,7 @@ def measured_spans(recording: Recording, name: str = "actual_q") -> list[tuple[i
     q = low_pass_at(time, measured, recording.period, SMOOTHED)
     velocity = np.asarray(np.gradient(q, time, axis=0))
     speed = np.max(np.abs(velocity), axis=1)
-    least = max(SLOW, 6.0 * _noise_of_speed(measured, recording.period))
+    least = max(REST_SPEED, 6.0 * _noise_of_speed(measured, recording.period))
     threshold = np.maximum(least, SWUNG * maximum_filter1d(speed, 2 * round(SWING / recording.period) + 1))
     rows = np.flatnonzero(speed > threshold)
     if not rows.size:

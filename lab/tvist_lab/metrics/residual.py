@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 from scipy.signal import find_peaks
 
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.felt import felt
+from tvist_lab.metrics.felt import acceleration_of
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.vibration import amplitude
 from tvist_lab.recordings import Floats, Recording
@@ -51,7 +51,7 @@ def residual(recording: Recording, motion: MotionRows) -> Residual:
     window = _window(recording, motion, WINDOW)
     stop = float(recording.time[window][0])
     # In the tick of the stop the reference still decelerates, so the measurement there is not a ring-down.
-    time, alpha_xyz = felt(recording, motion, slice(window.start + 1, window.stop))
+    time, alpha_xyz = acceleration_of(recording, motion, slice(window.start + 1, window.stop))
     alpha = amplitude(alpha_xyz)
     at, _ = find_peaks(alpha, prominence=PROMINENCE)
     if len(at) < 2:

@@ -27,7 +27,7 @@ SCALES = np.linspace(-0.4, 0.3, 29)
 """Logarithms of the common frequency factors to try."""
 BASES = np.geomspace(1e6, 3e4, 20)
 """Stiffnesses to try for the arm's base [N m/rad]; with the first one it is practically rigid."""
-COLOUR = 3.0
+CORRELATED_SAMPLES = 3.0
 """Number of samples that count as one, since the residual is correlated in time."""
 EXPECTED = 0.07
 """Standard deviation of the factor's logarithm before any measurement."""
@@ -90,7 +90,7 @@ class RingListener:
         except EstimatorError:  # so much damping that the arm does not vibrate there
             return []
         left = np.maximum(left, 1e-12 * alpha.size)
-        likely = -0.5 * alpha.size / COLOUR * np.log(left / left.min())
+        likely = -0.5 * alpha.size / CORRELATED_SAMPLES * np.log(left / left.min())
         if self._base is not None:
             return _certain([likely[0]])
         self._heard.append(likely)

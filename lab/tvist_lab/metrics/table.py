@@ -9,7 +9,7 @@ import numpy as np
 from tvist_lab.metrics.agreed_modes import agreed_modes, lighter_beside
 from tvist_lab.metrics.common_clock import peak_acceleration, still_after, vibration_after_stop
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.felt import felt
+from tvist_lab.metrics.felt import acceleration_of
 from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.residual import Residual, residual
@@ -187,7 +187,7 @@ def _suspicion(mode: Mode, modes: Sequence[Mode]) -> str:
 def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
     """Fit the modes that vibrate after the stop; the result is the strongest one."""
     first = motion.arm_stop(recording)
-    time, alpha = felt(recording, motion, slice(first, motion.end))
+    time, alpha = acceleration_of(recording, motion, slice(first, motion.end))
     late = time - recording.time[first]
     if recording.foreign:
         skip = SKIP if "target_q" in recording else SKIP_OF_MEASURED
@@ -240,7 +240,7 @@ def impact_percent(unshaped: float | None, shaped: float | None) -> float | None
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredRecording:
     """A recording with its motions and their metrics."""
 
     recording: Recording
@@ -248,7 +248,7 @@ class Measured:
     results: Sequence[MotionResult]
 
     @classmethod
-    def of(cls, recording: Recording) -> "Measured":
+    def of(cls, recording: Recording) -> "MeasuredRecording":
         """Find and measure all motions."""
         found = motions(recording)
         return cls(recording, found, [measure(recording, motion) for motion in found])

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import pinocchio as pin
 
-from tvist_lab.programs.limits import EXPECTED, UNITS, Limits
+from tvist_lab.programs.limits import EXPECTED, UNITS, RunLimits
 from tvist_lab.programs.results import Shortcoming, seconds
 from tvist_lab.programs.watch import Fastest, ProgramWatch
 from tvist_plant.model import Floats
@@ -17,7 +17,7 @@ from tvist_plant.plant import PERIOD, Plant, Shape
 from tvist_plant.user_file import UserFileError, read_text
 
 
-def broken(limits: Limits, watch: ProgramWatch) -> Iterator[Shortcoming]:
+def broken(limits: RunLimits, watch: ProgramWatch) -> Iterator[Shortcoming]:
     """Yield where and when a run broke each limit, and each stop with too much vibration."""
     if limits.max_seconds is not None and watch.seconds > limits.max_seconds:
         yield _more(limits, "max_seconds", f"it ran for {watch.seconds:.3f} s", None)
@@ -29,13 +29,13 @@ def broken(limits: Limits, watch: ProgramWatch) -> Iterator[Shortcoming]:
     yield from _fast(limits, "max_force", hardest, "the arm was touched with")
 
 
-def missed(limits: Limits, plant: Plant) -> list[Shortcoming]:
+def missed(limits: RunLimits, plant: Plant) -> list[Shortcoming]:
     """Return the bodies that are not where they are expected."""
     said = (_missed(text, plant) for text in limits.expect or ())
     return [Shortcoming("expect", f"{text} (--expect)") for text in said if text is not None]
 
 
-def _shaken(limits: Limits, watch: ProgramWatch, most: float) -> Iterator[Shortcoming]:
+def _shaken(limits: RunLimits, watch: ProgramWatch, most: float) -> Iterator[Shortcoming]:
     for number, move in enumerate(watch.moves, 1):
         if move.ended is None:
             continue
@@ -48,14 +48,14 @@ def _shaken(limits: Limits, watch: ProgramWatch, most: float) -> Iterator[Shortc
             yield Shortcoming("max_shake", why, line)
 
 
-def _fast(limits: Limits, name: str, fastest: Fastest, what: str) -> Iterator[Shortcoming]:
+def _fast(limits: RunLimits, name: str, fastest: Fastest, what: str) -> Iterator[Shortcoming]:
     most = getattr(limits, name)
     if most is not None and fastest.speed > most:
         text = f"{what} {fastest.speed:.3g} {UNITS[name]} at {seconds(fastest.tick):.3f} s"
         yield _more(limits, name, text, fastest.line or None)
 
 
-def _more(limits: Limits, name: str, what: str, line: int | None) -> Shortcoming:
+def _more(limits: RunLimits, name: str, what: str, line: int | None) -> Shortcoming:
     text = f"{what}, more than {getattr(limits, name):g} (--{name.replace('_', '-')})"
     return Shortcoming(name, text, line)
 

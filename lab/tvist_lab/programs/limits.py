@@ -1,4 +1,4 @@
-"""Limits of a run, and where bodies must end."""
+"""RunLimits of a run, and where bodies must end."""
 
 import math
 import re
@@ -10,7 +10,7 @@ EXPECTED = re.compile(r"\s*(?P<body>.+?) in (?P<area>.+)")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class RunLimits:
     """Limits of a run and expected positions of bodies; None for no limit."""
 
     max_shake: float | None = None

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from tvist_lab.programs.watch import Fastest, Move, ProgramWatch, Said
+from tvist_lab.programs.watch import Fastest, ProgramMessage, ProgramMove, ProgramWatch
 from tvist_lab.words import counted
 from tvist_plant.plant import PERIOD
 from tvist_protocol.errors import harmless
@@ -81,12 +81,12 @@ def seconds(ticks: int) -> float:
     return round(ticks * PERIOD, 6)  # 0.002 is no binary number
 
 
-def _message(said: Said) -> dict[str, Any]:
+def _message(said: ProgramMessage) -> dict[str, Any]:
     message: dict[str, Any] = {"timestamp": seconds(said.tick), "kind": said.kind, "text": said.text}
     return message | ({"title": said.title, "level": said.level} if said.kind == "popup" else {})
 
 
-def _move(move: Move) -> dict[str, Any]:
+def _move(move: ProgramMove) -> dict[str, Any]:
     ended, rests, followed = move.ended, move.rests, move.followed
     return {
         "id": move.id,

@@ -18,11 +18,11 @@ from tvist_protocol.io import SetRegisters, SimulationSetInputs
 from tvist_protocol.programs import ProgramClosePopup, ProgramRun
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_server.config import ServeConfig
-from tvist_server.ending import Ending
 from tvist_server.gateways.starting import Prepare
 from tvist_server.option_values import StartError
 from tvist_server.recording.recorder import Recorder
 from tvist_server.server import Server
+from tvist_server.shutdown import Shutdown
 
 CLIENT: Final = "tvist run"
 LEASE: Final = 3600.0
@@ -104,7 +104,7 @@ class ProgramServer:
         config: ServeConfig,
         text: str,
         inputs: Sequence[str],
-        ending: Ending,
+        ending: Shutdown,
         timeout: float | None,
         prepare: Prepare | None = None,
     ) -> None:

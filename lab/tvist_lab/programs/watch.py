@@ -22,7 +22,7 @@ SEEN = 50
 WINDOW = 150
 """Ticks after a stop (0.3 s) in which the peak is sought, as for the paper's residual vibration."""
 KEPT = 5000
-"""Most arm states (50 MB) that a real-time run keeps for `Move.peak`; later stops without rest have none."""
+"""Most arm states (50 MB) that a real-time run keeps for `ProgramMove.peak`; later stops without rest have none."""
 LINGER = 2500
 """Most ticks (5 s) for which a moving arm is observed after the end of its program."""
 
@@ -40,7 +40,7 @@ Reason = Literal[
 
 
 @dataclass
-class Said:
+class ProgramMessage:
     """A message of the program or the robot."""
 
     tick: int
@@ -53,7 +53,7 @@ class Said:
 
 
 @dataclass
-class Move:
+class ProgramMove:
     """A motion of the program, from its start until its shaped reference is at rest."""
 
     id: int
@@ -107,7 +107,7 @@ class Fastest:
 
 
 @dataclass(frozen=True)
-class Place:
+class ProgramPlace:
     """A position in the program's text, and what is wrong there."""
 
     line: int
@@ -145,12 +145,12 @@ class ProgramWatch(Sink):
         """How the run ended; None while it goes on."""
         self.why: str | None = None
         """Why the program did not end by itself, as a sentence."""
-        self.error: Place | None = None
+        self.error: ProgramPlace | None = None
         """Position of the error that ended the program."""
-        self.said: list[Said] = []
-        self.news: deque[Said] = deque()
+        self.said: list[ProgramMessage] = []
+        self.news: deque[ProgramMessage] = deque()
         """New messages, for another thread to take."""
-        self.moves: list[Move] = []
+        self.moves: list[ProgramMove] = []
         self.fastest_joint, self.fastest_tool = Fastest(), Fastest()
         """Largest speeds of a joint and of the tool centre point, as measured."""
         self.hardest = Fastest()
@@ -161,7 +161,7 @@ class ProgramWatch(Sink):
         self._ended = 0
         self._kept = 0
         """Number of arm states that are kept."""
-        self._placeless: list[Move | Said] = []
+        self._placeless: list[ProgramMove | ProgramMessage] = []
         """Messages and moves of this tick, whose line is not known yet."""
         self._rest = 0
         """Ticks for which the shaped reference has rested after the last move."""
@@ -193,11 +193,13 @@ class ProgramWatch(Sink):
             case "program_started" if not self.name:
                 self.name = event.program or ""
             case "text" | "popup" | "warning" if event.line is None:
-                self._say(Said(event.tick, event.kind, event.why or "", 0, event.title, event.level))
+                self._say(
+                    ProgramMessage(event.tick, event.kind, event.why or "", 0, event.title, event.level)
+                )
                 if event.blocking:
                     self._close_popup()
             case "warning" if event.program == self.name:
-                self.error = Place(event.line or 0, event.column or 0, event.why or "")
+                self.error = ProgramPlace(event.line or 0, event.column or 0, event.why or "")
                 self.end("runtime_error", self.error.text)
             case "protective_stop":
                 self.end("protective_stop", f"protective stop: {event.why}")
@@ -231,7 +233,7 @@ class ProgramWatch(Sink):
             self.over = True
             self._on_over()
 
-    def _watch_rest(self, move: Move, *, at_rest: bool) -> None:
+    def _watch_rest(self, move: ProgramMove, *, at_rest: bool) -> None:
         """Measure the tool's vibration while the reference rests."""
         if not at_rest or move.ended is None:
             self._rest = 0
@@ -261,11 +263,11 @@ class ProgramWatch(Sink):
     def _note_start(self, event: Event) -> None:
         if self.moves:
             self._note_next(self.moves[-1], event.tick)
-        self.moves.append(Move(event.id or 0, event.tick))
+        self.moves.append(ProgramMove(event.id or 0, event.tick))
         self._placeless.append(self.moves[-1])
         self._rest = 0
 
-    def _note_next(self, move: Move, tick: int) -> None:
+    def _note_next(self, move: ProgramMove, tick: int) -> None:
         """Note the start of the next move; in real time, the prediction of the arm at rest is computed later."""
         move.followed = tick
         if move.held is None:
@@ -284,7 +286,7 @@ class ProgramWatch(Sink):
                 if event.kind == "motion_stopped":
                     move.stopped = event.why or "it was stopped"
 
-    def _say(self, said: Said) -> None:
+    def _say(self, said: ProgramMessage) -> None:
         self.said.append(said)
         self._placeless.append(said)
         self.news.append(said)

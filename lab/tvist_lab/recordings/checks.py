@@ -28,7 +28,7 @@ MEASURED = re.compile(
     r"|(estimated|flange|payload|shaper|speed_scaling|truth_\w*(deflection|poses))\w*"
 )
 """Names of columns in SI units."""
-MOST = 1e6
+MAX_VALUE = 1e6
 """Largest number in such a column; more is damage."""
 LONG_GAP = 1.0
 """Longest gap between rows that is filled with straight lines [s]; a longer one splits the log."""
@@ -57,7 +57,7 @@ def check_names(where: object, names: Sequence[str]) -> None:
 def check_numbers(path: Path, columns: Mapping[str, Floats], places: Places) -> None:
     """Refuse a number that no robot has; NaN means missing."""
     for name, values in columns.items():
-        most = LARGEST.get(name, MOST if MEASURED.fullmatch(name) else np.inf)
+        most = LARGEST.get(name, MAX_VALUE if MEASURED.fullmatch(name) else np.inf)
         if len(strange := np.argwhere(np.abs(values) > most)):
             row, *entry = strange[0].tolist()
             where = f"{path}, {places[0]} {places[1][row]:.0f}, column {'_'.join([name, *map(str, entry)])}"

@@ -8,7 +8,7 @@ from tvist_lab.recordings.checks import LogError
 GZIP = b"\x1f\x8b"
 DENSEST = 100
 """Largest ratio of the content to the size of its file; logs reach 30, a malicious file 1000."""
-LEAST = 1 << 20
+MIN_CONTENT = 1 << 20
 """Size of the content that any file may have [bytes]."""
 
 
@@ -17,7 +17,7 @@ def content(path: Path) -> bytes:
     data = path.read_bytes()
     if not data.startswith(GZIP):
         return data
-    room, parts = LEAST + DENSEST * len(data), list[bytes]()
+    room, parts = MIN_CONTENT + DENSEST * len(data), list[bytes]()
     while data.startswith(GZIP):
         unpacker = zlib.decompressobj(wbits=31)
         try:

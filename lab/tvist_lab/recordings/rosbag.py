@@ -18,7 +18,7 @@ from tvist_lab.recordings.checks import ACCELEROMETER as SENSOR
 from tvist_lab.recordings.checks import GYROSCOPE, TIME, LogError
 from tvist_lab.recordings.mcap_records import DAMAGE, records
 from tvist_lab.recordings.recording import Floats
-from tvist_lab.recordings.table import Table
+from tvist_lab.recordings.table import LogTable
 from tvist_protocol.errors import quoted
 
 JOINTS, ACCELEROMETER, TARGET, POSE = "JointState", "Imu", "JointTrajectoryControllerState", "PoseStamped"
@@ -57,7 +57,7 @@ class _Topic:
             yield name, np.column_stack(axes)
 
 
-def read_rosbag(path: Path) -> Table:
+def read_rosbag(path: Path) -> LogTable:
     """Read a rosbag2 recording: `JointState`, `Imu`, `JointTrajectoryControllerState` and the TCP's `PoseStamped`."""
     # Of each type, the topic with the most messages is used. Times are from the headers; rows are those of
     # the accelerometer, with interpolated joint angles.
@@ -85,7 +85,7 @@ def read_rosbag(path: Path) -> Table:
     names = [TIME, *(f"{name}_{at}" for name, values in columns.items() for at in range(values.shape[1]))]
     order = np.argsort(times, kind="stable")
     table = np.column_stack([times, *columns.values()])[order]
-    return Table(
+    return LogTable(
         path, names, table, order + np.float64(1.0), "message", notes=tuple(notes), rtde=True, there=there
     )  # fmt: skip
 

@@ -52,7 +52,7 @@ SENSOR = Needs(
 
 
 @dataclass(frozen=True)
-class Table:
+class LogTable:
     """Numbers of a log as stored in its file."""
 
     path: Path
@@ -77,7 +77,7 @@ class Table:
     description: Description | None = None
 
 
-Reader = Callable[[Path], Table | Recording]
+Reader = Callable[[Path], LogTable | Recording]
 READERS: dict[str | bytes, Reader] = {}
 """Readers by file ending or first bytes, or `BINARY` and `TEXT` for other files."""
 BINARY, TEXT = "binary", "text"
@@ -93,7 +93,7 @@ def reader(*kinds: str | bytes) -> Callable[[Reader], Reader]:
     return register
 
 
-def to_recording(table: Table, columns: str | None = None, needs: Needs = ROBOT) -> Recording:
+def to_recording(table: LogTable, columns: str | None = None, needs: Needs = ROBOT) -> Recording:
     """Name the columns, convert them to SI, join vectors, and check and number the rows.
 
     Rows that repeat the time before, or have none, are left out, and swapped neighbours are sorted by time;
@@ -124,7 +124,7 @@ def to_recording(table: Table, columns: str | None = None, needs: Needs = ROBOT)
     return recording
 
 
-def _exported(table: Table) -> Recording | None:
+def _exported(table: LogTable) -> Recording | None:
     """Return the described recording if the description fits the table, else None."""
     if table.description is None:
         return None
@@ -138,7 +138,7 @@ def _exported(table: Table) -> Recording | None:
     return recording
 
 
-def _named(table: Table, columns: str | None, needs: Needs) -> tuple[list[str], Floats, list[str]]:
+def _named(table: LogTable, columns: str | None, needs: Needs) -> tuple[list[str], Floats, list[str]]:
     """Return RTDE's names (empty for ignored columns), values in SI, and notes."""
     if not table.names and columns is None:
         first = table.lines[0] if len(table.lines) else 1.0
@@ -168,7 +168,7 @@ def _named(table: Table, columns: str | None, needs: Needs) -> tuple[list[str], 
     return names, values, [*notes, *converted]
 
 
-def _check_header(table: Table, header: Sequence[str], names: Sequence[str], needs: Needs) -> None:
+def _check_header(table: LogTable, header: Sequence[str], names: Sequence[str], needs: Needs) -> None:
     """Refuse a header without any name of a robot's log, or with names that cannot be printed."""
     line, there = "it", f"{table.path}"
     if table.header:
@@ -184,7 +184,7 @@ def _check_header(table: Table, header: Sequence[str], names: Sequence[str], nee
         raise LogError(f"{there}: the column {twice[0]} is there twice")
 
 
-def _lacking(table: Table, found: Mapping[str, Floats], needs: Needs) -> LogError:
+def _lacking(table: LogTable, found: Mapping[str, Floats], needs: Needs) -> LogError:
     if needs == ROBOT and ACCELEROMETER in found:
         return LogError(
             f"{table.path} holds an accelerometer alone, no joint angles: tvist log analyze measures frequency and "
@@ -195,7 +195,7 @@ def _lacking(table: Table, found: Mapping[str, Floats], needs: Needs) -> LogErro
     return LogError(f"{table.path} has {has}: {_remedy(table, needs)}")
 
 
-def _remedy(table: Table, needs: Needs) -> str:
+def _remedy(table: LogTable, needs: Needs) -> str:
     return table.there or f"name them with {needs.option}; {found_columns(table.names)}"
 
 
@@ -227,7 +227,7 @@ def _vectors(names: Sequence[str], values: Floats) -> tuple[dict[str, Floats], l
     return columns, notes
 
 
-def _increasing(table: Table, time: Floats) -> tuple[NDArray[np.intp], list[str]]:
+def _increasing(table: LogTable, time: Floats) -> tuple[NDArray[np.intp], list[str]]:
     """Return the indices of usable rows, and notes about the others."""
     notes = []
     timed = np.flatnonzero(np.isfinite(time))
@@ -262,7 +262,7 @@ def _increasing(table: Table, time: Floats) -> tuple[NDArray[np.intp], list[str]
     return kept, notes
 
 
-def _left_out(table: Table, count: int, what: str, first: int) -> str:
+def _left_out(table: LogTable, count: int, what: str, first: int) -> str:
     return f"{counted(count, 'row')} {what} left out, the first in {table.unit} {first}"
 
 

@@ -29,7 +29,7 @@ APART = 0.25
 """Difference from which offsets are distinct [s]; the step of a fit is at most half of it."""
 BLOCK = 0.5
 """Time after which residuals of a fit count as independent [s]."""
-FAR = 2.0
+HUBER = 2.0
 """Residuals beyond this multiple of the median have less weight (Huber 1964)."""
 RANK = 1e-9
 """Share of the largest eigenvalue below which parameters cannot be separated [-]."""
@@ -126,7 +126,7 @@ def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | No
         )  # fmt: skip
         p, left = _solved(X, w - u, weight[both])
         far = np.linalg.norm(left, axis=1)
-        weight[both] = np.minimum(1.0, FAR * float(np.median(far)) / np.maximum(far, 1e-12))
+        weight[both] = np.minimum(1.0, HUBER * float(np.median(far)) / np.maximum(far, 1e-12))
         step = p[:2] * min(1.0, 0.5 * APART / max(abs(p[0]), CONVERGED))
         start, drift = start + step[0] - step[1] * middle, drift + step[1]
         rotation = Rotation.from_rotvec(p[TURN]) * rotation

@@ -3,12 +3,12 @@
 from tvist_lab.report.of_advice import advice_page
 from tvist_lab.report.of_recordings import recordings_page
 from tvist_lab.report.of_studies import study_figures, study_page
-from tvist_lab.report.page import Page, PageTable, Picture, Section, render
+from tvist_lab.report.page import PageTable, Picture, ReportPage, Section, render
 
 __all__ = [
-    "Page",
     "PageTable",
     "Picture",
+    "ReportPage",
     "Section",
     "advice_page",
     "recordings_page",

@@ -7,8 +7,8 @@ from pathlib import Path
 from tvist_lab.advice import Advice, command, verdict
 from tvist_lab.figures.advice import advice_figures
 from tvist_lab.figures.sheets import house_style
-from tvist_lab.metrics import Measured
-from tvist_lab.report.page import Page, PageTable, Section, picture
+from tvist_lab.metrics import MeasuredRecording
+from tvist_lab.report.page import PageTable, ReportPage, Section, picture
 
 MODES = ("mode\nf_d Hz", "damping\nζ", "motions", "largest\nm/s²")
 OPTIONS = ("shaper", "aimed at", "longer\nms", "left\n% rms", "by modes\n%", "still\nms after")
@@ -52,7 +52,9 @@ def option_rows(advice: Advice) -> list[tuple[str, ...]]:
 
 
 @house_style()
-def advice_page(advice: Advice, logs: Sequence[Measured], paths: Sequence[Path], typed: str) -> Page:
+def advice_page(
+    advice: Advice, logs: Sequence[MeasuredRecording], paths: Sequence[Path], typed: str
+) -> ReportPage:
     """Build the page of an advice; `typed` is the command for its provenance."""
     said, lines = verdict(advice, logs), command(advice, logs)
     sections = []
@@ -72,4 +74,4 @@ def advice_page(advice: Advice, logs: Sequence[Measured], paths: Sequence[Path],
         sections.append(Section("Not measured", points=points))
     files = ", ".join(path.name for path in paths)
     sections.append(Section("This page", facts={"Logs": files, "Command": typed}))
-    return Page("Which shaper?", said, sections)
+    return ReportPage("Which shaper?", said, sections)

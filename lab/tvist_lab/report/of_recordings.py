@@ -6,16 +6,16 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from tvist_lab.figures.after_stop import Shown, compared_figure
+from tvist_lab.figures.after_stop import ComparedPanel, compared_figure
 from tvist_lab.figures.ring_down import ring_down_figure
 from tvist_lab.figures.sheets import house_style
 from tvist_lab.figures.style import SERIES, literal
 from tvist_lab.metrics import (
     COLUMNS,
     Comparison,
-    Measured,
+    MeasuredRecording,
+    MotionPair,
     NotMeasurableError,
-    Pair,
     changes,
     compare,
     grouped_notes,
@@ -25,7 +25,7 @@ from tvist_lab.metrics import (
 from tvist_lab.metrics.columns import number, percent
 from tvist_lab.recordings import Recording, read
 from tvist_lab.recordings.mcap_records import files_of
-from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
+from tvist_lab.report.page import PageTable, Picture, ReportPage, Section, picture
 from tvist_lab.report.verdict import shaping_of, verdict_on_one, verdict_on_pairs, verdict_on_two
 from tvist_lab.words import counted
 
@@ -51,14 +51,14 @@ PICTURES = 6
 class _File:
     path: Path
     name: str
-    measured: Measured
-    pairs: Sequence[Pair]
+    measured: MeasuredRecording
+    pairs: Sequence[MotionPair]
 
 
 @house_style()
 def recordings_page(
     paths: Sequence[Path], command: str, recordings: Sequence[Recording] | None = None
-) -> Page:
+) -> ReportPage:
     """Build the report of recordings or logs; the others are compared with the first.
 
     `command` is for the provenance.
@@ -80,7 +80,7 @@ def recordings_page(
     sections += [Section(f"Provenance of {file.name}", facts=_provenance(file)) for file in files]
     sections.append(Section("This report", facts={"Command": command}))
     title = f"Vibration of {' and '.join(file.name for file in files)}"
-    return Page(title, _verdict(base, compared), sections)
+    return ReportPage(title, _verdict(base, compared), sections)
 
 
 def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[str]:
@@ -102,7 +102,7 @@ def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[
 def _files(paths: Sequence[Path], recordings: Sequence[Recording] | None = None) -> list[_File]:
     found = []
     for path, name, recording in zip(paths, _names(paths), recordings or map(read, paths), strict=True):
-        measured = Measured.of(recording)
+        measured = MeasuredRecording.of(recording)
         found.append(_File(path, name, measured, pairs(measured)))
     return found
 
@@ -145,7 +145,7 @@ def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
     return PageTable(("motions", *CHANGES), rows, f"From {base.name} to {other.name}")
 
 
-def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[Shown]:
+def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[ComparedPanel]:
     """Choose the curves of each panel: with and without shapers in one file, or corresponding motions of several."""
     base, *others = files
     recording, found = base.measured.recording, base.measured.motions
@@ -166,11 +166,11 @@ def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[S
             said = mine[0].change.less() if len(mine) == 1 else ""
         elif place in partners:
             continue
-        shown.append(Shown(name[0].upper() + name[1:], curves, said))
+        shown.append(ComparedPanel(name[0].upper() + name[1:], curves, said))
     return shown
 
 
-def _pictures(files: Sequence[_File], panels: Sequence[Shown]) -> Iterator[Picture]:
+def _pictures(files: Sequence[_File], panels: Sequence[ComparedPanel]) -> Iterator[Picture]:
     """Yield one picture of the first motions, on one scale, and one of each file's loudest ring-down."""
     plain = [file.name for file in files if shaping_of(file.measured.results, file.name).shaped is False]
     unshaped = [WITHOUT, *map(literal, plain)]
@@ -195,7 +195,7 @@ def _pictures(files: Sequence[_File], panels: Sequence[Shown]) -> Iterator[Pictu
         yield picture(figure, caption)
 
 
-def _missing(files: Sequence[_File], panels: Sequence[Shown]) -> list[str]:
+def _missing(files: Sequence[_File], panels: Sequence[ComparedPanel]) -> list[str]:
     """Return what could not be measured or drawn, with the reasons."""
     items = [f"{file.name}, {note}" for file in files for note in grouped_notes(file.measured.results)]
     if len(panels) > PICTURES:

@@ -1,10 +1,10 @@
 """The web page of a study: verdict, tables, figures and explanations."""
 
 from tvist_lab.figures import study_figure
-from tvist_lab.report.page import Page, PageTable, Section, picture
-from tvist_lab.study.columns import Table, cells, meanings, titles
+from tvist_lab.report.page import PageTable, ReportPage, Section, picture
+from tvist_lab.study.columns import ResultTable, cells, meanings, titles
 from tvist_lab.study.study import Figures, Result
-from tvist_lab.words import MANY, counted
+from tvist_lab.words import QUANTILES_FROM, counted
 
 LISTED = 200
 """Largest number of motions that are listed."""
@@ -15,12 +15,12 @@ def study_figures(result: Result) -> Figures:
     study, summary = result.study, result.values["summary"]
     if study.draw is not None:
         return study.draw(result)
-    few = any(entry["rows"] < MANY for entry in summary)
+    few = any(entry["rows"] < QUANTILES_FROM for entry in summary)
     caption = "The least and the most." if few else "Medians, and bands from the 5th to the 95th percentile."
     return {"study": (study_figure(summary, study.by, study.show, few=few), caption)}
 
 
-def study_page(result: Result, figures: Figures, command: str) -> Page:
+def study_page(result: Result, figures: Figures, command: str) -> ReportPage:
     """Build the report of a study; `command` is for the provenance."""
     values, tables = result.values, result.study.tables_of(result)
     words = {word: said for table in tables for word, said in meanings(table.columns).items()}
@@ -42,10 +42,10 @@ def study_page(result: Result, figures: Figures, command: str) -> Page:
     }
     sections.append(Section("Provenance", facts=facts))
     verdict = values.get("verdict") or [f"{counted(values['rows'], 'row')} were measured."]
-    return Page(values["title"], verdict, sections)
+    return ReportPage(values["title"], verdict, sections)
 
 
-def _table(table: Table) -> PageTable:
+def _table(table: ResultTable) -> PageTable:
     more = len(table.entries) > LISTED and table.listing
     caption = f"{table.title}: the first {LISTED} of {len(table.entries)}" if more else table.title
     shown = table.entries[:LISTED] if more else table.entries

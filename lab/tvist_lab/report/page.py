@@ -53,7 +53,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Page:
+class ReportPage:
     """A report."""
 
     title: str
@@ -69,7 +69,7 @@ def picture(figure: Figure, caption: str) -> Picture:
     return Picture("data:image/png;base64," + base64.b64encode(stream.getvalue()).decode(), caption)
 
 
-def render(page: Page) -> str:
+def render(page: ReportPage) -> str:
     """Render a page as HTML; equal pages give equal text, without a date."""
     environment = Environment(
         loader=PackageLoader("tvist_lab.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,

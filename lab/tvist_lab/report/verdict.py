@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from statistics import median
 
-from tvist_lab.metrics import Comparison, MotionResult, Pair
+from tvist_lab.metrics import Comparison, MotionPair, MotionResult
 from tvist_lab.metrics.comparison import TICK_MS
 from tvist_lab.words import counted, either, sample, spread
 
@@ -71,7 +71,7 @@ def verdict_on_one(results: Sequence[MotionResult], name: str) -> list[str]:
     return [f"{first}.", shaping_of(results, name).sentence]
 
 
-def verdict_on_pairs(pairs: Sequence[Pair], results: Sequence[MotionResult], name: str) -> list[str]:
+def verdict_on_pairs(pairs: Sequence[MotionPair], results: Sequence[MotionResult], name: str) -> list[str]:
     """Return what each shaper of one recording changed, the best first, in the words of `tvist demo`."""
     of_shaper = [list(group) for _, group in groupby(sorted(pairs, key=_shaper), _shaper)]
     of_shaper.sort(key=lambda group: -median(one.change.less_percent or 0.0 for one in group))
@@ -81,11 +81,11 @@ def verdict_on_pairs(pairs: Sequence[Pair], results: Sequence[MotionResult], nam
     return said
 
 
-def _shaper(pair: Pair) -> str:
+def _shaper(pair: MotionPair) -> str:
     return pair.shaper
 
 
-def _on_shaper(pairs: Sequence[Pair], results: Sequence[MotionResult], name: str) -> Iterator[str]:
+def _on_shaper(pairs: Sequence[MotionPair], results: Sequence[MotionResult], name: str) -> Iterator[str]:
     changes = [one.change for one in pairs]
     shaper = pairs[0].shaper or "the shaper"
     less = [change.less_percent for change in changes if change.less_percent is not None]

@@ -12,16 +12,16 @@ import polars as pl
 from tvist_lab.recordings import Floats
 from tvist_lab.studies.causality import inspect
 from tvist_lab.study.arms import ARMS
-from tvist_lab.study.asked import Asked, Preset
 from tvist_lab.study.case import Case
-from tvist_lab.study.columns import Column, Table, median, share
+from tvist_lab.study.columns import Column, ResultTable, median, share
 from tvist_lab.study.foreign import FromFile
-from tvist_lab.study.held_out import LEAST
+from tvist_lab.study.held_out import MIN_MOVES
 from tvist_lab.study.line import round_a_corner
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.menus import UNSHAPED
 from tvist_lab.study.method import Method, Named, Task
 from tvist_lab.study.moves import Move
+from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.shaping import ShaperFaultError
 from tvist_lab.study.study import Figures, Result, Study
 from tvist_lab.study.work import MEASURED
@@ -58,7 +58,7 @@ COLUMNS = (
     STILL, Column("still\np90 ms", _time(0.9, "p90"), 0), RING,
     Column("less\nmedian %", share("less_percent", 0.5, "median"), 1,
            meaning="Reduction of ring compared with waiting."),
-    Column("less\np5 %", share("less_percent", 0.05, "p5", LEAST), 1),
+    Column("less\np5 %", share("less_percent", 0.05, "p5", MIN_MOVES), 1),
     Column("worst arm", "worst_arm", meaning="The arm with the smallest median of less."),
     Column("delay\nmedian ms", share("declared_delay_ms", 0.5, "median", among=ONCE), 0),
     Column("moving", pl.col("moving").median().alias("in_motion_ratio"), 2,
@@ -76,7 +76,7 @@ MORE = (
 )  # fmt: skip
 
 
-def study(asked: Asked) -> Study:
+def study(asked: StudyRequest) -> Study:
     """Return the study: methods, moves and payload errors; if quick, one error in turn for each move."""
     # Only the user's own shapers are inspected here; tests cover those of the package.
     theirs = [
@@ -101,8 +101,12 @@ def study(asked: Asked) -> Study:
         prepare=_beside_waiting,
         finish=lambda result: _rank(result, asked, faults),
         tables=lambda result: [
-            Table(f"{result.study.title}; * keeps the limits, and no other shaper that keeps them is better in both "
-                  "still and ring", ranked(result.values), (STARRED, *COLUMNS))
+            ResultTable(
+                f"{result.study.title}; * keeps the limits, and no other shaper that keeps them is better in both "
+                "still and ring",
+                ranked(result.values),
+                (STARRED, *COLUMNS),
+            )
         ],
         draw=_draw,
         as_served=False,
@@ -125,7 +129,7 @@ def _beside_waiting(rows: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-def _cases(asked: Asked, methods: Sequence[Method], arms: Sequence[Variant]) -> list[Case]:
+def _cases(asked: StudyRequest, methods: Sequence[Method], arms: Sequence[Variant]) -> list[Case]:
     """Return the cases of one controller."""
     # If the calibration contains friction, it is fed forward to all methods of a case; methods without a
     # calibration therefore have separate cases.
@@ -147,7 +151,7 @@ def ranked(values: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [one for one in values["summary"] if one["ranked"]]
 
 
-def _rank(result: Result, asked: Asked, faults: Mapping[str, str]) -> None:
+def _rank(result: Result, asked: StudyRequest, faults: Mapping[str, str]) -> None:
     """Order the summary by settling time; those that cannot be ranked come last."""
     values, labels = result.values, {one.name: one for one in asked.methods}
     values["methods"] = [

@@ -7,7 +7,7 @@ import numpy as np
 
 from tvist_lab.recordings import Floats
 from tvist_lab.study.case import Case
-from tvist_lab.study.method import Method, Stepping, Task
+from tvist_lab.study.method import Method, SampleMethod, Task
 from tvist_lab.study.moves import Move
 from tvist_lab.study.shaping import ShaperFaultError
 from tvist_plant.description import RobotDescription
@@ -36,7 +36,7 @@ def check_causal(method: Method, task: Task) -> None:
     Raises ShaperFaultError if outputs depend on the future, or on earlier runs. A method that gets a move's target in
     advance gets the same one with every reference: it may know the end, but no more of the way than others.
     """
-    if not isinstance(method, Stepping):
+    if not isinstance(method, SampleMethod):
         return  # it plans the motion, whose end it may know
     first = _outputs(method, task)
     for place in PLACES:
@@ -54,7 +54,7 @@ def check_causal(method: Method, task: Task) -> None:
         raise ShaperFaultError(TWICE)
 
 
-def _outputs(method: Stepping, task: Task) -> Floats:
+def _outputs(method: SampleMethod, task: Task) -> Floats:
     stepper = method.stepper(task)
     return np.array([stepper.step(sample) for sample in task.reference])
 

@@ -14,9 +14,9 @@ from scipy.stats import binom
 
 from tvist_lab.recordings import Floats
 from tvist_lab.study.arms import JUDGED
-from tvist_lab.study.asked import Asked, Preset
 from tvist_lab.study.columns import Column, of_group, share
-from tvist_lab.study.held_out import LEAST, bootstrap
+from tvist_lab.study.held_out import MIN_MOVES, bootstrap
+from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Study, StudyError
 from tvist_lab.words import counted
 from tvist_plant.variants import variant
@@ -28,15 +28,15 @@ BOOTSTRAP = "Of the 5th percentiles, first minus second in points, with its 95 %
 EXACT = "Of the medians, first minus second in points, with its 95 % interval, which is exact."
 
 
-def study(asked: Asked) -> Study:
+def study(asked: StudyRequest) -> Study:
     """Return the study of two shapers, side by side."""
     if len(asked.methods) != 2:
         raise StudyError(f"shapers names {counted(len(asked.methods), 'shaper')}: must be two different ones")
     moves, names = asked.feasible(), [one.name for one in asked.methods]
-    if len(moves) < LEAST:
+    if len(moves) < MIN_MOVES:
         raise StudyError(
             f"only {len(moves)} of {len(asked.moves)} moves are within the drives' torque at these limits; at least "
-            f"{LEAST} are needed"
+            f"{MIN_MOVES} are needed"
         )
     weak = len(asked.moves) - len(moves)
     both = [(name, word) for name, word in zip(names, ("first", "second"), strict=True)]
@@ -79,13 +79,13 @@ def _columns(name: str, word: str) -> list[Column]:
     counts = DIFFERENCE.is_not_null()
     return [
         Column(f"{name}\nmedian %", share(f"{word}_percent", 0.5, "median", among=counts), 1),
-        Column(f"{name}\np5 %", share(f"{word}_percent", 0.05, "p5", LEAST, among=counts), 1),
+        Column(f"{name}\np5 %", share(f"{word}_percent", 0.05, "p5", MIN_MOVES, among=counts), 1),
         Column(f"{name}\ndelay ms", share(f"{word}_delay_ms", 0.5, "median"), 0),
     ]
 
 
 def _exact(differences: Floats) -> list[float] | None:
-    return exact_interval(differences) if len(differences) >= LEAST else None
+    return exact_interval(differences) if len(differences) >= MIN_MOVES else None
 
 
 def exact_interval(differences: Floats) -> list[float]:
@@ -104,7 +104,7 @@ def verdict(differences: Floats, first: str, second: str) -> str:
 
 
 def _between(first: Floats, second: Floats) -> float | None:
-    return float(np.percentile(first, 5.0) - np.percentile(second, 5.0)) if len(first) >= LEAST else None
+    return float(np.percentile(first, 5.0) - np.percentile(second, 5.0)) if len(first) >= MIN_MOVES else None
 
 
 def _of_p5(first: Floats, second: Floats) -> list[float] | None:
@@ -112,11 +112,11 @@ def _of_p5(first: Floats, second: Floats) -> list[float] | None:
         p5 = np.percentile(drawn, 5.0, axis=1)
         return np.asarray(p5[:, 0] - p5[:, 1])
 
-    return bootstrap(np.column_stack([first, second]), between) if len(first) >= LEAST else None
+    return bootstrap(np.column_stack([first, second]), between) if len(first) >= MIN_MOVES else None
 
 
 PRESET = Preset(
     study,
     options=frozenset(("plants", "limits", "modes")),
-    least=LEAST,
+    least=MIN_MOVES,
 )  # fmt: skip

@@ -6,14 +6,14 @@ from typing import Any
 import polars as pl
 
 from tvist_lab.study.arms import AS_DESCRIBED
-from tvist_lab.study.asked import Asked, Preset
-from tvist_lab.study.columns import Column, Table, highest, lowest, median, p5, p90, share
+from tvist_lab.study.columns import Column, ResultTable, highest, lowest, median, p5, p90, share
 from tvist_lab.study.held_out import sure
 from tvist_lab.study.measures import WORTH
-from tvist_lab.study.method import Waiting
+from tvist_lab.study.method import WaitingMethod
+from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Figures, Result, Study
 from tvist_lab.study.work import MEASURED, record
-from tvist_lab.words import MANY, either, sample, spread
+from tvist_lab.words import QUANTILES_FROM, either, sample, spread
 
 COUNTED = pl.col("reduction_percent").is_not_null()
 """Selects rows with enough vibration for a percentage."""
@@ -42,7 +42,7 @@ MORE = (
            meaning="Largest acceleration of the tool after the stop."),
     Column("largest q̇\nof its limit", highest("peak_velocity_ratio"), 3, meaning="Largest velocity of a joint."),
 )  # fmt: skip
-FEW = (
+FEW_COLUMNS = (
     Column("less\nleast %", lowest("reduction_percent"), 1, meaning=LESS),
     Column("less than waiting\nleast %", lowest("less_than_waiting_percent"), 1, meaning=WAITED),
     Column("delay\nlongest ms", highest("delay_ms"), 0, meaning="Time by which shaping lengthens a move."),
@@ -66,7 +66,7 @@ SUMMED = (
 """Further values for --json."""
 
 
-def study(asked: Asked) -> Study:
+def study(asked: StudyRequest) -> Study:
     """Return the study of these moves by these shapers, waiting, and the baselines."""
     moves = asked.feasible()
     named, others = asked.methods[: asked.named], asked.methods[asked.named :]
@@ -78,9 +78,9 @@ def study(asked: Asked) -> Study:
     return Study(
         title=f"Moves with {', '.join(one.name for one in named)}",
         cases=asked.cases(moves, asked.arms or (AS_DESCRIBED,)),
-        methods=(*named, Waiting(), *others),
+        methods=(*named, WaitingMethod(), *others),
         columns=(*COLUMNS, *MORE),
-        few=FEW,
+        few=FEW_COLUMNS,
         more=(*SUMMED, *(of("reduction_percent") for of in (lowest, highest))),
         finish=lambda result: _finish(result, notes),
         tables=_tables,
@@ -120,7 +120,7 @@ def _verdict(
     less = [move["reduction_percent"] for move in moves if move["reduction_percent"] is not None]
     if not less:
         return [f"No move vibrates enough unshaped to show what {name} does."]
-    many = len(less) >= MANY
+    many = len(less) >= QUANTILES_FROM
     words, delays = ("less", "more"), [move["delay_ms"] for move in moves]
     worst = (
         f", {either([first['reduction_percent_p5']], '%', words)} in all but one of twenty," if many else ""
@@ -142,8 +142,8 @@ def _verdict(
     return [lead, "No baseline leaves less without being later."] if others else [lead]
 
 
-def _tables(result: Result) -> Sequence[Table]:
-    each = Table(
+def _tables(result: Result) -> Sequence[ResultTable]:
+    each = ResultTable(
         f"moves with {result.values['summary'][0]['shaper']}", rows_of_first(result), EACH, listing=True
     )
     return [each, result.study.table_of(result.values["summary"])]

@@ -6,11 +6,11 @@ from typing import Any
 import polars as pl
 
 from tvist_lab.study.arms import AS_DESCRIBED, PERTURBED, with_springs
-from tvist_lab.study.asked import Asked, Preset
 from tvist_lab.study.case import Case
-from tvist_lab.study.columns import Column, Table, across, median, p5
-from tvist_lab.study.held_out import LEAST, sure
-from tvist_lab.study.measures import QUIET
+from tvist_lab.study.columns import Column, ResultTable, across, median, p5
+from tvist_lab.study.held_out import MIN_MOVES, sure
+from tvist_lab.study.measures import QUIET_LEVEL
+from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Figures, Result, Study
 from tvist_plant.variants import Variant, variant
 
@@ -23,15 +23,15 @@ exceeds the carried one."""
 PLANT = "plant"
 """Kind of error of a named plant."""
 LESS = Column("median", median("reduction_percent"), 1)
-WORST = Column("p5", p5("reduction_percent", LEAST), 1)
+WORST = Column("p5", p5("reduction_percent", MIN_MOVES), 1)
 BOTH = Column("median / p5", lambda one: f"{LESS.text(one)} / {WORST.text(one)}")
 DELAY = Column("delay ms", median("delay_ms"), 0)
 BEYOND = 100.0 * (1.0 - pl.col("shaped_peak_m_s2") / pl.col("waited_peak_m_s2"))
 """Reduction compared with waiting."""
-WAITED = pl.col("reduction_percent").is_not_null() & (pl.col("waited_peak_m_s2") >= QUIET)
+WAITED = pl.col("reduction_percent").is_not_null() & (pl.col("waited_peak_m_s2") >= QUIET_LEVEL)
 
 
-def study(asked: Asked) -> Study:
+def study(asked: StudyRequest) -> Study:
     """Return the study: payload errors and moves, each by all shapers on all arms with that error."""
     wrong = errors(asked.arms)
     arms: dict[float, dict[str, Variant]] = {}
@@ -55,9 +55,9 @@ def study(asked: Asked) -> Study:
         columns=(LESS, WORST, DELAY),
         more=(
             pl.col("reduction_percent").count().alias("counted"),
-            sure("reduction_percent", 50.0, "median"), sure("reduction_percent", 5.0, "p5", LEAST),
+            sure("reduction_percent", 50.0, "median"), sure("reduction_percent", 5.0, "p5", MIN_MOVES),
             BEYOND.filter(WAITED).median().alias("beyond_waiting_percent_median"),
-            pl.when(WAITED.sum() >= LEAST).then(BEYOND.filter(WAITED).quantile(0.05, "linear"))
+            pl.when(WAITED.sum() >= MIN_MOVES).then(BEYOND.filter(WAITED).quantile(0.05, "linear"))
             .alias("beyond_waiting_percent_p5"),
         ),
         measures=(),
@@ -101,11 +101,11 @@ def cells(values: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def tables(values: Mapping[str, Any], kind: str, shown: Sequence[Column]) -> list[Table]:
+def tables(values: Mapping[str, Any], kind: str, shown: Sequence[Column]) -> list[ResultTable]:
     """Return tables of one kind with a column for each error."""
     title = "Plants by name" if kind == PLANT else f"Wrong {kind}"
     found = [across(cells(values)[kind], "shaper", "error", one, [DELAY]) for one in shown]
-    return [Table(f"{title}: {one.title}", one.entries, one.columns) for one in found]
+    return [ResultTable(f"{title}: {one.title}", one.entries, one.columns) for one in found]
 
 
 def _draw(result: Result) -> Figures:

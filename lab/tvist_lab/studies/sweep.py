@@ -20,7 +20,7 @@ from msgspec import Meta, Struct
 from tvist_lab.studies.moves import COLUMNS, SUMMED
 from tvist_lab.study.arms import scattered
 from tvist_lab.study.case import LIMITS, Case, arm_seed
-from tvist_lab.study.columns import Column, Table, highest
+from tvist_lab.study.columns import Column, ResultTable, highest
 from tvist_lab.study.method import Named
 from tvist_lab.study.moves import Move, draw_moves
 from tvist_lab.study.recipes import Recipe
@@ -212,7 +212,7 @@ def study(spec: Spec, robots: Sequence[SweptRobot]) -> Study:
         few=COLUMNS,
         more=(*SUMMED, highest("delay_ms")),
         tables=lambda result: [
-            Table("", result.values["summary"], [SETTING, Column("shaper", "shaper"), *COLUMNS])
+            ResultTable("", result.values["summary"], [SETTING, Column("shaper", "shaper"), *COLUMNS])
         ],
         draw=_draw,
         identity={

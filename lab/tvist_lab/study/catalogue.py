@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tvist_controller.api.line import OwnShaper
 from tvist_lab.study.foreign import FromFile
-from tvist_lab.study.menus import ROWS, Kind, Row, row, rows
-from tvist_lab.study.method import Constant, ConstantMeanDelay, Longer, Method, Named, PeriodOfJerk
+from tvist_lab.study.menus import ROWS, Kind, MenuMethod, row, rows
+from tvist_lab.study.method import ConstantMeanDelay, ConstantModes, Longer, Method, Named, PeriodOfJerk
 from tvist_lab.study.recipes import Recipe, longest_mean_delay, robust
 from tvist_lab.study.study import StudyError
 from tvist_plant.description import RobotDescription
@@ -19,21 +19,21 @@ MOST_DECLARED = 1.1
 """Largest declared mass of the bench, relative to the rating [-]."""
 
 
-def made(
-    row: Row, recipe: Recipe, description: RobotDescription, masses: tuple[float, float] | None = None
+def build_method(
+    row: MenuMethod, recipe: Recipe, description: RobotDescription, masses: tuple[float, float] | None = None
 ) -> Method:
     """Create a method of the catalogue."""
     return _MAKERS[row.kind](row, recipe, description, masses or (0.0, description.limits.payload))
 
 
 def _for_workspace(
-    row: Row, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
+    row: MenuMethod, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
 ) -> Method:
     f_d, zeta = robust(row.of, recipe, description, masses)
-    return Constant(recipe, row.name, row.label, row.of, f_d=f_d, zeta=zeta)
+    return ConstantModes(recipe, row.name, row.label, row.of, f_d=f_d, zeta=zeta)
 
 
-def _held(row: Row, recipe: Recipe, description: RobotDescription, _: tuple[float, float]) -> Method:
+def _held(row: MenuMethod, recipe: Recipe, description: RobotDescription, _: tuple[float, float]) -> Method:
     # Use the longest mean delay over the workspace, for all declared masses.
     most = MOST_DECLARED * description.limits.payload
     delay = longest_mean_delay(recipe, description, (0.0, most), row.modes)
@@ -41,21 +41,23 @@ def _held(row: Row, recipe: Recipe, description: RobotDescription, _: tuple[floa
 
 
 def _as_long_as(
-    row: Row, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
+    row: MenuMethod, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
 ) -> Method:
     like = next(one for one in ROWS if one.name == row.of)
-    return Longer(row.name, row.label, made(like, recipe, description, masses))
+    return Longer(row.name, row.label, build_method(like, recipe, description, masses))
 
 
-_MAKERS: dict[Kind, Callable[[Row, Recipe, RobotDescription, tuple[float, float]], Method]] = {
+_MAKERS: dict[Kind, Callable[[MenuMethod, Recipe, RobotDescription, tuple[float, float]], Method]] = {
     "filter": lambda row, recipe, *_: Named(
         replace(recipe, shaper=row.of or row.name, modes=max(row.modes, recipe.modes)), row.name, row.label
     ),
     "shaped alone": lambda row, recipe, *_: Named(
         replace(recipe, shaper=row.of), row.name, row.label, alone=True
     ),
-    "for target": lambda row, recipe, *_: Constant(recipe, row.name, row.label, row.of, row.modes),
-    "for payload": lambda row, recipe, *_: Constant(recipe, row.name, row.label, row.of, for_payload=True),
+    "for target": lambda row, recipe, *_: ConstantModes(recipe, row.name, row.label, row.of, row.modes),
+    "for payload": lambda row, recipe, *_: ConstantModes(
+        recipe, row.name, row.label, row.of, for_payload=True
+    ),
     "for workspace": _for_workspace,
     "held": _held,
     "longer": lambda row, *_: Longer(row.name, row.label),
@@ -90,7 +92,7 @@ def some(
             method = FromFile(one, recipe, f"{name}.py" if name in known else name, one)
         else:
             try:
-                method = made(row(one), recipe, description, masses)
+                method = build_method(row(one), recipe, description, masses)
             except UnknownShaperError as error:
                 every = [each.name for each in rows()]
                 like = "".join(f", did you mean {near!r}" for near in get_close_matches(error.name, every, 1))

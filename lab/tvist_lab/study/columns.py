@@ -46,7 +46,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class ResultTable:
     """Entries, and the columns to show."""
 
     title: str
@@ -78,7 +78,7 @@ def across(
     cell: Column,
     first: Sequence[Column] = (),
     best: bool = False,
-) -> Table:
+) -> ResultTable:
     """Return a table with a line for each value of `line`, and a column for each value of `key`."""
     lines: dict[Any, dict[str, Entry]] = {}
     for entry in entries:
@@ -97,7 +97,7 @@ def across(
         return Column(name, text)
 
     shown = [{**next(iter(one.values())), "of": one} for one in lines.values()]
-    return Table(cell.title, shown, [Column(line, line), *first, *map(of, names)])
+    return ResultTable(cell.title, shown, [Column(line, line), *first, *map(of, names)])
 
 
 def share(

@@ -17,7 +17,7 @@ from tvist_lab.study.work import FAILED, Job, Row, failed, measure_each, why
 
 PART = 32
 """Number of jobs in a part, and the most that are lost if the program is killed."""
-FEW = 16
+FEW_MOTIONS = 16
 """Largest number of motions that do not justify another process."""
 
 Progress = Callable[[int], AbstractContextManager[Callable[[int], None]]]
@@ -25,7 +25,7 @@ Progress = Callable[[int], AbstractContextManager[Callable[[int], None]]]
 
 
 @dataclass
-class Ran:
+class StudyRun:
     """A study that was run."""
 
     rows: pl.DataFrame
@@ -40,7 +40,7 @@ def run(
     folder: Path | None = None,
     executor: Callable[[], AbstractContextManager[Executor]] | None = None,
     progress: Progress = lambda _: nullcontext(lambda _: None),
-) -> Ran:
+) -> StudyRun:
     """Run missing and failed jobs, and write all rows to `folder`, if given.
 
     `executor` starts what runs the jobs, by default processes of this machine if there are enough jobs. Raises
@@ -54,7 +54,7 @@ def run(
         done = store.done()
         missing = Missing(jobs, [place for place in range(len(jobs)) if place not in done])
         if missing:
-            few = len(missing) * missing[0].motions <= FEW
+            few = len(missing) * missing[0].motions <= FEW_MOTIONS
             begin = executor or (Here if few else processes)
             _run(
                 missing,
@@ -63,7 +63,7 @@ def run(
                 stack.enter_context(begin()),
                 stack.enter_context(progress(len(missing))),
             )
-        return Ran(store.finish(), len(done), len(missing))
+        return StudyRun(store.finish(), len(done), len(missing))
 
 
 def _run(

@@ -14,7 +14,7 @@ import numpy as np
 from tvist_controller.api.line import MotionLimits, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.study.line import PAPER
-from tvist_lab.study.method import Stepping, Task
+from tvist_lab.study.method import SampleMethod, Task
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.shaping import ShaperFaultError
 from tvist_plant.plant import PERIOD
@@ -51,7 +51,7 @@ class TickInfo:
 
 
 @dataclass(frozen=True)
-class FromFile(Stepping):
+class FromFile(SampleMethod):
     """A shaper from the user's own file."""
 
     path: str

@@ -105,7 +105,7 @@ class ControlLine:
         delay: float = 0.0,
         elastic: ElasticFeedForward | None = None,
         law: Floats | None = None,
-    ) -> "Following":
+    ) -> "FollowedReference":
         """Return the drives' commands, for any arm, to follow a shaped reference from rest and then rest.
 
         `reference`, unshaped, (T, n) [rad] is what results are compared with, `shaped` (T', n) [rad] what the
@@ -114,10 +114,10 @@ class ControlLine:
         """
         ticks = RESTING + max(len(shaped), len(reference)) + round(REST / PERIOD)
         driven = self._line.drive(self._start, shaped, ticks, RESTING, elastic, law)
-        return Following(self._start, reference, driven, delay)
+        return FollowedReference(self._start, reference, driven, delay)
 
 
-class Following:
+class FollowedReference:
     """A shaped reference, and the drives' commands to follow it; see `ControlLine.follow`."""
 
     def __init__(self, start: Floats, reference: Floats, driven: Driven, delay: float) -> None:

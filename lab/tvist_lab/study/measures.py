@@ -32,11 +32,11 @@ from tvist_plant.plant import PERIOD
 
 WORTH = 0.2
 """Unshaped peak [m/s²] below which a move is listed, but not counted in percentages."""
-QUIET = 0.02
+QUIET_LEVEL = 0.02
 """A lower threshold for an arm at rest [m/s²]."""
 
 
-class Motion:
+class MadeMotion:
     """A motion of an arm, with the same motion unshaped."""
 
     def __init__(
@@ -44,14 +44,14 @@ class Motion:
         case: Case,
         shaped: Shaped,
         recording: Recording,
-        unshaped: "Callable[[], Motion]",
-        like: "Motion | None" = None,
+        unshaped: "Callable[[], MadeMotion]",
+        like: "MadeMotion | None" = None,
     ) -> None:
         self.case, self.shaped, self.recording = case, shaped, recording
         self._unshaped, self._like = unshaped, like
 
     @cached_property
-    def unshaped(self) -> "Motion":
+    def unshaped(self) -> "MadeMotion":
         """The unshaped motion, which may be this one."""
         return self._unshaped()
 
@@ -117,11 +117,11 @@ class Measure:
     unit: str
     """Unit; "–" for a ratio."""
     meaning: str
-    of: Callable[[Motion], float | None]
+    of: Callable[[MadeMotion], float | None]
     """Measures a motion; None if not measurable or irrelevant."""
 
 
-def _late(at: float | None, motion: Motion) -> float | None:
+def _late(at: float | None, motion: MadeMotion) -> float | None:
     """Return the time after the unshaped reference's stop, since the lengths of moves differ [ms]."""
     return None if at is None else round(1e3 * (at - motion.unshaped.duration), 6)
 
@@ -138,7 +138,7 @@ def _largest(q: Floats, order: int) -> float:
     return float(np.abs(np.diff(q, order, axis=0) / PERIOD**order).max())
 
 
-def _since_stop(motion: Motion) -> float | None:
+def _since_stop(motion: MadeMotion) -> float | None:
     at = motion.still()
     return None if at is None else 1e3 * (at - motion.rows.duration(motion.recording))
 
@@ -194,7 +194,7 @@ _ALL = (
     ),
     Measure(
         "quiet_after_unshaped_stop_ms", "ms", "the same below 0.02 m/s²",
-        lambda motion: _late(motion.still(QUIET), motion),
+        lambda motion: _late(motion.still(QUIET_LEVEL), motion),
     ),
     Measure(
         "time_until_still_ms", "ms",
@@ -203,10 +203,10 @@ _ALL = (
     ),
     Measure(
         "residual_m_s2", "m/s²",
-        "largest envelope of the tool's acceleration within 3 to 60 Hz after the declared end", Motion.residual,
+        "largest envelope of the tool's acceleration within 3 to 60 Hz after the declared end", MadeMotion.residual,
     ),
     Measure(
-        "in_motion_m_s2", "m/s²", "rms of the tool's acceleration relative to that of a rigid arm", Motion.in_motion
+        "in_motion_m_s2", "m/s²", "rms of the tool's acceleration relative to that of a rigid arm", MadeMotion.in_motion
     ),
     Measure(
         "declared_delay_ms", "ms", "delay of what the drives get, by the shaper's word",
@@ -235,7 +235,7 @@ OF_PEAKS = (
 """Measures that `evaluate` and sweeps use."""
 
 
-def measured(motion: Motion, names: Iterable[str]) -> dict[str, float | None]:
+def measured(motion: MadeMotion, names: Iterable[str]) -> dict[str, float | None]:
     """Measure a motion; see `MEASURES`."""
     return {name: MEASURES[name].of(motion) for name in names}
 

@@ -10,7 +10,7 @@ from tvist_lab.recordings import Floats
 from tvist_lab.study.line import PAPER, lengthened, point_to_point
 from tvist_lab.study.moves import Move
 from tvist_lab.study.recipes import Recipe, own_move, robust
-from tvist_lab.study.shaping import Running, RunningShaper, Shaped, shape
+from tvist_lab.study.shaping import RunningFilter, RunningShaper, Shaped, shape
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
@@ -63,7 +63,7 @@ class Method(ABC):
         """Return the whole motion."""
 
 
-class Waiting(Method):
+class WaitingMethod(Method):
     """The unshaped motion, as a robot makes that only waits."""
 
     name, label = "waiting", "waiting, unshaped"
@@ -73,7 +73,7 @@ class Waiting(Method):
         return Shaped(task.reference)
 
 
-class Stepping(Method):
+class SampleMethod(Method):
     """A method that shapes a reference sample by sample."""
 
     @abstractmethod
@@ -91,7 +91,7 @@ class Stepping(Method):
 
 
 @dataclass(frozen=True)
-class Named(Stepping):
+class Named(SampleMethod):
     """A filter by name, created as on the server."""
 
     recipe: Recipe
@@ -105,7 +105,7 @@ class Named(Stepping):
         """Whether the filter uses the target."""
         return self.recipe.shaper == AIMED
 
-    def stepper(self, task: Task) -> Running:
+    def stepper(self, task: Task) -> RunningFilter:
         """Return the filter, reset and given the target."""
         return _from_rest(self.recipe.make(task.description, task.move.mass), task)
 
@@ -121,11 +121,11 @@ class Named(Stepping):
         if task.stream or not task.as_served:
             return super().shaped(task)
         tvist, own = own_move(self.recipe, task.description, task.move, task.limits)
-        return self.driven(shape(Running(tvist), own, watched=False), task)
+        return self.driven(shape(RunningFilter(tvist), own, watched=False), task)
 
 
 @dataclass(frozen=True)
-class Constant(Stepping):
+class ConstantModes(SampleMethod):
     """A shaper of the catalogue with constant modes: those of the move's target, or of a whole range."""
 
     recipe: Recipe
@@ -146,7 +146,7 @@ class Constant(Stepping):
         """Whether it is designed for the end of each move."""
         return self.f_d is None and not self.for_payload
 
-    def stepper(self, task: Task) -> Running:
+    def stepper(self, task: Task) -> RunningFilter:
         """Return the fixed filter, reset; it knows the target if it is designed for it."""
         made, description, mass = shaper(self.shaper), task.description, task.move.mass
         designed = (self.f_d, self.zeta)
@@ -165,7 +165,7 @@ class Constant(Stepping):
 
 
 @dataclass(frozen=True)
-class ConstantMeanDelay(Stepping):
+class ConstantMeanDelay(SampleMethod):
     """The modes' ZV shapers in series, delayed to a constant mean delay."""
 
     recipe: Recipe
@@ -175,7 +175,7 @@ class ConstantMeanDelay(Stepping):
     name: str
     label: str
 
-    def stepper(self, task: Task) -> Running:
+    def stepper(self, task: Task) -> RunningFilter:
         """Return the filter, reset."""
         description = task.description
         estimator = self.recipe.estimator(description, task.move.mass, self.modes)
@@ -236,8 +236,8 @@ class PeriodOfJerk(Planned):
         )
 
 
-def _from_rest(tvist: Filter, task: Task) -> Running:
+def _from_rest(tvist: Filter, task: Task) -> RunningFilter:
     """Return a filter at rest at the start of a move, given the target as by a robot."""
     tvist.reset(np.array(task.move.start))
     tvist.aim(None if task.stream else np.array(task.move.target))
-    return Running(tvist)
+    return RunningFilter(tvist)

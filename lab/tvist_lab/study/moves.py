@@ -22,7 +22,7 @@ from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Angle, Mass
 
-LEAST = 1e-4
+MIN_TURN = 1e-4
 """Rotation of the fastest joint below which a move counts as going nowhere [rad]."""
 STROKE = (0.3, 1.0)
 """Length of a random move, as a share of the way to an independent configuration [-]."""
@@ -232,8 +232,8 @@ def _check(number: int, move: Move, description: RobotDescription) -> None:
                     f"move {number}: {end} of joint {joint + 1} ({joints[joint]}) is {angle:g}: "
                     f"must be within ±{limit:.6g} rad"
                 )
-    if max(abs(a - b) for a, b in zip(move.start, move.target, strict=True)) < LEAST:
-        raise MovesError(f"move {number} is too short: no joint turns by {LEAST:g} rad or more")
+    if max(abs(a - b) for a, b in zip(move.start, move.target, strict=True)) < MIN_TURN:
+        raise MovesError(f"move {number} is too short: no joint turns by {MIN_TURN:g} rad or more")
 
 
 def _in_words(why: str) -> str:

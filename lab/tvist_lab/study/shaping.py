@@ -66,7 +66,7 @@ class InOneGo(Protocol):
         """Return the next samples, shape (T, n) [rad], equal to those one by one."""
 
 
-class Running:
+class RunningFilter:
     """A filter in operation; it fails if its shaper's function does, so that no result has old weights."""
 
     def __init__(self, tvist: Filter) -> None:

@@ -11,12 +11,12 @@ import polars as pl
 from matplotlib.figure import Figure
 
 from tvist_lab.study.case import Case
-from tvist_lab.study.columns import Column, Table, highest, lowest, p5, share
+from tvist_lab.study.columns import Column, ResultTable, highest, lowest, p5, share
 from tvist_lab.study.foreign import run_file
 from tvist_lab.study.measures import MEASURES, OF_PEAKS
 from tvist_lab.study.method import Method
 from tvist_lab.study.work import FAILED, MEASURED, TOO_WEAK, Job, Row
-from tvist_lab.words import MANY
+from tvist_lab.words import QUANTILES_FROM
 
 KINDS: Mapping[type, Any] = {
     bool: pl.Boolean,
@@ -105,7 +105,7 @@ class Study:
     """Transforms all rows before they are grouped."""
     finish: Callable[[Result], None] = lambda _: None
     """Adds to a result what no column can compute."""
-    tables: Callable[[Result], Sequence[Table]] | None = None
+    tables: Callable[[Result], Sequence[ResultTable]] | None = None
     """Returns the tables; None for one with the summary."""
     draw: Callable[[Result], Figures] | None = None
     """Draws the figures; None for the measures over the first axis."""
@@ -229,17 +229,17 @@ class Study:
         self.finish(found)
         return found
 
-    def tables_of(self, result: Result) -> Sequence[Table]:
+    def tables_of(self, result: Result) -> Sequence[ResultTable]:
         """Return the tables that show a result."""
         if self.tables is not None:
             return self.tables(result)
         return [self.table_of(result.values["summary"])]
 
-    def table_of(self, entries: Sequence[dict[str, Any]], title: str = "") -> Table:
+    def table_of(self, entries: Sequence[dict[str, Any]], title: str = "") -> ResultTable:
         """Return the table of a summary; with few rows, with extremes instead of medians."""
-        many = all(entry.get("counted", entry["rows"]) >= MANY for entry in entries)
+        many = all(entry.get("counted", entry["rows"]) >= QUANTILES_FROM for entry in entries)
         columns = self.shown if many else self.few or (self.columns or ends_of(*self.show))
-        return Table(title, entries, [*(Column(name, name) for name in self.keys), *columns])
+        return ResultTable(title, entries, [*(Column(name, name) for name in self.keys), *columns])
 
 
 class _Jobs(Sequence[Job]):

@@ -18,8 +18,8 @@ from tvist_protocol.io import Io
 from tvist_protocol.programs import ProgramLoad
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.values import Payload
+from tvist_server.gateways.ur.deferred import Deferred
 from tvist_server.gateways.ur.interfaces import UrInterfaces
-from tvist_server.gateways.ur.later import Later
 
 from .desks import EVERYWHERE, Desk, until
 
@@ -49,7 +49,7 @@ class FakeControl:
 
     def ask(self, command):
         self.commands.append(command)
-        later = Later()
+        later = Deferred()
         if isinstance(command, ProgramLoad) and command.name == "nothing.urp":
             later.come(Refused(code="out_of_range", where="name", why="there is no nothing.urp"))
         elif self._waiting is None:
@@ -60,7 +60,7 @@ class FakeControl:
 
     def asked(self, reply):
         """A reply that comes at once."""
-        later = Later()
+        later = Deferred()
         later.come(reply)
         return later
 

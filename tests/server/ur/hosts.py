@@ -1,7 +1,7 @@
 """A robot as its interfaces see it, with programs."""
 
+from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.external_control import ExternalControl
-from tvist_server.gateways.ur.later import begin
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.robot import NO_MODE
 

@@ -6,8 +6,8 @@ import pytest
 
 from tvist_protocol.programs import ProgramLoad, ProgramPlay
 from tvist_server.gateways.ur import program_request
+from tvist_server.gateways.ur.deferred import Deferred
 from tvist_server.gateways.ur.external_control import ALONE
-from tvist_server.gateways.ur.later import Later
 from tvist_server.gateways.ur.program_request import program_of
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.program_folder import ProgramFolder
@@ -59,7 +59,7 @@ def test_a_machine_that_does_not_answer_or_sends_a_wrong_text_starts_nothing(rob
 
 @pytest.mark.parametrize("what", ["stop", "load", "play"])
 def test_what_comes_while_a_machine_is_asked_counts(robot, control, what):
-    waiting = [Later(), Later()]
+    waiting = [Deferred(), Deferred()]
     left = iter(waiting)
     programs = Programs(robot, external(fetch=lambda _: next(left)))
     hear(programs.load("external_control.urp", control), [])

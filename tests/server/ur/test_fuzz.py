@@ -19,7 +19,7 @@ from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.gateways.ur.rtde.board import Board
+from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.session import RtdeSession
 
 from . import rtde_client
@@ -46,7 +46,7 @@ class House(ControllerThread):
     def __init__(self):
         super().__init__(late=True)
         self.instruments = Instruments(UR5E)
-        self.boards = defaultdict(Board)
+        self.boards = defaultdict(PackageEncoder)
         self.robot = UrRobot(UR5E, "ur5e", self.tell, external(), lambda _: None, lambda _: None)
         self.leases = {host: HostLease(self, host, self.post) for host in ("127.0.0.1", "127.0.0.2")}
         self.clients = []

@@ -2,17 +2,17 @@
 
 import asyncio
 
-from tvist_server.gateways.ur.notices import EVERY, Notices
+from tvist_server.gateways.ur.throttled_log import LINE_INTERVAL, ThrottledLog
 
 
 async def test_a_flood_is_a_line_a_second_with_the_number_of_those_left_out(later):
     async def passed():
-        later(EVERY)
+        later(LINE_INTERVAL)
         await asyncio.sleep(0)
         await asyncio.sleep(0)
 
     said = []
-    notices = Notices(said.append)
+    notices = ThrottledLog(said.append)
     for number in range(1000):
         notices.tell(f"line {number}")
     assert said == ["line 0"]

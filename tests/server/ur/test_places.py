@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_server.gateways.ur.connection import KEPT, MOST, UNREAD_FOR, ConnectionLimit, _is_loopback
+from tvist_server.gateways.ur.connection import (
+    LOCAL_PLACES,
+    MAX_CONNECTIONS,
+    UNREAD_FOR,
+    ConnectionLimit,
+    _is_loopback,
+)
 
 from .desks import PATIENCE, connect, lines, until
 
@@ -59,7 +65,7 @@ async def readers(desk, count):
 
 
 async def test_clients_that_say_nothing_lock_nobody_out(desk):
-    for number in range(MOST):
+    for number in range(MAX_CONNECTIONS):
         await connect(desk, ("dashboard", "rtde")[number % 2])
     await until(lambda: all(connection.session for connection in desk.interfaces._connections))
     await dashboard(desk)
@@ -106,7 +112,7 @@ async def test_for_a_newcomer_the_one_that_has_been_silent_for_longest_goes(late
 async def test_who_is_being_served_goes_for_nobody_and_the_last_newcomer_is_turned_away(later, desk, caplog):
     served, writer = await rtde(desk)
     later(86_400.0)
-    others = await readers(desk, MOST - 1)
+    others = await readers(desk, MAX_CONNECTIONS - 1)
     assert await is_cut_off((await connect(desk, "primary"))[0])
     assert "was refused: 256 of 256 connections are in use" in caplog.text
     await desk.tick()
@@ -140,30 +146,30 @@ def places(*clients):
 
 
 def test_some_places_are_kept_for_this_machine():
-    house, said = places(*(Client() for _ in range(MOST - KEPT)))
+    house, said = places(*(Client() for _ in range(MAX_CONNECTIONS - LOCAL_PLACES)))
     assert not house.make_room("far", local=False)
     assert "8 are kept for this machine" in said[0]
-    for _ in range(KEPT):
+    for _ in range(LOCAL_PLACES):
         assert house.make_room("near", local=True)
         house.taken.add(Client())
     assert not house.make_room("near", local=True)
 
 
 @examples(20)
-@given(st.lists(st.tuples(st.floats(0, 100), st.booleans()), min_size=200, max_size=MOST))
+@given(st.lists(st.tuples(st.floats(0, 100), st.booleans()), min_size=200, max_size=MAX_CONNECTIONS))
 def test_whoever_goes_is_dispensable_and_nobody_such_has_been_silent_for_longer(clients):
     all_of_them = [Client(*client) for client in clients]
     house, said = places(*all_of_them)
     came_in = house.make_room("new", local=True)
     gone = [client for client in all_of_them if client.gone]
     candidates = [client for client in all_of_them if client.dispensable]
-    if len(clients) < 0.9 * MOST or not candidates:
+    if len(clients) < 0.9 * MAX_CONNECTIONS or not candidates:
         assert not gone
     else:
         (one,) = gone
         assert one.heard == min(client.heard for client in candidates)
         assert one not in house.taken
-    assert came_in == (len(house.taken) < MOST)
+    assert came_in == (len(house.taken) < MAX_CONNECTIONS)
     assert len(said) == len(gone) + (not came_in)
 
 

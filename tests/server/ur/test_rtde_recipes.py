@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from tests.controller.robots import UR5E, cut
 from tests.examples import examples
 
-from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.inputs import INPUTS
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, PARTS
+from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
 from tvist_server.gateways.ur.rtde.table import page
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import WireType
 
 from . import rtde_client as client
 
@@ -38,7 +38,7 @@ BANKS = {
 
 def alone(names, snapshot, head=b"\x01"):
     """The package for a client that is the only one."""
-    board, recipe = Board(), OutputRecipe(tuple(names))
+    board, recipe = PackageEncoder(), OutputRecipe(tuple(names))
     board.begin("client", recipe)
     return board.package(recipe, snapshot, head)
 
@@ -58,7 +58,7 @@ def sent_inputs(draw):
 def test_variables_and_their_types_are_the_published_ones_and_our_own():
     assert {name: wire.name for name, wire in OUTPUTS.items()} == client.OUTPUT_TYPES | client.OWN
     assert {name: wire.name for name, wire in INPUTS.items()} == client.INPUT_TYPES
-    for wire in Wire:
+    for wire in WireType:
         word = client.WORD[wire.name]
         assert (wire.size, wire.length) == (struct.calcsize(">" + word), len(word))
 
@@ -82,7 +82,7 @@ def test_a_package_holds_the_values_of_the_snapshot(snapshots, names):
 @examples(40)
 @given(st.lists(st.tuples(st.integers(0, 3), st.none() | names_of_outputs), min_size=1, max_size=12))
 def test_who_else_reads_what_changes_nothing(snapshots, changes):
-    board, recipes = Board(), {}
+    board, recipes = PackageEncoder(), {}
     for snapshot, (number, names) in zip(snapshots, changes, strict=False):
         if names is None:
             board.end(number)
@@ -95,7 +95,7 @@ def test_who_else_reads_what_changes_nothing(snapshots, changes):
 
 
 def test_a_variable_that_cannot_be_written_ends_only_those_who_read_it(ur5e, monkeypatch):
-    robot, board = ur5e(), Board()
+    robot, board = ur5e(), PackageEncoder()
     sound, faulty = OutputRecipe(("actual_q", "timestamp")), OutputRecipe(("actual_momentum",))
     board.begin("one", sound)
     board.package(sound, robot.tick(), b"\x01")

@@ -13,8 +13,8 @@ from tvist_protocol.commands import SetSpeed
 from tvist_protocol.io import Registers, SetIo, SetRegisters
 from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.robot import InputOwners
-from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.inputs import matching
+from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.session import RtdeSession, ticks_between
 
 from . import rtde_client as client
@@ -69,7 +69,7 @@ class Client:
 
 @pytest.fixture
 def robot(robot):
-    robot.inputs, robot.boards = InputOwners(), defaultdict(Board)
+    robot.inputs, robot.boards = InputOwners(), defaultdict(PackageEncoder)
     return robot
 
 

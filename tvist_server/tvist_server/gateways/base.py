@@ -25,7 +25,7 @@ class GatewayError(Exception):
     """A gateway cannot open; the message gives the reason and the remedy."""
 
 
-class Queried(Protocol):
+class QueryHandler(Protocol):
     """Answers the queries that arrive at a gateway. The methods may be called from any thread and do not block."""
 
     def request(self, data: bytes, answer: Answer) -> None:
@@ -38,8 +38,8 @@ class Queried(Protocol):
         """
 
 
-class Desk(Queried, Protocol):
-    """Receives all messages that arrive at a gateway; threads as for `Queried`."""
+class CommandIntake(QueryHandler, Protocol):
+    """Receives all messages that arrive at a gateway; threads as for `QueryHandler`."""
 
     def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
         """Take a command that the gateway itself has made.
@@ -78,7 +78,7 @@ class Gateway(ABC):
     """Number of set-points rejected before the desk: on a key with a wildcard, or too large."""
     dropped = 0
     """Number of states dropped because too many were queued."""
-    takes: Collection[Topic] = frozenset(get_args(Topic))
+    wanted_topics: Collection[Topic] = frozenset(get_args(Topic))
     """Topics that currently have a reader; messages that no gateway takes are not made. Read from any thread."""
 
     def report(self, report: Report) -> None:

@@ -96,7 +96,7 @@ class ConsoleGateway(Gateway):
     """Passes the events of the robot `name` to the console; `command_line` builds its commands."""
 
     setpoints_refused = 0
-    takes: Collection[Topic] = frozenset[Topic]({"event"})
+    wanted_topics: Collection[Topic] = frozenset[Topic]({"event"})
 
     def __init__(self, console: Console, name: str, command_line: Callable[[str], str]) -> None:
         self._console, self._name, self._command_line = console, name, command_line

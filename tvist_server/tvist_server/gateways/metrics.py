@@ -27,7 +27,7 @@ class MetricsGateway(Gateway):
     """Keeps a robot's newest messages for Prometheus; `newest` returns the newest state, from any thread."""
 
     setpoints_refused = 0
-    takes: Collection[Topic] = frozenset[Topic]({"event", "telemetry"})
+    wanted_topics: Collection[Topic] = frozenset[Topic]({"event", "telemetry"})
 
     def __init__(self, namespace: str, robot: str, newest: Callable[[], State | None]) -> None:
         self.labels = (namespace, robot)

@@ -5,7 +5,7 @@ import resource
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Self
 
-from tvist_client.across import Place, place_of
+from tvist_client.across import RobotPlace, place_of
 from tvist_client.transports.session import close_session
 from tvist_protocol import keys
 from tvist_server.gateways.exposure import check_endpoints, guarded_router
@@ -14,7 +14,7 @@ from tvist_server.gateways.network import REALTIME, open_router
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 SESSIONS = 4096
 """Largest number of robots, clients and routers connected at once."""
-MOST = 10_000
+MAX_COUNT = 10_000
 """Largest COUNT in `NAME*COUNT`; each robot has its own rules."""
 FASTEST = 500.0
 """Largest rate of states to pass on [1/s], which is the rate at which a robot publishes."""
@@ -53,7 +53,7 @@ class Router:
         listen: Sequence[str],
         connect: Sequence[str],
         rates: Sequence[Rate],
-        robots: Sequence[Place],
+        robots: Sequence[RobotPlace],
         *,
         security: str | None,
         insecure: bool,
@@ -73,18 +73,18 @@ class Router:
         close_session(self._session)
 
 
-def robots_of(text: str) -> list[Place]:
+def robots_of(text: str) -> list[RobotPlace]:
     """Parse `[NAMESPACE/]NAME`, or `[NAMESPACE/]NAME*COUNT` for NAME-1 to NAME-COUNT; may raise ValueError."""
     first, star, count = text.partition("*")
     if not star:
         return [place_of(first)]
     number = int(count) if count.isascii() and count.isdigit() and len(count) < 9 else 0
-    if not 1 <= number <= MOST:
-        raise ValueError(f"robot is {text!r}: the count after * must be a whole number from 1 to {MOST}")
+    if not 1 <= number <= MAX_COUNT:
+        raise ValueError(f"robot is {text!r}: the count after * must be a whole number from 1 to {MAX_COUNT}")
     return [place_of(f"{first}-{each}") for each in range(1, number + 1)]
 
 
-def downsampling(rates: Sequence[Rate], robots: Sequence[Place]) -> list[dict[str, Any]]:
+def downsampling(rates: Sequence[Rate], robots: Sequence[RobotPlace]) -> list[dict[str, Any]]:
     """Return Zenoh's `downsampling` settings for what leaves the router.
 
     Zenoh counts per rule, not per key: under a wildcard, one robot could use up the rate of all. Listed

@@ -111,7 +111,7 @@ class _Link(asyncio.Protocol):
 class ProgramSockets(Gateway, SocketPorts):
     """Opens sockets to the machines that programs may connect to; `tell` and `warn` run in any thread."""
 
-    takes: Collection[Topic] = ()
+    wanted_topics: Collection[Topic] = ()
 
     def __init__(
         self, tell: Callable[[SocketNews], None], warn: Callable[[str], None], allowed: AllowedHosts

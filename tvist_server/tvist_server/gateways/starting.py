@@ -5,7 +5,7 @@ from functools import partial
 
 from tvist_protocol.codec import encode
 from tvist_protocol.replies import Refused
-from tvist_server.gateways.base import Answer, Queried
+from tvist_server.gateways.base import Answer, QueryHandler
 
 Tell = Callable[[int, int], None]
 """Takes the number of compiled kernels and of all kernels."""
@@ -13,7 +13,7 @@ Prepare = Callable[[Tell], None]
 """Does the slow work that precedes the creation of robots."""
 
 
-class Starting(Queried):
+class Starting(QueryHandler):
     """Refuses every query to robots that are starting, and reports the progress."""
 
     def __init__(self) -> None:

@@ -15,7 +15,7 @@ from tvist_controller.instruments.report import Report, Topic
 from tvist_protocol import keys
 from tvist_protocol.codec import MAX_BYTES
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.base import Desk, Gateway, Message, Queried
+from tvist_server.gateways.base import CommandIntake, Gateway, Message, QueryHandler
 from tvist_server.gateways.replies import ENCODING, Answers
 
 EVERY_TICK: frozenset[Topic] = frozenset({"state", "truth"})
@@ -29,15 +29,15 @@ class ZenohGateway(Gateway):
     """
 
     def __init__(
-        self, session: zenoh.Session, robot: str, starting: Queried, *, complete: bool = True
+        self, session: zenoh.Session, robot: str, starting: QueryHandler, *, complete: bool = True
     ) -> None:
         self.setpoints_refused = 0
         self._session = session
         self._robot = robot
-        self._desk: Desk | None = None
+        self._desk: CommandIntake | None = None
         self._queried = starting
         self._closed = False
-        self.takes: set[Topic] = set()
+        self.wanted_topics: set[Topic] = set()
         self._answers = Answers()
         serve = {keys.key(robot, "command"): self._on_command, keys.key(robot, "info"): self._on_info}
         self._queryables = [
@@ -50,7 +50,12 @@ class ZenohGateway(Gateway):
             queryable.undeclare()  # type: ignore[no-untyped-call]
 
     def serve(
-        self, desk: Desk, *, lockstep: bool, truth: bool, wanted: Callable[[bool], None] | None = None
+        self,
+        desk: CommandIntake,
+        *,
+        lockstep: bool,
+        truth: bool,
+        wanted: Callable[[bool], None] | None = None,
     ) -> None:
         """Let clients reach the robot; arguments as for `Network.gateway`."""
         session, robot = self._session, self._robot
@@ -62,11 +67,11 @@ class ZenohGateway(Gateway):
         setpoint = keys.key(robot, "setpoint")
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
         self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth or wanted is not None)
-        self.takes = set(self._publishers)
+        self.wanted_topics = set(self._publishers)
         # In lockstep a client must not miss the tick that it requests right after subscribing.
         if not lockstep:
-            for topic in EVERY_TICK & self.takes:
-                self.takes.discard(topic)
+            for topic in EVERY_TICK & self.wanted_topics:
+                self.wanted_topics.discard(topic)
                 self._listen(topic, partial(self._on_wanted, topic))
         if wanted is not None:
             self._listen("truth", wanted)
@@ -103,9 +108,9 @@ class ZenohGateway(Gateway):
 
     def _on_wanted(self, topic: Topic, wanted: bool) -> None:
         if wanted:
-            self.takes.add(topic)
+            self.wanted_topics.add(topic)
         else:
-            self.takes.discard(topic)
+            self.wanted_topics.discard(topic)
 
     def _on_command(self, key: str, query: zenoh.Query) -> None:
         answer = self._answer(key, query)

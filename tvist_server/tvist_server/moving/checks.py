@@ -11,14 +11,14 @@ from tvist_plant.model import Floats
 from tvist_plant.plant import GRAVITY, Halt, Sight
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.moving.interfaces import Configuration
-from tvist_server.moving.program import Ended
+from tvist_server.moving.program import ProgramEnded
 from tvist_server.ur_model import series
 
 MODEL, REMOTE = "get robot model", "is in remote control"
 QUESTIONS = MODEL, REMOTE
 LEAST_MINOR = {3: 14, 5: 9}
 """Oldest supported minor version of the robot's software by major version; later major versions are all supported."""
-NEAR = 0.01
+MAX_JOINT_DIFFERENCE = 0.01
 """Largest deviation of a joint from its expected angle [rad]."""
 SAME_MASS = 0.05
 """Largest difference of two masses that count as equal [kg]."""
@@ -40,14 +40,16 @@ _SAFETY = {
     f"pendant, {_AGAIN}",
 }
 _ENDED = {
-    Ended.ORDERED: f"another client has ended its program: find the client that writes its registers, {_AGAIN}",
-    Ended.SILENCE: "no set-point reached it for 40 ms, so it braked: check the network and the load of this machine, "
-    f"{_AGAIN}",
-    Ended.AWAY: "it is more than 0.01 rad from the first set-point: power on here to start from its present position",
-    Ended.TOO_FAST: "a set-point exceeded the speed cap, so it braked: power on here, and report how this happened",
-    Ended.LOST: f"its program was paused or fell behind, so it braked: find the cause, {_AGAIN}",
-    Ended.STRAYED: "the arm did not follow the set-points, so it braked: look for an obstacle, do not move the speed "
-    f"slider during a motion, {_AGAIN}",
+    ProgramEnded.ORDERED: f"another client has ended its program: find the client that writes its registers, {_AGAIN}",
+    ProgramEnded.SILENCE: "no set-point reached it for 40 ms, so it braked: check the network and the load of this "
+    f"machine, {_AGAIN}",
+    ProgramEnded.AWAY: "it is more than 0.01 rad from the first set-point: power on here to start from its present "
+    "position",
+    ProgramEnded.TOO_FAST: "a set-point exceeded the speed cap, so it braked: power on here, and report how this "
+    "happened",
+    ProgramEnded.LOST: f"its program was paused or fell behind, so it braked: find the cause, {_AGAIN}",
+    ProgramEnded.STRAYED: "the arm did not follow the set-points, so it braked: look for an obstacle, do not move "
+    f"the speed slider during a motion, {_AGAIN}",
 }
 _MOVABLE = {SafetyMode.NORMAL, SafetyMode.REDUCED}
 _PAUSED = {RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING}
@@ -72,7 +74,7 @@ class Wanted(NamedTuple):
     """Joint angles at which the robot should be [rad]; None: any."""
 
 
-def answers_trouble(wanted: Wanted, answers: Mapping[str, str], own: Configuration | None) -> str | None:
+def why_not_by_answers(wanted: Wanted, answers: Mapping[str, str], own: Configuration | None) -> str | None:
     """Return why the answers of a robot's interfaces forbid moving it; None if they allow it."""
     model = wanted.description.robot.model
     told = answers.get(MODEL)
@@ -107,7 +109,7 @@ def version_trouble(version: Sequence[int]) -> str | None:
     return f"its software {own} may not run tvist's program: update it to 5.9 or later, on a CB3 robot to 3.14 or later"
 
 
-def state_trouble(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> str | None:
+def why_not_by_state(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> str | None:
     """Return why a robot must not be moved now, None if it may; `may_play`: the program that runs on it is ours."""
     mode, safety, runtime = sight.modes
     if mode == RobotMode.DISCONNECTED:
@@ -128,8 +130,8 @@ def _posture_trouble(wanted: Wanted, sight: Sight) -> str | None:
     if (joint := _apart(target, measured)) is not None:
         by = abs(target[joint] - measured[joint])
         return (
-            f"joint {joint} is {by:.3f} rad from where its controller has it, more than {NEAR:g}: remove what "
-            "holds it, or switch its power off and on"
+            f"joint {joint} is {by:.3f} rad from where its controller has it, more than {MAX_JOINT_DIFFERENCE:g}: "
+            "remove what holds it, or switch its power off and on"
         )
     if wanted.q is not None and (joint := _apart(np.array(wanted.q), target)) is not None:
         return (
@@ -197,10 +199,10 @@ def halt_by_modes(modes: tuple[int, int, int]) -> Halt | None:
 
 
 def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
-    """Return why the running program no longer follows; None if it does. `ended` is the program's `Ended` register."""
+    """Return why the running program no longer follows; None if it does. `ended` is its register."""
     _, safety, runtime = modes
-    if ended in {*Ended} and ended != Ended.NOT:
-        return Halt(_ENDED[Ended(ended)], safety)
+    if ended in {*ProgramEnded} and ended != ProgramEnded.NOT:
+        return Halt(_ENDED[ProgramEnded(ended)], safety)
     if runtime in _PAUSED:
         return Halt(f"its program was paused: stop it at the robot, {_AGAIN}", safety)
     if runtime != RuntimeState.PLAYING:
@@ -210,9 +212,9 @@ def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
 
 
 def _apart(one: Floats, other: Floats) -> int | None:
-    """Return the joint that differs most, if it differs by more than `NEAR`."""
+    """Return the joint that differs most, if it differs by more than `MAX_JOINT_DIFFERENCE`."""
     joint = int(np.argmax(np.abs(one - other)))
-    return joint if abs(one[joint] - other[joint]) > NEAR else None
+    return joint if abs(one[joint] - other[joint]) > MAX_JOINT_DIFFERENCE else None
 
 
 def _listed(numbers: Sequence[float]) -> str:

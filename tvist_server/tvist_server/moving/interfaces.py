@@ -11,11 +11,11 @@ from msgspec.structs import replace
 
 from tvist_plant.description import RobotDescription
 from tvist_protocol.errors import short
-from tvist_server.watching.place import Place
+from tvist_server.watching.address import RobotAddress
 
 PATIENCE = 2.0
 """Longest duration of a conversation [s]."""
-MOST = 1 << 20
+MAX_ANSWER = 1 << 20
 """Largest answer [bytes]."""
 DASHBOARD = 29999
 """Port of the dashboard server on a UR robot."""
@@ -34,13 +34,13 @@ class NoAnswerError(Exception):
     """An interface does not answer; the message names it and gives the reason."""
 
 
-def ask(place: Place, question: bytes, answer: Callable[[bytes], T | None]) -> T:
+def ask(place: RobotAddress, question: bytes, answer: Callable[[bytes], T | None]) -> T:
     """Return an interface's answer, parsed by `answer` (None: more must come); NoAnswerError after `PATIENCE`."""
     heard, ends = b"", time.monotonic() + PATIENCE
     try:
         with socket.create_connection((place.host, place.port), PATIENCE) as connection:
             connection.sendall(question)
-            while len(heard) < MOST and (left := ends - time.monotonic()) > 0.0:
+            while len(heard) < MAX_ANSWER and (left := ends - time.monotonic()) > 0.0:
                 connection.settimeout(left)
                 data = connection.recv(1 << 16)
                 heard += data
@@ -54,7 +54,7 @@ def ask(place: Place, question: bytes, answer: Callable[[bytes], T | None]) -> T
     raise NoAnswerError(f"port {place.port} of {place.host} gives no answer within {PATIENCE:g} s")
 
 
-def asked(place: Place, questions: Sequence[str]) -> dict[str, str]:
+def asked(place: RobotAddress, questions: Sequence[str]) -> dict[str, str]:
     """Return the answers by question, without those that it does not understand; empty if there is no dashboard."""
     text = "".join(f"{question}\n" for question in (*questions, "quit")).encode()
 
@@ -108,7 +108,7 @@ class Configuration(NamedTuple):
         return all(np.abs(own - np.array(there)).max() <= apart for own, there, apart in pairs)
 
 
-def configuration_of(place: Place) -> Configuration | None:
+def configuration_of(place: RobotAddress) -> Configuration | None:
     """Ask a robot for its configuration; None if it does not report one."""
     try:
         return ask(place.beside(PRIMARY), b"", found)

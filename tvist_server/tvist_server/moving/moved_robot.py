@@ -16,24 +16,24 @@ from tvist_server.moving.checks import (
     FELL_SILENT,
     QUESTIONS,
     Wanted,
-    answers_trouble,
     mounting_trouble,
-    state_trouble,
     tells_gravity,
     version_trouble,
+    why_not_by_answers,
+    why_not_by_state,
 )
 from tvist_server.moving.interfaces import asked, configuration_of, narrowed
 from tvist_server.moving.program import INPUTS, OUTPUTS
-from tvist_server.moving.run import Run
+from tvist_server.moving.run import ProgramRun
 from tvist_server.moving.servo_lag import ServoLag
-from tvist_server.watching.place import Place
+from tvist_server.watching.address import RobotAddress
 from tvist_server.watching.watched_robot import WatchedRobot
 
 NUMBERS = 1_000_000_000
-"""Run numbers start with the time in microseconds, so that those of two processes differ."""
+"""ProgramRun numbers start with the time in microseconds, so that those of two processes differ."""
 SILENT = 0.08
 """Time without a row after which the robot counts as silent; its program brakes much earlier [s]."""
-MOST = 50
+MAX_CAUGHT_UP = 50
 """Largest number of periods made up for after a gap; for a longer one, this machine's clock has counted the time."""
 
 
@@ -42,7 +42,7 @@ class MovedRobot(RealArm):
 
     def __init__(
         self,
-        place: Place,
+        place: RobotAddress,
         description: RobotDescription,
         payload: Payload,  # payload that the robot should have been told
         *,
@@ -58,9 +58,9 @@ class MovedRobot(RealArm):
         own = configuration_of(place)
         answers = asked(place, QUESTIONS)
         file = Wanted(description, payload, tool, start)
-        self._refuse_if(version_trouble(self._robot.version) or answers_trouble(file, answers, own))
+        self._refuse_if(version_trouble(self._robot.version) or why_not_by_answers(file, answers, own))
         self._wanted = file._replace(description=narrowed(description, own, speed_cap))
-        self._refuse_if(state_trouble(self._wanted, self._sight))
+        self._refuse_if(why_not_by_state(self._wanted, self._sight))
         felt = np.mean([row["actual_tool_accelerometer"] for row in self._robot.looked_at], axis=0)
         if tells_gravity(felt):
             self._refuse_if(mounting_trouble(description, self._sight.measured.q, felt))
@@ -71,9 +71,9 @@ class MovedRobot(RealArm):
             self._told.append("its primary interface reports no limits: only those of the robot file apply")
         if not answers:
             self._told.append("it has no dashboard: model and remote control were not checked")
-        self._pace, self._number = Pace(), time.monotonic_ns() // 1000 % NUMBERS
+        self._pace, self._number = ControlPeriods(), time.monotonic_ns() // 1000 % NUMBERS
         self._held, self._lag, self._interval = False, lag, round(self._robot.interval() / PERIOD)
-        self._run: Run | None = None
+        self._run: ProgramRun | None = None
         self._halt: Halt | None = None
         self._left_paused = False
         """Whether a safety stop has paused our program on the robot, so that it may be replaced."""
@@ -96,7 +96,7 @@ class MovedRobot(RealArm):
         run = self._run
         if run is None or not run.ready:
             may_play = run is not None or self._left_paused
-            self._refuse_if(state_trouble(self._wanted, self._sight, may_play=may_play))
+            self._refuse_if(why_not_by_state(self._wanted, self._sight, may_play=may_play))
         last = None if run is None else run.last
         return self._measured(last or self._robot.newest["target_q"])
 
@@ -146,7 +146,9 @@ class MovedRobot(RealArm):
             if trouble is None:
                 self._number += 1
                 limits = self._wanted.description.limits
-                self._run = Run(self._robot, self._place, self._number, limits, self._lag, self._trouble)
+                self._run = ProgramRun(
+                    self._robot, self._place, self._number, limits, self._lag, self._trouble
+                )
             else:  # the conditions at the last check no longer hold
                 self._let_go(Halt(trouble, sight.modes[1]))
         self._left_paused &= sight.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
@@ -158,7 +160,7 @@ class MovedRobot(RealArm):
         return self._pace.row(sight.tick, time.monotonic())
 
     def _trouble(self) -> str | None:
-        return state_trouble(self._wanted, self._sight, may_play=self._left_paused)
+        return why_not_by_state(self._wanted, self._sight, may_play=self._left_paused)
 
     @property
     def condition(self) -> Condition:
@@ -187,7 +189,7 @@ class MovedRobot(RealArm):
         self._halt = Halt(f"the robot at {self._place} does not follow: {halt.why}", halt.safety_mode)
 
 
-class Pace:
+class ControlPeriods:
     """Counts the control periods of one robot: by its rows, or by this machine's clock while it is silent."""
 
     def __init__(self) -> None:
@@ -211,7 +213,7 @@ class Pace:
         passed = tick - self.tick
         if passed <= 0:
             return False
-        self.owed = passed if passed <= MOST else 1
+        self.owed = passed if passed <= MAX_CAUGHT_UP else 1
         self.tick = tick - self.owed
         return self.next(now)
 

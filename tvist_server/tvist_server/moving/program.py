@@ -6,7 +6,7 @@ from enum import IntEnum
 from importlib import resources
 from string import Template
 
-from tvist_server.rtde.wire import Field, Wire
+from tvist_server.rtde.wire import Field, WireType
 
 NAME = "tvist_follow"
 """Name of the program, which robots display."""
@@ -30,7 +30,7 @@ MARGIN = 1.05
 JOINTS = 6
 KEPT = 4
 """Number of set-points in a package: the newest and its predecessors."""
-MOST = 2**30
+MAX_NUMBER = 2**30
 """Largest number of a set-point or run, followed by 1. Differences fit into a 32-bit register."""
 
 NUMBER = 24
@@ -41,11 +41,11 @@ SETPOINTS = 24
 """First of the input doubles: joint angles of set-point n, then of n-1, n-2 and n-3 [rad]."""
 
 STATE = 24
-"""Output integer: a `State`."""
+"""Output integer: a `ProgramState`."""
 PLAYED = 25
-"""Output integer: number of the set-point being played; 0 and below stand for `MOST` and its predecessors."""
+"""Output integer: number of the set-point being played; 0 and below stand for `MAX_NUMBER` and its predecessors."""
 ENDED = 26
-"""Output integer: an `Ended`."""
+"""Output integer: an `ProgramEnded`."""
 ALONE = 27
 """Output integer: number of periods without their set-point, in which the arm extrapolated."""
 LEFT_OUT = 28
@@ -54,8 +54,8 @@ RUN = 29
 """Output integer: number of the run. It is written last, so the others belong to this run once it appears."""
 
 
-class State(IntEnum):
-    """State of the program."""
+class ProgramState(IntEnum):
+    """ProgramState of the program."""
 
     NONE = 0
     WAITING = 1
@@ -64,7 +64,7 @@ class State(IntEnum):
     ENDED = 4
 
 
-class Ended(IntEnum):
+class ProgramEnded(IntEnum):
     """Why the program has braked."""
 
     NOT = 0
@@ -81,15 +81,15 @@ class Ended(IntEnum):
     """The arm did not follow the program."""
 
 
-INPUTS: dict[str, Wire] = {
-    f"input_int_register_{NUMBER}": Wire.INT32,
-    f"input_int_register_{ORDER}": Wire.INT32,
-    **{f"input_double_register_{SETPOINTS + place}": Wire.DOUBLE for place in range(KEPT * JOINTS)},
+INPUTS: dict[str, WireType] = {
+    f"input_int_register_{NUMBER}": WireType.INT32,
+    f"input_int_register_{ORDER}": WireType.INT32,
+    **{f"input_double_register_{SETPOINTS + place}": WireType.DOUBLE for place in range(KEPT * JOINTS)},
 }
 """Registers that tvist writes, in the order of a package's values."""
 OUTPUTS: dict[str, Field] = dict.fromkeys(
     [f"output_int_register_{place}" for place in (STATE, PLAYED, ENDED, ALONE, LEFT_OUT, RUN)],
-    Field(Wire.INT32),
+    Field(WireType.INT32),
 )
 """Registers that tvist reads."""
 
@@ -98,14 +98,14 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
     """Return the text of the program, which only uses functions of e-Series (5.9 or later) and CB3 (3.14 or later).
 
     Args:
-        run: Number of this run, 1 to `MOST`, which the program reports.
+        run: Number of this run, 1 to `MAX_NUMBER`, which the program reports.
         speed: Fastest set-points; faster ones end the program [rad/s].
         deceleration: Deceleration of the fastest joint when it ends [rad/s²].
         lookahead: `lookahead_time` of `servoj`, 0.03 to 0.2 [s].
         gain: `gain` of `servoj`, 100 to 2000.
     """
     for name, value, least, most in (
-        ("run", run, 1, MOST),
+        ("run", run, 1, MAX_NUMBER),
         ("speed", speed, 0.01, 10.0),
         ("deceleration", deceleration, 0.1, 100.0),
         ("lookahead", lookahead, 0.03, 0.2),
@@ -118,10 +118,10 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         "lookahead": float(lookahead), "gain": float(gain), "silence": SILENCE, "first": FIRST, "away": AWAY,
         "fade": FADE, "again": AGAIN, "close": CLOSE, "after_shift": AFTER_SHIFT, "NUMBER": NUMBER, "ORDER": ORDER,
         "SETPOINTS": SETPOINTS, "STATE": STATE, "PLAYED": PLAYED, "ENDED": ENDED, "ALONE": ALONE,
-        "LEFT_OUT": LEFT_OUT, "RUN": RUN, "MOST": MOST,
+        "LEFT_OUT": LEFT_OUT, "RUN": RUN, "MAX_NUMBER": MAX_NUMBER,
     }  # fmt: skip
-    given |= {f"ended_{one.name.lower()}": int(one) for one in Ended}
-    given |= {f"state_{one.name.lower()}": int(one) for one in State}
+    given |= {f"ended_{one.name.lower()}": int(one) for one in ProgramEnded}
+    given |= {f"state_{one.name.lower()}": int(one) for one in ProgramState}
     text = resources.files("tvist_server.moving").joinpath("follow.script").read_text("utf-8")
     return Template(text).substitute(given)
 
@@ -141,7 +141,7 @@ class Window:
 
     def add(self, setpoint: Sequence[float]) -> None:
         """Add the next set-point, shape (6,) [rad]; the first one also fills the history."""
-        self.number = self.number % MOST + 1
+        self.number = self.number % MAX_NUMBER + 1
         self._kept.extendleft([setpoint] * (1 if self._kept else KEPT))
 
     def values(self, order: int) -> tuple[float, ...]:

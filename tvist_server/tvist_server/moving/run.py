@@ -14,9 +14,19 @@ from tvist_plant.robot_tables import ArmLimits
 from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.checks import REMOTE, REPLACED, halt_by_modes, halt_by_program, remote_trouble
 from tvist_server.moving.interfaces import PATIENCE, PRIMARY, asked
-from tvist_server.moving.program import ALONE, ENDED, LEFT_OUT, PLAYED, RUN, STATE, State, Window, program
-from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, Setpoints
-from tvist_server.watching.place import Place
+from tvist_server.moving.program import (
+    ALONE,
+    ENDED,
+    LEFT_OUT,
+    PLAYED,
+    RUN,
+    STATE,
+    ProgramState,
+    Window,
+    program,
+)
+from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, ServoSetpoints
+from tvist_server.watching.address import RobotAddress
 from tvist_server.watching.watched_robot import WatchedRobot
 
 DECELERATION = 5.0
@@ -39,13 +49,13 @@ LOOK_EVERY = 0.2
 """Longest time until the upload thread notices that it should end [s]."""
 
 
-class Run:
+class ProgramRun:
     """Runs the program once, on a connected robot."""
 
     def __init__(
         self,
         robot: WatchedRobot,
-        place: Place,
+        place: RobotAddress,
         number: int,
         limits: ArmLimits,
         lag: ServoLag | None,  # lag of its `servoj`; None: unknown
@@ -54,7 +64,7 @@ class Run:
         self._robot, self._number, self._window = robot, number, Window()
         self._stands, speed = robot.newest["target_q"], max(limits.velocity)
         here = np.array(self._stands)
-        self._setpoints = Setpoints(here, lag, fastest=speed, reach=np.array(limits.position))
+        self._setpoints = ServoSetpoints(here, lag, fastest=speed, reach=np.array(limits.position))
         self._begun, self._plays = time.monotonic(), False
         self._waiting, self._settled, self._ending = False, 0, 0
         self._follows, self._played, self._still = False, 0, 0
@@ -112,18 +122,18 @@ class Run:
                 why = f"the program has not started within {BEGINS:g} s: look for a message on its teach pendant"
                 self.halt = Halt(f"{why}, then power on here", sight.modes[1])
             return None
-        self._still = self._still + 1 if state == State.FOLLOWING and played == self._played else 0
+        self._still = self._still + 1 if state == ProgramState.FOLLOWING and played == self._played else 0
         self._played = played
         ends = halt_by_program(ended if ours else 0, sight.modes)
-        waits = state == State.WAITING and self._window.number > HEEDS
+        waits = state == ProgramState.WAITING and self._window.number > HEEDS
         if ends is None and (not ours or waits or self._still >= STANDS):
             ends = Halt(REPLACED, sight.modes[1])
         self._ending = 0 if ends is None else self._ending + 1
         if self._ending > GRACE:
             self.halt = self.halt or ends
-        self._follows = (state == State.FOLLOWING or self._follows) and self.halt is None
-        self._waiting = state == State.WAITING and self.halt is None
-        self._settled += state == State.WAITING
+        self._follows = (state == ProgramState.FOLLOWING or self._follows) and self.halt is None
+        self._waiting = state == ProgramState.WAITING and self.halt is None
+        self._settled += state == ProgramState.WAITING
         return self._tell_missed((alone, left_out, self._setpoints.limited))
 
     def _tell_missed(self, missed: tuple[int, int, int]) -> str | None:
@@ -141,7 +151,7 @@ class Run:
 class Upload:
     """Sends a program from its own thread, and stays connected, since some robots end a program without sender."""
 
-    def __init__(self, place: Place, text: str, check: Callable[[], str | None]) -> None:
+    def __init__(self, place: RobotAddress, text: str, check: Callable[[], str | None]) -> None:
         self._place, self._text, self._check = place, text, check
         self.trouble: str | None = None
         """Why the program cannot run."""

@@ -35,7 +35,7 @@ class ServoLag:
         return cls(time, max(gain, DAMPED / time**2))
 
 
-class Setpoints:
+class ServoSetpoints:
     """Turns drive commands into set-points, one for each control period, which compensate the lag of `servoj`.
 
     The arm is at the reference if p = q + T q̇ + q̈/k. All three are taken midway between two commands, where p is

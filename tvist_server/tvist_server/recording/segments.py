@@ -24,7 +24,7 @@ from tvist_server.recording.writer import RecordingWriter
 
 PARTS = 4
 """Number of segments for the ticks that must be kept."""
-MOST = 5
+KEPT_RUNS = 5
 """Number of earlier runs whose recordings are kept."""
 
 
@@ -142,7 +142,7 @@ def _new_run(path: Path) -> int:
         if found is not None and found[0] == path.name and place.is_file():
             runs.setdefault(found[1], []).append(place)
     kept = [run for run in sorted(runs) if not all(map(_is_empty, runs[run]))]
-    for run in runs.keys() - kept[-MOST:]:
+    for run in runs.keys() - kept[-KEPT_RUNS:]:
         if not any(map(_is_claimed, runs[run])):
             for place in runs[run]:
                 place.unlink(missing_ok=True)

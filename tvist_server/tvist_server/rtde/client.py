@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from tvist_protocol.errors import quoted
 from tvist_server.rtde.codec import PackageKind, PackageReader, package, words
-from tvist_server.rtde.wire import Field, Wire
+from tvist_server.rtde.wire import Field, WireType
 
 Row = Mapping[str, tuple[float, ...]]
 """Values of one cycle of the robot by name, each within its range; a number is a tuple of one."""
@@ -41,7 +41,7 @@ class RtdeClient:
         self,
         needed: Mapping[str, Field],  # types and ranges of the required variables
         optional: Mapping[str, Field],  # those of variables that some robots, and so their rows, lack
-        inputs: Mapping[str, Wire] = MappingProxyType({}),  # types of the inputs to claim; no vectors
+        inputs: Mapping[str, WireType] = MappingProxyType({}),  # types of the inputs to claim; no vectors
     ) -> None:
         self._needed, self._types = needed, {**needed, **optional}
         self._inputs, self._claimed = inputs, 0

@@ -5,7 +5,7 @@ from struct import Struct
 from typing import NamedTuple
 
 
-class Wire(Enum):
+class WireType(Enum):
     """A type by its name in RTDE; the value is its format in `struct`, without byte order."""
 
     BOOL = "?"
@@ -33,6 +33,6 @@ class Wire(Enum):
 class Field(NamedTuple):
     """Type and range of a variable that is read."""
 
-    wire: Wire
+    wire: WireType
     least: float = -(2.0**63)
     most: float = 2.0**63

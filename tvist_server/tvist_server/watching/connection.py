@@ -10,7 +10,7 @@ from typing import Any
 
 from tvist_plant.plant import PERIOD
 from tvist_server.rtde.client import Row, RtdeClient, RtdeError
-from tvist_server.watching.place import PORT, Place
+from tvist_server.watching.address import PORT, RobotAddress
 
 ANSWERS = 3.0
 """Longest time for a robot to accept a connection and start sending [s]."""
@@ -30,10 +30,10 @@ class UnreachableError(LostError):
     """Nothing answers at the address."""
 
 
-class Connection:
+class RtdeConnection:
     """One connection to the robot at `place`, whose `address` comes from `resolved`; `client` reads and writes."""
 
-    def __init__(self, place: Place, address: Address, client: RtdeClient) -> None:
+    def __init__(self, place: RobotAddress, address: Address, client: RtdeClient) -> None:
         self._place, self.client = place, client
         self.texts: list[str] = []
         """Messages of the controller, until the caller clears the list."""
@@ -118,7 +118,7 @@ class Connection:
             raise UnreachableError(f"no robot answers at {self._place} within {ANSWERS:g} s")
 
 
-def resolved(place: Place) -> Address:
+def resolved(place: RobotAddress) -> Address:
     """Resolve an address, which may take seconds; raise LostError if it has none."""
     try:
         found = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)[0]

@@ -8,35 +8,35 @@ import numpy as np
 from tvist_plant.description import Payload, is_real_body
 from tvist_plant.plant import PERIOD, Measurement, Sight
 from tvist_server.rtde.client import Row, RtdeError
-from tvist_server.rtde.wire import Field, Wire
+from tvist_server.rtde.wire import Field, WireType
 
 NEEDED: dict[str, Field] = {
-    "timestamp": Field(Wire.DOUBLE, 0.0, 1e9),
-    "target_q": Field(Wire.VECTOR6D, -1e3, 1e3),
-    "target_qd": Field(Wire.VECTOR6D, -1e3, 1e3),
-    "target_qdd": Field(Wire.VECTOR6D, -1e5, 1e5),
-    "target_moment": Field(Wire.VECTOR6D, -1e5, 1e5),
-    "actual_q": Field(Wire.VECTOR6D, -1e3, 1e3),
-    "actual_qd": Field(Wire.VECTOR6D, -1e3, 1e3),
-    "actual_current": Field(Wire.VECTOR6D, -1e3, 1e3),
-    "actual_TCP_pose": Field(Wire.VECTOR6D, -1e3, 1e3),
-    "actual_TCP_force": Field(Wire.VECTOR6D, -1e5, 1e5),
-    "actual_tool_accelerometer": Field(Wire.VECTOR3D, -1e4, 1e4),
-    "robot_mode": Field(Wire.INT32, -1, 255),
-    "safety_mode": Field(Wire.INT32, -1, 255),
-    "runtime_state": Field(Wire.UINT32, -1, 255),
-    "speed_scaling": Field(Wire.DOUBLE, 0.0, 2.0),
+    "timestamp": Field(WireType.DOUBLE, 0.0, 1e9),
+    "target_q": Field(WireType.VECTOR6D, -1e3, 1e3),
+    "target_qd": Field(WireType.VECTOR6D, -1e3, 1e3),
+    "target_qdd": Field(WireType.VECTOR6D, -1e5, 1e5),
+    "target_moment": Field(WireType.VECTOR6D, -1e5, 1e5),
+    "actual_q": Field(WireType.VECTOR6D, -1e3, 1e3),
+    "actual_qd": Field(WireType.VECTOR6D, -1e3, 1e3),
+    "actual_current": Field(WireType.VECTOR6D, -1e3, 1e3),
+    "actual_TCP_pose": Field(WireType.VECTOR6D, -1e3, 1e3),
+    "actual_TCP_force": Field(WireType.VECTOR6D, -1e5, 1e5),
+    "actual_tool_accelerometer": Field(WireType.VECTOR3D, -1e4, 1e4),
+    "robot_mode": Field(WireType.INT32, -1, 255),
+    "safety_mode": Field(WireType.INT32, -1, 255),
+    "runtime_state": Field(WireType.UINT32, -1, 255),
+    "speed_scaling": Field(WireType.DOUBLE, 0.0, 2.0),
 }
 """Variables that every robot with RTDE has; the ranges exclude impossible values."""
 OPTIONAL: dict[str, Field] = {
-    "actual_current_as_torque": Field(Wire.VECTOR6D, -1e5, 1e5),
-    "target_speed_fraction": Field(Wire.DOUBLE, 0.0, 1.0),
-    "tcp_offset": Field(Wire.VECTOR6D, -10.0, 10.0),
-    "payload": Field(Wire.DOUBLE, 0.0, 100.0),
-    "payload_cog": Field(Wire.VECTOR3D, -2.0, 2.0),
-    "payload_inertia": Field(Wire.VECTOR6D, -10.0, 10.0),
-    "actual_digital_input_bits": Field(Wire.UINT64, 0, 2**32 - 1),
-    "actual_digital_output_bits": Field(Wire.UINT64, 0, 2**32 - 1),
+    "actual_current_as_torque": Field(WireType.VECTOR6D, -1e5, 1e5),
+    "target_speed_fraction": Field(WireType.DOUBLE, 0.0, 1.0),
+    "tcp_offset": Field(WireType.VECTOR6D, -10.0, 10.0),
+    "payload": Field(WireType.DOUBLE, 0.0, 100.0),
+    "payload_cog": Field(WireType.VECTOR3D, -2.0, 2.0),
+    "payload_inertia": Field(WireType.VECTOR6D, -10.0, 10.0),
+    "actual_digital_input_bits": Field(WireType.UINT64, 0, 2**32 - 1),
+    "actual_digital_output_bits": Field(WireType.UINT64, 0, 2**32 - 1),
 }
 """Variables that older software lacks."""
 JOINTS = 6

@@ -16,9 +16,9 @@ from tvist_plant.plant import PERIOD, Measurement, PlantError, RealArm, Sight
 from tvist_protocol.errors import harmless
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.rtde.client import Row, RtdeClient, RtdeError
-from tvist_server.rtde.wire import Field, Wire
-from tvist_server.watching.connection import ANSWERS, Connection, LostError, UnreachableError, resolved
-from tvist_server.watching.place import Place
+from tvist_server.rtde.wire import Field, WireType
+from tvist_server.watching.address import RobotAddress
+from tvist_server.watching.connection import ANSWERS, LostError, RtdeConnection, UnreachableError, resolved
 from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, RowCount, has_real_payload, sight_of
 
 LOOKED_AT = 25
@@ -40,11 +40,11 @@ class WatchedRobot(RealArm):
 
     def __init__(
         self,
-        place: Place,
+        place: RobotAddress,
         description: RobotDescription,
         payload: Payload,  # if the robot does not report one
         outputs: Mapping[str, Field] = MappingProxyType({}),  # types and ranges of further required variables
-        inputs: Mapping[str, Wire] = MappingProxyType({}),  # types of the inputs to claim
+        inputs: Mapping[str, WireType] = MappingProxyType({}),  # types of the inputs to claim
     ) -> None:
         model = description.robot.model
         if description.joints != JOINTS:
@@ -57,7 +57,7 @@ class WatchedRobot(RealArm):
         self._arm = Arm(description)
         self._constants = [rating.torque_constant for rating in joint_ratings(description)]
         self._sights: deque[tuple[Sight, Row]] = deque()
-        self._connection: Connection | None = None
+        self._connection: RtdeConnection | None = None
         self.looked_at: list[Row] = []
         """Rows read before the first tick."""
         self._checked = False
@@ -178,9 +178,9 @@ class WatchedRobot(RealArm):
         self._connection, self._checked = self._new_connection(), False
         self._client = self._connection.client
 
-    def _new_connection(self) -> Connection:
+    def _new_connection(self) -> RtdeConnection:
         client = RtdeClient(self._needed, OPTIONAL, self._inputs)
-        return Connection(self._place, self._address, client)
+        return RtdeConnection(self._place, self._address, client)
 
     def _rows(self, timeout: float) -> list[Row]:
         """Return the rows that have come, and keep the robot's messages."""

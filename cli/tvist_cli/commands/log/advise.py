@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, progress, say, table, typed, write_report
 
@@ -30,14 +30,14 @@ def advise(
         raise Failure("advise needs at least one recording or log: tvist log advise run.mcap", code=2)
     from tvist_lab.advice import advise as advised
     from tvist_lab.advice import as_dict, command, verdict
-    from tvist_lab.metrics import Measured
+    from tvist_lab.metrics import MeasuredRecording
     from tvist_lab.recordings import RecordingError
     from tvist_lab.report.of_advice import MODES, OPTIONS, advice_page, modes_rows, option_rows
 
     measured = []
-    with told(RecordingError), progress(len(files), "logs") as bar:
+    with failing_on(RecordingError), progress(len(files), "logs") as bar:
         for recording in logs.read(*files):
-            measured.append(Measured.of(recording))
+            measured.append(MeasuredRecording.of(recording))
             bar(1, None)
     joints = sorted({log.recording.joints for log in measured})
     if len(joints) > 1:

@@ -4,8 +4,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tvist_cli.failure import Failure, told
-from tvist_cli.figure_files import AS_USUAL, FigureOptions, Save, write
+from tvist_cli.failure import Failure, failing_on
+from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, Save, write
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import number, out, print_json, progress, say, table, words
 
@@ -28,7 +28,7 @@ COMPARED = (
 def analyze(
     *files: Path,
     figures: Path | None = None,
-    look: FigureOptions = AS_USUAL,
+    look: FigureOptions = DEFAULT_FIGURES,
     logs: LogOptions = AS_IT_IS,
     json: bool = False,
 ) -> None:
@@ -90,7 +90,15 @@ def _motions(
     recording: "Recording", figures: Path | None, look: FigureOptions, *, json: bool
 ) -> dict[str, Any]:
     """Measure all motions; print them as a table, or return the content for --json."""
-    from tvist_lab.metrics import COLUMNS, Measured, changes, grouped_notes, measure, motion_cells, motions
+    from tvist_lab.metrics import (
+        COLUMNS,
+        MeasuredRecording,
+        changes,
+        grouped_notes,
+        measure,
+        motion_cells,
+        motions,
+    )
     from tvist_lab.words import counted
 
     found, results = motions(recording), []
@@ -101,7 +109,7 @@ def _motions(
     if figures is not None:
         with look.into(figures) as save:
             _draw(recording, found, save)
-    changed = changes(Measured(recording, found, results))
+    changed = changes(MeasuredRecording(recording, found, results))
     if json:
         return {"motions": [result.as_dict() for result in results], "changes": changed}
     if not results:
@@ -186,13 +194,13 @@ def _lack(from_tick: int | None) -> str:
 
 
 def _compare(a: Path, b: Path, logs: LogOptions, *, json: bool) -> None:
-    from tvist_lab.metrics import Measured
+    from tvist_lab.metrics import MeasuredRecording
     from tvist_lab.metrics import compare as compared
     from tvist_lab.recordings import RecordingError
 
     first, second = logs.read(a, b)
-    with told(RecordingError):
-        result = compared(Measured.of(first), Measured.of(second))
+    with failing_on(RecordingError):
+        result = compared(MeasuredRecording.of(first), MeasuredRecording.of(second))
     for file, recording in ((a, first), (b, second)):
         for note in recording.notes:
             say(f"{file}: {note}")

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.misuse import lower
 from tvist_cli.output import default_output, print_json, say
@@ -39,7 +39,7 @@ def export(
     if kind == FOXGLOVE and logs.given:
         raise Failure("--columns and --imu are for logs: --to foxglove needs a recording", code=2)
     ending = f".{kind}.mcap" if kind == FOXGLOVE else f".{kind}"
-    with told(RecordingError):
+    with failing_on(RecordingError):
         files = files_of(file)
     named = file if file.exists() else files[0]
     path = output or named.with_name(named.name.removesuffix(".gz")).with_suffix(ending)
@@ -49,7 +49,7 @@ def export(
             raise Failure(f"{place} is the file to be exported: choose another one with --output", code=2)
         if output is None:
             default_output(place)
-    with told(RecordingError):
+    with failing_on(RecordingError):
         if kind == FOXGLOVE:
             from tvist_lab.foxglove.export import export as draw
 

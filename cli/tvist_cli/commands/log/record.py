@@ -4,7 +4,7 @@ import asyncio
 from pathlib import Path
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.failure import Failure, failing_on, interrupted
 from tvist_cli.output import print_json, say
 
 
@@ -31,14 +31,14 @@ def record(
     """
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
-    from tvist_server.ending import Ending
     from tvist_server.option_values import ticks_of
     from tvist_server.recording import RecorderError
     from tvist_server.recording.recorder import Recorder
+    from tvist_server.shutdown import Shutdown
 
-    with told(ValueError, code=2):
+    with failing_on(ValueError, exit_code=2):
         kept = None if keep is None else ticks_of(keep, "keep")
-    ending = Ending()
+    ending = Shutdown()
 
     async def run() -> tuple[Path | None, int, int]:
         ticks: list[int] = []
@@ -67,7 +67,7 @@ def record(
             missing = ticks[-1] - ticks[0] + 1 - len(ticks) if ticks else 0
             return recorder.place, len(ticks), missing + recorder.dropped
 
-    with told(RecorderError):
+    with failing_on(RecorderError):
         place, states, lost = asyncio.run(run())
     ending.close()
     if json:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from tvist_cli.compiling import compile_if_new
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import out, print_json, say
 from tvist_cli.shapers_of import load_given
 
@@ -76,9 +76,9 @@ def _run_again(file: Path, output: Path | None, shaper: list[str], plant: str | 
     from tvist_server.recording import RecorderError
 
     own = [load_given(place) for place in shaper]
-    with told(OwnFileError, code=2):
+    with failing_on(OwnFileError, exit_code=2):
         arm = None if plant is None else load_plant(plant)
-    with told(RecordingError, ReplayError, RecorderError, ValueError):
+    with failing_on(RecordingError, ReplayError, RecorderError, ValueError):
         content = read_checked(file)
         compile_if_new()
         again = replay_file(content, output, own, arm)
@@ -112,15 +112,15 @@ def _publish(
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read_checked
     from tvist_lab.republish import Playback
-    from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
     from tvist_server.option_values import StartError
+    from tvist_server.shutdown import Shutdown
 
-    with told(RecordingError):
+    with failing_on(RecordingError):
         content = read_checked(file)
     if content.note:
         say(content.note)
-    ending = Ending()
+    ending = Shutdown()
 
     async def run() -> Playback:
         playback = Playback(
@@ -139,7 +139,7 @@ def _publish(
             await playing
         return playback
 
-    with told(StartError, code=2), told(RecordingError, GatewayError):
+    with failing_on(StartError, exit_code=2), failing_on(RecordingError, GatewayError):
         playback = asyncio.run(run())
     ending.close()
     if json:

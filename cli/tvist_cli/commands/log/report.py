@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, failing_on
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import default_output, out, print_json, typed, write_report
 
@@ -32,7 +32,7 @@ def report(
     from tvist_lab.report import recordings_page
 
     recordings = logs.read(*files)
-    with told(RecordingError):
+    with failing_on(RecordingError):
         page = recordings_page(files, typed(), recordings)
     write_report(output, page)
     if json:

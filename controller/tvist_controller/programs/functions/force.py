@@ -104,7 +104,7 @@ class ForceFunctions(Family):
         self._arm.hold_again(by_hand=True)
 
     get_freedrive_status = reads(
-        "Return 0, or 1 where a singular posture hinders the arm from being moved by hand, 2 where it forbids it.",
+        "Return 0, or 1 near a singular posture, which hinders moving by hand, or 2 where it prevents it.",
         lambda on: on.access.force.hindrance,
     )
 

@@ -96,7 +96,7 @@ class SettingFunctions(Family):
                         f"[0, 0, {GRAVITY}]")  # fmt: skip
 
     get_gravity = reads(
-        "Return the gravity that the arm has, which is installed upright [m/s^2].",
+        "Return gravity for an upright arm [m/s^2].",
         lambda _: Array((0.0, 0.0, GRAVITY)),
     )
 

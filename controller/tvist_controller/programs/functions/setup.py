@@ -96,15 +96,15 @@ class SetupFunctions(Family):
         self._act(f"standard digital input {port}", action)
 
     def set_configurable_digital_input_action(self, port: Octet, action: Action) -> None:
-        """Check what an input does, as `set_standard_digital_input_action`."""
+        """Check an input's action, as `set_standard_digital_input_action`."""
         self._act(f"configurable digital input {port}", action)
 
     def set_tool_digital_input_action(self, port: Bit, action: Action) -> None:
-        """Check what an input does, as `set_standard_digital_input_action`."""
+        """Check an input's action, as `set_standard_digital_input_action`."""
         self._act(f"tool digital input {port}", action)
 
     def set_gp_boolean_input_action(self, port: BitPlace, action: Action) -> None:
-        """Check what an input bit does, as `set_standard_digital_input_action`."""
+        """Check an input bit's action, as `set_standard_digital_input_action`."""
         self._act(f"input bit {port}", action)
 
     # ------------------------------------------------------------------ outputs
@@ -149,7 +149,7 @@ class SetupFunctions(Family):
         """Check that the acceleration of the base is zero."""
 
     get_base_acceleration = reads(
-        "Return the acceleration of the base, which stands [m/s^2].", lambda _: Array((0.0, 0.0, 0.0))
+        "Return zero, the acceleration of the base [m/s^2].", lambda _: Array((0.0, 0.0, 0.0))
     )
 
     def position_deviation_warning(self, enabled: Flag, threshold: Share = 0.8) -> None:

@@ -82,52 +82,50 @@ class StateFunctions(Family):
 
     get_steptime = reads("Return the control period [s].", lambda _: PERIOD)
     get_actual_joint_positions = reads("Return the measured joint positions [rad].", _positions)
-    get_joint_positions = reads("Return the measured joint positions: an older name [rad].", _positions)
+    get_joint_positions = reads("Older name of `get_actual_joint_positions` [rad].", _positions)
     get_actual_joint_speeds = reads(
         "Return the measured joint velocities [rad/s].", lambda on: a_list(on.access.latest().actual_qd)
     )
     get_target_joint_positions = reads(
-        "Return the joint positions that the program asks for at present, before shaping [rad].",
+        "Return the target joint positions, before shaping [rad].",
         lambda on: a_list(_target(on.access.latest()).q),
     )
     get_target_joint_speeds = reads(
-        "Return the joint velocities that the program asks for at present [rad/s].",
+        "Return the target joint velocities, before shaping [rad/s].",
         lambda on: a_list(_target(on.access.latest()).qd),
     )
     get_target_joint_accelerations = reads(
-        "Return the joint accelerations that the program asks for at present [rad/s^2].",
+        "Return the target joint accelerations, before shaping [rad/s^2].",
         lambda on: a_list(_target(on.access.latest()).qdd),
     )
     get_actual_tcp_pose = reads(
-        "Return the pose of the tool by the measured joint positions.",
+        "Return the pose of the tool at the measured joint positions.",
         lambda on: _pose(on, on.access.latest().actual_q),
         50,
     )
     get_actual_tcp_speed = reads(
-        "Return the velocity of the tool by the measured joint velocities [m/s, rad/s].",
+        "Return the measured velocity of the tool [m/s, rad/s].",
         lambda on: _speed(on, on.access.latest().actual_q, on.access.latest().actual_qd),
     )
-    get_target_tcp_pose = reads(
-        "Return the pose of the tool that the program asks for at present.", _target_pose, 50
-    )
+    get_target_tcp_pose = reads("Return the target pose of the tool, before shaping.", _target_pose, 50)
     get_target_tcp_speed = reads(
-        "Return the velocity of the tool that the program asks for at present [m/s, rad/s].",
+        "Return the target velocity of the tool, before shaping [m/s, rad/s].",
         _target_speed,
         50,
     )
     tool_pose = reads(
-        "Return `get_target_tcp_pose`: PolyScope's name for the feature Tool, where a program uses one.",
+        "Return `get_target_tcp_pose`; exported PolyScope programs use it as the feature Tool.",
         _target_pose,
         50,
     )
     get_target_tcp_pose_along_path = reads(
-        "Return `get_target_tcp_pose`, since nothing offsets the path.", _target_pose, 50
+        "Return `get_target_tcp_pose`, since path offsets are not simulated.", _target_pose, 50
     )
     get_target_tcp_speed_along_path = reads(
-        "Return `get_target_tcp_speed`, since nothing offsets the path.", _target_speed, 50
+        "Return `get_target_tcp_speed`, since path offsets are not simulated.", _target_speed, 50
     )
     get_actual_tool_flange_pose = reads(
-        "Return the pose of the flange by the measured joint positions.",
+        "Return the pose of the flange at the measured joint positions.",
         lambda on: _pose(on, on.access.latest().actual_q, (0.0,) * 6),
         50,
     )
@@ -157,7 +155,7 @@ class StateFunctions(Family):
         lambda on: a_list([on.access.declared().inertia[place] for place in ORDER]),
     )
     get_joint_torques = reads(
-        "Return the external torques on the joints: without what the arm itself needs [N m].",
+        "Return the external torques on the joints, without those of the arm's own motion and weight [N m].",
         lambda on: a_list(on.access.forces.torques()),
         80,
     )
@@ -174,11 +172,9 @@ class StateFunctions(Family):
     is_steady = reads(
         "Return whether the target has been at rest for 500 ms.", lambda on: on.access.motion.steady
     )
-    get_tool_current = reads(
-        "Return the current of the tool's supply [A]: 0, since nothing draws any.", lambda _: 0.0
-    )
+    get_tool_current = reads("Return 0, the current of the tool's supply [A].", lambda _: 0.0)
     get_tool_accelerometer_reading = reads(
-        "Return what the accelerometer in the flange measures, gravity included [m/s^2].",
+        "Return the reading of the accelerometer in the flange, including gravity [m/s^2].",
         lambda on: a_list(on.access.latest().actual_tool_accelerometer),
     )
 

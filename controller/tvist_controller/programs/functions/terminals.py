@@ -128,7 +128,7 @@ class TerminalFunctions(Family):
     # ------------------------------------------------------------------ digital
 
     set_digital_out = _sets(
-        "Set a digital output: 0 to 7 standard, 8 and 9 those of the tool, as before configurable ones existed.",
+        "Set a digital output: 0 to 7 standard, 8 and 9 of the tool; cannot set configurable ones.",
         Old,
     )
     set_standard_digital_out = _sets("Set one of the eight standard digital outputs.", Standard)
@@ -178,7 +178,7 @@ class TerminalFunctions(Family):
         self._arm.then(lambda: self._peripherals.set_tool(tool_output_voltage=voltage))
 
     def set_runstate_outputs(self, outputs: object) -> None:
-        """Check that no output is to show whether a program runs."""
+        """Fail if an output shall show whether a program runs."""
         if not isinstance(outputs, Array):
             raise Fault(f"outputs is {shown(outputs)}: it must be a list")
         if any(bool(item) for item in outputs.items):

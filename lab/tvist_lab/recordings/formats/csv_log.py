@@ -11,7 +11,7 @@ from tvist_lab.recordings.checks import LogError
 from tvist_lab.recordings.description import beside
 from tvist_lab.recordings.packed import content
 from tvist_lab.recordings.recording import Floats
-from tvist_lab.recordings.table import STRANGE, TEXT, Table, reader
+from tvist_lab.recordings.table import STRANGE, TEXT, LogTable, reader
 from tvist_lab.words import counted
 
 SEPARATORS = (";", "\t", ",", " ")
@@ -22,7 +22,7 @@ _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 
 
 @reader(TEXT)
-def read_csv(path: Path) -> Table:
+def read_csv(path: Path) -> LogTable:
     """Read cells separated by spaces, commas, semicolons or tabs, with or without a header."""
     # Lines with too few or too many cells are left out, and a note names the first. Numbers may have decimal
     # commas if cells have another separator.
@@ -60,7 +60,7 @@ def read_csv(path: Path) -> Table:
     text = b"\n".join(line for _, line in kept) + b"\n" if kept else b""
     numbers = np.array([at for at, _ in kept], dtype=np.float64)
     values, texts = _numbers(text if separator == "," else text.replace(b",", b"."), separator, width)
-    return Table(
+    return LogTable(
         path, names, values, numbers, "line", top + 1 if names else 0, tuple(notes),
         {
             place: f"{path}, line {numbers[row]:.0f}, column {names[place] if names else place + 1}: "

@@ -5,11 +5,11 @@ from pathlib import Path
 from tvist_lab.recordings import mcap_file
 from tvist_lab.recordings.mcap_records import MAGIC
 from tvist_lab.recordings.recording import Recording
-from tvist_lab.recordings.table import Table, reader
+from tvist_lab.recordings.table import LogTable, reader
 
 
 @reader(".mcap", MAGIC)
-def read_mcap(path: Path) -> Recording | Table:
+def read_mcap(path: Path) -> Recording | LogTable:
     """Read a file, or the segments that a folder or pattern names."""
     try:
         content = mcap_file.read_checked(path)

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from tvist_lab.recordings.checks import LogError
 from tvist_lab.recordings.formats.parquet import check_size, reason
 from tvist_lab.recordings.recording import Floats
-from tvist_lab.recordings.table import Table, reader
+from tvist_lab.recordings.table import LogTable, reader
 
 
 @reader(".npz")
-def read_npz(path: Path) -> Table:
+def read_npz(path: Path) -> LogTable:
     """Read numeric arrays with one or two dimensions, which must have equal numbers of rows."""
     try:
         with zipfile.ZipFile(path) as file:
@@ -35,7 +35,7 @@ def read_npz(path: Path) -> Table:
     if len({len(column) for column in columns.values()}) != 1:
         raise LogError(f"{path} holds no columns of numbers of equal lengths")
     values = np.column_stack(list(columns.values()))
-    return Table(path, list(columns), values, np.arange(1.0, len(values) + 1.0))
+    return LogTable(path, list(columns), values, np.arange(1.0, len(values) + 1.0))
 
 
 def _array(data: bytes) -> NDArray[np.generic]:

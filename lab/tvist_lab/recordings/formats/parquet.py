@@ -16,7 +16,7 @@ import polars as pl
 
 from tvist_lab.recordings.checks import LogError
 from tvist_lab.recordings.description import KEY, described
-from tvist_lab.recordings.table import Table, reader
+from tvist_lab.recordings.table import LogTable, reader
 
 DENSEST = 2000
 """Largest ratio of the content to the size of its file; recordings reach a tenth of it."""
@@ -25,7 +25,7 @@ LEAST_CONTENT = 1 << 20
 
 
 @reader(".parquet")
-def read_parquet(path: Path) -> Table:
+def read_parquet(path: Path) -> LogTable:
     """Read the columns of numbers, and of lists of numbers, of a Parquet file."""
     child = subprocess.run(  # noqa: S603  this program itself
         [sys.executable, "-P", "-m", __name__, path],  # -P: import nothing from the folder one works in
@@ -41,7 +41,7 @@ def read_parquet(path: Path) -> Table:
     text, _, numbers = child.stdout.partition(b"\n")
     frame = pl.read_ipc(io.BytesIO(numbers))
     rows = np.arange(1.0, len(frame) + 1.0)
-    return Table(path, frame.columns, frame.to_numpy(), rows, description=described(text))
+    return LogTable(path, frame.columns, frame.to_numpy(), rows, description=described(text))
 
 
 def check_size(path: Path, numbers: int) -> None:

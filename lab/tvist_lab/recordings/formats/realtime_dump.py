@@ -7,7 +7,7 @@ import numpy as np
 
 from tvist_lab.recordings.checks import LogError
 from tvist_lab.recordings.packed import content
-from tvist_lab.recordings.table import BINARY, STRANGE, Table, reader
+from tvist_lab.recordings.table import BINARY, STRANGE, LogTable, reader
 
 SIZES = (1044, 1060, 1108, 1116, 1140, 1220)
 """Lengths of a packet [bytes], from software 3.0 on; each later one starts like the earlier ones."""
@@ -16,7 +16,7 @@ OLD = 812
 
 
 @reader(BINARY)
-def read_dump(path: Path) -> Table:
+def read_dump(path: Path) -> LogTable:
     """Read a dump of any software from 3.0 on; it may start and end within a packet."""
     from tvist_server.gateways.ur.realtime import LAYOUT
 
@@ -32,7 +32,7 @@ def read_dump(path: Path) -> Table:
     notes = (f"{skipped} bytes outside complete packets were left out",) if skipped else ()
     values = doubles[:, places].astype(np.float64)
     values[~np.isfinite(values)] = np.nan
-    return Table(path, names, values, np.arange(1.0, len(starts) + 1.0), "packet", notes=notes, rtde=True)
+    return LogTable(path, names, values, np.arange(1.0, len(starts) + 1.0), "packet", notes=notes, rtde=True)
 
 
 def _packets(path: Path, data: bytes) -> tuple[list[int], int, int]:

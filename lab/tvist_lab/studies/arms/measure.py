@@ -15,10 +15,10 @@ from tvist_lab.identification.jogs import make_jogs, plan_jogs
 from tvist_lab.in_process import robot_in_process
 from tvist_lab.studies.moves import study
 from tvist_lab.study.arms import stiffer
-from tvist_lab.study.asked import Asked
 from tvist_lab.study.catalogue import some
 from tvist_lab.study.engine import run
 from tvist_lab.study.moves import draw_moves
+from tvist_lab.study.request import StudyRequest
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
@@ -53,7 +53,7 @@ def measure(
     known = asyncio.run(_identified(arm, seed)) if calibration is None else calibration
     mass = arm.payload.mass
     drawn = draw_moves(arm, moves, seed, (mass, mass)).moves
-    asked = Asked(description=arm, moves=drawn, methods=some(["auto"], arm, known), named=1, seed=seed)
+    asked = StudyRequest(description=arm, moves=drawn, methods=some(["auto"], arm, known), named=1, seed=seed)
     wanted = study(asked)
     weak = len(drawn) - len(wanted.cases)
     progress(weak)

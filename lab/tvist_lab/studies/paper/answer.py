@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tvist_lab.change import Change
+from tvist_lab.change import MotionChange
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL
 
 POSES = {"Q1": "stretched out", "Q2": "stretched out to the side", "Q3": "folded"}
@@ -62,9 +62,9 @@ def checks(report: dict[str, Any], difference: str | None) -> dict[str, str]:
     return said
 
 
-def _change(report: dict[str, Any], motion: str) -> Change:
+def _change(report: dict[str, Any], motion: str) -> MotionChange:
     methods = [report["baselines"][motion][name] for name in ("unshaped", "shaped")]
-    return Change(*(method[figure] for figure in ("peak_m_s2", "still_after_ms") for method in methods))
+    return MotionChange(*(method[figure] for figure in ("peak_m_s2", "still_after_ms") for method in methods))
 
 
 def _number(value: float | None) -> str:

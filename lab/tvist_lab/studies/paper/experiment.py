@@ -28,7 +28,7 @@ Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Method:
+class PaperMethod:
     """A method for making a motion: a shaper, and the modes that it is designed for."""
 
     name: str
@@ -58,22 +58,22 @@ class Method:
         await arm.set_shaper(self.shaper)
 
 
-UNSHAPED = Method("unshaped", "unshaped")
-SHAPED = Method("shaped", "TVIST-ZV", "zv")
+UNSHAPED = PaperMethod("unshaped", "unshaped")
+SHAPED = PaperMethod("shaped", "TVIST-ZV", "zv")
 """TVIST with the calibration's polynomials."""
-FROZEN_AT_END = Method("zv_frozen_at_end", "ZV for the end pose", "zv", frozen=True)
+FROZEN_AT_END = PaperMethod("zv_frozen_at_end", "ZV for the end pose", "zv", frozen=True)
 
 
-def fixed(shaper: str, f_d: float, zeta: float) -> Method:
+def fixed(shaper: str, f_d: float, zeta: float) -> PaperMethod:
     """Return one shaper for the whole workspace, with a design frequency [Hz] and damping ratio [-]."""
-    return Method(f"fixed_{shaper}", f"fixed {shaper.upper()}", shaper, (f_d, zeta))
+    return PaperMethod(f"fixed_{shaper}", f"fixed {shaper.upper()}", shaper, (f_d, zeta))
 
 
-def equal_duration(delay: float) -> Method:
+def equal_duration(delay: float) -> PaperMethod:
     """Return a motion without shaper and model that takes as long as a shaped one with this delay [s]."""
     # A double S that reaches its limits lasts way/v + v/a + a/j, so an increase of a/j lengthens it equally.
     jerk = ACCELERATION / (ACCELERATION / JERK + delay)
-    return Method("equal_duration_double_s", "longer double S", jerk=jerk)
+    return PaperMethod("equal_duration_double_s", "longer double S", jerk=jerk)
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ async def table_1(robot: Robot, arm: Arm) -> dict[str, dict[str, float]]:
     return table
 
 
-async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) -> Recording:
+async def run(robot: Robot, arm: Arm, motion: str, method: PaperMethod, seed: int) -> Recording:
     """Record one motion from rest to rest, and the time after it."""
     start, end = (pose(name) for name in MOTIONS[motion])
     period = 1.0 / (await robot.info()).rate_hz
@@ -180,7 +180,7 @@ def simulate(
     return asyncio.run(whole())
 
 
-def fixed_baselines(info: Info, delay: float) -> Sequence[Method]:
+def fixed_baselines(info: Info, delay: float) -> Sequence[PaperMethod]:
     """Return the baselines to compare with the paper's method."""
     if info.calibration is None:
         return [equal_duration(delay)]
@@ -195,7 +195,7 @@ def count(runs: int, *, baselines: bool) -> int:
 
 
 async def _repeat(
-    robot: Robot, arm: Arm, done: Experiment, motion: str, method: Method, runs: int, progress: Progress
+    robot: Robot, arm: Arm, done: Experiment, motion: str, method: PaperMethod, runs: int, progress: Progress
 ) -> None:
     key = (motion, method.name)
     done.labels[method.name] = method.label

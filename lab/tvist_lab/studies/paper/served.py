@@ -17,7 +17,7 @@ from tvist_lab.studies.paper.report import as_dict
 
 
 @dataclass(frozen=True)
-class Served:
+class ServedExperiment:
     """One run of the experiment on a served robot."""
 
     done: Experiment
@@ -32,7 +32,7 @@ class Served:
         return self.difference is None and bool(self.report["recording_gives_same_figures"])
 
 
-def serve(path: Path, seed: int, progress: Progress) -> Served:
+def serve(path: Path, seed: int, progress: Progress) -> ServedExperiment:
     """Serve a robot, run the experiment once, and replay the recording, which replaces an earlier one.
 
     Figures come from the server's own recording, which is complete even on a busy machine, and are compared
@@ -52,7 +52,7 @@ def serve(path: Path, seed: int, progress: Progress) -> Served:
         "states_lost_on_the_way": lost,
         "missed_ticks": content.states[-1].missed_ticks,
     }
-    return Served(done, report, again.first_difference)
+    return ServedExperiment(done, report, again.first_difference)
 
 
 async def _run(

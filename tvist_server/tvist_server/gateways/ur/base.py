@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
-from tvist_server.gateways.ur.later import begin
+from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
 
@@ -102,7 +102,7 @@ class InTurnSession(PortSession, Generic[Item]):
             self._control.leave()
 
 
-class Lines:
+class LineSplitter:
     """Splits a client's stream into lines; only the first `longest` bytes of each are kept."""
 
     def __init__(self, longest: int) -> None:

@@ -35,9 +35,9 @@ LAST_WORDS = 65_536
 UNREAD_FOR = 10.0
 """In real time, time without a successful sample after which a client is disconnected [s]."""
 
-MOST: Final = 256
+MAX_CONNECTIONS: Final = 256
 """Largest number of connections to all interfaces of a robot."""
-KEPT: Final = 8
+LOCAL_PLACES: Final = 8
 """Number of places reserved for clients on this machine, so that a local user can always connect."""
 SCARCE: Final = 0.9
 """Share of places in use above which each new client displaces another [-]."""
@@ -46,7 +46,7 @@ MakeSession = Callable[[ConnectionControl, Send], PortSession]
 """Creates an interface's session from its access to the controller and its send function."""
 
 
-class Connection(asyncio.BufferedProtocol):
+class ClientConnection(asyncio.BufferedProtocol):
     """One client at one interface; if it is lossless (lockstep), samples wait for a slow client."""
 
     def __init__(
@@ -225,8 +225,10 @@ class ConnectionLimit:
     longest: a dashboard client, or an RTDE client outside the time from its start to its pause.
     """
 
-    def __init__(self, now: Callable[[], float], note: Callable[[str], None], most: int = MOST) -> None:
-        self.taken: set[Connection] = set()
+    def __init__(
+        self, now: Callable[[], float], note: Callable[[str], None], most: int = MAX_CONNECTIONS
+    ) -> None:
+        self.taken: set[ClientConnection] = set()
         """Clients that have a place; each adds and removes itself."""
         self._now = now
         self._note = note
@@ -236,12 +238,12 @@ class ConnectionLimit:
         """Return whether a new client may connect; disconnect another one for it if necessary."""
         if len(self.taken) >= SCARCE * self._most:
             self._send_one_away(peer)
-        kept = 0 if local else KEPT
+        kept = 0 if local else LOCAL_PLACES
         if len(self.taken) < self._most - kept:
             return True
         self._note(
             f"{peer} was refused: {len(self.taken)} of {self._most} connections are in use"
-            + (f", and {KEPT} are kept for this machine" if kept else "")
+            + (f", and {LOCAL_PLACES} are kept for this machine" if kept else "")
         )
         return False
 

@@ -8,8 +8,8 @@ from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Refused
 from tvist_server.gateways.ur import messages, power, version
-from tvist_server.gateways.ur.base import InTurnSession, Lines, Send
-from tvist_server.gateways.ur.later import Later
+from tvist_server.gateways.ur.base import InTurnSession, LineSplitter, Send
+from tvist_server.gateways.ur.deferred import Deferred
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
 from tvist_server.ur_model import series
@@ -252,8 +252,8 @@ class DashboardSession(InTurnSession[str]):
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
         super().__init__(robot, control, send)
-        self._lines = Lines(LONGEST)
-        self._rests: Later[bool] | None = None
+        self._lines = LineSplitter(LONGEST)
+        self._rests: Deferred[bool] | None = None
         """Waits for the arm to rest."""
         self._last = 0
         """Tick at which this wait ends."""
@@ -305,7 +305,7 @@ class DashboardSession(InTurnSession[str]):
         latest = self._robot.latest
         if self.over or latest is None or latest.runtime_state == RuntimeState.STOPPED:
             return True
-        self._rests, self._last = Later[bool](), latest.state.tick + PATIENCE
+        self._rests, self._last = Deferred[bool](), latest.state.tick + PATIENCE
         return await self._rests
 
     def _say(self, text: str) -> None:

@@ -16,23 +16,23 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event
-from tvist_server.gateways.base import Desk, Gateway, Message
+from tvist_server.gateways.base import CommandIntake, Gateway, Message
 from tvist_server.gateways.ur.base import PortSession, Send
-from tvist_server.gateways.ur.connection import Connection, ConnectionLimit
+from tvist_server.gateways.ur.connection import ClientConnection, ConnectionLimit
 from tvist_server.gateways.ur.dashboard import DashboardSession
+from tvist_server.gateways.ur.deferred import Deferred
 from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.gripper import AskGripper, GripperSession
 from tvist_server.gateways.ur.interpreter import InterpreterSession
-from tvist_server.gateways.ur.later import Later
 from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
 from tvist_server.gateways.ur.listening import listen
-from tvist_server.gateways.ur.notices import Notices
 from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.program_request import program_of
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.gateways.ur.rtde.board import Board
+from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.session import RtdeSession
+from tvist_server.gateways.ur.throttled_log import ThrottledLog
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.ur_ports import InterfaceName
 
@@ -53,11 +53,11 @@ UNREAD = 10
 class UrInterfaces(Gateway):
     """A robot's UR interfaces. The constructor binds the sockets (GatewayError if it cannot); `open` admits clients."""
 
-    takes: Collection[Topic] = frozenset[Topic]({"state", "event", "io"})
+    wanted_topics: Collection[Topic] = frozenset[Topic]({"state", "event", "io"})
 
     def __init__(
         self,
-        desk: Desk,
+        desk: CommandIntake,
         description: RobotDescription,
         name: str,
         address: str,
@@ -72,16 +72,19 @@ class UrInterfaces(Gateway):
         self.address = address
         self._desk, self._gripper = desk, gripper
         self._scripts, self._refusals, self._coming_and_going = (
-            Notices(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(3)
+            ThrottledLog(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(3)
         )
         external = ExternalControl(programs, self._fetch, self._aside)
         self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
         self.robot.inputs.take(reserved, self)
-        self._instruments, self._boards = Instruments(description), defaultdict[int, Board](Board)
+        self._instruments, self._boards = (
+            Instruments(description),
+            defaultdict[int, PackageEncoder](PackageEncoder),
+        )
         self._io: Io | None = None
         self._early = deque[Report](maxlen=FIRST)
         """States from before `open`: temperatures and energies are integrated from the first tick."""
-        self._connections: set[Connection] = set()
+        self._connections: set[ClientConnection] = set()
         """Connections that have a place while the interfaces are open."""
         self._leases = WeakValueDictionary[str, HostLease]()
         """Lease of each host; it lives as long as one of the host's connections."""
@@ -138,7 +141,7 @@ class UrInterfaces(Gateway):
         self._look()
         for interface, bound in self._sockets.items():
             session = partial(self._session, interface)
-            connection = partial(Connection, session, self._lease, limit, lossless=self._lockstep)
+            connection = partial(ClientConnection, session, self._lease, limit, lossless=self._lockstep)
             self._servers.append(await self._loop.create_server(connection, sock=bound))
         self._run(self._keep_alive())
 
@@ -282,9 +285,9 @@ class UrInterfaces(Gateway):
             with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
                 loop.call_soon_threadsafe(action)
 
-    def _aside(self, read: Callable[[], str | None]) -> Later[str | None]:
+    def _aside(self, read: Callable[[], str | None]) -> Deferred[str | None]:
         """Read a file in a daemon thread, which shutdown does not wait for."""
-        later = Later[str | None]()
+        later = Deferred[str | None]()
 
         def reading() -> None:
             text = None
@@ -297,8 +300,8 @@ class UrInterfaces(Gateway):
         threading.Thread(target=reading, name="tvist-ur-file", daemon=True).start()
         return later
 
-    def _fetch(self, host: str) -> Later[str | None]:
-        later = Later[str | None]()
+    def _fetch(self, host: str) -> Deferred[str | None]:
+        later = Deferred[str | None]()
 
         async def fetching() -> None:
             later.come(await program_of(host))

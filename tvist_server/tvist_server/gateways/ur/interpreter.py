@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from tvist_protocol.programs import MAX_SCRIPT, Interpreter, ProgramInterpret, ProgramSkip
 from tvist_protocol.replies import Accepted, Refused
-from tvist_server.gateways.ur.base import InTurnSession, Lines, Send
+from tvist_server.gateways.ur.base import InTurnSession, LineSplitter, Send
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
 
@@ -42,7 +42,7 @@ class InterpreterSession(InTurnSession[tuple[str, bool]]):
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
         super().__init__(robot, control, send)
-        self._lines = Lines(LONGEST + 1)
+        self._lines = LineSplitter(LONGEST + 1)
 
     def receive(self, data: bytes) -> None:
         for line in self._lines.feed(data):

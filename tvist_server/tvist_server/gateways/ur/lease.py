@@ -4,8 +4,8 @@ from collections.abc import Awaitable, Callable
 
 from tvist_protocol.commands import Command, KeepAlive, ReleaseControl, TakeControl
 from tvist_protocol.replies import Accepted, Refused, Reply
-from tvist_server.gateways.base import Desk
-from tvist_server.gateways.ur.later import Later, begin
+from tvist_server.gateways.base import CommandIntake
+from tvist_server.gateways.ur.deferred import Deferred, begin
 
 # The longest lease that the protocol allows: a host's control ends with its connections, not with time. ALIVE
 # is wall time but the lease is robot time, which can pass many times faster in lockstep.
@@ -23,13 +23,13 @@ MakeCommand = Callable[[str], Command]
 class HostLease:
     """Control for the clients of one host; `soon` runs a function in the interfaces' thread."""
 
-    def __init__(self, desk: Desk, host: str, soon: Callable[[Callable[[], None]], None]) -> None:
+    def __init__(self, desk: CommandIntake, host: str, soon: Callable[[Callable[[], None]], None]) -> None:
         self.client = f"ur-{host}"
         """Name under which the lease is held."""
         self._desk, self.host = desk, host
         self._soon = soon
         self._token = _NO_TOKEN
-        self._taking: Later[Reply] | None = None
+        self._taking: Deferred[Reply] | None = None
         """Reply to a pending request for control."""
         self._users: set[object] = set()
 
@@ -47,9 +47,9 @@ class HostLease:
             return taken
         return await self.ask(command(taken.token))
 
-    def ask(self, command: Command) -> Later[Reply]:
+    def ask(self, command: Command) -> Deferred[Reply]:
         """Send a command that needs no control or already has its token."""
-        later = Later[Reply]()
+        later = Deferred[Reply]()
         self._desk.command(command, lambda reply: self._soon(lambda: later.come(reply)), self.host)
         return later
 
@@ -79,16 +79,16 @@ class HostLease:
     def held_by_other(self) -> bool:
         return self._desk.holder() not in {None, self.client}
 
-    def _take(self) -> Later[Reply]:
+    def _take(self) -> Deferred[Reply]:
         """Take control, once for all connections that need it."""
         taking = self._taking
         if taking is None:
-            taking = self._taking = Later[Reply]()
+            taking = self._taking = Deferred[Reply]()
             self._desk.client_seen(self.client)
             begin(self._taken(taking))
         return taking
 
-    async def _taken(self, taking: Later[Reply]) -> None:
+    async def _taken(self, taking: Deferred[Reply]) -> None:
         reply = await self.ask(TakeControl(client=self.client, lease_s=LEASE))
         self._taking = None
         if isinstance(reply, Accepted) and reply.token is not None:
@@ -116,19 +116,19 @@ class ConnectionControl:
         self.unanswered = 0
         """Number of commands without an answer."""
 
-    def change(self, command: MakeCommand) -> Later[Reply]:
+    def change(self, command: MakeCommand) -> Deferred[Reply]:
         """Send a command that needs control; it is refused if another client has it."""
         return self._heard(self._lease.change(self, command))
 
-    def ask(self, command: Command) -> Later[Reply]:
+    def ask(self, command: Command) -> Deferred[Reply]:
         return self._heard(self._lease.ask(command))
 
-    def _heard(self, reply: Awaitable[Reply]) -> Later[Reply]:
-        heard = Later[Reply]()
+    def _heard(self, reply: Awaitable[Reply]) -> Deferred[Reply]:
+        heard = Deferred[Reply]()
         begin(self._hear(reply, heard))
         return heard
 
-    async def _hear(self, awaited: Awaitable[Reply], heard: Later[Reply]) -> None:
+    async def _hear(self, awaited: Awaitable[Reply], heard: Deferred[Reply]) -> None:
         self.unanswered += 1
         reply = await awaited
         self.unanswered -= 1

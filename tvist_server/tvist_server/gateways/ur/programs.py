@@ -32,7 +32,7 @@ _SAVED: Final = (".urp", ".script")
 _PLACE: Final = re.compile(r"text:(\d+):(\d+)")
 
 
-class Host(Protocol):
+class ProgramHost(Protocol):
     """The parts of the robot that messages about its programs need."""
 
     latest: Snapshot | None
@@ -42,7 +42,7 @@ class Host(Protocol):
 class Programs:
     """Loads, runs, plays, pauses and stops programs, and reports them; their state comes from replies and `io`."""
 
-    def __init__(self, host: Host, external: ExternalControl) -> None:
+    def __init__(self, host: ProgramHost, external: ExternalControl) -> None:
         self._host, self._external = host, external
         self.path: str | None = None
         """Path of the loaded program, or name of a script that a client has sent; None before the first."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tvist_protocol.programs import MAX_SCRIPT
-from tvist_server.gateways.ur.base import Lines
+from tvist_server.gateways.ur.base import LineSplitter
 
 LONGEST: Final = MAX_SCRIPT
 """Longest unit with its line feeds [bytes]: twenty times the longest program of a known client."""
@@ -69,7 +69,7 @@ class Intake:
     """One client's stream of script text, which may be split anywhere."""
 
     def __init__(self) -> None:
-        self._lines = Lines(LONGEST)
+        self._lines = LineSplitter(LONGEST)
         self._unit = bytearray()
         """Lines of an incomplete unit, as bytes: one string per line would take twenty times the memory."""
         self._depth = 0

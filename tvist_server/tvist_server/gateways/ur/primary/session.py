@@ -14,7 +14,7 @@ from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake, Unit
 from tvist_server.gateways.ur.robot import UrRobot
 
-EVERY: Final = 50
+STATE_TICKS: Final = 50
 """Ticks between two robot states: 10 Hz."""
 TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was thrown away"
 SHORT: Final = 1000
@@ -150,7 +150,7 @@ class PrimarySession(ScriptSession):
         tick = snapshot.state.tick
         if tick < self._due:
             return b""
-        first, self._due = self._due == 0, (tick // EVERY + 1) * EVERY
+        first, self._due = self._due == 0, (tick // STATE_TICKS + 1) * STATE_TICKS
         state = robot_state(self._robot.description, snapshot)
         if not first:
             return state

@@ -6,7 +6,7 @@ from typing import get_args
 
 from tvist_protocol.io import Bank
 from tvist_server.option_values import StartError
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import WireType
 
 NUMBERS = range(48)
 """Numbers of the integer registers and of the double registers."""
@@ -16,12 +16,12 @@ WORDS = ("0_to_31", "32_to_63")
 """Suffixes of the names of the two words."""
 
 
-def registers(kind: str) -> tuple[tuple[str, Wire], ...]:
+def registers(kind: str) -> tuple[tuple[str, WireType], ...]:
     """Return names and types of the variables of a bank, in the order of its registers."""
     if kind.endswith("_bit"):
-        words = [(f"{kind}_registers{span}", Wire.UINT32) for span in WORDS]
-        return (*words, *[(f"{kind}_register_{number}", Wire.BOOL) for number in SINGLE_BITS])
-    wire = Wire.INT32 if kind.endswith("_int") else Wire.DOUBLE
+        words = [(f"{kind}_registers{span}", WireType.UINT32) for span in WORDS]
+        return (*words, *[(f"{kind}_register_{number}", WireType.BOOL) for number in SINGLE_BITS])
+    wire = WireType.INT32 if kind.endswith("_int") else WireType.DOUBLE
     return tuple((f"{kind}_register_{number}", wire) for number in NUMBERS)
 
 
@@ -31,42 +31,48 @@ KINDS = [f"{side}_{kind}" for side in ("output", "input") for kind in ("bit", "i
 DIGITAL: dict[str, tuple[int, int]] = {"standard": (0, 8), "configurable": (8, 8), "tool": (16, 2)}
 """Groups of digital outputs: number of the first bit, and number of bits."""
 
-NAMED: dict[str, tuple[Wire, str]] = {
-    "speed_slider_mask": (Wire.UINT32, "1: use `speed_slider_fraction`."),
-    "speed_slider_fraction": (Wire.DOUBLE, "Position of the speed slider, 0 to 1."),
-    "standard_digital_output_mask": (Wire.UINT8, "Mask of the eight standard digital outputs to set."),
-    "standard_digital_output": (Wire.UINT8, "Values of the standard digital outputs."),
+NAMED: dict[str, tuple[WireType, str]] = {
+    "speed_slider_mask": (WireType.UINT32, "1: use `speed_slider_fraction`."),
+    "speed_slider_fraction": (WireType.DOUBLE, "Position of the speed slider, 0 to 1."),
+    "standard_digital_output_mask": (WireType.UINT8, "Mask of the eight standard digital outputs to set."),
+    "standard_digital_output": (WireType.UINT8, "Values of the standard digital outputs."),
     "configurable_digital_output_mask": (
-        Wire.UINT8,
+        WireType.UINT8,
         "Mask of the eight configurable digital outputs to set.",
     ),
-    "configurable_digital_output": (Wire.UINT8, "Values of the configurable digital outputs."),
-    "tool_digital_output_mask": (Wire.UINT8, "Mask of the tool's two digital outputs to set."),
-    "tool_digital_output": (Wire.UINT8, "Values of the tool's digital outputs."),
-    "standard_analog_output_mask": (Wire.UINT8, "Mask of the two analogue outputs to set."),
+    "configurable_digital_output": (WireType.UINT8, "Values of the configurable digital outputs."),
+    "tool_digital_output_mask": (WireType.UINT8, "Mask of the tool's two digital outputs to set."),
+    "tool_digital_output": (WireType.UINT8, "Values of the tool's digital outputs."),
+    "standard_analog_output_mask": (WireType.UINT8, "Mask of the two analogue outputs to set."),
     "standard_analog_output_type": (
-        Wire.UINT8,
+        WireType.UINT8,
         "Type of each analogue output: 0 is current (4–20 mA), 1 voltage (0–10 V).",
     ),
-    "standard_analog_output_0": (Wire.DOUBLE, "Value of analogue output 0 as a share of its range, 0 to 1."),
-    "standard_analog_output_1": (Wire.DOUBLE, "Value of analogue output 1 as a share of its range, 0 to 1."),
+    "standard_analog_output_0": (
+        WireType.DOUBLE,
+        "Value of analogue output 0 as a share of its range, 0 to 1.",
+    ),
+    "standard_analog_output_1": (
+        WireType.DOUBLE,
+        "Value of analogue output 1 as a share of its range, 0 to 1.",
+    ),
     "external_force_torque": (
-        Wire.VECTOR6D,
+        WireType.VECTOR6D,
         "Wrench measured by an external force sensor, every 100 ms; for programs of its host that use it [N, N m].",
     ),
 }
 """Type and description of each input variable that is not a register."""
 
 _BITS, _INTS, _DOUBLES = get_args(Bank)[:3]
-REGISTERS: dict[str, tuple[Bank, int, Wire]] = (
-    {f"input_bit_registers{span}": (_BITS, 32 * k, Wire.UINT32) for k, span in enumerate(WORDS)}
-    | {f"input_bit_register_{k}": (_BITS, k, Wire.BOOL) for k in SINGLE_BITS}
-    | {f"input_int_register_{k}": (_INTS, k, Wire.INT32) for k in NUMBERS}
-    | {f"input_double_register_{k}": (_DOUBLES, k, Wire.DOUBLE) for k in NUMBERS}
+REGISTERS: dict[str, tuple[Bank, int, WireType]] = (
+    {f"input_bit_registers{span}": (_BITS, 32 * k, WireType.UINT32) for k, span in enumerate(WORDS)}
+    | {f"input_bit_register_{k}": (_BITS, k, WireType.BOOL) for k in SINGLE_BITS}
+    | {f"input_int_register_{k}": (_INTS, k, WireType.INT32) for k in NUMBERS}
+    | {f"input_double_register_{k}": (_DOUBLES, k, WireType.DOUBLE) for k in NUMBERS}
 )
 """Bank, number of the first register, and type of each variable that sets registers."""
 
-INPUTS: dict[str, Wire] = {name: wire for name, (wire, _) in NAMED.items()} | {
+INPUTS: dict[str, WireType] = {name: wire for name, (wire, _) in NAMED.items()} | {
     name: wire for name, (_, _, wire) in REGISTERS.items()
 }
 """Type of every input variable by name."""

@@ -8,15 +8,15 @@ from tvist_controller.instruments.snapshot import Snapshot
 from tvist_controller.instruments.variables import VARIABLES
 from tvist_controller.instruments.wrench import JOINT_LISTS
 from tvist_server.gateways.ur.rtde.inputs import KINDS, SINGLE_BITS, registers
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import WireType
 
-OUTPUTS: dict[str, Wire] = {name: Wire[one.type] for name, one in VARIABLES.items()} | {
+OUTPUTS: dict[str, WireType] = {name: WireType[one.type] for name, one in VARIABLES.items()} | {
     name: wire for kind in KINDS for name, wire in registers(kind)
 }
 """Type of every output variable by name."""
 
 
-class Part(NamedTuple):
+class OutputSource(NamedTuple):
     """One variable, or several with the same number of entries that are read together."""
 
     read: Callable[[Snapshot], Any]
@@ -39,26 +39,28 @@ def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
     return read
 
 
-def _parts() -> Iterator[tuple[str, tuple[Part, int]]]:
+def _parts() -> Iterator[tuple[str, tuple[OutputSource, int]]]:
     for name, one in VARIABLES.items():
         # Computed values may have other readers: the snapshot caches them.
         read = attrgetter(name) if one.source == "computed" else one.read
-        yield name, (Part(read, Wire[one.type].value[-1], of_io=one.source == "io"), 0)
-    joints = Part(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
+        yield name, (OutputSource(read, WireType[one.type].value[-1], of_io=one.source == "io"), 0)
+    joints = OutputSource(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
     yield from ((name, (joints, row)) for row, name in enumerate(JOINT_LISTS))
-    tool = Part(attrgetter("target_tool"), "d", 3)
+    tool = OutputSource(attrgetter("target_tool"), "d", 3)
     yield from (
         (f"target_TCP_{name}", (tool, row)) for row, name in enumerate(("pose", "speed", "acceleration"))
     )
     for kind in KINDS:
         bank, bits = f"{kind}_register", kind.endswith("_bit")
-        words = [name for name, wire in registers(kind) if wire is not Wire.BOOL]
-        whole = Part(attrgetter(f"io.{bank}"), OUTPUTS[words[0]].value, 4 if bits else len(words), of_io=True)
+        words = [name for name, wire in registers(kind) if wire is not WireType.BOOL]
+        whole = OutputSource(
+            attrgetter(f"io.{bank}"), OUTPUTS[words[0]].value, 4 if bits else len(words), of_io=True
+        )
         yield from ((name, (whole, row)) for row, name in enumerate(words))
         if bits:
-            single = Part(_single_bits(bank), Wire.BOOL.value, len(SINGLE_BITS), of_io=True)
+            single = OutputSource(_single_bits(bank), WireType.BOOL.value, len(SINGLE_BITS), of_io=True)
             yield from ((f"{bank}_{number}", (single, row)) for row, number in enumerate(SINGLE_BITS))
 
 
-PARTS: dict[str, tuple[Part, int]] = dict(_parts())
-"""Part with which each output variable is read, and its index in that part."""
+PARTS: dict[str, tuple[OutputSource, int]] = dict(_parts())
+"""OutputSource with which each output variable is read, and its index in that part."""

@@ -5,7 +5,7 @@ from struct import Struct
 from tvist_server.gateways.ur.rtde.inputs import INPUTS
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
 from tvist_server.rtde.codec import HEADER, LARGEST
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import WireType
 
 Value = int | float | tuple[float, ...]
 
@@ -57,7 +57,7 @@ class InputRecipe:
         return _collect(fields, numbers)
 
 
-def _collect(fields: list[tuple[str, Wire]], numbers: tuple[int | float, ...]) -> dict[str, Value]:
+def _collect(fields: list[tuple[str, WireType]], numbers: tuple[int | float, ...]) -> dict[str, Value]:
     values: dict[str, Value] = {}
     at = 0
     for name, wire in fields:

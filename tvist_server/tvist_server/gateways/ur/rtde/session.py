@@ -13,8 +13,8 @@ from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.gateways.ur.rtde.board import Board
 from tvist_server.gateways.ur.rtde.inputs import INPUTS, NEED_CONTROL
+from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
 from tvist_server.gateways.ur.rtde.writing import InputWriter
 from tvist_server.rtde.codec import (
@@ -51,7 +51,7 @@ class RtdeSession(PortSession):
     client_begins = True
 
     def __init__(
-        self, robot: UrRobot, control: ConnectionControl, send: Send, boards: Mapping[int, Board]
+        self, robot: UrRobot, control: ConnectionControl, send: Send, boards: Mapping[int, PackageEncoder]
     ) -> None:
         super().__init__(robot, control, send)
         self._boards, self._board = boards, boards[1]

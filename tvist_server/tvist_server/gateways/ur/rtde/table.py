@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from tvist_controller.instruments.variables import VARIABLES
 from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import WireType
 
 HEAD = """\
 # RTDE variables
@@ -26,11 +26,11 @@ Joint vectors have six entries. An arm with fewer joints fills the rest with zer
 those that software of the reported version does not have yet.
 """
 REGISTER_ROWS = (
-    ("{bank}_bit_registers0_to_31", Wire.UINT32, "bits 0–31"),
-    ("{bank}_bit_registers32_to_63", Wire.UINT32, "bits 32–63"),
-    ("{bank}_bit_register_64 … _127", Wire.BOOL, "one bit each"),
-    ("{bank}_int_register_0 … _47", Wire.INT32, "integers"),
-    ("{bank}_double_register_0 … _47", Wire.DOUBLE, "doubles"),
+    ("{bank}_bit_registers0_to_31", WireType.UINT32, "bits 0–31"),
+    ("{bank}_bit_registers32_to_63", WireType.UINT32, "bits 32–63"),
+    ("{bank}_bit_register_64 … _127", WireType.BOOL, "one bit each"),
+    ("{bank}_int_register_0 … _47", WireType.INT32, "integers"),
+    ("{bank}_double_register_0 … _47", WireType.DOUBLE, "doubles"),
 )
 
 

@@ -8,12 +8,12 @@ from tvist_protocol.commands import SetSpeed
 from tvist_protocol.forces import SetExternalWrench
 from tvist_protocol.io import Bank, Io, Registers, SetIo, SetRegisters
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.ur.later import begin
+from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.lease import ConnectionControl, MakeCommand
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.inputs import DIGITAL, REGISTERS
 from tvist_server.gateways.ur.rtde.recipes import Value
-from tvist_server.rtde.wire import Wire
+from tvist_server.rtde.wire import WireType
 
 Number = bool | int | float
 LARGEST = 1e308
@@ -81,7 +81,7 @@ class InputWriter:
             bank, first, wire = REGISTERS[name]
             assert not isinstance(value, tuple)
             new, cell = name in news, cells.setdefault(bank, {})
-            if wire is Wire.UINT32:
+            if wire is WireType.UINT32:
                 cell.update({first + k: (bool(int(value) >> k & 1), new) for k in range(32)})
             else:
                 cell[first] = (value, new)
@@ -191,9 +191,9 @@ class InputWriter:
 def _present(io: Io, name: str) -> Number:
     bank, first, wire = REGISTERS[name]
     registers: list[int] | list[float] = getattr(io, f"{bank}_register")
-    if wire is Wire.BOOL:
+    if wire is WireType.BOOL:
         return bool(int(registers[first // 32]) >> first % 32 & 1)
-    return registers[first // 32 if wire is Wire.UINT32 else first]
+    return registers[first // 32 if wire is WireType.UINT32 else first]
 
 
 def _runs(cells: dict[int, tuple[Number, bool]]) -> Iterator[tuple[int, tuple[Number, ...]]]:

@@ -58,7 +58,7 @@ class SignalExit(SystemExit):
     """Exit because of a signal; distinct from a SystemExit that a user's file raises."""
 
 
-class Ending:
+class Shutdown:
     """A shutdown that a signal requests. Construct it in the main thread.
 
     From then on, signals do not end the process directly. The first one requests the shutdown, which

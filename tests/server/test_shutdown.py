@@ -9,11 +9,11 @@ from tests.places import free_endpoint
 
 HANGING = """
 import atexit, signal, threading, time
-from tvist_server import ending
+from tvist_server import shutdown as module
 def on_and_on():
     while True: {what}
-ending.LONGEST = 0.2
-shutdown = ending.Ending()
+module.LONGEST = 0.2
+shutdown = module.Shutdown()
 {where}
 """
 
@@ -33,7 +33,7 @@ def test_a_shutdown_that_hangs_is_cut_off_and_says_where(what, where):
 SERVING = """
 import sys
 from tvist_cli.main import main
-from tvist_server import ending
+from tvist_server import shutdown as module
 from {module} import {owner} as owner
 def on_and_on(*_):
     while True: pass

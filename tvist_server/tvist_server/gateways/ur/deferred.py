@@ -10,12 +10,12 @@ from typing import Any, Generic, TypeVar
 T = TypeVar("T")
 
 
-class Later(Generic[T]):
+class Deferred(Generic[T]):
     """A value that is set once. Waiting coroutines resume in the order in which they started to wait."""
 
     def __init__(self) -> None:
         self._values: list[T] = []
-        self._waiting: list[Coroutine[Later[Any], None, object]] = []
+        self._waiting: list[Coroutine[Deferred[Any], None, object]] = []
 
     def come(self, value: T) -> None:
         if not self._values:
@@ -23,16 +23,16 @@ class Later(Generic[T]):
             for coroutine in self._waiting:
                 begin(coroutine)
 
-    def wait(self, coroutine: "Coroutine[Later[Any], None, object]") -> None:
+    def wait(self, coroutine: "Coroutine[Deferred[Any], None, object]") -> None:
         self._waiting.append(coroutine)
 
-    def __await__(self) -> "Generator[Later[Any], None, T]":
+    def __await__(self) -> "Generator[Deferred[Any], None, T]":
         if not self._values:
             yield self
         return self._values[0]
 
 
-def begin(coroutine: Coroutine[Later[Any], None, object]) -> None:
+def begin(coroutine: Coroutine[Deferred[Any], None, object]) -> None:
     """Run or resume a coroutine until it has to wait."""
     with suppress(StopIteration):
         coroutine.send(None).wait(coroutine)

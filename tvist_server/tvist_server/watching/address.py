@@ -7,14 +7,14 @@ SCHEME = "ur://"
 PORT = 30004
 
 
-class Place(NamedTuple):
+class RobotAddress(NamedTuple):
     """Address of a robot's RTDE interface."""
 
     host: str
     """Name or IP address."""
     port: int = PORT
 
-    def beside(self, port: int) -> "Place":
+    def beside(self, port: int) -> "RobotAddress":
         """Return the place of another interface, which has `port` on a UR robot; it is shifted as RTDE's port is."""
         return self._replace(port=port + self.port - PORT)
 
@@ -28,7 +28,7 @@ def is_place(plant: str) -> bool:
     return plant.lower().startswith(SCHEME)
 
 
-def place_of(plant: str) -> Place:
+def place_of(plant: str) -> RobotAddress:
     """Return the address; raise ValueError if it is invalid."""
     try:
         parts = urlsplit(plant)
@@ -40,4 +40,4 @@ def place_of(plant: str) -> Place:
             f"plant is {plant!r}: must be ur://ADDRESS or ur://ADDRESS:PORT, such as ur://192.168.0.10, with a port "
             f"from 1 to 65535 [{PORT}, that of RTDE]"
         )
-    return Place(parts.hostname, port)
+    return RobotAddress(parts.hostname, port)

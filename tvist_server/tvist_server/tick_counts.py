@@ -6,7 +6,7 @@ ENDS, ENDS_AFTER = 0.05, 5
 """Share below which missed ticks must fall [-], and number of such seconds in a row, to leave overload."""
 
 
-class Overload:
+class TickCounts:
     """Counts a robot's due and missed ticks, `period` apart [s], in seconds measured in due ticks.
 
     A pause of the whole machine is one long second with almost all ticks missed, which alone is no overload.

@@ -9,10 +9,10 @@ from tvist_controller.dispatch.rights import NoControlError, Presence
 from tvist_controller.host import Host
 from tvist_protocol.commands import Command, HandOver, TakeClock, TakeControl
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.base import Answer, Desk
+from tvist_server.gateways.base import Answer, CommandIntake
 
 
-class Post(Protocol):
+class QueueJob(Protocol):
     """Queues a job for the controller's thread, before its next tick; from any thread, without blocking."""
 
     def __call__(self, do: Callable[[], None], client: str | None = None, /) -> None:
@@ -23,13 +23,13 @@ CarryOut = Callable[[Admitted, Answer], None]
 """Queues a command for the controller's thread and answers it; from any thread, without blocking."""
 
 
-class Reception(Desk):
+class RobotIntake(CommandIntake):
     """The desk of one robot: admits valid messages and rejects others at once, without the controller."""
 
     def __init__(
         self,
         host: Host,  # only its thread-safe methods are called here
-        post: Post,
+        post: QueueJob,
         carry_out: CarryOut,
         complete_info: Callable[[bytes], bytes] | None = None,  # adds to an encoded `info`
     ) -> None:

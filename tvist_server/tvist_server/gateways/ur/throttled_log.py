@@ -1,14 +1,14 @@
-"""Notices about the interfaces' clients on the server's console, limited so that no client can flood it."""
+"""ThrottledLog about the interfaces' clients on the server's console, limited so that no client can flood it."""
 
 import asyncio
 from collections.abc import Callable
 from typing import Final
 
-EVERY: Final = 1.0
+LINE_INTERVAL: Final = 1.0
 """Time between two lines [s]."""
 
 
-class Notices:
+class ThrottledLog:
     """Passes at most one line a second to `say`, with the number of omitted lines; for the event loop's thread."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
@@ -24,7 +24,7 @@ class Notices:
             self._waiting += 1
             return
         self._say(line)
-        self._pause = asyncio.get_running_loop().call_later(EVERY, self._go_on)
+        self._pause = asyncio.get_running_loop().call_later(LINE_INTERVAL, self._go_on)
 
     def flush(self) -> None:
         """Write the waiting line at shutdown, when no timer will."""

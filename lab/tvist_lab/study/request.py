@@ -16,7 +16,7 @@ from tvist_plant.variants import Variant
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class StudyRequest:
     """A robot, moves and shapers, all checked."""
 
     description: RobotDescription
@@ -41,7 +41,7 @@ class Asked:
     """Description of all this for --json."""
     notes: Sequence[str] = ()
     """Notes on the moves for the reader."""
-    on: "Callable[[str], Asked | None]" = lambda _: None
+    on: "Callable[[str], StudyRequest | None]" = lambda _: None
     """Returns the same for another robot that comes with the package; None if the user chose a robot."""
 
     def feasible(self) -> list[Move]:
@@ -69,7 +69,7 @@ class Asked:
 class Preset:
     """A study that comes with the package."""
 
-    study: Callable[[Asked], Study]
+    study: Callable[[StudyRequest], Study]
     always: tuple[str, ...] = ()
     shapers: tuple[str, ...] = ()
     """Default shapers."""

@@ -10,17 +10,17 @@ import numpy as np
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.io import Io
-from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, PARTS, Part
+from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, PARTS, OutputSource
 from tvist_server.gateways.ur.rtde.recipes import OutputRecipe
 from tvist_server.rtde.codec import HEADER, PackageKind
 
 
-class Board:
+class PackageEncoder:
     """Makes data packages, each once for all clients with the same recipe."""
 
     def __init__(self) -> None:
         self._recipes: dict[object, OutputRecipe] = {}
-        self._bytes: _Bytes | None = None
+        self._bytes: _EncodedTick | None = None
         """Bytes of the last tick; None if the recipes have changed since."""
         self._snapshot: Snapshot | None = None
         self._packages: dict[tuple[bytes, str], bytes] = {}
@@ -41,7 +41,7 @@ class Board:
             gathered = self._at(snapshot)
         except Exception:  # noqa: BLE001  an error in a variable must only affect its readers
             self._bytes = self._snapshot = None
-            alone = _Bytes([recipe], snapshot)
+            alone = _EncodedTick([recipe], snapshot)
             alone.write(snapshot)
             return _package(head, alone.of(recipe))
         key = head, recipe.text
@@ -50,9 +50,9 @@ class Board:
             package = self._packages[key] = _package(head, gathered.of(recipe))
         return package
 
-    def _at(self, snapshot: Snapshot) -> "_Bytes":
+    def _at(self, snapshot: Snapshot) -> "_EncodedTick":
         if self._bytes is None:
-            self._bytes = _Bytes(self._recipes.values(), snapshot)
+            self._bytes = _EncodedTick(self._recipes.values(), snapshot)
         if snapshot is not self._snapshot:
             self._bytes.write(snapshot)
             self._packages.clear()
@@ -64,14 +64,14 @@ def _package(head: bytes, data: bytes) -> bytes:
     return HEADER.pack(HEADER.size + len(head) + len(data), PackageKind.DATA) + head + data
 
 
-class _Bytes:
+class _EncodedTick:
     """Bytes of the variables of some recipes; the snapshot determines the number of joints."""
 
     def __init__(self, recipes: Iterable[OutputRecipe], snapshot: Snapshot) -> None:
         different = {recipe.text: recipe for recipe in recipes}.values()
         names = [name for recipe in different for name in recipe.names]
         parts = dict.fromkeys(PARTS[name][0] for name in names)
-        self._places: dict[Part, _Place] = {}
+        self._places: dict[OutputSource, _Place] = {}
         self._of_io = _Packing([part for part in parts if part.of_io], snapshot, 0, self._places)
         self._others = _Packing(
             [part for part in parts if not part.of_io], snapshot, self._of_io.end, self._places
@@ -124,7 +124,9 @@ class _Place(NamedTuple):
 class _Packing:
     """Writes parts from the index `first` on in one call, and adds their places; a snapshot gives the lengths."""
 
-    def __init__(self, parts: list[Part], snapshot: Snapshot, first: int, places: dict[Part, _Place]) -> None:
+    def __init__(
+        self, parts: list[OutputSource], snapshot: Snapshot, first: int, places: dict[OutputSource, _Place]
+    ) -> None:
         found = [(part, part.read(snapshot)) for part in parts]
         lists = [(part, value) for part, value in found if isinstance(value, list)]
         others = [(part, value) for part, value in found if not isinstance(value, list)]
