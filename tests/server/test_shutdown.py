@@ -38,7 +38,7 @@ from {module} import {owner} as owner
 def on_and_on(*_):
     while True: pass
 owner.{name} = on_and_on
-ending.LONGEST = {longest}
+module.LONGEST = {longest}
 sys.argv = ["tvist", "serve", "--listen", "{endpoint}"]
 main()
 """

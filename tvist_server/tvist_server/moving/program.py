@@ -118,7 +118,7 @@ def program(run: int, *, speed: float, deceleration: float, lookahead: float, ga
         "lookahead": float(lookahead), "gain": float(gain), "silence": SILENCE, "first": FIRST, "away": AWAY,
         "fade": FADE, "again": AGAIN, "close": CLOSE, "after_shift": AFTER_SHIFT, "NUMBER": NUMBER, "ORDER": ORDER,
         "SETPOINTS": SETPOINTS, "STATE": STATE, "PLAYED": PLAYED, "ENDED": ENDED, "ALONE": ALONE,
-        "LEFT_OUT": LEFT_OUT, "RUN": RUN, "MAX_NUMBER": MAX_NUMBER,
+        "LEFT_OUT": LEFT_OUT, "RUN": RUN, "MOST": MAX_NUMBER,
     }  # fmt: skip
     given |= {f"ended_{one.name.lower()}": int(one) for one in ProgramEnded}
     given |= {f"state_{one.name.lower()}": int(one) for one in ProgramState}
