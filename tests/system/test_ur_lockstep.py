@@ -272,55 +272,6 @@ def test_a_script_of_a_client_is_told_and_moves_the_arm_and_what_replaces_it_end
     assert (state.unshaped_q or state.target_q) == pytest.approx([0.1, -3, 0, -1.6, 0, 0], abs=1e-6)
 
 
-INTERPRETED = """def main():
-  global n = 1
-  interpreter_mode(clearQueueOnEnter=False)
-  write_output_integer_register(2, n)
-end
-"""
-
-
-def test_statements_of_a_client_move_the_arm_what_is_skipped_does_nothing_and_a_replay_is_equal(tmp_path):
-    with (
-        lockstep(7, tmp_path / "run.mcap") as (served, host),
-        Wire(served.endpoint) as stepper,
-        Connection(host, 30003) as script,
-        Connection(host, 30020) as interpreter,
-    ):
-
-        def say(line):
-            """Send a line; the first word of its answer, and the number in it."""
-            kind, _, rest = interpreter.ask(line).partition(":")
-            return kind, int(rest.split(":")[0]) if rest.split(":")[0].strip().isdecimal() else None
-
-        clock = take_clock(stepper)
-        stepper.step(clock, 1)
-        begin_step(stepper, clock, 100_000)
-        stepper.listen("event")
-        script.send(INTERPRETED.encode())
-        while say("sync()")[0] == "discard":
-            pass
-        near, far = ([angle + offset for angle in FAR] for offset in (0.0, 0.3))
-        kind, number = say(f"def there(q): movej(q, a=3, v=2) n = n + 1 end there({near})")
-        assert (kind, number) == ("ack", 2)
-        while (say("statelastexecuted")[1] or 0) < number:
-            pass
-        say(f"movej({far}, a=0.1, v=0.01)")
-        stepper.wait("event", lambda event: event["kind"] == "motion_started" and event["id"] == 2)
-        say("write_output_integer_register(1, 99)")
-        say("skipbuffer")
-        say("abort")
-        say("end_interpreter()")
-        while stepper.info()["control"] is not None:
-            pass
-        assert served.end() == 0
-    content = replayed(tmp_path / "run.mcap")
-    started = [event for event in content.events if event.kind == "motion_started"]
-    assert len(started) == 2
-    assert any(event.kind == "motion_stopped" and event.id == started[1].id for event in content.events)
-    assert not [event for event in content.events if event.line is not None]
-
-
 def test_each_of_several_robots_has_interfaces_of_its_own_and_no_client_keeps_them_from_ending():
     options = ("--robots", "ur5e*2", "--clock", "lockstep", "--ur", "--ur-address", own_address(8))
     with Served(*options, name=None) as served, ExitStack() as stack:
