@@ -16,13 +16,13 @@ from tvist_protocol.errors import RefusedError
 
 SLOW = """
 import os, sys
-from tvist_cli.commands import serve
+from tvist_cli import serving
 from tvist_cli.main import main
 def compile_slowly(tell):
     with open(os.environ["PROGRESS"]) as progress:
         for line in progress:
             tell(*map(int, line.split()))
-serve.compile_if_new = compile_slowly
+serving.compile_if_new = compile_slowly
 sys.argv[0] = "tvist"
 main()
 """
