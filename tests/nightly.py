@@ -29,7 +29,9 @@ class NightlyRecord:
         if report.failed:
             self.failed.append(report.nodeid)
 
-    def pytest_sessionfinish(self):
+    def pytest_sessionfinish(self, session, exitstatus):
+        if exitstatus not in (0, 1) or session.config.option.keyword:  # interrupted, or not whole
+            return
         run = {
             "commit": _git("rev-parse", "HEAD"),
             "date": f"{datetime.now(UTC):%Y-%m-%d}",

@@ -1,7 +1,6 @@
 """Functions shared by the commands that serve a robot."""
 
 import asyncio
-import gc
 import os
 import time
 from collections.abc import Sequence
@@ -23,8 +22,6 @@ from tvist_server.workers import Workers, WorkersError
 
 def serve_robots(config: ServeConfig) -> None:
     """Serve robots until a signal ends this process."""
-    gc.freeze()
-    gc.enable()
     with failing_on(StartError, exit_code=2):
         ending = Shutdown()
         if config.workers > 1:

@@ -1,5 +1,6 @@
 """Write files that appear under their name only when they are complete."""
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -7,6 +8,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
+IN_PLACE = {errno.EBUSY, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG}
+"""Errors with which a file cannot be replaced, but perhaps be written."""
 UNFINISHED = ".tmp"
 """Suffix of an incomplete file, which remains if the program is killed."""
 
@@ -32,12 +35,21 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file completely or not at all, or raise OSError; links and devices are written directly."""
-    if path.is_symlink() or (path.exists() and not path.is_file()):
+    """Write a file, all of it or nothing.
+
+    A link, a device such as /dev/stdout, and a file that cannot be replaced, such as one that is a mount of its own, are
+    written in place.
+    """
+    if path.is_symlink() or (path.exists() and (not path.is_file() or path.stat().st_nlink > 1)):
         path.write_bytes(content)
         return
-    with whole_file(path) as stream:
-        stream.write(content)
+    try:
+        with whole_file(path) as stream:
+            stream.write(content)
+    except OSError as error:
+        if error.errno not in IN_PLACE:
+            raise
+        path.write_bytes(content)
 
 
 def _umask() -> int:

@@ -130,7 +130,9 @@ class TestLinks:
             *re.findall(rf"\| {origin} \| [^|]+ \| {origin} \|$", page, re.MULTILINE), strict=True
         )
         said = re.search(
-            r"(\d+) of the (\d+) figures.* leaves (\d+) unmatched:", (ROOT / "README.md").read_text("utf-8"), re.DOTALL
+            r"(\d+) of the (\d+) figures.* leaves (\d+) unmatched:",
+            (ROOT / "README.md").read_text("utf-8"),
+            re.DOTALL,
         )
         counted = [first.count("not matched"), len(first), second.count("not matched")]
         assert counted == list(map(int, said.groups()))

@@ -81,7 +81,7 @@ def test_a_dead_process_is_told_with_its_robots_and_ends_all(tmp_path):
         second.kill()
         assert served.wait() == 1
         assert (
-            "worker 2 of 2 (ur5e-2, ur5e-3) was ended by SIGKILL: the other robots were stopped"
+            "worker 2 of 2 (ur5e-2, ur5e-3) was ended by SIGKILL: the other robots were also stopped"
             in served.said
         )
         assert not first.is_running()
@@ -118,17 +118,19 @@ def test_a_port_that_is_taken_leaves_neither_processes_nor_recordings(served, tm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_through_a_router_of_a_fleet_in_a_namespace_with_figures_for_prometheus():
+def test_through_a_router_of_a_fleet_in_a_namespace():
+    with Router() as router, Served(*LOCKSTEP, "--namespace", "hall-3", router=router.endpoint, name=None):
+        assert check(router.endpoint, NAMES[0], namespace="hall-3").robots == NAMES
+
+
+def test_one_page_has_the_figures_of_all_for_prometheus():
     port = free_port()
-    with Router() as router:
-        options = ("--namespace", "hall-3", "--metrics", str(port))
-        with Served(*LOCKSTEP, *options, router=router.endpoint, name=None):
-            assert check(router.endpoint, NAMES[0], namespace="hall-3").robots == NAMES
 
-            def page():
-                with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
-                    return answer.read().decode()
+    def page():
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
+            return answer.read().decode()
 
-            eventually(lambda: page().count("tvist_ticks_total{") == 3)
-            for name in NAMES:
-                assert f'tvist_ticks_total{{namespace="hall-3",robot="{name}"}}' in page()
+    with Served(*LOCKSTEP, "--namespace", "hall-3", "--metrics", str(port), name=None):
+        eventually(lambda: page().count("tvist_ticks_total{") == 3)
+        for name in NAMES:
+            assert f'tvist_ticks_total{{namespace="hall-3",robot="{name}"}}' in page()

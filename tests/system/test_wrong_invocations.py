@@ -125,7 +125,7 @@ MISUSE = [
     (("study", "moves", "--disturbances", "gear", "--clean"), ["--clean", "--disturbances"]),
     (("study", "moves", "--moves", "nope.json", "--wrists"), ["--wrists is for random moves"]),
     (("study", "match", "--shapers", "zv", "auto", "--moves", "19"), ["moves is 19", "20 to 100000"]),
-    (("study", "match", "--shapers", "zv", "zv"), ["give two as --shapers"]),
+    (("study", "match", "--shapers", "zv", "zv"), ["must be two different ones"]),
     (("study", "match", "--shapers", "zv", "auto", "--payload", "3", "1"), ["payload is 3 1", "0 to 100 kg"]),
     (("study", "moves", "--moves", "1", "--plants", "zz"), ["plant is 'zz'", "stribeck"]),
     (("serve", "--hidden", "1", "--truth"), ["hidden is 1, but truth is on"]),

@@ -1,5 +1,6 @@
 """`tvist serve`: run a robot."""
 
+import gc
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -30,6 +31,8 @@ def serve(
     """
     from tvist_cli.serving import compile_all, serve_robots
 
+    gc.freeze()  # what is imported lives until the end
+    gc.enable()
     if compile_only is None:
         serve_robots(configuration(given, config))
     elif given or config is not None:

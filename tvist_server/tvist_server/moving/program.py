@@ -45,7 +45,7 @@ STATE = 24
 PLAYED = 25
 """Output integer: number of the set-point being played; 0 and below stand for `MAX_NUMBER` and its predecessors."""
 ENDED = 26
-"""Output integer: an `ProgramEnded`."""
+"""Output integer: a `ProgramEnded`."""
 ALONE = 27
 """Output integer: number of periods without their set-point, in which the arm extrapolated."""
 LEFT_OUT = 28
@@ -55,7 +55,7 @@ RUN = 29
 
 
 class ProgramState(IntEnum):
-    """ProgramState of the program."""
+    """State of the program."""
 
     NONE = 0
     WAITING = 1
