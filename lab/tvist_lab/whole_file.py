@@ -37,7 +37,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file, all of it or nothing.
 
-    A link, a device such as /dev/stdout, and a file that cannot be replaced, such as one that is a mount of its own, are
+    A link, a device such as /dev/stdout, and a file that cannot be replaced, such as a mount of its own, are
     written in place.
     """
     if path.is_symlink() or (path.exists() and (not path.is_file() or path.stat().st_nlink > 1)):
