@@ -82,7 +82,8 @@ MAKERS = {
     "identified": lambda made, _, __: made.identified_figure("mine", MODES, 1.02 * MODES),
     "map": lambda made, _, found: made.workspace_map_figure(found, "f_d_hz", "an arm"),
     "compared": lambda made, pair, _: made.compared_figure(
-        [made.Shown("Q1 → Q2", {"without": pair[0], "with zv": pair[1]}, "90 % less")] * 2, ["without"]
+        [made.ComparedPanel("Q1 → Q2", {"without": pair[0], "with zv": pair[1]}, "90 % less")] * 2,
+        ["without"],
     ),
     "sweep": lambda made, _, __: made.sweep_figure(
         [{"shaper": name, **ENTRY} for name in ("zv", "auto")] * 2, ["5 kg", "1 kg"] * 2

@@ -89,7 +89,7 @@ async def test_control_that_the_robot_ended_is_noticed(robot, pilot, said):
     assert pilot.holder == 1
     await pilot.heard(None)
     assert pilot.holder is None
-    assert "ended" in said[-1]
+    assert "lost control" in said[-1]
 
 
 async def test_control_of_another_client_is_said(robot, pilot, said):
