@@ -23,6 +23,8 @@ from tvist_protocol.io import SetTcp
 from tvist_protocol.motions import MovePath
 from tvist_protocol.replies import Accepted
 
+KNOWN_FAULT = 8
+"""Case of `judge_changes` that exceeds a limit."""
 LEAD = 1e-8
 """A pause goes through a filter whose weights follow the posture, and so may lead by nanometres [m]."""
 
@@ -148,8 +150,9 @@ def judge_changes(seed):
         changes[int(random.integers(4))]()
     robot.send(c.Resume)
     robot.send(c.SetSpeed, fraction=1.0)
-    # Case 8 exceeds a joint's velocity by 3 %: while shapers fade, what one of the two alone would give is allowed.
-    arrives_within_limits(robot, trip, 1.05)
+    # A known fault: in case 8 a joint turns with 1.03 of its velocity limit, for 62 ticks. The slider rises there while
+    # the filter fades from `zvd` to `none`; each shaper alone keeps the limit.
+    arrives_within_limits(robot, trip, 1.05 if seed == KNOWN_FAULT else 1.01)
 
 
 def judge_stop(seed):
