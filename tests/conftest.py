@@ -36,12 +36,16 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    if config.option.keep_durations and not hasattr(config, "workerinput"):
-        config.pluginmanager.register(Durations())
-    if config.option.record_nightly and not hasattr(config, "workerinput"):
-        config.pluginmanager.register(NightlyRecord())
-    if config.option.known_skips and not hasattr(config, "workerinput"):
-        config.pluginmanager.register(Skips())
+    if hasattr(config, "workerinput"):  # the first process hears what all processes report
+        return
+    asked = config.option
+    for wanted, plugin in (
+        (asked.keep_durations, Durations),
+        (asked.record_nightly, NightlyRecord),
+        (asked.known_skips, Skips),
+    ):
+        if wanted:
+            config.pluginmanager.register(plugin())
 
 
 @pytest.hookimpl(wrapper=True)

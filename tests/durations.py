@@ -42,7 +42,7 @@ def quick(items):
     functions = defaultdict(list)
     for item in items:
         if not item.get_closest_marker("nightly"):
-            functions[_function(item.nodeid)].append(item)
+            functions[function_of(item.nodeid)].append(item)
     return [item for (file, test), cases in functions.items() for item in _few(cases, seconds, file, test)]
 
 
@@ -54,7 +54,7 @@ def _few(cases, seconds, file, test):
     return cases[::apart]
 
 
-def _function(nodeid):
+def function_of(nodeid):
     """A test's file, and its function without case and group."""
     file, _, test = nodeid.partition("::")
     return file, test.partition("[")[0].partition("@")[0]
@@ -68,7 +68,7 @@ def arrange(items):
     seconds = kept()
     took = defaultdict(float)
     for item in items:
-        file, _ = _function(item.nodeid)
+        file, _ = function_of(item.nodeid)
         group = item.nodeid if item.get_closest_marker("search") else file
         group = CLOCK if item.get_closest_marker("realtime") else group
         item.add_marker(pytest.mark.xdist_group(group))
@@ -85,7 +85,7 @@ class Durations:
         self.clocked = 0.0
 
     def pytest_runtest_logreport(self, report):
-        file, test = _function(report.nodeid)
+        file, test = function_of(report.nodeid)
         self.seconds[file][test] += report.duration
         if "realtime" in report.keywords:
             self.clocked += report.duration

@@ -1,4 +1,4 @@
-"""The record of the last nightly run: `make nightly` writes nightly.json, and `.ci/run` checks it by this module."""
+"""The record of the last nightly run: `make nightly` writes nightly.json, `python -m tests.nightly` checks it."""
 
 import json
 import subprocess

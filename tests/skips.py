@@ -1,7 +1,9 @@
-"""The tests that `.ci/run` skips, in skips.json, each with the command or workflow that runs it."""
+"""`pytest --known-skips` fails unless what it skips is listed in skips.json, with the command that runs it."""
 
 import json
 from pathlib import Path
+
+from tests.durations import function_of
 
 KEPT = Path(__file__).with_name("skips.json")
 
@@ -18,7 +20,7 @@ class Skips:
 
     def pytest_runtest_logreport(self, report):
         if report.skipped and not hasattr(report, "wasxfail"):
-            self.skipped.add(report.nodeid.partition("[")[0].partition("@")[0])
+            self.skipped.add("::".join(function_of(report.nodeid)))
 
     def pytest_sessionfinish(self, session):
         known = set(json.loads(KEPT.read_text()))

@@ -107,11 +107,11 @@ class Watch:
         """Time from the last new number before braking to the beginning of braking [s].
 
         Braking has begun at the last row before rest at which the fastest joint was not slower than a row before, or
-        where the program says so, whichever is later.
+        where the program reports it, whichever is later.
         """
         course = self.since(first)
         speed, time = np.abs(course["target_qd"]).max(axis=1), course["timestamp"]
-        said = int(np.argmax(course[OUTPUT] >= ProgramState.BRAKING))  # 0 where it does not say so
+        said = int(np.argmax(course[OUTPUT] >= ProgramState.BRAKING))  # 0 if it does not report it
         rest = int(np.argmax(speed[said:] < STILL)) + said
         faster = np.flatnonzero(np.diff(speed[: rest + 1]) >= 0.0)
         begun = max(said, int(faster[-1]) + 1 if len(faster) else 0)

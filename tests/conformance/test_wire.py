@@ -168,7 +168,7 @@ class TestIo:
 
     def test_registers_of_clients_take_no_control_and_those_of_the_robot_do(self, live):
         live.listen("io")
-        io = live.wait("io")  # who comes late is told all the same
+        io = live.wait("io")  # a late client gets it, too
         assert (io["tcp_offset"], io["payload"]["mass"], io["target_speed_fraction"]) == ([0.0] * 6, 5.0, 1.0)
         written = live.command("set_registers", bank="input_double", first=24, values=[1.5, -2])
         assert written == {"type": "done"}

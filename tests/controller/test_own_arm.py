@@ -304,7 +304,7 @@ def test_what_has_the_wrong_shape_is_refused_at_the_start(field, value, said):
 
 
 class OtherController:
-    """Follows our positions exactly, and stops as it is told."""
+    """Follows the commanded positions exactly, and stops when commanded."""
 
     payload = Payload(mass=5.0)
 

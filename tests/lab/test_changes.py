@@ -1,4 +1,4 @@
-"""A change of the arm in the middle of a recording is told soon, with the motion after which it shows."""
+"""A change of the arm during a recording is reported soon, with the motion after which it is visible."""
 
 import re
 from functools import partial

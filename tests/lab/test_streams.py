@@ -19,7 +19,7 @@ MASSES = (0.0, 1.25, 2.5, 3.75, 5.0)
 SECONDS = 90.0
 """Of each stream: ten of them are a quarter of an hour."""
 RETARGETED = (0.1, 1.5)
-"""Least and longest time after which a stream turns to a new target, wherever it is by then [s]."""
+"""Shortest and longest time after which a stream turns to a new target, whether or not it has arrived [s]."""
 
 
 def retargeted(seconds, seed, *, wrists=True, together=False):
