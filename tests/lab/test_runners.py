@@ -29,6 +29,7 @@ def cluster():
         Client(local, set_as_default=False) as client,
     ):
         yield client.get_executor(pure=False)
+        client.wait_for_workers(2)  # Dask cannot end a worker that it is just starting again
 
 
 EXECUTORS = {"processes": lambda: processes(2), "dask": cluster, "here": Here}
