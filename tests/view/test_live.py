@@ -59,7 +59,7 @@ async def test_a_page_is_connected_to_the_few_robots_that_tabs_show_and_a_tab_le
     await heard("robot", '"name": "b"')
     assert set(connected) == {"a", "b"}
     tab.asks.put_nowait({"do": "robot", "name": "c"})
-    await heard("notice", "most at once")
+    await heard("notice", "the maximum")
     tab.asks.put_nowait({"do": "robot", "name": "a"})
     for message in [*({"do": "take"} for _ in range(100)), None]:
         tab.asks.put_nowait(message)
