@@ -10,28 +10,21 @@ from tvist_lab.bench.moving import Run
 from tvist_lab.recordings import Floats
 
 CONFIDENCE = 0.95
-Tell = Callable[[str], None]
-"""Receives a description of each measurement before it starts."""
+Tell = Callable[[str], None]  # receives a description of each measurement before it starts
 
 
 class Figure(Struct, frozen=True, kw_only=True):
     """One figure and its reference."""
 
     what: str
-    value: float
-    """Median over the repetitions."""
+    value: float  # median over the repetitions
     unit: str
-    reference: str
-    """Name of what it is compared with."""
-    reference_value: float
-    """Median of the reference over the same repetitions."""
-    compared: float | None
-    """Median of value / reference; None if a reference is 0."""
+    reference: str  # name of what it is compared with
+    reference_value: float  # median of the reference over the same repetitions
+    compared: float | None  # median of value / reference; None if a reference is 0
     low: float | None
-    high: float | None
-    """Ends of its 95 % interval; None after one repetition."""
-    repetitions: int
-    """Number of repetitions; each measured both."""
+    high: float | None  # ends of its 95 % interval; None after one repetition
+    repetitions: int  # number of repetitions; each measured both
 
 
 def figure(

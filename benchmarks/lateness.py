@@ -17,8 +17,7 @@ from tvist_plant.plant import PERIOD
 
 SEGMENT = 4.0
 """Longest segment [s]; a robot that is halted for one responds before Zenoh's lease of 10 s expires."""
-SETTLE_TICKS = 200
-"""Ticks after a halt that do not count, since the robot makes up for some of the time."""
+SETTLE_TICKS = 200  # ticks after a halt that do not count, since the robot makes up for some of the time
 STUDIES = {"alone": 0, "ten_clients": 10}
 
 

@@ -13,8 +13,7 @@ from tvist_protocol.commands import TakeControl
 from tvist_protocol.programs import ProgramRun
 from tvist_protocol.simulation import SimulationStep
 
-CASES, LINES = 60, 1200
-"""Number of commands that the idle loop distinguishes, and lines of the long program."""
+CASES, LINES = 60, 1200  # number of commands that the idle loop distinguishes, and lines of the long program
 TICKS, PAIRS, COMPILED = 250, 40, 10
 """Ticks of a run, pairs of runs, and repetitions of compiling the long program."""
 

@@ -15,18 +15,15 @@ from tvist_server.moving.program import ALONE
 from tvist_server.ur_ports import UrPorts
 
 IN_PROCESS = "the line in process"
-SHORTEST = 2.0
-"""Shortest time of a measurement [s]; telemetry comes once per second."""
-OF_READER, OF_RTDE = 7, 5
-"""Number of rounds of measurements."""
+SHORTEST = 2.0  # shortest time of a measurement [s]; telemetry comes once per second
+OF_READER, OF_RTDE = 7, 5  # number of rounds of measurements
 READER = {
     "one_robot": "a served robot that one client reads",
     "paced_line": "the line alone, once every 2 ms",
     "bare_put": "a bare put() of a state to one client, once every 2 ms",
 }
 """Measurements in each round of the part `reader`."""
-CLIENTS = 10
-"""Number of RTDE clients at 500 Hz."""
+CLIENTS = 10  # number of RTDE clients at 500 Hz
 KINDS = (
     ("rtde_us_per_client_and_tick", CLIENTS, "ten with different recipes"),
     ("rtde_us_per_client_of_one_recipe", 1, "ten with the same recipe"),
@@ -34,8 +31,7 @@ KINDS = (
 """Figures: key, number of recipes, and description of the clients."""
 ADDRESS, BRIDGED = "127.0.0.1", "127.42.7.1"
 """Addresses of the robot that RTDE clients read, and of the robot behind a bridge."""
-OF_MANY = 0.4
-"""Time for each number of robots, as a share of the time for one robot [-]."""
+OF_MANY = 0.4  # time for each number of robots, as a share of the time for one robot [-]
 SEVERAL, SLOWER = 8, 0.25
 """Number of robots in a process, and their speed relative to real time, at which none is late."""
 

@@ -13,10 +13,8 @@ from tvist_lab.bench.moving import Run
 from tvist_lab.served import served
 
 REPETITIONS = 7
-LIBRARIES = "import numba, numpy, pinocchio, ruckig, msgspec, zenoh"
-"""Libraries of a served robot."""
-SMALL = "import msgspec, zenoh"
-"""Libraries of a client."""
+LIBRARIES = "import numba, numpy, pinocchio, ruckig, msgspec, zenoh"  # libraries of a served robot
+SMALL = "import msgspec, zenoh"  # libraries of a client
 
 
 def start(tell: Tell) -> dict[str, Figure]:

@@ -51,10 +51,8 @@ IMAGES = Path(__file__).parents[1] / "docs" / "images"
 LIMITS = MotionLimits(1.5, 2.0, 100.0)
 SHOWN = (-0.12, 0.4)
 """Times shown of the rest after elastic feed-forward, from the stop of the unshaped reference [s]."""
-MODES = 3
-"""Number of modes in the product of zero-vibration shapers."""
-TICKS_AFTER = 100
-"""Ticks shown after the stop of the reference."""
+MODES = 3  # number of modes in the product of zero-vibration shapers
+TICKS_AFTER = 100  # ticks shown after the stop of the reference
 
 
 def elastic_figure() -> Figure:

@@ -22,10 +22,8 @@ from tvist_view.stage import Tab, open_stage, page
 from tvist_view.track import Track
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-SIZE = (1200, 760)
-"""Width and height of the film [px]."""
-RATE = 25
-"""Frames per second."""
+SIZE = (1200, 760)  # width and height of the film [px]
+RATE = 25  # frames per second
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 FLAGS = (
     "--headless=new",
@@ -39,18 +37,13 @@ FLAGS = (
     "--disable-sync",
     "--no-first-run",
 )
-FIRST_S, NEXT_S = 120.0, 60.0
-"""Time limits of the browser for the first frame and for each later one [s]."""
+FIRST_S, NEXT_S = 120.0, 60.0  # time limits of the browser for the first frame and for each later one [s]
 SLOW, SLOW_S = 5, 0.4
 """Factor of slow motion after a stop, and its duration [s]: the arm vibrates for a few tenths of a second."""
-REST_S = 1.0
-"""Time shown after a stop, unless the next motion starts earlier [s]."""
-LEAD_S = 0.25
-"""The plot of a single motion starts this long before the stop [s]."""
-HOLD_S = 2.0
-"""Time for which the last frame stays [s]."""
-QUALITY = 76
-"""Quality of the frames, of 100."""
+REST_S = 1.0  # time shown after a stop, unless the next motion starts earlier [s]
+LEAD_S = 0.25  # the plot of a single motion starts this long before the stop [s]
+HOLD_S = 2.0  # time for which the last frame stays [s]
+QUALITY = 76  # quality of the frames, of 100
 SHAPERS = ("none", "zv")
 """Shapers that the film compares."""
 

@@ -28,8 +28,7 @@ HEAD = """# fmt: off
 
 from typing import Any, Literal, Optional, Self, Union
 """
-NAME = re.compile(r"(?<![\w.'\"])((?:[a-z]\w*\.)+)(\w+)")
-"""A name with its module."""
+NAME = re.compile(r"(?<![\w.'\"])((?:[a-z]\w*\.)+)(\w+)")  # a name with its module
 
 
 def generated() -> dict[Path, str]:

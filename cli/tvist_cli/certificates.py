@@ -14,8 +14,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 AUTHORITY_DAYS = 7300
 """Validity of an authority's own certificate [days]; the certificates it signs expire earlier."""
-SLACK = timedelta(hours=1)
-"""How far the clock of a client or robot may be behind."""
+SLACK = timedelta(hours=1)  # how far the clock of a client or robot may be behind
 USAGES = {"robot": ExtendedKeyUsageOID.SERVER_AUTH, "client": ExtendedKeyUsageOID.CLIENT_AUTH}
 """Extended key usage of each kind: a client's certificate cannot pass as a robot's, or the reverse."""
 

@@ -5,8 +5,7 @@ from collections.abc import Callable
 
 from tvist_cli.output import err, progress, say
 
-SAY_EVERY = 10.0
-"""Shortest time between two lines about progress where stderr is no terminal [s]."""
+SAY_EVERY = 10.0  # shortest time between two lines about progress where stderr is no terminal [s]
 
 
 def compile_if_new(tell: Callable[[int, int], None] = lambda *_: None) -> None:

@@ -15,12 +15,10 @@ from tvist_client.transports.zenoh import only_robot
 class Connection:
     """Where a robot is. A command that has this as its first parameter also takes the endpoint without its option."""
 
-    endpoint: str = ENDPOINT
-    """Connect to the robot or router at this Zenoh endpoint."""
+    endpoint: str = ENDPOINT  # connect to the robot or router at this Zenoh endpoint
     name: str | None = field(default=None, kw_only=True)
     """Select the robot of this name [ur5e; if there is none, the only robot at the endpoint]."""
-    namespace: str = field(default="", kw_only=True)
-    """Look for the robot in this namespace."""
+    namespace: str = field(default="", kw_only=True)  # look for the robot in this namespace
     security: Path | None = field(default=None, kw_only=True)
     """Use this client's certificate from this folder, made by tvist keys; the endpoint is then tls/HOST:PORT."""
 

@@ -23,8 +23,7 @@ Save = Callable[["Figure", str], Path]
 class FigureOptions:
     """How a command writes figures."""
 
-    format: Literal["png", "pdf", "svg"] | None = None
-    """Write figures as png, pdf or svg [png]."""
+    format: Literal["png", "pdf", "svg"] | None = None  # write figures as png, pdf or svg [png]
     style: list[str] | None = None
     """Draw figures in this style, repeatable: paper, with headings and explanations in a text file beside
     each; slides, with larger type; or a matplotlib style sheet FILE.mplstyle, which may also set colors,

@@ -37,8 +37,7 @@ from tvist_server.watching.address import place_of
 
 ROBOT = "ur5e"
 """Robot that is identified unless another one is named."""
-READY = 30.0
-"""Longest wait for the robot to follow set-points [s]."""
+READY = 30.0  # longest wait for the robot to follow set-points [s]
 MOVED = 0.01
 """If a joint is further than this from where the moves were planned to start, they are not made [rad]."""
 

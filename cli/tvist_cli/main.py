@@ -19,8 +19,7 @@ from tvist_server.shutdown import end_like_interrupted, ending_signals
 if TYPE_CHECKING:
     import cyclopts
 
-BEGAN = time.monotonic()
-"""Start of this program, before the slow imports."""
+BEGAN = time.monotonic()  # start of this program, before the slow imports
 ABOUT = "A robot controller for a flexible arm in simulation, with time-varying input shaping."
 LOG = {
     "record": "Record a served robot as MCAP.",
@@ -61,8 +60,7 @@ GROUPS = {
     },
 }
 """The commands with their one-line help, in groups, in the order in which a new user meets them."""
-OF_GROUPS = {"log": LOG}
-"""Commands that have subcommands."""
+OF_GROUPS = {"log": LOG}  # commands that have subcommands
 COMMANDS = {name: what for group in GROUPS.values() for name, what in group.items()}
 
 

@@ -61,8 +61,7 @@ def _offered(kind: str, *endings: str) -> Parameter:
 
 ROBOTS = _offered("robot", ".toml")
 SHAPERS = _offered("shaper", ".py")
-COMPARED = _offered("compared", ".py")
-"""Shapers and baselines that studies compare."""
+COMPARED = _offered("compared", ".py")  # shapers and baselines that studies compare
 PLANTS = _offered("plant", ".py")
 WORLDS = _offered("world", ".xml")
 STUDIES = _offered("study", ".toml", ".py")

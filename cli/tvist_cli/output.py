@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from tvist_lab.report import ReportPage
 
 GAP = " │ "
-WIDTH = 120
-"""Number of columns when the output is not a terminal."""
+WIDTH = 120  # number of columns when the output is not a terminal
 
 
 class _Screen(Console):

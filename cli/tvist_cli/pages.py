@@ -13,8 +13,7 @@ from tvist_cli.output import err
 if TYPE_CHECKING:
     from tvist_view.stage import Meet
 
-NICE = 5
-"""Niceness of a page's process, so that it yields to a robot's server on the same machine."""
+NICE = 5  # Niceness of a page's process, so that it yields to a robot's server on the same machine
 
 
 @dataclass(frozen=True)
@@ -23,8 +22,7 @@ class PageAddress:
 
     address: str
     port: int
-    insecure: bool
-    """Whether other machines can open the page."""
+    insecure: bool  # whether other machines can open the page
 
 
 def serve_page(

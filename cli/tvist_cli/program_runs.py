@@ -28,10 +28,8 @@ from tvist_server.recording import RecorderError
 from tvist_server.server import Server
 from tvist_server.shutdown import Shutdown
 
-SHOWN_EVERY = 0.1
-"""Shortest time between two changes of the progress line [s]."""
-_CLEAR = "\r\x1b[K"
-"""Moves to the start of the terminal's line and clears it."""
+SHOWN_EVERY = 0.1  # shortest time between two changes of the progress line [s]
+_CLEAR = "\r\x1b[K"  # moves to the start of the terminal's line and clears it
 STDIN = "-"
 
 
@@ -94,14 +92,10 @@ def _is_stdin(file: Path) -> bool:
 class ProgramOutcome:
     """How a program's run ended."""
 
-    result: dict[str, Any]
-    """The program's part of what --json prints."""
-    account: str = ""
-    """Summary of the run."""
-    failure: Failure | None = None
-    """Why the run failed; None if it passed."""
-    server: Server | None = None
-    """The robot's server; None in lockstep."""
+    result: dict[str, Any]  # the program's part of what --json prints
+    account: str = ""  # summary of the run
+    failure: Failure | None = None  # why the run failed; None if it passed
+    server: Server | None = None  # the robot's server; None in lockstep
 
 
 class ProgramConsole:
@@ -109,8 +103,7 @@ class ProgramConsole:
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
-        self.which = ""
-        """Which of several programs is running, for the progress line."""
+        self.which = ""  # which of several programs is running, for the progress line
         self._shown, self._visible = 0.0, False
 
     def __call__(self, watch: ProgramWatch) -> None:
@@ -157,8 +150,7 @@ class Runner:
     inputs: Sequence[str]
     timeout: float | None
     limits: RunLimits
-    baseline: Mapping[str, Run] | None
-    """Earlier runs by program name; None if there is no baseline."""
+    baseline: Mapping[str, Run] | None  # earlier runs by program name; None if there is no baseline
     tell: ProgramConsole
 
     def run(self, file: Path, text: str) -> ProgramOutcome:

@@ -12,10 +12,8 @@ if TYPE_CHECKING:
     from tvist_lab.recordings import Floats
     from tvist_shaping import Shaper
 
-STANDARD = ("zv", "zvd", "ei")
-"""Shapers of the paper's Figure 4."""
-TABLED = (-0.2, -0.1, 0.0, 0.1, 0.2)
-"""Frequency errors in the table [-]."""
+STANDARD = ("zv", "zvd", "ei")  # shapers of the paper's Figure 4
+TABLED = (-0.2, -0.1, 0.0, 0.1, 0.2)  # frequency errors in the table [-]
 POINTS = 401
 
 

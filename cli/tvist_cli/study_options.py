@@ -46,33 +46,27 @@ class StudyOptions:
     modes: int = 1
     """With moves and match, suppress this number of modes with impulse shapers; more than one needs a modal
     calibration."""
-    seed: int = 0
-    """Set the seed of moves, payloads, gear errors and random properties of plants."""
+    seed: int = 0  # set the seed of moves, payloads, gear errors and random properties of plants
     limits: Literal["gentle", "industrial"] = "gentle"
     """With moves and match, use gentle limits, the paper's 1.5 rad/s, 2 rad/s² and 100 rad/s³; or industrial
     ones, 3 rad/s, 8 rad/s² and 2000 rad/s³. Moves for which the drives are too weak are left out."""
     stroke: tuple[float, float] | None = None
     """Set the smallest and largest length of random moves, as a share of the way between two configurations [0.3 1]."""
-    wrists: bool = False
-    """Let random moves turn the two outer wrist joints as well."""
+    wrists: bool = False  # let random moves turn the two outer wrist joints as well
     streams: bool = False
     """With moves, follow a stream of set-points that turns to other targets on the way and is then stopped,
     instead of making each move."""
-    clean: bool = False
-    """Simulate without nonlinear friction, gear errors and noise."""
+    clean: bool = False  # simulate without nonlinear friction, gear errors and noise
     disturbances: str | None = None
     """Simulate these disturbances, separated by commas: friction, gear, noise, or none [all]."""
     frequency_error: float = 0.0
     """With moves, let the controller overestimate every frequency by this percentage."""
-    payload_error: float = 0.0
-    """With moves, let the declared mass exceed the carried one by this percentage."""
+    payload_error: float = 0.0  # with moves, let the declared mass exceed the carried one by this percentage
     stiffness_error: float = 0.0
     """With moves, add one arm whose gears, links and velocity loops are each stiffer or softer, at random, by
     this percentage than the controller knows."""
-    quick: bool = False
-    """With bench, make each move with one payload error only, in turn."""
-    save_moves: Path | None = None
-    """Write the moves and their payloads to this file."""
+    quick: bool = False  # with bench, make each move with one payload error only, in turn
+    save_moves: Path | None = None  # write the moves and their payloads to this file
 
     @property
     def given(self) -> dict[str, Any]:

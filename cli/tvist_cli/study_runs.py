@@ -28,10 +28,8 @@ from tvist_lab.words import counted
 
 ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s:/\[\]]+|\[[\da-fA-F:.]+\]):\d{1,5}")
 """Address of a Dask scheduler."""
-PATIENCE = 10.0
-"""Time within which a scheduler must answer and have a worker [s]."""
-LISTED = 12
-"""Largest number of motions that are listed."""
+PATIENCE = 10.0  # time within which a scheduler must answer and have a worker [s]
+LISTED = 12  # largest number of motions that are listed
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 One = TypeVar("One")
 
-Figures = Mapping[str, "Figure"]
-"""Figures by file name, without suffix."""
+Figures = Mapping[str, "Figure"]  # figures by file name, without suffix
 
 
 def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:

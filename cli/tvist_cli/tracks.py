@@ -17,12 +17,9 @@ if TYPE_CHECKING:
     from tvist_view.look import Look
     from tvist_view.track import Track
 
-MAGNIFY = 100.0
-"""Default magnification of the bending [-]."""
-LEAD = 150
-"""Ticks at rest shown before a motion."""
-REST = 500
-"""Ticks shown after a motion."""
+MAGNIFY = 100.0  # default magnification of the bending [-]
+LEAD = 150  # ticks at rest shown before a motion
+REST = 500  # ticks shown after a motion
 
 
 @dataclass(frozen=True)

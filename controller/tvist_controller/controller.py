@@ -45,8 +45,7 @@ class Controller(RobotParts):
         setup.check(placed=plant is None or not (plant.watched or plant.supervised))
         self._failed: PlantError | None = None
         """Failure of the plant between two ticks, handled in the next one."""
-        self._next_timeout = -math.inf
-        """Time of the next possible timeout [s]."""
+        self._next_timeout = -math.inf  # time of the next possible timeout [s]
         super().__init__(setup, plant, Planner(setup), order)
 
     # ------------------------------------------------------------------ inputs

@@ -50,8 +50,7 @@ class Host:
     ) -> None:
         self.controller, self._experience, self._survives = controller, experience, survives
         self._ports = ports or SocketPorts()
-        self.failure: str | None = None
-        """Reason why the controller has stopped ticking; None while it ticks."""
+        self.failure: str | None = None  # reason why the controller has stopped ticking; None while it ticks
         self._sinks = sinks
         self._info: tuple[object, bytes] = None, b""
         self._stepping = False

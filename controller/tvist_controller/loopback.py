@@ -31,8 +31,7 @@ class LoopbackHost(Sink):
         self, setup: Setup, plant: Plant | None = None, experience: Experience | None = None
     ) -> None:
         self.controller = Controller(setup, plant)
-        self.entries: list[Entry] = []
-        """Inputs of the controller; a replay needs only these and the setup."""
+        self.entries: list[Entry] = []  # inputs of the controller; a replay needs only these and the setup
         self._host = Host(self.controller, self, experience=experience or experience_of(setup))
         self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
 

@@ -35,8 +35,7 @@ _RECORDED = (
 """Fields stored unchanged in every recording."""
 _LATER = ("compensate_sag", "shape_servo", "instance", "hidden")
 """Optional fields, missing in older recordings."""
-Adapt = Literal["payload"]
-"""Quantities that can be learnt from the robot's own motions."""
+Adapt = Literal["payload"]  # quantities that can be learnt from the robot's own motions
 
 
 @dataclass(frozen=True)

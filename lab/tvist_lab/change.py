@@ -7,14 +7,10 @@ from dataclasses import dataclass
 class MotionChange:
     """Vibration of the same motion without and with a shaper; None if not measurable."""
 
-    before: float | None
-    """Largest |α| after the unshaped motion [m/s²]."""
-    after: float | None
-    """Largest |α| after the shaped one [m/s²]."""
-    still_before: float | None
-    """Time from the start of the unshaped motion until the tool is at rest [ms]."""
-    still_after: float | None
-    """Time from the start of the shaped motion until the tool is at rest [ms]."""
+    before: float | None  # largest |α| after the unshaped motion [m/s²]
+    after: float | None  # largest |α| after the shaped one [m/s²]
+    still_before: float | None  # time from the start of the unshaped motion until the tool is at rest [ms]
+    still_after: float | None  # time from the start of the shaped motion until the tool is at rest [ms]
 
     @property
     def less_percent(self) -> float | None:

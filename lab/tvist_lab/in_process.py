@@ -16,12 +16,9 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.info import Info
 from tvist_server.config import ServeConfig
 
-LEAD = 150
-"""Ticks at rest before the first motion."""
-VELOCITY, ACCELERATION = 1.5, 2.0
-"""The paper's limits of the motions [rad/s, rad/s²]."""
-REST_S = 1.0
-"""Time for the shaper's delay and the vibration after a motion [s]."""
+LEAD = 150  # ticks at rest before the first motion
+VELOCITY, ACCELERATION = 1.5, 2.0  # the paper's limits of the motions [rad/s, rad/s²]
+REST_S = 1.0  # time for the shaper's delay and the vibration after a motion [s]
 
 
 def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:

@@ -24,30 +24,23 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD
 from tvist_shaping import FlexibleJoint, flexible_joint
 
-MASSES = (0.0, 1.0)
-"""Payloads of the figure [kg]."""
+MASSES = (0.0, 1.0)  # payloads of the figure [kg]
 ANGLES = tuple(np.radians(np.arange(0.0, 151.0, 10.0)).tolist())
 """Elbow angles at which the arm is plucked [rad]."""
-TORQUE = 2.0
-"""Torque that twists the shoulder before it is released [N m]."""
+TORQUE = 2.0  # torque that twists the shoulder before it is released [N m]
 HELD, LISTENED = 1.0, 1.0
 """Time for which the torque acts, until the arm rests, and time recorded after its release [s]."""
-GRAVITY = (0.0, 0.0, 9.81)
-"""Reading of the accelerometer of an arm with vertical axes at rest [m/s²]."""
+GRAVITY = (0.0, 0.0, 9.81)  # reading of the accelerometer of an arm with vertical axes at rest [m/s²]
 
 
 @dataclass(frozen=True)
 class FlexibleShoulder:
     """Parameters of the closed form."""
 
-    middle: float
-    """I(90°) = J_1 + J_2 + m_2 l² [kg m²]."""
-    change: float
-    """2 l m_2 c_2, the additional inertia of the stretched arm [kg m²]."""
-    stiffness: float
-    """K of the shoulder [N m/rad]."""
-    damping: float
-    """D of the damper beside it [N m s/rad]."""
+    middle: float  # i(90°) = J_1 + J_2 + m_2 l² [kg m²]
+    change: float  # 2 l m_2 c_2, the additional inertia of the stretched arm [kg m²]
+    stiffness: float  # k of the shoulder [N m/rad]
+    damping: float  # d of the damper beside it [N m s/rad]
 
     @classmethod
     def of(cls, description: RobotDescription, payload: Payload) -> "FlexibleShoulder":
@@ -91,16 +84,11 @@ class FlexibleShoulder:
 class Plucked(NamedTuple):
     """The mode at one elbow angle: from the formula, and fitted to the accelerometer after a pluck."""
 
-    mass: float
-    """Mass of the payload [kg]."""
-    elbow: float
-    """Elbow angle [rad]."""
-    inertia: float
-    """Inertia about the shoulder [kg m²]."""
-    f_d: float
-    """Damped frequency [Hz]."""
-    zeta: float
-    """Damping ratio [-]."""
+    mass: float  # mass of the payload [kg]
+    elbow: float  # elbow angle [rad]
+    inertia: float  # inertia about the shoulder [kg m²]
+    f_d: float  # damped frequency [Hz]
+    zeta: float  # damping ratio [-]
     simulated_f_d: float
     simulated_zeta: float
 
@@ -110,8 +98,7 @@ class OneJointModes:
     """The modes of the one-joint arm over its elbow angle."""
 
     description: RobotDescription
-    curve: tuple[Plucked, ...]
-    """Modes over `ANGLES`, with each of `MASSES`."""
+    curve: tuple[Plucked, ...]  # modes over `ANGLES`, with each of `MASSES`
     poses: tuple[Plucked, ...]
     """OneJointModes at Q1 to Q3 of the robot file, the angles of the paper's figure, with its payload."""
 

@@ -45,8 +45,7 @@ class Replay:
     states: list[State] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     truths: list[Truth] = field(default_factory=list)
-    first_difference: str | None = None
-    """First difference from the original; None if there is none."""
+    first_difference: str | None = None  # first difference from the original; None if there is none
     notes: list[str] = field(default_factory=list)
 
 

@@ -20,10 +20,8 @@ from tvist_server.gateways.base import Answer, CommandIntake, Gateway, topic_of
 from tvist_server.gateways.exposure import guarded
 from tvist_server.gateways.network import Network
 
-TICK = TICK_NS * 1e-9
-"""Duration of a tick [s]."""
-LEAVE = 0.6
-"""Longest time for clients to read the remaining messages at the end [s]."""
+TICK = TICK_NS * 1e-9  # duration of a tick [s]
+LEAVE = 0.6  # longest time for clients to read the remaining messages at the end [s]
 REFUSAL = Refused(
     code="wrong_mode",
     where="",
@@ -37,8 +35,7 @@ class PlaybackDesk(CommandIntake):
 
     def __init__(self, info: Info, name: str) -> None:
         self._info = msgspec.structs.replace(info, name=name, clock="realtime", control=None, stepper=None)
-        self.tick = info.tick
-        """Tick of the last state published."""
+        self.tick = info.tick  # tick of the last state published
 
     def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  no command is carried out
         """Refuse a command."""

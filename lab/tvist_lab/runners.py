@@ -33,8 +33,7 @@ class TaskError(Exception):
 class Failed:
     """Why a task gave no result."""
 
-    error: Exception
-    """Exception of the work, or a `TaskError`."""
+    error: Exception  # exception of the work, or a `TaskError`
 
 
 def outcomes(

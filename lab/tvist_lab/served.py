@@ -39,10 +39,8 @@ class RunningServer:
 
     endpoint: str
     pid: int
-    took: float
-    """Time from the start until the first answer [s]."""
-    robot: Robot
-    """Client of the robot, or of the first of several."""
+    took: float  # time from the start until the first answer [s]
+    robot: Robot  # client of the robot, or of the first of several
 
 
 @asynccontextmanager

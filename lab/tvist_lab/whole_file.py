@@ -10,8 +10,7 @@ from typing import IO
 
 IN_PLACE = {errno.EBUSY, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG}
 """Errors with which a file cannot be replaced, but perhaps be written."""
-UNFINISHED = ".tmp"
-"""Suffix of an incomplete file, which remains if the program is killed."""
+UNFINISHED = ".tmp"  # suffix of an incomplete file, which remains if the program is killed
 
 
 @contextmanager

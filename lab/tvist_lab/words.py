@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from statistics import median
 
-QUANTILES_FROM = 20
-"""Number of values from which quantiles are meaningful; with fewer, extremes are shown."""
+QUANTILES_FROM = 20  # number of values from which quantiles are meaningful; with fewer, extremes are shown
 
 
 def counted(count: int, what: str) -> str:

@@ -14,10 +14,8 @@ from tvist_plant.description import RobotDescription
 class Region:
     """A box in joint space; joints without bounds stay at zero."""
 
-    low: tuple[float, ...]
-    """Lower bounds, one per joint from the base on [rad]."""
-    high: tuple[float, ...]
-    """Upper bounds, one per joint from the base on [rad]."""
+    low: tuple[float, ...]  # lower bounds, one per joint from the base on [rad]
+    high: tuple[float, ...]  # upper bounds, one per joint from the base on [rad]
 
     def spread(self, count: int, joints: int, seed: int) -> Floats:
         """Return configurations that cover the box evenly (scrambled Halton sequence), shape (count, joints) [rad]."""

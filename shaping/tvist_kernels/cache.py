@@ -32,22 +32,16 @@ from tvist_kernels import trust
 from tvist_kernels.machine_code import from_bytes, to_bytes
 from tvist_kernels.sources import digest, top
 
-DIGITS = 16
-"""Hexadecimal digits of each hash in a file's name."""
+DIGITS = 16  # hexadecimal digits of each hash in a file's name
 CHECKSUM_BYTES = 32
-FORMAT = 2
-"""Version of the format that `machine_code` writes; increase it with each change."""
+FORMAT = 2  # version of the format that `machine_code` writes; increase it with each change
 
-kernels: "list[KernelCache]" = []
-"""Caches of all compiled functions that this process has imported."""
+kernels: "list[KernelCache]" = []  # caches of all compiled functions that this process has imported
 OTHERS = 16
 """Number of files of other versions of a kernel that stay, since several installations share the folder."""
-SHIPPED = "tvist_compiled"
-"""Package whose folder holds precompiled machine code, if it is installed."""
-unkept: dict[str, str] = {}
-"""Why machine code could not be written, by folder."""
-_said: set[str] = set()
-"""Warnings already given."""
+SHIPPED = "tvist_compiled"  # package whose folder holds precompiled machine code, if it is installed
+unkept: dict[str, str] = {}  # why machine code could not be written, by folder
+_said: set[str] = set()  # warnings already given
 
 
 class DistrustWarning(UserWarning):

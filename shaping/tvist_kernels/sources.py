@@ -6,8 +6,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-OURS = "tvist_"
-"""Prefix of the names of the project's packages."""
+OURS = "tvist_"  # prefix of the names of the project's packages
 _IMPORT = re.compile(
     rf"^(?:from[ ]+({OURS}[\w.]+)[ ]+import[ ]+(\([^)]*\)|[^\n]*)|import[ ]+({OURS}[\w.]+))", re.MULTILINE
 )

@@ -12,8 +12,7 @@ from tvist_plant.chain import SCRATCH, WIDTH
 from tvist_plant.joint_parameters import ROWS
 from tvist_plant.model import Floats
 
-LAST, NOW = 0, 1
-"""Indices of the commands and dynamics of the last and the current tick."""
+LAST, NOW = 0, 1  # indices of the commands and dynamics of the last and the current tick
 LINKS, JOINTS, PERIOD, SUBSTEPS, GRAVITY, ENCODER_STEP, HEAD = range(7)
 """Indices of the scalars at the front of the memory, and their number."""
 
@@ -21,31 +20,21 @@ LINKS, JOINTS, PERIOD, SUBSTEPS, GRAVITY, ENCODER_STEP, HEAD = range(7)
 class ArmMemory(NamedTuple):
     """Views of the memory of an arm with N links and n motors."""
 
-    state: Floats
-    """Rows of `ArmState`, shape (6, N+n)."""
-    commands: Floats
-    """Rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n)."""
+    state: Floats  # rows of `ArmState`, shape (6, N+n)
+    commands: Floats  # rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n)
     dynamics: Floats
     """Upper triangle of M [kg m^2] over a row with the bias [N m]: Coriolis, centrifugal and gravity torques
     minus external ones; last tick and this one, shape (2, N+1, N)."""
     springs: Floats
     """Diagonal of stiffness [N m/rad] and damping [N m s/rad] of each link and motor, shape (2, N+n)."""
-    joints: Floats
-    """Rows of `JointParameters`, shape (23, n)."""
-    chain: Floats
-    """Parameters of the links, see `chain_of`, shape (N+1, 22)."""
-    bodies: Floats
-    """Scratch of `sweep`, with the flange in the last row, shape (N+1, 28)."""
-    pushed: Floats
-    """External torques, shape (N,) [N m]."""
-    qdd: Floats
-    """Accelerations of the links, shape (N,) [rad/s^2]."""
-    readings: Floats
-    """Last encoder readings, NaN before the first, shape (n,) [rad]."""
-    factor: Floats
-    """Scratch for a factorised matrix, shape (N, N)."""
-    force: Floats
-    """Scratch for the torques that do not depend on the state, shape (N+n,) [N m]."""
+    joints: Floats  # rows of `JointParameters`, shape (23, n)
+    chain: Floats  # parameters of the links, see `chain_of`, shape (N+1, 22)
+    bodies: Floats  # scratch of `sweep`, with the flange in the last row, shape (N+1, 28)
+    pushed: Floats  # external torques, shape (N,) [N m]
+    qdd: Floats  # accelerations of the links, shape (N,) [rad/s^2]
+    readings: Floats  # last encoder readings, NaN before the first, shape (n,) [rad]
+    factor: Floats  # scratch for a factorised matrix, shape (N, N)
+    force: Floats  # scratch for the torques that do not depend on the state, shape (N+n,) [N m]
 
 
 def shapes(N: int, n: int) -> ArmMemory:

@@ -26,8 +26,7 @@ AXES = {
 """Rotation that turns z into the axis of each kind of joint."""
 TURN, SHIFT, BODY, WIDTH = 0, 9, 12, 22
 """Columns of a chain's row: rotation, translation and inertia of a link; the number of columns."""
-SCRATCH = 28
-"""Columns of the scratch: twist (6), inertia (10), velocity (6), acceleration or force (6)."""
+SCRATCH = 28  # columns of the scratch: twist (6), inertia (10), velocity (6), acceleration or force (6)
 
 
 def chain_of(model: pin.Model, frame: int) -> Floats:

@@ -26,32 +26,22 @@ class DriveCommand:
     Not frozen, because creating a frozen one at every tick takes five times as long.
     """
 
-    q: Floats
-    """Position q_r, shape (n,) [rad]."""
-    qd: Floats
-    """Velocity q̇_r, shape (n,) [rad/s]."""
-    torque: Floats
-    """Feed-forward torque τ_ff, shape (n,) [N m]."""
+    q: Floats  # position q_r, shape (n,) [rad]
+    qd: Floats  # velocity q̇_r, shape (n,) [rad/s]
+    torque: Floats  # feed-forward torque τ_ff, shape (n,) [N m]
 
 
 @dataclass(frozen=True)
 class LinearPart:
     """Stiffness, damping and gains of arm and drives, the same in every posture; N links, then n motors."""
 
-    stiffness: Floats
-    """Springs and position gains, shape (N+n, N+n) [N m/rad]."""
-    damping: Floats
-    """Dampers, velocity gains and the slope of friction at rest, shape (N+n, N+n) [N m s/rad]."""
-    gear_damping: Floats
-    """D_g, shape (n,) [N m s/rad]."""
-    rotor_inertia: Floats
-    """B, shape (n,) [kg m^2]."""
-    velocity_gain: Floats
-    """K_d, shape (n,) [N m s/rad]."""
-    position_gain: Floats
-    """K_d (K_p + K_i), shape (n,) [N m/rad]."""
-    integral_gain: Floats
-    """K_d K_p K_i, shape (n,) [N m/(rad s)]."""
+    stiffness: Floats  # springs and position gains, shape (N+n, N+n) [N m/rad]
+    damping: Floats  # dampers, velocity gains and the slope of friction at rest, shape (N+n, N+n) [N m s/rad]
+    gear_damping: Floats  # d_g, shape (n,) [N m s/rad]
+    rotor_inertia: Floats  # b, shape (n,) [kg m^2]
+    velocity_gain: Floats  # k_d, shape (n,) [N m s/rad]
+    position_gain: Floats  # k_d (K_p + K_i), shape (n,) [N m/rad]
+    integral_gain: Floats  # k_d K_p K_i, shape (n,) [N m/(rad s)]
 
     @classmethod
     def of(cls, flexible: FlexibleModel, drives: Drives) -> "LinearPart":
@@ -86,16 +76,11 @@ class LinearPart:
 class Nonlinear:
     """Friction and gear error, one entry per joint."""
 
-    friction: Floats
-    """F_c, shape (n,); zero if the file models friction as linear [N m]."""
-    friction_width: float
-    """w [rad/s]."""
-    gear_stiffness: Floats
-    """K_g, shape (n,) [N m/rad]."""
-    gear_error: float
-    """Amplitude ε [rad]."""
-    gear_waves: float
-    """n_w [-]."""
+    friction: Floats  # f_c, shape (n,); zero if the file models friction as linear [N m]
+    friction_width: float  # w [rad/s]
+    gear_stiffness: Floats  # k_g, shape (n,) [N m/rad]
+    gear_error: float  # amplitude ε [rad]
+    gear_waves: float  # n_w [-]
 
     @classmethod
     def of(cls, drives: Drives) -> "Nonlinear":

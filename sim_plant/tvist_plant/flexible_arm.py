@@ -79,8 +79,7 @@ class FlexibleArm(SimulatedArm):
         drives = msgspec.structs.replace(self.description.drives, rotor_inertia=rotors)
         self._linear = linear = LinearPart.of(self._flexible, drives)
         links, n = self._flexible.model.nv, self.description.joints
-        self.memory = memory_for(links, n)
-        """Memory of the kernels in `arm_tick`; see `arm_memory`."""
+        self.memory = memory_for(links, n)  # memory of the kernels in `arm_tick`; see `arm_memory`
         self.memory[[PERIOD_AT, SUBSTEPS]] = self.period, self._substeps
         self.memory[GRAVITY] = -self._flexible.model.gravity.linear[2]
         self.memory[ENCODER_STEP] = self.description.sensors.encoder_step

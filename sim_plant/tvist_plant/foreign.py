@@ -19,8 +19,7 @@ _METHODS = [
     for name, value in vars(kind).items()
     if callable(value) and not name.startswith("_") and name != "can"
 ]
-MOST_KEPT = 10
-"""Largest number of exceptions kept for `told`."""
+MOST_KEPT = 10  # largest number of exceptions kept for `told`
 
 
 def is_plant(value: object) -> bool:
@@ -67,8 +66,7 @@ class _StandIn(Plant):
     def __init__(self, plant: Plant, joints: int | None) -> None:
         self.plant, self._joints = plant, joints
         self._payload = plant.payload
-        self.raised: list[Exception] = []
-        """Exceptions other than `PlantError`, until `told` returns them."""
+        self.raised: list[Exception] = []  # exceptions other than `PlantError`, until `told` returns them
 
     @property
     def payload(self) -> Payload:  # type: ignore[override]

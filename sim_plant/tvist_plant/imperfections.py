@@ -35,24 +35,18 @@ from tvist_plant.robot_tables import Payload, RobotDescription
 
 STICTION = frozenset({"stiction", "stiction_load", "stiction_speed", "stiction_stiffness"})
 """Keys of the motors' stiction."""
-TOUCH = 1e-6
-"""Torque below which a gear at rest lies within its backlash [N m]."""
-STEEPEST = math.pi / 6
-"""Largest tilt of an arm [rad]."""
+TOUCH = 1e-6  # torque below which a gear at rest lies within its backlash [N m]
+STEEPEST = math.pi / 6  # largest tilt of an arm [rad]
 
 
 @dataclass(frozen=True)
 class YieldingBase:
     """A base on springs; raise ValueError unless each value is positive (`damping_time` may be 0)."""
 
-    stiffness: float = 1.5e5
-    """Stiffness about each of the two axes [N m/rad]."""
-    damping_time: float = 1e-3
-    """Damping divided by stiffness [s]."""
-    mass: float = 20.0
-    """Mass of the ring under the arm [kg]."""
-    radius: float = 0.25
-    """Radius of the ring, for its inertia [m]."""
+    stiffness: float = 1.5e5  # stiffness about each of the two axes [N m/rad]
+    damping_time: float = 1e-3  # damping divided by stiffness [s]
+    mass: float = 20.0  # mass of the ring under the arm [kg]
+    radius: float = 0.25  # radius of the ring, for its inertia [m]
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass", "radius"):
@@ -64,34 +58,24 @@ class YieldingBase:
 class Imperfections:
     """Deviations from the description; the defaults add none. Raise ValueError if a value is out of range."""
 
-    breakaway: float = 1.0
-    """F_s divided by F_c, at least 1 [-]."""
-    stribeck_speed: float = 0.05
-    """v_s, above 0 [rad/s]."""
+    breakaway: float = 1.0  # f_s divided by F_c, at least 1 [-]
+    stribeck_speed: float = 0.05  # v_s, above 0 [rad/s]
     rotor: float = 1.0
     """Rotor inertia divided by the description's, above 0; the feed-forward does not know it [-]."""
-    hysteresis: float = 0.0
-    """r: relative stiffness added to a gear when its twist reverses, at least 0 [-]."""
-    hysteresis_torque: float = 0.02
-    """z_max divided by the joint's torque limit, above 0 [-]."""
-    soft: float = 1.0
-    """K₁ divided by K, above 0 and at most 1 [-]."""
-    soft_torque: float = 0.1
-    """K₁ δ₁ divided by the joint's torque limit, at least 0 [-]."""
+    hysteresis: float = 0.0  # r: relative stiffness added to a gear when its twist reverses, at least 0 [-]
+    hysteresis_torque: float = 0.02  # z_max divided by the joint's torque limit, above 0 [-]
+    soft: float = 1.0  # k₁ divided by K, above 0 and at most 1 [-]
+    soft_torque: float = 0.1  # k₁ δ₁ divided by the joint's torque limit, at least 0 [-]
     stiction: tuple[float, ...] = ()
     """F_s of the torque d that holds each motor near standstill, at least 0; empty for none [N m]."""
-    stiction_load: float = 0.0
-    """μ_s: increase of d per torque in the gear, at least 0 [-]."""
-    stiction_speed: float = 0.03
-    """v_s: speed over which d decays, above 0 [rad/s]."""
+    stiction_load: float = 0.0  # μ_s: increase of d per torque in the gear, at least 0 [-]
+    stiction_speed: float = 0.03  # v_s: speed over which d decays, above 0 [rad/s]
     stiction_stiffness: float = 27.0
     """σ: stiffness of d before it breaks away, divided by the gear's, above 0 [-]."""
-    base: YieldingBase | None = None
-    """The yielding base; None for a rigid one."""
+    base: YieldingBase | None = None  # the yielding base; None for a rigid one
     torsion: float | None = None
     """Torsional stiffness of each link that bends, above 0; None for rigid in torsion [N m/rad]."""
-    backlash: tuple[float, ...] = ()
-    """b of each joint, half its backlash, at least 0; empty for none [rad]."""
+    backlash: tuple[float, ...] = ()  # b of each joint, half its backlash, at least 0; empty for none [rad]
     tilt: float = 0.0
     """Angle by which the arm leans about the world's x axis, at most 30 degrees either way [rad]."""
 
@@ -129,30 +113,18 @@ class Imperfections:
 class GearLaw:
     """Imperfections of friction and gears in the units of the equations; arrays have one entry per joint."""
 
-    breakaway: float
-    """F_s/F_c [-]."""
-    stribeck_speed: float
-    """v_s [rad/s]."""
-    softness: Floats
-    """K - K₁, shape (n,) [N m/rad]."""
-    soft_angle: Floats
-    """δ₁, shape (n,) [rad]."""
-    hysteresis: Floats
-    """r K, shape (n,) [N m/rad]."""
-    hysteresis_torque: Floats
-    """z_max, shape (n,) [N m]."""
-    stiffness: Floats
-    """K, shape (n,) [N m/rad]."""
-    backlash: Floats
-    """b, shape (n,) [rad]."""
-    stiction: Floats
-    """F_s of the stiction, shape (n,) [N m]."""
-    stiction_load: float
-    """μ_s [-]."""
-    stiction_speed: float
-    """v_s of the stiction [rad/s]."""
-    stiction_stiffness: Floats
-    """σ K, shape (n,) [N m/rad]."""
+    breakaway: float  # f_s/F_c [-]
+    stribeck_speed: float  # v_s [rad/s]
+    softness: Floats  # k - K₁, shape (n,) [N m/rad]
+    soft_angle: Floats  # δ₁, shape (n,) [rad]
+    hysteresis: Floats  # r K, shape (n,) [N m/rad]
+    hysteresis_torque: Floats  # z_max, shape (n,) [N m]
+    stiffness: Floats  # k, shape (n,) [N m/rad]
+    backlash: Floats  # b, shape (n,) [rad]
+    stiction: Floats  # f_s of the stiction, shape (n,) [N m]
+    stiction_load: float  # μ_s [-]
+    stiction_speed: float  # v_s of the stiction [rad/s]
+    stiction_stiffness: Floats  # σ K, shape (n,) [N m/rad]
 
     @classmethod
     def of(cls, imperfections: Imperfections, description: RobotDescription) -> "GearLaw":

@@ -61,18 +61,12 @@ def solve(L: Floats, x: Floats) -> None:
 class ArmState(NamedTuple):
     """State of the arm with N links and n motors."""
 
-    y: Floats
-    """Angles of N links, then n motors, shape (N+n,) [rad]."""
-    v: Floats
-    """Velocities, shape (N+n,) [rad/s]."""
-    a: Floats
-    """Mean accelerations of the last substep, shape (N+n,) [rad/s^2]."""
-    s: Floats
-    """Integrators of the drives, shape (n,) [rad s]."""
-    z: Floats
-    """Hysteresis torque of each gear, shape (n,) [N m]."""
-    d: Floats
-    """Stiction of each motor, shape (n,) [N m]."""
+    y: Floats  # angles of N links, then n motors, shape (N+n,) [rad]
+    v: Floats  # velocities, shape (N+n,) [rad/s]
+    a: Floats  # mean accelerations of the last substep, shape (N+n,) [rad/s^2]
+    s: Floats  # integrators of the drives, shape (n,) [rad s]
+    z: Floats  # hysteresis torque of each gear, shape (n,) [N m]
+    d: Floats  # stiction of each motor, shape (n,) [N m]
     load: Floats
     """Torque in each motor's gear in the middle of the last substep, if motors stick, shape (n,) [N m]."""
 

@@ -13,52 +13,29 @@ from tvist_plant.model import Floats, Integers
 class JointParameters(NamedTuple):
     """Parameters of one joint."""
 
-    rotor_inertia: float
-    """B [kg m^2]."""
-    velocity_gain: float
-    """K_d [N m s/rad]."""
-    position_gain: float
-    """K_d (K_p + K_i) [N m/rad]."""
-    integral_gain: float
-    """K_d K_p K_i [N m/(rad s)]."""
-    friction: float
-    """F_c; zero if friction is modelled as linear [N m]."""
-    friction_width: float
-    """w [rad/s]."""
-    breakaway: float
-    """F_s/F_c [-]."""
-    stribeck_speed: float
-    """v_s [rad/s]."""
-    link: float
-    """Index of its link, as a float [-]."""
-    gear_stiffness: float
-    """K [N m/rad]."""
-    gear_damping: float
-    """D [N m s/rad]."""
-    gear_error: float
-    """Amplitude ε of the gear's kinematic error [rad]."""
-    gear_waves: float
-    """n_w [-]."""
-    gear_phase: float
-    """φ [rad]."""
-    softness: float
-    """K - K₁ [N m/rad]."""
-    soft_angle: float
-    """δ₁ [rad]."""
-    hysteresis: float
-    """r K [N m/rad]."""
-    hysteresis_torque: float
-    """z_max [N m]."""
-    backlash: float
-    """b [rad]."""
-    stiction: float
-    """F_s of the stiction [N m]."""
-    stiction_load: float
-    """μ_s [-]."""
-    stiction_speed: float
-    """v_s of the stiction [rad/s]."""
-    stiction_stiffness: float
-    """σ K [N m/rad]."""
+    rotor_inertia: float  # b [kg m^2]
+    velocity_gain: float  # k_d [N m s/rad]
+    position_gain: float  # k_d (K_p + K_i) [N m/rad]
+    integral_gain: float  # k_d K_p K_i [N m/(rad s)]
+    friction: float  # f_c; zero if friction is modelled as linear [N m]
+    friction_width: float  # w [rad/s]
+    breakaway: float  # f_s/F_c [-]
+    stribeck_speed: float  # v_s [rad/s]
+    link: float  # index of its link, as a float [-]
+    gear_stiffness: float  # k [N m/rad]
+    gear_damping: float  # d [N m s/rad]
+    gear_error: float  # amplitude ε of the gear's kinematic error [rad]
+    gear_waves: float  # n_w [-]
+    gear_phase: float  # φ [rad]
+    softness: float  # k - K₁ [N m/rad]
+    soft_angle: float  # δ₁ [rad]
+    hysteresis: float  # r K [N m/rad]
+    hysteresis_torque: float  # z_max [N m]
+    backlash: float  # b [rad]
+    stiction: float  # f_s of the stiction [N m]
+    stiction_load: float  # μ_s [-]
+    stiction_speed: float  # v_s of the stiction [rad/s]
+    stiction_stiffness: float  # σ K [N m/rad]
 
 
 ROWS = len(JointParameters._fields)

@@ -30,20 +30,13 @@ class FlexibleModel:
 
     model: pin.Model
     """Model with at least N = n + 2 x (bending links) degrees of freedom, in the order of the chain."""
-    joints: Integers
-    """Indices of the n joints."""
-    flexes: Integers
-    """Indices of all virtual joints."""
-    bending: Integers
-    """Indices of the virtual joints about y and z of bending links."""
-    flex_stiffness: Floats
-    """Stiffness of each virtual joint [N m/rad]."""
-    flex_damping: Floats
-    """Damping of each virtual joint [N m s/rad]."""
-    flange: int
-    """Frame index of the flange."""
-    bare: pin.Inertia
-    """Body of the last joint, without payload."""
+    joints: Integers  # indices of the n joints
+    flexes: Integers  # indices of all virtual joints
+    bending: Integers  # indices of the virtual joints about y and z of bending links
+    flex_stiffness: Floats  # stiffness of each virtual joint [N m/rad]
+    flex_damping: Floats  # damping of each virtual joint [N m s/rad]
+    flange: int  # frame index of the flange
+    bare: pin.Inertia  # body of the last joint, without payload
 
     def carry(self, payload: Payload) -> None:
         """Change the payload in place, since a new model takes half a tick; both are equal up to rounding."""

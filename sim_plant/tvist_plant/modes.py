@@ -14,10 +14,8 @@ from tvist_plant.model import FlexibleModel, Floats
 class Modes:
     """Oscillatory modes in ascending frequency; arrays have one entry per mode."""
 
-    f_d: Floats
-    """Damped frequencies [Hz]."""
-    zeta: Floats
-    """Damping ratios [-]."""
+    f_d: Floats  # damped frequencies [Hz]
+    zeta: Floats  # damping ratios [-]
     participation: Floats
     """Amplitude of the flange acceleration after a step of 1 rad/s² in a joint's reference acceleration, root
     sum of squares over joints and axes [m/s^2 per rad/s^2]."""

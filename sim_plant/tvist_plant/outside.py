@@ -10,14 +10,10 @@ from tvist_plant.model import FLANGE, FlexibleModel, Floats
 
 
 class _Wrench(NamedTuple):
-    joint: int
-    """Index of the model's joint that moves the body."""
-    point: Floats
-    """Point of application in the joint's frame, shape (3,) [m]."""
-    force: Floats
-    """Force in world axes, shape (3,) [N]."""
-    moment: Floats
-    """Moment about the point, world axes, shape (3,) [N m]."""
+    joint: int  # index of the model's joint that moves the body
+    point: Floats  # point of application in the joint's frame, shape (3,) [m]
+    force: Floats  # force in world axes, shape (3,) [N]
+    moment: Floats  # moment about the point, world axes, shape (3,) [N m]
 
 
 class Outside:

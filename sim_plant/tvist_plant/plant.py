@@ -17,10 +17,8 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
 from tvist_plant.modes import Modes
 
-PERIOD = 0.002
-"""Control period [s]."""
-GRAVITY = 9.81
-"""Gravitational acceleration, along the base's negative z axis [m/s²]."""
+PERIOD = 0.002  # control period [s]
+GRAVITY = 9.81  # Gravitational acceleration, along the base's negative z axis [m/s²]
 
 
 class PlantError(ArithmeticError):
@@ -34,16 +32,11 @@ class Measurement:
     Not frozen, because creating a frozen one at every tick takes five times as long.
     """
 
-    q: Floats
-    """Link-side joint angles, shape (n,) [rad]."""
-    qd: Floats
-    """Link-side joint velocities, shape (n,) [rad/s]."""
-    moment: Floats
-    """Motor torques on the joint side, shape (n,) [N m]."""
-    accelerometer: Floats
-    """Specific force in the flange frame, with noise, shape (3,) [m/s^2]."""
-    timestamp: float | None = None
-    """Time of the measurement on the plant's clock; None if it has none [s]."""
+    q: Floats  # link-side joint angles, shape (n,) [rad]
+    qd: Floats  # link-side joint velocities, shape (n,) [rad/s]
+    moment: Floats  # motor torques on the joint side, shape (n,) [N m]
+    accelerometer: Floats  # specific force in the flange frame, with noise, shape (3,) [m/s^2]
+    timestamp: float | None = None  # time of the measurement on the plant's clock; None if it has none [s]
     wrench: Floats | None = None
     """Force and torque about the flange's origin that everything beyond the force sensor exerts on the
     flange, in its frame, shape (6,) [N, N m]: weight, inertia and contact, with noise and offset. A push
@@ -54,20 +47,15 @@ class Measurement:
 class PlantTruth:
     """Quantities that a simulation knows and a real robot cannot measure."""
 
-    motor_q: Floats
-    """Motor angles on the joint side θ, shape (n,) [rad]."""
-    motor_qd: Floats
-    """Motor velocities on the joint side, shape (n,) [rad/s]."""
-    gear_deflection: Floats
-    """q - θ, shape (n,) [rad]."""
+    motor_q: Floats  # motor angles on the joint side θ, shape (n,) [rad]
+    motor_qd: Floats  # motor velocities on the joint side, shape (n,) [rad/s]
+    gear_deflection: Floats  # q - θ, shape (n,) [rad]
     link_deflection: Floats
     """Angles of the links' virtual joints, about y and z of each; empty if links are rigid [rad]."""
     flange_position: Floats
     """Position of the flange in the world including deflections and tilt, shape (3,) [m]."""
-    flange_rotation: Floats
-    """Orientation of the flange, deflections included, shape (3, 3)."""
-    specific_force: Floats
-    """Specific force in the flange frame without noise, shape (3,) [m/s^2]."""
+    flange_rotation: Floats  # orientation of the flange, deflections included, shape (3, 3)
+    specific_force: Floats  # specific force in the flange frame without noise, shape (3,) [m/s^2]
     static_gear_deflection: Floats | None = None
     """Part of `gear_deflection` that remains at rest in this pose, shape (n,); None: unknown [rad]."""
     static_link_deflection: Floats | None = None
@@ -78,112 +66,81 @@ class PlantTruth:
 class Response:
     """Results of T consecutive periods."""
 
-    measured: Measurement
-    """Measurements after each period, with arrays of shape (T, n) and (T, 3)."""
-    specific_force: Floats
-    """Specific force in the flange frame without noise, shape (T, 3) [m/s^2]."""
-    flange_position: Floats
-    """Position of the flange, shape (T, 3) [m]."""
-    flange_rotation: Floats
-    """Orientation of the flange, shape (T, 3, 3)."""
+    measured: Measurement  # measurements after each period, with arrays of shape (T, n) and (T, 3)
+    specific_force: Floats  # specific force in the flange frame without noise, shape (T, 3) [m/s^2]
+    flange_position: Floats  # position of the flange, shape (T, 3) [m]
+    flange_rotation: Floats  # orientation of the flange, shape (T, 3, 3)
 
 
 @dataclass(frozen=True)
 class Halt:
     """A stop by the arm's own controller."""
 
-    why: str
-    """The reason, and what to do before tvist can power on or unlock the arm."""
-    safety_mode: int
-    """The arm's safety mode (RTDE number)."""
+    why: str  # the reason, and what to do before tvist can power on or unlock the arm
+    safety_mode: int  # the arm's safety mode (RTDE number)
 
 
 @dataclass(frozen=True)
 class Condition:
     """State of a plant's drives as the plant reports it."""
 
-    ready: bool
-    """Whether the drives have power and the brakes are released."""
-    fault: str | None = None
-    """Description of a fault; None without one."""
-    halt: Halt | None = None
-    """The stop by the arm's own controller; None if it has not stopped."""
+    ready: bool  # whether the drives have power and the brakes are released
+    fault: str | None = None  # description of a fault; None without one
+    halt: Halt | None = None  # the stop by the arm's own controller; None if it has not stopped
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sight:
     """One cycle's report of a robot that its own controller moves."""
 
-    tick: int
-    """Number of the control period on the robot's clock, increasing."""
-    measured: Measurement
-    """The robot's measurements."""
+    tick: int  # number of the control period on the robot's clock, increasing
+    measured: Measurement  # the robot's measurements
     target: Floats
     """The robot's target position [rad], velocity [rad/s], acceleration [rad/s²] and torque [N m], shape (4, n)."""
-    modes: tuple[int, int, int]
-    """Robot mode, safety mode and runtime state (RTDE numbers)."""
-    speed: float
-    """Fraction of the programmed speed [-]."""
-    missed: int
-    """Number of cycles lost since the first one."""
-    payload: Payload | None = None
-    """Payload set on the robot; None if not reported."""
+    modes: tuple[int, int, int]  # robot mode, safety mode and runtime state (RTDE numbers)
+    speed: float  # fraction of the programmed speed [-]
+    missed: int  # number of cycles lost since the first one
+    payload: Payload | None = None  # payload set on the robot; None if not reported
     tool: tuple[float, ...] | None = None
     """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]; None if not reported."""
     force: tuple[float, ...] | None = None
     """Force and torque at the tool centre point, base frame [N, N m]; None if not reported."""
-    slider: float | None = None
-    """Position of the speed slider [-]; None if not reported."""
-    inputs: int = 0
-    """Digital inputs, bits in RTDE's order."""
-    outputs: int = 0
-    """Digital outputs, bits in RTDE's order."""
-    told: tuple[str, ...] = ()
-    """Messages for users."""
+    slider: float | None = None  # position of the speed slider [-]; None if not reported
+    inputs: int = 0  # digital inputs, bits in RTDE's order
+    outputs: int = 0  # digital outputs, bits in RTDE's order
+    told: tuple[str, ...] = ()  # messages for users
 
 
 @dataclass(frozen=True)
 class Shape:
     """A primitive shape."""
 
-    kind: str
-    """`plane`, `sphere`, `capsule`, `ellipsoid`, `cylinder` or `box`."""
+    kind: str  # `plane`, `sphere`, `capsule`, `ellipsoid`, `cylinder` or `box`
     size: tuple[float, ...]
     """Size as in MuJoCo: radius and half length along z, or half lengths; 0 for an infinite side of a plane [m]."""
-    pose: tuple[float, ...]
-    """Pose in the body's frame: x y z [m] and rotation vector [rad]."""
-    body: int | None
-    """Number of the body that carries it; None if fixed in the arm's base frame."""
-    colour: tuple[float, ...]
-    """Red, green, blue and opacity, 0 to 1."""
+    pose: tuple[float, ...]  # pose in the body's frame: x y z [m] and rotation vector [rad]
+    body: int | None  # number of the body that carries it; None if fixed in the arm's base frame
+    colour: tuple[float, ...]  # Red, green, blue and opacity, 0 to 1
 
 
 @dataclass(frozen=True)
 class Things:
     """The objects around an arm."""
 
-    name: str
-    """Name of the scene."""
-    bodies: tuple[str, ...]
-    """Names of the moving bodies."""
-    shapes: tuple[Shape, ...]
-    """Shapes of the moving bodies and of everything fixed."""
-    areas: Mapping[str, Shape]
-    """Named areas in which a test can check for a body."""
-    unseen: int = 0
-    """Number of shapes left out, such as meshes."""
+    name: str  # name of the scene
+    bodies: tuple[str, ...]  # names of the moving bodies
+    shapes: tuple[Shape, ...]  # shapes of the moving bodies and of everything fixed
+    areas: Mapping[str, Shape]  # named areas in which a test can check for a body
+    unseen: int = 0  # number of shapes left out, such as meshes
 
 
 @dataclass(frozen=True)
 class Hand:
     """A gripper whose two fingers close along y of the tool centre point."""
 
-    stroke: float
-    """Distance between open fingers [m]."""
-    position: Floats
-    """Position of the tool centre point in the flange frame, shape (3,) [m]."""
-    rotation: Floats
-    """Orientation of the tool centre point in the flange frame, shape (3, 3)."""
+    stroke: float  # distance between open fingers [m]
+    position: Floats  # position of the tool centre point in the flange frame, shape (3,) [m]
+    rotation: Floats  # orientation of the tool centre point in the flange frame, shape (3, 3)
 
     @property
     def direction(self) -> Floats:

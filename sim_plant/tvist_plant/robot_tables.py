@@ -20,8 +20,7 @@ Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
 MAX_JOINTS = 7
 DISTURBANCES = ("friction", "gear", "noise")
 """Disturbances unknown to a shaper: Coulomb friction, kinematic gear error, accelerometer noise."""
-ORIGINS = ("published", "measured", "given", "assumed", "invented")
-"""Kinds of sources in `provenance`."""
+ORIGINS = ("published", "measured", "given", "assumed", "invented")  # kinds of sources in `provenance`
 QUIET_STEP = 2.0 * math.pi / 2**23
 """Step of a 23-bit encoder [rad]; an arm at rest moves less while its drives settle."""
 
@@ -54,12 +53,9 @@ class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True, 
     Denavit-Hartenberg parameters, Tz(d) Tx(a) Rx(alpha), or `placement`.
     """
 
-    a: tuple[Number, ...] = ()
-    """Link lengths [m]."""
-    d: tuple[Number, ...] = ()
-    """Link offsets [m]."""
-    alpha: tuple[Number, ...] = ()
-    """Link twists [rad]."""
+    a: tuple[Number, ...] = ()  # link lengths [m]
+    d: tuple[Number, ...] = ()  # link offsets [m]
+    alpha: tuple[Number, ...] = ()  # link twists [rad]
     placement: tuple[Placement, ...] = ()
     """Position [m] and roll, pitch, yaw about fixed axes [rad]: x y z roll pitch yaw."""
 
@@ -67,31 +63,21 @@ class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True, 
 class Links(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Mass properties of the rigid links, in the frame at the end of each link."""
 
-    mass: tuple[Positive, ...]
-    """Masses [kg]."""
-    com: tuple[Vector3, ...]
-    """Centres of mass [m]."""
-    inertia: tuple[Tensor, ...]
-    """Inertias about the centres of mass [kg m^2]."""
+    mass: tuple[Positive, ...]  # masses [kg]
+    com: tuple[Vector3, ...]  # centres of mass [m]
+    inertia: tuple[Tensor, ...]  # Inertias about the centres of mass [kg m^2]
 
 
 class ArmLimits(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Limits of the controller; tuples have one entry per joint."""
 
-    position: tuple[Positive, ...]
-    """Largest distance from zero in either direction [rad]."""
-    velocity: tuple[Positive, ...]
-    """Velocity limits [rad/s]."""
-    acceleration: tuple[Positive, ...]
-    """Acceleration limits [rad/s^2]."""
-    jerk: tuple[Positive, ...]
-    """Jerk limits [rad/s^3]."""
-    torque: tuple[Positive, ...]
-    """Torque limits [N m]."""
-    payload: NotNegative
-    """Rated payload [kg]."""
-    repeatability: Positive
-    """Repeatability of the tool's position [m]."""
+    position: tuple[Positive, ...]  # largest distance from zero in either direction [rad]
+    velocity: tuple[Positive, ...]  # velocity limits [rad/s]
+    acceleration: tuple[Positive, ...]  # acceleration limits [rad/s^2]
+    jerk: tuple[Positive, ...]  # jerk limits [rad/s^3]
+    torque: tuple[Positive, ...]  # torque limits [N m]
+    payload: NotNegative  # rated payload [kg]
+    repeatability: Positive  # repeatability of the tool's position [m]
 
 
 class Payload(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -141,21 +127,16 @@ class Drives(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class LinkFlexibility(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Links that bend, each with two virtual elastic joints about y and z in its middle."""
 
-    links: tuple[Annotated[int, Meta(ge=0, lt=MAX_JOINTS)], ...] = ()
-    """Indices of the links, 0 for the first."""
-    stiffness: tuple[Positive, ...] = ()
-    """Stiffness for both axes, one entry per link [N m/rad]."""
-    damping_time: NotNegative = 0.0
-    """Damping divided by stiffness [s]."""
+    links: tuple[Annotated[int, Meta(ge=0, lt=MAX_JOINTS)], ...] = ()  # indices of the links, 0 for the first
+    stiffness: tuple[Positive, ...] = ()  # stiffness for both axes, one entry per link [N m/rad]
+    damping_time: NotNegative = 0.0  # damping divided by stiffness [s]
 
 
 class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Properties of the sensors."""
 
-    accelerometer_noise: NotNegative = 0.0
-    """rms per axis [m/s^2]."""
-    encoder_step: NotNegative = 0.0
-    """Change of a joint angle that updates its reading [rad]."""
+    accelerometer_noise: NotNegative = 0.0  # rms per axis [m/s^2]
+    encoder_step: NotNegative = 0.0  # change of a joint angle that updates its reading [rad]
     force_noise: NotNegative = 1.2
     """rms per axis of the force of the flange sensor, which only an arm in a world has; a third of UR's
     published e-Series precision, 3.5 N [N]."""
@@ -163,8 +144,7 @@ class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """rms per axis of the torque of the flange sensor; a third of 0.2 N m [N m]."""
     force_offset: NotNegative = 4.0
     """Largest constant force error per axis, drawn from the seed; UR's published accuracy [N]."""
-    torque_offset: NotNegative = 0.3
-    """Largest constant torque error per axis [N m]."""
+    torque_offset: NotNegative = 0.3  # largest constant torque error per axis [N m]
 
 
 class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -184,29 +164,22 @@ class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class Collision(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Bodies of the arm and the floor, which must not collide; neighbours in the list may touch."""
 
-    floor: Number = 0.0
-    """Height of the floor, which the first two bodies may touch [m]."""
-    has_floor: bool = True
-    """Whether there is a floor."""
+    floor: Number = 0.0  # height of the floor, which the first two bodies may touch [m]
+    has_floor: bool = True  # whether there is a floor
     payload_radius: Positive = 0.05
     """Radius of a capsule from the flange through the payload's centre to twice its distance [m]."""
-    apart: tuple[tuple[str, str], ...] = ()
-    """Further pairs that are not checked; "payload" is a valid name."""
-    bodies: tuple[Body, ...] = ()
-    """Bodies of the arm, from the base to the flange."""
+    apart: tuple[tuple[str, str], ...] = ()  # further pairs that are not checked; "payload" is a valid name
+    bodies: tuple[Body, ...] = ()  # bodies of the arm, from the base to the flange
 
 
 class Mesh(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A mesh of a part of the arm, for drawing only."""
 
-    link: Annotated[int, Meta(ge=-1)]
-    """Index of the link in whose frame it is given; -1 for the base frame."""
-    file: str
-    """Path of the mesh file."""
+    link: Annotated[int, Meta(ge=-1)]  # index of the link in whose frame it is given; -1 for the base frame
+    file: str  # path of the mesh file
     placement: Placement = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     """Position [m] and roll, pitch, yaw about fixed axes [rad]."""
-    scale: Vector3 = (1.0, 1.0, 1.0)
-    """Scale factors [-]."""
+    scale: Vector3 = (1.0, 1.0, 1.0)  # scale factors [-]
 
 
 class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):

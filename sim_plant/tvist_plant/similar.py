@@ -29,10 +29,8 @@ from tvist_plant.user_file import toml
 
 RULE: Final = "assumed: the UR5e's, scaled by dynamic similarity to this arm's torques and length"
 """Provenance of the values computed here."""
-WRIST: Final = 3
-"""Number of joints at the end that correspond to the UR5e's wrist."""
-DIGITS: Final = 4
-"""Number of significant digits of scaled values."""
+WRIST: Final = 3  # number of joints at the end that correspond to the UR5e's wrist
+DIGITS: Final = 4  # number of significant digits of scaled values
 
 _POWERS: Final = {
     "gear_stiffness": (1.0, 0.0),
@@ -84,8 +82,7 @@ class Scale:
         ]
         """τ of each joint, shape (n,) [-]."""
         length = stretched(kinematics)
-        self.length = length / stretched(measured.kinematics) if length > 0.0 else 1.0
-        """λ [-]."""
+        self.length = length / stretched(measured.kinematics) if length > 0.0 else 1.0  # λ [-]
 
     @property
     def time(self) -> float:
@@ -131,8 +128,7 @@ class Scale:
         }
 
 
-BENDING_LENGTH: Final = 0.2
-"""Length above which a link bends, in an arm as long as the UR5e [m]."""
+BENDING_LENGTH: Final = 0.2  # length above which a link bends, in an arm as long as the UR5e [m]
 
 
 def completed(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -191,8 +187,7 @@ def with_limits(content: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-_POSES: Final = {"Q1": 0.0, "Q2": 0.5}
-"""Poses of an arm from a URDF: one angle for all joints [rad]."""
+_POSES: Final = {"Q1": 0.0, "Q2": 0.5}  # poses of an arm from a URDF: one angle for all joints [rad]
 
 
 def _rounded(value: float) -> float:

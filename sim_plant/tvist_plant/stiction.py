@@ -4,8 +4,7 @@ import math
 
 from tvist_plant._compiled import compiled
 
-MIN_TORQUE = 1e-9
-"""Remaining stiction of a fast motor, to avoid a division by zero [N m]."""
+MIN_TORQUE = 1e-9  # remaining stiction of a fast motor, to avoid a division by zero [N m]
 
 
 @compiled

@@ -22,14 +22,11 @@ from tvist_plant.user_file import LONGEST_NAME, UserFileError, is_name, read_tex
 TURNING: Final = ("revolute", "continuous")
 FLANGES: Final = ("tool0", "flange")
 """Names of a link that marks the flange if it is fixed to the last joint; otherwise that joint's link is the flange."""
-CONTINUOUS: Final = 4.0 * math.pi
-"""Position limit of a joint without end stops [rad]."""
-UPRIGHT: Final = 1e-6
-"""Deviation of the first axis from the vertical that counts as rounding [-]."""
+CONTINUOUS: Final = 4.0 * math.pi  # position limit of a joint without end stops [rad]
+UPRIGHT: Final = 1e-6  # deviation of the first axis from the vertical that counts as rounding [-]
 DEEPEST: Final = 200
 """Largest number of joints from the base to a link, fixed ones included, because URDF parsers recurse."""
-LARGEST: Final = 1e7
-"""Largest number, as in other robot files."""
+LARGEST: Final = 1e7  # largest number, as in other robot files
 _ORIGIN: Final = {"xyz": (0.0, 0.0, 0.0), "rpy": (0.0, 0.0, 0.0)}
 NUMBERS: Final[dict[tuple[str, str], dict[str, tuple[float, ...]]]] = {
     ("joint", "origin"): {**_ORIGIN},

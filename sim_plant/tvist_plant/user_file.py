@@ -8,15 +8,12 @@ from pathlib import Path
 from typing import Any, Final
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
-LARGEST: Final = 4 << 20
-"""Largest file size, a hundred times the largest useful one [bytes]."""
+LARGEST: Final = 4 << 20  # largest file size, a hundred times the largest useful one [bytes]
 DEEPEST: Final = 100
 """Deepest nesting of XML elements and TOML brackets, and most parts of a dotted TOML key, since the parser
 takes quadratic time. TOML files need five levels."""
-LONGEST_NAME: Final = 100
-"""Largest number of characters of a name."""
-LONGEST_LINE: Final = 500
-"""Largest number of characters quoted from a file or a library's message."""
+LONGEST_NAME: Final = 100  # largest number of characters of a name
+LONGEST_LINE: Final = 500  # largest number of characters quoted from a file or a library's message
 
 
 def named(error: BaseException, said: str | None = None) -> str:

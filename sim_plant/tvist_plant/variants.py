@@ -24,14 +24,11 @@ SCATTER: Final = 0.15
 MASS_SCATTER, COM_SCATTER = 0.07, 0.010
 """Relative deviation of each link's mass [-] and deviation of its centre of mass per axis [m] in `blind`,
 with random signs."""
-TORSION: Final = 2e4
-"""Torsional stiffness of links that twist [N m/rad]."""
+TORSION: Final = 2e4  # torsional stiffness of links that twist [N m/rad]
 BACKLASH: Final = (5e-5, 1e-4, 1e-4, 2e-4, 2e-4, 2e-4)
 """Half the backlash of each gear, by the corresponding joint of the UR5e [rad]."""
-SPRINGS: Final = ("gear_stiffness",)
-"""Stiffnesses among the drives' parameters."""
-LOOPS: Final = (*SPRINGS, "velocity_gain", "position_gain")
-"""Springs and loop gains."""
+SPRINGS: Final = ("gear_stiffness",)  # Stiffnesses among the drives' parameters
+LOOPS: Final = (*SPRINGS, "velocity_gain", "position_gain")  # springs and loop gains
 DRIVES: Final = {
     "gear_stiffness": 0.2,
     "gear_damping": 0.2,
@@ -43,10 +40,8 @@ DRIVES: Final = {
 """Largest relative deviation per joint of a hidden robot's drives; the width is common to all joints [-]."""
 LINKS: Final = {"stiffness": 0.2, "damping_time": 0.2}
 """Largest relative deviation per bending link; the damping time is common to all links [-]."""
-MASS: Final = 0.15
-"""Largest relative deviation of the carried mass from the declared one [-]."""
-CENTRE: Final = 0.015
-"""Largest deviation of the carried centre of mass per flange axis [m]."""
+MASS: Final = 0.15  # largest relative deviation of the carried mass from the declared one [-]
+CENTRE: Final = 0.015  # largest deviation of the carried centre of mass per flange axis [m]
 
 HEAVIER: Final[Mapping[str, float | tuple[float, ...]]] = {
     "coulomb_friction": (1.21, 1.3, 1.02, 1.22, 1.29, 1.06),
@@ -58,8 +53,7 @@ HEAVIER: Final[Mapping[str, float | tuple[float, ...]]] = {
 """Factors for an arm with more friction than its controller knows, drawn once: F_s and μ_s within 1.3 to 2.5,
 F_c within 1 to 1.4, v_s and σ within 0.7 to 1.5 [-]."""
 
-Factors = Callable[[float, tuple[int, ...]], Any]
-"""Function that returns factors for a share and a shape."""
+Factors = Callable[[float, tuple[int, ...]], Any]  # function that returns factors for a share and a shape
 
 
 def _same(description: RobotDescription, _seed: int) -> RobotDescription:
@@ -70,20 +64,15 @@ def _same(description: RobotDescription, _seed: int) -> RobotDescription:
 class Variant:
     """A plant by name."""
 
-    name: str
-    """Name in JSON and on the command line."""
-    label: str
-    """Description for users."""
+    name: str  # name in JSON and on the command line
+    label: str  # description for users
     truly: Callable[[RobotDescription, int], RobotDescription] = _same
     """Function that returns the true arm from the controller's description and a seed."""
-    imperfections: Imperfections | None = None
-    """Deviations that no description contains; None for none."""
-    backlash: float = 0.0
-    """Backlash of the gears, relative to `BACKLASH` [-]."""
+    imperfections: Imperfections | None = None  # deviations that no description contains; None for none
+    backlash: float = 0.0  # backlash of the gears, relative to `BACKLASH` [-]
     carries: Callable[[Payload], Payload] | None = None
     """Function that returns the carried payload from the declared one; None if they are equal."""
-    seed: int | None = None
-    """Fixed seed that overrides the given one."""
+    seed: int | None = None  # fixed seed that overrides the given one
 
     def make(self, description: RobotDescription, carried: Payload, seed: int) -> SimulatedArm:
         """Create the arm from the controller's description, the declared payload and a seed."""

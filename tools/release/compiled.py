@@ -18,8 +18,7 @@ from tools.release.environments import FailedError, clean, constraints, install,
 ROOT = Path(__file__).parents[2]
 
 NAME, FOLDER = "tvist-compiled", "tvist_compiled"
-SYSTEM = "manylinux_2_17"
-"""The machine code calls no system library that is not already in the process."""
+SYSTEM = "manylinux_2_17"  # the machine code calls no system library that is not already in the process
 ASKED = """
 import json, sys
 from importlib.metadata import version

@@ -17,10 +17,8 @@ if TYPE_CHECKING:
     from cyclopts.help import HelpEntry, HelpPanel
     from rich.console import Console, ConsoleOptions
 
-FOLDER = "commands"
-"""Folder of these pages in the site."""
-OVERVIEW = "cli/README.md"
-"""Page that lists the commands."""
+FOLDER = "commands"  # folder of these pages in the site
+OVERVIEW = "cli/README.md"  # page that lists the commands
 OPTION = re.compile(r"(?<!\w)--[a-z][\w-]*")
 NAMED = re.compile(r"`tvist (?P<command>[a-z ]+)`")
 

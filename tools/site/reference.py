@@ -11,10 +11,8 @@ from tools.site.tree import ROOT
 
 PROGRAMS = {"tvist_cli", "tvist_server", "tvist_view"}
 """Packages that are run, not imported. Every other package has an API."""
-FOLDER = "api"
-"""Folder of these pages in the site."""
-MANY = 15
-"""Most exports of a module on a single page."""
+FOLDER = "api"  # folder of these pages in the site
+MANY = 15  # most exports of a module on a single page
 SHOWN = "    options: { show_root_heading: true, show_root_toc_entry: true }\n"
 
 
@@ -22,12 +20,9 @@ SHOWN = "    options: { show_root_heading: true, show_root_toc_entry: true }\n"
 class Module:
     """A module with a page."""
 
-    name: str
-    """Dotted name."""
-    source: Path
-    """Folder that contains its package."""
-    about: str
-    """First line of its docstring, without the full stop."""
+    name: str  # dotted name
+    source: Path  # folder that contains its package
+    about: str  # first line of its docstring, without the full stop
     parts: dict[str, list[str]] = field(default_factory=dict)
     """Exported names by the module that defines them; empty if all are on one page."""
 

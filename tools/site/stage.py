@@ -12,8 +12,7 @@ from tools.site.tree import HOME, ROOT, collect, linked, links
 
 ASSETS = Path(__file__).parent / "assets"
 LOGO = Path("docs/images/logo.svg")
-FIRST = "---\nhide: [navigation, toc]\n---\n\n"
-"""Header of the front page, which uses the whole width."""
+FIRST = "---\nhide: [navigation, toc]\n---\n\n"  # header of the front page, which uses the whole width
 TRY = ROOT / "view" / "tvist_view" / "try.html"
 FRAME = '<iframe class="try" src="try.html" title="Try shaping"></iframe>\n\n'
 """The interactive shaping page, which the site's front page shows above its picture."""

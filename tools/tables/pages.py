@@ -93,16 +93,11 @@ def _bench(result: dict[str, Any]) -> dict[str, Any]:
 class Page:
     """A page of the documentation."""
 
-    path: str
-    """Path in the repository."""
-    command: str
-    """Command whose result it shows."""
-    more: Callable[[dict[str, Any]], dict[str, Any]]
-    """Returns what its template needs besides the result."""
-    files: str = ""
-    """Options for further files of the page."""
-    result: str = ""
-    """Path of the stored result; empty if it is not stored."""
+    path: str  # path in the repository
+    command: str  # command whose result it shows
+    more: Callable[[dict[str, Any]], dict[str, Any]]  # returns what its template needs besides the result
+    files: str = ""  # options for further files of the page
+    result: str = ""  # path of the stored result; empty if it is not stored
 
 
 PAGES = {

@@ -19,14 +19,11 @@ from tvist_server.tick_counts import TickCounts
 
 log = logging.getLogger(__name__)
 
-LONGEST_SLEEP = 0.1
-"""Longest sleep of the tick thread before it checks whether it should end [s]."""
+LONGEST_SLEEP = 0.1  # longest sleep of the tick thread before it checks whether it should end [s]
 LONGEST_TICK = 1.5
 """Longest wait for a tick at shutdown [s]: a plug-in arm, or in lockstep a client, may block it for ever."""
-REPEAT_EVERY = 1.0
-"""Time without a step after which a robot in lockstep republishes its last state [s]."""
-SET_TIMER_SLACK = 29
-"""`prctl` option: timer slack, the largest delay of a wake-up [ns]."""
+REPEAT_EVERY = 1.0  # time without a step after which a robot in lockstep republishes its last state [s]
+SET_TIMER_SLACK = 29  # `prctl` option: timer slack, the largest delay of a wake-up [ns]
 
 
 class TickedRobot:
@@ -42,11 +39,9 @@ class TickedRobot:
         self.host, self.pace, self.interval = host, pace, interval
         self._patience = patience
         self.jobs = Jobs()
-        self.ending = False
-        """Whether a step in progress must end."""
+        self.ending = False  # whether a step in progress must end
         self.lateness = Lateness()
-        self.overload: TickCounts | None = None
-        """Counts missed ticks; None if a client advances time."""
+        self.overload: TickCounts | None = None  # counts missed ticks; None if a client advances time
 
     def post(self, do: Do, client: str | None = None) -> None:
         """Queue a job from `client` for before the next tick, from any thread, without blocking."""
@@ -166,8 +161,7 @@ class Realtime(Clock):
             robot.overload = overload
         self._priority = priority
         self._asked = threading.Event()
-        self.granted: list[str] = []
-        """What the system granted to the thread; complete after `start`."""
+        self.granted: list[str] = []  # what the system granted to the thread; complete after `start`
 
     def start(self) -> None:
         """Start the thread, and wait until its priority and its timer slack are set."""

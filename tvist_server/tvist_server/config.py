@@ -39,8 +39,7 @@ from tvist_server.watching.address import is_place, place_of
 from tvist_server.watching.watched_robot import WatchedRobot
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-SPEED_CAP = 0.5
-"""Default speed limit of a real robot that tvist moves [rad/s]."""
+SPEED_CAP = 0.5  # default speed limit of a real robot that tvist moves [rad/s]
 TOOL_IN_WORLD = 1.0
 """Default mass on the flange in a scene [kg]: without one, the sensor would not feel what the wrist touches."""
 _REAL = ("enable_motion", "speed_cap", "tcp", "servo_lag")

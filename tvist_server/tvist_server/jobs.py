@@ -19,8 +19,7 @@ class Jobs:
 
     def __init__(self) -> None:
         self._new: SimpleQueue[_Job] = SimpleQueue()
-        self._behind: deque[_Job] = deque()
-        """Jobs that wait for the end of a step; they precede all new ones."""
+        self._behind: deque[_Job] = deque()  # jobs that wait for the end of a step; they precede all new ones
 
     def post(self, do: Do, client: str | None = None) -> None:
         """Add a job, from any thread, without blocking; `client` sent it, if known."""

@@ -37,10 +37,8 @@ from tvist_server.config import from_mapping
 from tvist_server.gateways.starting import Tell
 from tvist_server.punctual import processors
 
-MOVE_TICKS = 1000
-"""Longest time of a motion that uses kernels [ticks]."""
-LOOK = 0.5
-"""Time between two checks of what is on disk [s]."""
+MOVE_TICKS = 1000  # longest time of a motion that uses kernels [ticks]
+LOOK = 0.5  # time between two checks of what is on disk [s]
 FILTERS = (("elastic", 1), ("auto", 1), ("zv", 1), ("none", 2))
 """Shapers, each with a number of modes, that together use all kernels of shapers."""
 STUDIES = {"all_to_drives", "drive", "mean_delay", "play", "product_taps", "shape_all"}

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-KEPT = 4096
-"""Largest number of ticks kept: eight seconds, while they are read every second."""
+KEPT = 4096  # largest number of ticks kept: eight seconds, while they are read every second
 
 
 @dataclass(frozen=True)
@@ -18,8 +17,7 @@ class Punctuality:
     p50_us: float
     p99_us: float
     max_us: float
-    load: float
-    """Share of the time spent in ticks and the jobs between them [-]."""
+    load: float  # share of the time spent in ticks and the jobs between them [-]
 
 
 class Lateness:

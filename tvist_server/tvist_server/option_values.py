@@ -18,10 +18,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-RATE = 500
-"""Number of ticks in a second of simulation time."""
-SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-"""Seconds in each unit of a duration."""
+RATE = 500  # number of ticks in a second of simulation time
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}  # seconds in each unit of a duration
 LONGEST = 1000.0 * 3600.0
 """Longest accepted duration [s]."""
 MAX_ROBOTS = 64
@@ -89,10 +87,8 @@ def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[f
 class RobotEntry:
     """One of the robots listed in `robots`."""
 
-    robot: str
-    """Name of a robot that comes with the package, or path of a robot file."""
-    name: str
-    """Name of the robot on the network."""
+    robot: str  # name of a robot that comes with the package, or path of a robot file
+    name: str  # name of the robot on the network
 
 
 def members(text: str, most: int = MAX_ROBOTS) -> list[RobotEntry]:

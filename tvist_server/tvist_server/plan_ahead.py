@@ -19,14 +19,11 @@ from tvist_server.gateways.base import Answer
 
 log = logging.getLogger(__name__)
 
-MAX_WAITING = 16
-"""Number of commands that may wait for planning, their own or that of an earlier command."""
+MAX_WAITING = 16  # number of commands that may wait for planning, their own or that of an earlier command
 MAX_ASKING = 8
 """Number of waiting commands above which questions are refused, to leave room for the client in control."""
-TRIES = 10
-"""Number of outdated plans after which the controller's thread plans itself."""
-CLOSE_WAIT = 1.0
-"""Longest time to finish the current plan at close [s]."""
+TRIES = 10  # number of outdated plans after which the controller's thread plans itself
+CLOSE_WAIT = 1.0  # longest time to finish the current plan at close [s]
 
 _REHEARSING = threading.Lock()
 _BUSY = Refused(

@@ -16,13 +16,11 @@ EXTERNAL_CONTROL = (
 )
 """Placeholder of an External Control node until the program is played; see `with_external_control`."""
 _EXTERNAL = "com.fzi.externalcontrol.ExternalControlNode"
-_SIGNS = {"≟": "==", "≠": "!="}
-"""PolyScope's signs in expressions that URScript writes differently."""
+_SIGNS = {"≟": "==", "≠": "!="}  # PolyScope's signs in expressions that URScript writes differently
 _MOVES = {"MoveJ": "movej", "MoveL": "movel"}
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _STEP = re.compile(r"(\w+)(?:\[(\d{1,6})\])?")
-_MOST_REFERENCES = 100
-"""Longest chain of references; a file may contain endless ones."""
+_MOST_REFERENCES = 100  # longest chain of references; a file may contain endless ones
 _LONGEST_REFERENCE = 1000
 """Longest reference [characters]: enough for the deepest element that a file may have."""
 

@@ -17,15 +17,11 @@ class Profile(Struct, frozen=True, kw_only=True):
 
     payload: float | None = None
     """Mass of the disc on the flange, both declared and carried [kg]; None: the robot file's payload."""
-    ur_start: bool = False
-    """Whether an arm with UR's geometry starts in URSim's posture instead of `Q1`."""
+    ur_start: bool = False  # whether an arm with UR's geometry starts in URSim's posture instead of `Q1`
     shaper: str = "zv"
-    quiet: bool = False
-    """Whether sensors are free of noise."""
-    floor: bool = True
-    """Whether motions keep clear of the floor."""
-    compensate_sag: bool = False
-    """Whether the drives compensate the twist of the gears under gravity."""
+    quiet: bool = False  # whether sensors are free of noise
+    floor: bool = True  # whether motions keep clear of the floor
+    compensate_sag: bool = False  # whether the drives compensate the twist of the gears under gravity
 
     def start(self, description: RobotDescription) -> tuple[float, ...] | None:
         """Return the posture to start in [rad]; None: the robot file's `Q1`."""

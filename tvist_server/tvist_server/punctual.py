@@ -9,10 +9,8 @@ from pathlib import Path
 
 log = logging.getLogger(__name__)
 
-PRIORITY = 50
-"""Real-time priority of the tick thread: the middle of the range 1 to 99."""
-RECORDER = "recorder"
-"""Name of the threads that take the messages of every tick."""
+PRIORITY = 50  # real-time priority of the tick thread: the middle of the range 1 to 99
+RECORDER = "recorder"  # name of the threads that take the messages of every tick
 
 
 def processors() -> int:

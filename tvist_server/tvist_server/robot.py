@@ -36,8 +36,7 @@ from tvist_server.studies import Studies
 if TYPE_CHECKING:
     from tvist_server.recording.recorder import Recorder
 
-LOCAL = "127.0.0.1"
-"""Address of this machine, from which this process's own commands come."""
+LOCAL = "127.0.0.1"  # address of this machine, from which this process's own commands come
 
 
 class ServedRobot:
@@ -83,8 +82,7 @@ class ServedRobot:
                 on_moved=self.warn,
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins())
-        self.publisher = Publisher()
-        """Passes the robot's messages to the gateways."""
+        self.publisher = Publisher()  # passes the robot's messages to the gateways
         self._looked_at = self.controller.report.tick
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]

@@ -10,8 +10,7 @@ CATCH_UP = 50
 class Followed:
     """Ticks that the arm starts itself, `period` apart [s]; with `counts` False, the arm counts its missed ticks."""
 
-    due = math.inf
-    """Time from which the next tick may start: unknown."""
+    due = math.inf  # time from which the next tick may start: unknown
 
     def __init__(self, period: float, start: float, *, counts: bool = True) -> None:
         self._period, self._before, self._counts = period, start, counts
@@ -39,8 +38,7 @@ class Schedule:
         self._deadlines = [(start + period * (1.0 + robot / robots), robot) for robot in range(robots)]
         # Half a share less than a period, so that the first robot's next tick waits for its deadline.
         self._together = period * (1.0 - 0.5 / robots)
-        self.due = self._deadlines[0][0]
-        """Time from which the next tick may start [s]."""
+        self.due = self._deadlines[0][0]  # time from which the next tick may start [s]
 
     def begin(self, now: float) -> tuple[int, float, int]:
         """Take the next tick, which starts now; return the robot's index, the lateness [s] and its missed ticks."""

@@ -30,23 +30,18 @@ from tvist_server.ur_ports import InterfaceName
 if TYPE_CHECKING:
     from tvist_server.gateways.ur.interfaces import UrInterfaces
 
-LEAVE = 0.6
-"""Longest time for clients to read pending messages at shutdown [s]."""
+LEAVE = 0.6  # longest time for clients to read pending messages at shutdown [s]
 
 
-INSTANCE_BYTES = 4
-"""Number of random bytes that distinguish the tokens of this run from earlier ones."""
+INSTANCE_BYTES = 4  # number of random bytes that distinguish the tokens of this run from earlier ones
 
 
 class RecordingResult(NamedTuple):
     """Location and completeness of a recording."""
 
-    place: str
-    """Description of its location."""
-    dropped: int
-    """Number of messages dropped because the queue was full."""
-    error: str | None
-    """Reason why it ended early; None: it did not."""
+    place: str  # description of its location
+    dropped: int  # number of messages dropped because the queue was full
+    error: str | None  # reason why it ended early; None: it did not
 
 
 class Server:
@@ -70,15 +65,13 @@ class Server:
         if config.clock == "realtime":  # equal runs in lockstep must be equal, including tokens
             setups = [replace(setup, instance=secrets.token_hex(INSTANCE_BYTES)) for setup in setups]
         self._observed = observe is not None
-        self.granted: list[str] = []
-        """What the system granted to make ticks punctual; complete after `start`."""
+        self.granted: list[str] = []  # what the system granted to make ticks punctual; complete after `start`
         # A process that others reach through the first one needs no protection.
         listen, guard = (
             protected(config, [setup.name for setup in setups]) if share.router is None else ([], {})
         )
         self.robots: list[ServedRobot] = []
-        self.metrics: Metrics | None = None
-        """Figures for Prometheus; None if they are not published."""
+        self.metrics: Metrics | None = None  # figures for Prometheus; None if they are not published
         self.left = True
         """Whether the network is closed after `close`; Zenoh may still wait for a client that has stopped reading."""
         lockstep, starting = config.clock != "realtime", Starting()

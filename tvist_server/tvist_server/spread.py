@@ -7,16 +7,14 @@ from itertools import pairwise
 from tvist_server.config import ServeConfig
 from tvist_server.option_values import StartError
 
-LOCAL = "unixsock-stream/"
-"""Prefix of the endpoints reserved for the server's own processes."""
+LOCAL = "unixsock-stream/"  # prefix of the endpoints reserved for the server's own processes
 
 
 @dataclass(frozen=True)
 class Share:
     """The robots that one of several processes serves."""
 
-    numbers: range
-    """Indices of the robots in the list of all."""
+    numbers: range  # indices of the robots in the list of all
     router: str | None = None
     """Endpoint of the process that clients connect to; None if this process has the configured endpoints."""
 

@@ -37,16 +37,11 @@ def read_cell(path: str) -> Cell:
 class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Content of a state file, the fields of `simulation.reset`; None keeps the value of the `Setup`."""
 
-    q: Joints | None = None
-    """Joint angles at which the arm rests [rad]."""
-    seed: Seed | None = None
-    """Seed of sensor noise and gear errors."""
-    payload: Payload | None = None
-    """Payload that the arm carries, independent of the declared one."""
-    mode: ResetMode | None = None
-    """Robot mode."""
-    shaper: ShaperChoice | None = None
-    """Name of the shaper, or FILE.py:NAME."""
+    q: Joints | None = None  # joint angles at which the arm rests [rad]
+    seed: Seed | None = None  # seed of sensor noise and gear errors
+    payload: Payload | None = None  # payload that the arm carries, independent of the declared one
+    mode: ResetMode | None = None  # robot mode
+    shaper: ShaperChoice | None = None  # name of the shaper, or FILE.py:NAME
 
     def on(self, setup: Setup) -> Setup:
         """Return a setup with the fields of this state that are not None."""

@@ -12,8 +12,7 @@ InterfaceName = Literal[
     "primary_read_only", "secondary_read_only", "realtime_read_only", "gripper",
 ]  # fmt: skip
 """Name of one of UR's interfaces, or of that of a cell's gripper."""
-MOST_JOINTS = 6
-"""Number of joints in packages of UR's interfaces; missing joints are 0."""
+MOST_JOINTS = 6  # number of joints in packages of UR's interfaces; missing joints are 0
 WITHOUT_JOINTS: frozenset[InterfaceName] = frozenset({"dashboard", "interpreter"})
 """Interfaces without joint values, which suit any number of joints."""
 Port = Annotated[int, Meta(ge=0, le=65535)]
@@ -31,8 +30,7 @@ class UrPorts(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     primary_read_only: Port = 30011
     secondary_read_only: Port = 30012
     realtime_read_only: Port = 30013
-    gripper: Port = PORT
-    """Port of the gripper, for a robot with a cell."""
+    gripper: Port = PORT  # port of the gripper, for a robot with a cell
 
     def open(self) -> dict[InterfaceName, int]:
         """Return the ports of UR's open interfaces."""

@@ -26,10 +26,8 @@ from tvist_server.shutdown import Shutdown, limit_shutdown
 from tvist_server.spread import Share
 from tvist_server.ur_ports import InterfaceName
 
-END = 3.5
-"""Longest wait for a process to close its recordings and end [s]; then it is killed."""
-REACHED = 15.0
-"""Longest wait until clients reach all robots [s]."""
+END = 3.5  # longest wait for a process to close its recordings and end [s]; then it is killed
+REACHED = 15.0  # longest wait until clients reach all robots [s]
 
 
 @dataclass(frozen=True)
@@ -37,18 +35,15 @@ class WorkerRefused:
     """The robots cannot be served."""
 
     why: str
-    misuse: bool
-    """Whether an option is wrong."""
+    misuse: bool  # whether an option is wrong
 
 
 @dataclass(frozen=True)
 class Made:
     """The robots exist but do not tick yet."""
 
-    ur: list[tuple[str, dict[InterfaceName, int]]]
-    """Address and ports of each robot's UR interfaces."""
-    page: str | None = None
-    """Address of the page with figures for Prometheus."""
+    ur: list[tuple[str, dict[InterfaceName, int]]]  # address and ports of each robot's UR interfaces
+    page: str | None = None  # address of the page with figures for Prometheus
 
 
 @dataclass(frozen=True)
@@ -60,8 +55,7 @@ class WorkerReady:
 class WorkerEnded:
     """The robots have stopped, and their recordings are closed."""
 
-    failure: str | None
-    """Why a robot had stopped ticking before."""
+    failure: str | None  # why a robot had stopped ticking before
     recordings: list[RecordingResult]
 
 
@@ -73,8 +67,7 @@ class ParentPipe:
     """The first process, as seen from another one."""
 
     pipe: Connection
-    died: Callable[[], None]
-    """Cleans up after it."""
+    died: Callable[[], None]  # Cleans up after it
 
     def receive(self) -> Any:
         """Wait for its message; False if it has died or wants no robots."""

@@ -51,8 +51,7 @@ class WorkersError(Exception):
 
 @dataclass
 class _Worker:
-    who: str
-    """Description of the process and its robots."""
+    who: str  # description of the process and its robots
     process: multiprocessing.process.BaseProcess
     pipe: Connection
     told: WorkerEnded | None = None
@@ -74,8 +73,7 @@ class Workers:
         """Address and ports of each robot's UR interfaces; empty if they are closed."""
         self.recordings: list[RecordingResult] = []
         self._folder = OwnFolder()
-        self._front: list[_Worker] = []
-        """The process that clients connect to."""
+        self._front: list[_Worker] = []  # the process that clients connect to
         self._workers: list[_Worker] = []
         try:
             self._front.append(self._open())

@@ -21,10 +21,8 @@ from tvist_view.look import Look
 from tvist_view.pilot import Doing, Pilot, go, motion
 from tvist_view.signals import moves, signals_of
 
-REST = 500
-"""Ticks recorded after a motion; before it, the arm comes to rest for half as many."""
-POINTS = 600
-"""Points of a curve on the page."""
+REST = 500  # ticks recorded after a motion; before it, the arm comes to rest for half as many
+POINTS = 600  # points of a curve on the page
 
 
 @dataclass
@@ -41,8 +39,7 @@ Verdict = Mapping[str, float | None]
 
 Keys: `before`, `after`, `less_percent`, `earlier_ms`.
 """
-Judge = Callable[[MotionRecord, MotionRecord], Verdict]
-"""Compares a motion without and with the shaper."""
+Judge = Callable[[MotionRecord, MotionRecord], Verdict]  # compares a motion without and with the shaper
 
 
 def beside(
@@ -128,12 +125,9 @@ class Doer:
     look: Look
     pilot: Pilot
     judge: Judge
-    say: Callable[[str], None]
-    """Shows a message in all tabs."""
-    result: Callable[[dict[str, Any]], None]
-    """Shows the result of a comparison in all tabs."""
-    comparing: str | None = None
-    """Present step of a comparison, in words; None if there is none."""
+    say: Callable[[str], None]  # shows a message in all tabs
+    result: Callable[[dict[str, Any]], None]  # shows the result of a comparison in all tabs
+    comparing: str | None = None  # present step of a comparison, in words; None if there is none
 
     async def do(self, info: Info, tab: int, message: asked.Message) -> None:
         """Carry out a tab's request."""

@@ -12,14 +12,11 @@ from tvist_view.meshes import Meshes
 
 NO_TRUTH = "this robot does not publish how it bends; simulated robots do, for pages on the same machine"
 REAL = "a real arm does not report how it bends"
-USUAL = ("auto", "zv")
-"""Shapers to compare with none while none is in use; the first one that the robot has."""
-MOVES = 0.05
-"""Joint velocity above which a watched robot counts as moving [rad/s]."""
+USUAL = ("auto", "zv")  # shapers to compare with none while none is in use; the first one that the robot has
+MOVES = 0.05  # joint velocity above which a watched robot counts as moving [rad/s]
 STOPS = {"protective_stop", "safety_stop"}
 
-Step = tuple[bool, str, str]
-"""Whether it is done, what to do, and how."""
+Step = tuple[bool, str, str]  # whether it is done, what to do, and how
 
 
 def described(info: Info, look: Look, robots: list[str], meshes: Meshes) -> dict[str, Any]:

@@ -11,8 +11,7 @@ from tvist_view.shown_robot import RobotPlace, ShownRobot
 from tvist_view.stage import Tab, page
 from tvist_view.watcher import Watcher
 
-MOST_SHOWN = 8
-"""Most robots that tabs show at once, since each takes one of a server's limited sessions."""
+MOST_SHOWN = 8  # most robots that tabs show at once, since each takes one of a server's limited sessions
 
 
 class LivePage:

@@ -4,10 +4,8 @@ from pathlib import Path
 
 from tvist_protocol.geometry import Geometry
 
-KINDS = (".stl", ".obj", ".dae")
-"""Suffixes of mesh files that the page can draw."""
-LARGEST = 64 * 2**20
-"""Largest mesh file that is offered [byte]."""
+KINDS = (".stl", ".obj", ".dae")  # Suffixes of mesh files that the page can draw
+LARGEST = 64 * 2**20  # largest mesh file that is offered [byte]
 
 
 class Meshes:

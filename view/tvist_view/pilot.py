@@ -15,17 +15,12 @@ from tvist_client.unlock import make_ready
 from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.values import Payload
 
-DEADMAN_S = 0.25
-"""Time without jog messages after which the arm is stopped [s]."""
-JOG_PERIOD = 0.02
-"""Time between two set-points of a jog [s]."""
-JOG_SPEED = 0.25
-"""Jog speed as a share of the joint's velocity limit [-]."""
-JOG_ACCELERATION = 1.5
-"""Acceleration at the start of a jog [rad/s²]."""
+DEADMAN_S = 0.25  # time without jog messages after which the arm is stopped [s]
+JOG_PERIOD = 0.02  # time between two set-points of a jog [s]
+JOG_SPEED = 0.25  # jog speed as a share of the joint's velocity limit [-]
+JOG_ACCELERATION = 1.5  # acceleration at the start of a jog [rad/s²]
 
-SPEED = 1.5
-"""Velocity of motions between poses [rad/s]."""
+SPEED = 1.5  # velocity of motions between poses [rad/s]
 
 Say = Callable[[str], None]
 Doing = Callable[[Arm], Awaitable[Any]]
@@ -38,8 +33,7 @@ class Pilot:
     or lost.
     """
 
-    holder: int | None
-    """Number of the tab that has control; None if no tab has."""
+    holder: int | None  # number of the tab that has control; None if no tab has
 
     def __init__(self, robot: Robot, client: str, say: Say) -> None:
         self._robot, self.client, self._say = robot, client, say

@@ -28,12 +28,9 @@ from tvist_view.watcher import Watcher
 
 log = logging.getLogger("tvist.view")
 
-INFO_S = 1.0
-"""Time between two queries of which client has control [s]."""
-RETRY_S = 2.0
-"""Time between two attempts to find the robot [s]."""
-MOST_ASKED = 16
-"""Most requests of a tab that are carried out at once; further ones wait."""
+INFO_S = 1.0  # time between two queries of which client has control [s]
+RETRY_S = 2.0  # time between two attempts to find the robot [s]
+MOST_ASKED = 16  # most requests of a tab that are carried out at once; further ones wait
 SHOWN_EVENTS = {"protective_stop", "safety_stop", "warning", "lease_lost"}
 """Kinds of events whose reason the page shows."""
 
@@ -42,12 +39,9 @@ SHOWN_EVENTS = {"protective_stop", "safety_stop", "warning", "lease_lost"}
 class RobotPlace:
     """Where robots are found."""
 
-    endpoint: str
-    """Zenoh endpoint."""
-    security: Path | None = None
-    """Folder with a certificate for the robot's server."""
-    namespace: str = ""
-    """Namespace of the robots."""
+    endpoint: str  # zenoh endpoint
+    security: Path | None = None  # folder with a certificate for the robot's server
+    namespace: str = ""  # namespace of the robots
 
 
 class ShownRobot:
@@ -65,8 +59,7 @@ class ShownRobot:
         self._io: Io | None = None
         self._described: dict[str, Any] = {}
         self._absent = f"Looking for robot {name} at {place.endpoint} …"
-        self.robots: list[str] = []
-        """Names of all robots at the endpoint when this one was last found."""
+        self.robots: list[str] = []  # names of all robots at the endpoint when this one was last found
         self.task = asyncio.create_task(self._run())
 
     def come(self, watcher: Watcher) -> None:

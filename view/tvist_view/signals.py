@@ -11,34 +11,26 @@ from tvist_plant.tool_acceleration import tool_acceleration, upward
 from tvist_protocol.stream import State, Truth
 from tvist_view.look import Floats, Look
 
-RESTS = 1e-9
-"""Change of a reference within a tick that counts as rest [rad]."""
-MOVING = 1e-3
-"""Acceleration above which a reference counts as moving, in a recorded motion [rad/s²]."""
-BRAKES_S = 0.02
-"""Time after the stop of the shaped reference during which the tool still decelerates [s]."""
-KEPT = 3000
-"""Samples of a running robot that are kept: six seconds."""
-LATE_TICKS = 50
-"""Ticks after which a missing truth is no longer awaited."""
+RESTS = 1e-9  # change of a reference within a tick that counts as rest [rad]
+MOVING = 1e-3  # acceleration above which a reference counts as moving, in a recorded motion [rad/s²]
+BRAKES_S = 0.02  # time after the stop of the shaped reference during which the tool still decelerates [s]
+KEPT = 3000  # samples of a running robot that are kept: six seconds
+LATE_TICKS = 50  # ticks after which a missing truth is no longer awaited
 
 
 @dataclass(frozen=True)
 class Signals:
     """T samples in the order of time."""
 
-    time: Floats
-    """Simulation time, shape (T,) [s]."""
+    time: Floats  # simulation time, shape (T,) [s]
     alpha: Floats
     """|α|, acceleration of the tool without gravity, shape (T,) [m/s²].
 
     If the robot publishes the truth, it is free of noise, and NaN at ticks whose truth is missing; else it is
     measured.
     """
-    acceleration: Floats
-    """Largest |q̈| over the joints of the shaped reference, shape (T,) [rad/s²]."""
-    unshaped: Floats
-    """The same for the reference before the shaper, shape (T,) [rad/s²]."""
+    acceleration: Floats  # largest |q̈| over the joints of the shaped reference, shape (T,) [rad/s²]
+    unshaped: Floats  # the same for the reference before the shaper, shape (T,) [rad/s²]
 
     def largest_alpha(self) -> float:
         """Return the largest known |α|, 0 if none is known [m/s²]."""
@@ -83,8 +75,7 @@ class LatestSignals:
         self._states: deque[State] = deque()
         self._truths: dict[int, Truth] = {}
         self.kept: deque[tuple[float, float, float, float]] = deque(maxlen=KEPT)
-        self.count = 0
-        """Number of samples since the start."""
+        self.count = 0  # number of samples since the start
         self.state: State | None = None
         self._shown: State | None = None
 

@@ -19,10 +19,8 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-LARGEST = 16 * 2**20
-"""Largest message from a page [byte]; the largest ones are frames of a film."""
-WAITS_S = 1.0
-"""How long a tab may take to close its connection when the server ends [s]."""
+LARGEST = 16 * 2**20  # largest message from a page [byte]; the largest ones are frames of a film
+WAITS_S = 1.0  # how long a tab may take to close its connection when the server ends [s]
 
 
 _QUIET = logging.getLogger("tvist.view.stage")
@@ -50,8 +48,7 @@ class Tab:
         return aiter(self._connection)
 
 
-Meet = Callable[[Tab], Awaitable[None]]
-"""Serves one tab until it is closed."""
+Meet = Callable[[Tab], Awaitable[None]]  # serves one tab until it is closed
 
 
 def page(boot: Mapping[str, Any]) -> str:

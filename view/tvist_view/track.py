@@ -11,14 +11,11 @@ from tvist_protocol.stream import State, Truth
 from tvist_view.look import Look
 from tvist_view.signals import Signals, signals_of
 
-ROW_TICKS = 5
-"""Ticks between two rows for the page, which interpolates."""
-MOVES = 1e-7
-"""Change of a reference within a tick above which it counts as moving [rad]."""
+ROW_TICKS = 5  # ticks between two rows for the page, which interpolates
+MOVES = 1e-7  # change of a reference within a tick above which it counts as moving [rad]
 SET = 0.05
 """Change of a reference within a tick above which it counts as a jump, for example by a reset [rad]."""
-CALM = 50
-"""Ticks of rest after which a motion has ended."""
+CALM = 50  # ticks of rest after which a motion has ended
 
 
 class TrackError(ValueError):

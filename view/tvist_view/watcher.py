@@ -8,10 +8,8 @@ from typing import Any, Protocol
 from tvist_view.signals import LatestSignals, after_stop
 from tvist_view.stage import Tab
 
-FRAME_S = 1.0 / 30.0
-"""Time between two frames [s]."""
-NOTES_EVERY = 6
-"""Frames between two updates of the note on the last stop."""
+FRAME_S = 1.0 / 30.0  # time between two frames [s]
+NOTES_EVERY = 6  # frames between two updates of the note on the last stop
 
 
 async def pictures() -> AsyncIterator[int]:
@@ -43,8 +41,7 @@ class Watcher:
     tab: Tab
     robot: Watched | None = None
     waiting: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
-    tasks: set[asyncio.Task[Any]] = field(default_factory=set)
-    """Its requests that are being carried out."""
+    tasks: set[asyncio.Task[Any]] = field(default_factory=set)  # its requests that are being carried out
     status: dict[str, Any] = field(default_factory=dict)
     count: int = 0
     free: bool = True

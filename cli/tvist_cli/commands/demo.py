@@ -18,8 +18,7 @@ from tvist_cli.tracks import MAGNIFY, recorded
 if TYPE_CHECKING:
     from tvist_lab.studies.paper.served import ServedExperiment
 
-PORT = 8080
-"""Port of the page that --view opens."""
+PORT = 8080  # port of the page that --view opens
 FOLDER = Path("tvist-demo")
 ANSWERED = "Q1-Q3"
 """Motion of the overview figure: the arm's frequency doubles along it, and the ringing is easy to see."""

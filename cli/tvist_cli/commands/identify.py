@@ -15,8 +15,7 @@ from tvist_cli.offered import ROBOTS, SOURCES
 from tvist_cli.output import default_output
 
 ENDPOINT = re.compile(r"(tcp|tls|udp|quic|ws|unixsock-stream)/.+")
-HEAVIEST = 100.0
-"""Largest payload mass that the command accepts [kg]."""
+HEAVIEST = 100.0  # largest payload mass that the command accepts [kg]
 
 
 def identify(

@@ -13,8 +13,7 @@ from tvist_client.motion import Motion
 from tvist_client.readiness import look
 from tvist_protocol.errors import RefusedError
 
-BENT = "0,-1.57,1.57,-1.57,-1.57,0"
-"""Joint angles of UR-like arms that are far from any singularity [rad]."""
+BENT = "0,-1.57,1.57,-1.57,-1.57,0"  # joint angles of UR-like arms that are far from any singularity [rad]
 
 
 def move(

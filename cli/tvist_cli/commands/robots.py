@@ -10,8 +10,7 @@ from tvist_cli.studying import check_range, check_seed, give, show
 if TYPE_CHECKING:
     from tvist_plant.description import RobotDescription
 
-VARIED = 50.0
-"""Largest value of --vary [%]: a spring must not vanish."""
+VARIED = 50.0  # largest value of --vary [%]: a spring must not vanish
 
 
 def robots(

@@ -18,14 +18,10 @@ if TYPE_CHECKING:
     from tvist_shaping import Impulses
     from tvist_shaping.named import AnyShaper
 
-F_D = 10.0
-"""Damped frequency of the mode in the list [Hz]."""
-ERRORS = (-40.0, 60.0)
-"""Range of frequency errors for --sensitivity [%]."""
-BANDS = {"5": 0.05, "10": 0.1}
-"""Residual vibration that bounds each band [-], by its percentage."""
-TOUCHING = 1.0 + 1e-4
-"""Factor on the bound, so that rounding does not exclude a hump that just reaches it."""
+F_D = 10.0  # damped frequency of the mode in the list [Hz]
+ERRORS = (-40.0, 60.0)  # range of frequency errors for --sensitivity [%]
+BANDS = {"5": 0.05, "10": 0.1}  # residual vibration that bounds each band [-], by its percentage
+TOUCHING = 1.0 + 1e-4  # factor on the bound, so that rounding does not exclude a hump that just reaches it
 
 
 def shapers(

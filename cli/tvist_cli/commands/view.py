@@ -13,8 +13,7 @@ from tvist_cli.pages import PageAddress, serve_page
 from tvist_cli.tracks import MAGNIFY, Shows, compared, recorded, repeated
 from tvist_client.robot import NAME
 
-LONGEST_S = 120.0
-"""Longest recording that can be written as HTML [s]."""
+LONGEST_S = 120.0  # longest recording that can be written as HTML [s]
 
 
 def view(

@@ -23,12 +23,9 @@ from tvist_client.robot import Robot
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import Event, State, Telemetry
 
-REFRESH_S = 0.1
-"""Time between two readings of states [s]."""
-FLEET_EVERY = 1.0
-"""Time between two readings of a fleet [s]."""
-STALE_S = 1.0
-"""Age above which a newest state is shown in red [s]."""
+REFRESH_S = 0.1  # time between two readings of states [s]
+FLEET_EVERY = 1.0  # time between two readings of a fleet [s]
+STALE_S = 1.0  # age above which a newest state is shown in red [s]
 
 
 def watch(

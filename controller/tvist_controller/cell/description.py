@@ -17,10 +17,8 @@ Terminal = Literal[
     "tool 0", "tool 1",
 ]  # fmt: skip
 """Name of a digital terminal, in bit order of inputs and outputs."""
-MAX_THINGS = 100
-"""Largest number each of wires, tools and parts."""
-STROKES = {"2F-85": 0.085, "2F-140": 0.14}
-"""Opening of each gripper model [m]."""
+MAX_THINGS = 100  # largest number each of wires, tools and parts
+STROKES = {"2F-85": 0.085, "2F-140": 0.14}  # opening of each gripper model [m]
 
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 HeavyMass = Annotated[float, Meta(gt=0, le=100)]
@@ -34,14 +32,11 @@ class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
 class CellWire(_Table, frozen=True, kw_only=True):
     """A wire from a digital output to a digital input, or a valve, relay or sensor that acts like one."""
 
-    output: Terminal
-    """Output: `standard 0` to `7`, `configurable 0` to `7`, `tool 0` or `1`."""
-    input: Terminal
-    """Input, named likewise; an input has only one wire."""
+    output: Terminal  # output: `standard 0` to `7`, `configurable 0` to `7`, `tool 0` or `1`
+    input: Terminal  # input, named likewise; an input has only one wire
     after: Annotated[float, Meta(ge=0, le=3600)] = 0.0
     """Delay of the input, rounded to ticks of 2 ms, at least one tick [s]."""
-    inverted: bool = False
-    """Whether the input is on while the output is off."""
+    inverted: bool = False  # whether the input is on while the output is off
 
     @property
     def ticks(self) -> int:
@@ -52,14 +47,10 @@ class CellWire(_Table, frozen=True, kw_only=True):
 class Tool(_Table, frozen=True, kw_only=True):
     """A tool. The first is mounted on the flange, and its TCP and payload are declared at the start."""
 
-    name: Name
-    """Name for messages."""
-    mass: Mass
-    """Mass [kg]."""
-    cog: Vec3
-    """Centre of gravity in the flange frame [m]."""
-    tcp: Pose
-    """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+    name: Name  # name for messages
+    mass: Mass  # mass [kg]
+    cog: Vec3  # centre of gravity in the flange frame [m]
+    tcp: Pose  # tool centre point in the flange frame: x y z [m] and rotation vector [rad]
     inertia: Inertia6 = (0.0,) * 6
     """Moments of inertia xx xy xz yy yz zz about the centre of gravity, flange axes [kg m²]."""
     while_on: Terminal | None = None
@@ -74,10 +65,8 @@ def as_declared(tool: Tool) -> Payload:
 class GripperModel(_Table, frozen=True, kw_only=True):
     """A two-finger gripper on one of the tools; it answers like a Robotiq 2F."""
 
-    model: Literal["2F-85", "2F-140"]
-    """Model; it opens by 85 mm or 140 mm."""
-    tool: str | None = None
-    """Name of its tool [the first]."""
+    model: Literal["2F-85", "2F-140"]  # model; it opens by 85 mm or 140 mm
+    tool: str | None = None  # name of its tool [the first]
     activated: bool = False
     """Whether it is activated at the start; otherwise a program activates it, as after power-on."""
     tolerance: Annotated[float, Meta(gt=0, le=0.1)] = 0.005
@@ -94,16 +83,11 @@ class GripperModel(_Table, frozen=True, kw_only=True):
 class Workpiece(_Table, frozen=True, kw_only=True):
     """A box that can be gripped."""
 
-    name: Name
-    """Name for messages."""
-    mass: HeavyMass
-    """Mass [kg]."""
-    size: tuple[Edge, Edge, Edge]
-    """Edge lengths along x y z of its own frame; fingers close along y [m]."""
-    pose: Pose
-    """Pose in the base frame: that of a tool centre point that grips it in the middle."""
-    cog: Vec3 = (0.0, 0.0, 0.0)
-    """Centre of gravity in its own frame [m]."""
+    name: Name  # name for messages
+    mass: HeavyMass  # mass [kg]
+    size: tuple[Edge, Edge, Edge]  # edge lengths along x y z of its own frame; fingers close along y [m]
+    pose: Pose  # pose in the base frame: that of a tool centre point that grips it in the middle
+    cog: Vec3 = (0.0, 0.0, 0.0)  # centre of gravity in its own frame [m]
 
     @property
     def inertia(self) -> Inertia6:
@@ -115,12 +99,10 @@ class Workpiece(_Table, frozen=True, kw_only=True):
 class Cell(_Table, frozen=True, kw_only=True):
     """The cell around one robot."""
 
-    wires: Annotated[tuple[CellWire, ...], Meta(max_length=MAX_THINGS)] = ()
-    """Wires between terminals."""
+    wires: Annotated[tuple[CellWire, ...], Meta(max_length=MAX_THINGS)] = ()  # wires between terminals
     tools: Annotated[tuple[Tool, ...], Meta(max_length=MAX_THINGS)] = ()
     """Tools; the first is mounted on the flange."""
-    gripper: GripperModel | None = None
-    """Gripper; None for none."""
+    gripper: GripperModel | None = None  # gripper; None for none
     parts: Annotated[tuple[Workpiece, ...], Meta(max_length=MAX_THINGS)] = ()
     """Parts that the gripper can grip."""
     world: Annotated[str, Meta(min_length=1, max_length=4096)] | None = None

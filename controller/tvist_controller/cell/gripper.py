@@ -13,36 +13,28 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-OPEN, CLOSED = 3, 230
-"""Positions of open and closed fingers [counts]; real ones differ by a few counts."""
-ACTIVATION: Final = 500
-"""Shortest duration of an activation [ticks]."""
+OPEN, CLOSED = 3, 230  # positions of open and closed fingers [counts]; real ones differ by a few counts
+ACTIVATION: Final = 500  # shortest duration of an activation [ticks]
 SPEEDS = {0.085: (0.020, 0.150), 0.14: (0.030, 0.250)}
 """Finger speed at register values 0 and 255 for each opening [m/s]."""
 FORCES = {0.085: (20.0, 235.0), 0.14: (10.0, 125.0)}
 """Finger force at register values 0 and 255 for each opening [N]."""
-MOVING, STOPPED_CLOSING, ARRIVED = 0, 2, 3
-"""Values of OBJ."""
+MOVING, STOPPED_CLOSING, ARRIVED = 0, 2, 3  # values of OBJ
 WRITABLE: Mapping[str, int] = MappingProxyType(
     {"ACT": 1, "GTO": 1, "ATR": 1, "ARD": 1, "POS": 255, "SPE": 255, "FOR": 255, "MOD": 1, "MSC": 255}
 )
 """Writable registers and their largest values."""
 
-PORT: Final = 63352
-"""TCP port on which the URCap listens."""
-SLAVES = ("9", "1")
-"""SID values by which clients select the only gripper."""
-UNKNOWN: Final = b"?"
-"""Answer to an unknown request."""
+PORT: Final = 63352  # TCP port on which the URCap listens
+SLAVES = ("9", "1")  # SID values by which clients select the only gripper
+UNKNOWN: Final = b"?"  # answer to an unknown request
 LONGEST: Final = 1024
 """Longest line [bytes]."""
 _DIGITS = {"PRE": 3, "POS": 3, "SPE": 3, "FOR": 3, "MSC": 3, "FLT": 2}
 """Digits of a bare answer; 1 for other registers."""
 _BARE_GET = re.compile(rb"GET [A-Z]{3}")
-_LIST = b"[9]"
-"""Numbers of the connected grippers."""
-_LIST_BYTES = 17
-"""Length of the list of up to four grippers."""
+_LIST = b"[9]"  # numbers of the connected grippers
+_LIST_BYTES = 17  # length of the list of up to four grippers
 
 Meet = Callable[[float, float], float | None]
 """Function that returns the opening at which fingers closing between two openings meet a part, else None [m]."""
@@ -52,12 +44,9 @@ Meet = Callable[[float, float], float | None]
 class Moved:
     """Results of a tick of the fingers."""
 
-    gripped: bool = False
-    """The fingers have gripped a part."""
-    released: bool = False
-    """The fingers have released the part."""
-    met_nothing: bool = False
-    """The fingers have closed without a part."""
+    gripped: bool = False  # the fingers have gripped a part
+    released: bool = False  # the fingers have released the part
+    met_nothing: bool = False  # the fingers have closed without a part
 
 
 _NOTHING = Moved()
@@ -67,8 +56,7 @@ class Gripper:
     """The fingers with their opening [m], and their registers."""
 
     def __init__(self, stroke: float, *, activated: bool) -> None:
-        self.stroke = stroke
-        """Largest opening [m]."""
+        self.stroke = stroke  # largest opening [m]
         self._activated = activated
         self.begin()
 
@@ -86,14 +74,11 @@ class Gripper:
         """Reset to the start: open fingers."""
         self._position = float(OPEN)
         self._written = dict.fromkeys(WRITABLE, 0) | {"ACT": int(self._activated), "SPE": 255, "FOR": 255}
-        self._activating = 0
-        """Remaining ticks of the activation; 0 if complete."""
+        self._activating = 0  # remaining ticks of the activation; 0 if complete
         self._active = self._activated
-        self._released = False
-        """Whether an automatic release has ended, which requires another activation."""
+        self._released = False  # whether an automatic release has ended, which requires another activation
         self._object = ARRIVED
-        self.holds = False
-        """Whether a part is between the fingers."""
+        self.holds = False  # whether a part is between the fingers
 
     # ------------------------------------------------------------------ registers
 

@@ -19,14 +19,10 @@ from tvist_protocol.values import Pose
 
 TRANSFER = 100
 """Ticks (0.2 s) in which a part's weight moves to the arm and back, as when lifted off its support."""
-MISSED_BY = 0.1
-"""Distance up to which a missed part causes a warning [m]."""
-THIS_MACHINE = ("127.0.0.1", "localhost", "::1")
-"""Names by which programs address the machine of the URCap."""
-STALLED = 0.004
-"""Lag by which simulated fingers count as stopped by an object [m]."""
-_SWAPPED = np.diag([-1.0, -1.0, 1.0])
-"""Half a turn about z."""
+MISSED_BY = 0.1  # distance up to which a missed part causes a warning [m]
+THIS_MACHINE = ("127.0.0.1", "localhost", "::1")  # names by which programs address the machine of the URCap
+STALLED = 0.004  # lag by which simulated fingers count as stopped by an object [m]
+_SWAPPED = np.diag([-1.0, -1.0, 1.0])  # half a turn about z
 
 
 class Terminals(Protocol):
@@ -48,8 +44,7 @@ class Wires:
 
     def __init__(self, wires: Sequence[CellWire]) -> None:
         self._wires = [(bit_of(one.output), bit_of(one.input), one.ticks, one.inverted) for one in wires]
-        self._outputs: int | None = None
-        """Outputs of the last tick; None before the first."""
+        self._outputs: int | None = None  # outputs of the last tick; None before the first
         # Entries of one wire are in order of time, since its delay is constant.
         self._under_way: list[deque[tuple[int, bool]]] = [deque() for _ in wires]
         self._left = 0
@@ -117,16 +112,11 @@ class LiveCell:
         self._places = [placement(part.pose) for part in self._cell.parts]
         self._tool = self._cell.tools[0] if self._cell.tools else None
         self._load = self._first_load = load
-        self._met: int | None = None
-        """Number of the part met by the closing fingers in this tick."""
-        self._held: int | None = None
-        """Number of the part between the fingers."""
-        self._grip = placement(None)
-        """Pose of that part in the flange frame."""
-        self._part = Payload()
-        """Body of the held or last held part."""
-        self._share = 0
-        """Ticks of `TRANSFER` completed."""
+        self._met: int | None = None  # number of the part met by the closing fingers in this tick
+        self._held: int | None = None  # number of the part between the fingers
+        self._grip = placement(None)  # pose of that part in the flange frame
+        self._part = Payload()  # body of the held or last held part
+        self._share = 0  # ticks of `TRANSFER` completed
 
     def answer(self, request: bytes) -> bytes:
         """Carry out a request of the gripper's protocol."""

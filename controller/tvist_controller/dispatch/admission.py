@@ -34,14 +34,11 @@ class Admitted(NamedTuple):
     """A command that passed the checks."""
 
     command: Command
-    content: dict[str, Any]
-    """Content as built-in types, for the journal."""
+    content: dict[str, Any]  # content as built-in types, for the journal
     session: str | None = None
     """Session of a client that gets control or the clock, if `client_gone` will report its end."""
-    client: str | None = None
-    """Sending client, from its token or the command; None if unknown."""
-    origin: str | None = None
-    """IP address of the sender; None if unknown."""
+    client: str | None = None  # sending client, from its token or the command; None if unknown
+    origin: str | None = None  # IP address of the sender; None if unknown
 
 
 def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:

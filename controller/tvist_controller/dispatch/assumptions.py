@@ -37,8 +37,7 @@ class Assumptions:
         follows: bool,  # whether the robot follows its payload
     ) -> None:
         self.declared = payload
-        self.assumed = payload
-        """Payload for dynamics and modes: the declared or the learnt one."""
+        self.assumed = payload  # payload for dynamics and modes: the declared or the learnt one
         self.source = source
         self._motion, self._cycle, self._peripherals = motion, motion.cycle, peripherals
         self._plan, self._emit = plan, emit

@@ -102,10 +102,8 @@ def check_step(clock: Lease | None, lease: Lease | None, step: SimulationStep) -
 class Standing(NamedTuple):
     """Holders of control and the clock at one moment."""
 
-    lease: Lease | None
-    """Lease of the client in control."""
-    clock: Lease | None
-    """Hold of the client with the clock."""
+    lease: Lease | None  # lease of the client in control
+    clock: Lease | None  # hold of the client with the clock
 
     def sessions_of(self, client: str) -> set[str | None]:
         """Return the sessions whose end takes control or the clock from a client."""

@@ -45,19 +45,15 @@ class RobotParts(ABC):
     """The parts of one robot, on which commands act; a `Controller` creates them."""
 
     def __init__(self, setup: Setup, plant: Plant | None, planner: MakesPlans, order: Order | None) -> None:
-        self.setup = setup
-        """Initial setup; for an arm that cannot be placed, with its initial posture."""
+        self.setup = setup  # initial setup; for an arm that cannot be placed, with its initial posture
         self.tick_number = 0
         self.counters = Counters()
-        self.events: list[Event] = []
-        """Events of the present tick, or of the next one between ticks."""
-        self.plans = Plans(planner.plan, self.snapshot, order)
-        """Access to plans."""
+        self.events: list[Event] = []  # events of the present tick, or of the next one between ticks
+        self.plans = Plans(planner.plan, self.snapshot, order)  # access to plans
         first, timeouts, description = planner.filters.first(), setup.clock == "realtime", setup.description
         self.cycle = _cycle(setup, first, plant)
         plant = self.cycle.plant
-        self.seed = setup.seed
-        """Seed for the next reset of a simulated arm."""
+        self.seed = setup.seed  # seed for the next reset of a simulated arm
         # A robot that is only watched cannot be moved.
         mode = "POWER_OFF" if plant.watched else setup.mode
         collisions = CollisionModel(description, body(setup.payload))
@@ -76,8 +72,7 @@ class RobotParts(ABC):
         elif isinstance(plant, RealArm) and plant.supervised:
             self.supervision = Supervision(plant, self.peripherals, self.emit, motion, safety)
         self.forces = ToolForces(description, self.peripherals, lambda: self.report, lambda: self.declared)
-        self.cell = None
-        """The cell around the robot; None for none."""
+        self.cell = None  # the cell around the robot; None for none
         if setup.cell is not None:
             self.cell = LiveCell(setup.cell, description, plant, self.peripherals, self.emit)
         self.guidance = Guidance(motion)

@@ -20,8 +20,7 @@ of columns. The floor's row has the link `FLOOR` and its height."""
 FLOOR = -1.0
 ONE, OTHER, ARMS = 0, 1, 2
 """Columns of a pair: numbers of its bodies, then for each joint the bound of their approach [m/rad]."""
-MAX_POSTURES = 16
-"""Largest number of postures checked per stop."""
+MAX_POSTURES = 16  # largest number of postures checked per stop
 
 
 @compiled_for_ticks

@@ -28,14 +28,10 @@ from tvist_plant.model import FLANGE, link_frame, rigid_model
 
 CLEARANCE = 0.005
 """Smallest permitted distance between two bodies [m]."""
-FAR_APART = 0.05
-"""Distance above which long steps between checks are allowed [m]."""
-SHORT = 0.004
-"""Travel of the arm between two checks at the smallest permitted distance [m]."""
-ROUNDING = 1e-9
-"""Distance changes below this are rounding errors [m]."""
-BOUND_MARGIN = 1e-5
-"""Margin of bounds beyond the clearance, above the accuracy of distances [m]."""
+FAR_APART = 0.05  # distance above which long steps between checks are allowed [m]
+SHORT = 0.004  # travel of the arm between two checks at the smallest permitted distance [m]
+ROUNDING = 1e-9  # distance changes below this are rounding errors [m]
+BOUND_MARGIN = 1e-5  # margin of bounds beyond the clearance, above the accuracy of distances [m]
 PAYLOAD = "payload"
 
 
@@ -45,8 +41,7 @@ class Meeting:
 
     first: str
     second: str
-    distance: float
-    """Distance between their surfaces; negative if they overlap [m]."""
+    distance: float  # distance between their surfaces; negative if they overlap [m]
 
     def __str__(self) -> str:
         pair, distance = f"{self.first} and {self.second}", 1e3 * self.distance

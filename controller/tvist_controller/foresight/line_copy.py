@@ -10,8 +10,7 @@ from tvist_controller.line.shaped_reference import ShapedReference
 from tvist_controller.trajectory import Trajectory
 from tvist_plant.plant import PERIOD
 
-MAX_AHEAD = 4000
-"""Largest number of ticks simulated to find the end of a motion."""
+MAX_AHEAD = 4000  # largest number of ticks simulated to find the end of a motion
 
 
 class LineSimulation:
@@ -25,8 +24,7 @@ class LineSimulation:
         """Samples of the shaped reference, one per entry of `references`: path parameters or joint positions."""
         self.references: list[Floats] = [shaped.joints.published.q, shaped.position]
         """The last two shaped references played, then the future ones per tick, each of shape (n,) [rad]."""
-        self.rests = False
-        """Whether the last reference is at rest, so that no more follow."""
+        self.rests = False  # whether the last reference is at rest, so that no more follow
 
     def until(self, ticks: int) -> None:
         """Simulate until this many future references are known or they come to rest."""

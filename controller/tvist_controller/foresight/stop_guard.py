@@ -34,8 +34,7 @@ class StreamGuard(Guard):
         self._before: tuple[Target, float | JointStop] | None = None
         self.met: Meeting | None = None
         """Meeting during the latest stop that is not clear; None if it leaves the joints' range."""
-        self.obstacle = Obstacle("", "collision")
-        """Reason for refusing the latest reference."""
+        self.obstacle = Obstacle("", "collision")  # reason for refusing the latest reference
 
     def begin(self, state: Target) -> None:
         """Start from rest."""

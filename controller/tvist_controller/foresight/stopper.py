@@ -15,10 +15,8 @@ from tvist_controller.trajectory import AnyStop, BrakingForecast, JointStop, Stu
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
-LONG_STOP = 0.2
-"""Duration above which slower playback along a curve is tried as a stop [s]."""
-EVEN = 1e-12
-"""Differences between steps below this are rounding errors [rad]."""
+LONG_STOP = 0.2  # duration above which slower playback along a curve is tried as a stop [s]
+EVEN = 1e-12  # differences between steps below this are rounding errors [rad]
 
 
 def _anywhere(_: JointStop) -> bool:

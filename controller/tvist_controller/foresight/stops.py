@@ -24,35 +24,25 @@ from tvist_plant.description import RobotDescription
 
 S = TypeVar("S", JointStop, PathStop, SlowedStop)
 
-DECELERATION_RATIO = 0.8
-"""Ratio of consecutive trial decelerations [-]."""
+DECELERATION_RATIO = 0.8  # ratio of consecutive trial decelerations [-]
 HARDER = 1.05
 """Factor by which a stop must brake harder than the motion to be never ahead of it, since a varying filter
 may brake slightly harder than its reference [-]."""
-TURN_BACK_SPEED = 3e-3
-"""Speed below which interpolation may turn a shaped motion back slightly [rad/s]."""
-SOON = 0.02
-"""A motion that brakes later than this is by then ahead of a stop [s]."""
-COUNTED = 0.9
-"""Fraction of its velocity that a motion is assumed to keep until it brakes [-]."""
-ROUNDING = 1e-12
-"""Position differences below this are rounding errors [rad]."""
+TURN_BACK_SPEED = 3e-3  # speed below which interpolation may turn a shaped motion back slightly [rad/s]
+SOON = 0.02  # a motion that brakes later than this is by then ahead of a stop [s]
+COUNTED = 0.9  # fraction of its velocity that a motion is assumed to keep until it brakes [-]
+ROUNDING = 1e-12  # position differences below this are rounding errors [rad]
 
 
 @dataclass(frozen=True)
 class StopPlan:
     """A stop and its limits."""
 
-    trajectory: AnyStop | None
-    """Trajectory of the stop; None if the present motion runs out."""
-    acceleration: float | None
-    """Acceleration limit of the stop, None for the motion's own [rad/s^2]."""
-    limited: bool
-    """Whether the limit differs from the requested one."""
-    duration: float | None
-    """Time until rest, None if too far ahead [s]."""
-    way: float | None
-    """Largest joint angle until rest, None if too far ahead [rad]."""
+    trajectory: AnyStop | None  # trajectory of the stop; None if the present motion runs out
+    acceleration: float | None  # acceleration limit of the stop, None for the motion's own [rad/s^2]
+    limited: bool  # whether the limit differs from the requested one
+    duration: float | None  # time until rest, None if too far ahead [s]
+    way: float | None  # largest joint angle until rest, None if too far ahead [rad]
 
 
 class StopPlanner:
@@ -64,8 +54,7 @@ class StopPlanner:
         self._torque, self._position = np.array(limits.torque), np.array(limits.position)
         self.highest, self.jerk = min(limits.acceleration), min(limits.jerk)
         """Largest acceleration and jerk of any stop [rad/s^2, rad/s^3]."""
-        self.period = period
-        """Tick [s]."""
+        self.period = period  # tick [s]
 
     def on_path(
         self,

@@ -15,28 +15,20 @@ from math import exp
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 
-AMBIENT = 25.0
-"""Ambient temperature [°C]."""
-BUS_VOLTAGE = 48.0
-"""Voltage of the supply [V]."""
-STANDBY = 5.0
-"""Power of a joint's electronics when on [W]."""
+AMBIENT = 25.0  # Ambient temperature [°C]
+BUS_VOLTAGE = 48.0  # voltage of the supply [V]
+STANDBY = 5.0  # power of a joint's electronics when on [W]
 
 
 @dataclass(frozen=True)
 class JointRating:
     """One size of joint."""
 
-    torque_constant: float
-    """Joint torque per motor current [N m/A]."""
-    resistance: float
-    """Motor heat per squared current [Ω]."""
-    thermal_resistance: float
-    """Steady temperature rise per heat [K/W]."""
-    thermal_time: float
-    """Time constant of the temperature [s]."""
-    torque: float
-    """Largest torque [N m]."""
+    torque_constant: float  # joint torque per motor current [N m/A]
+    resistance: float  # motor heat per squared current [Ω]
+    thermal_resistance: float  # steady temperature rise per heat [K/W]
+    thermal_time: float  # time constant of the temperature [s]
+    torque: float  # largest torque [N m]
 
     @property
     def window(self) -> float:
@@ -48,8 +40,7 @@ BIG = JointRating(10.0, resistance=0.4, thermal_resistance=1.0, thermal_time=120
 """Base, shoulder and elbow of a UR5e."""
 SMALL = JointRating(7.9, resistance=1.2, thermal_resistance=2.0, thermal_time=900.0, torque=28.0)
 """Wrists of a UR5e."""
-LARGEST_SMALL = 60.0
-"""Joints with a larger torque limit are big [N m]."""
+LARGEST_SMALL = 60.0  # joints with a larger torque limit are big [N m]
 
 
 def joint_ratings(description: RobotDescription) -> list[JointRating]:
@@ -72,14 +63,10 @@ class Meters:
         self._ratings = ratings
         self._tick = 0
         self._shares = self._over(PERIOD)
-        self.temperatures = [AMBIENT] * len(ratings)
-        """Temperatures of the joints [°C]."""
-        self.power = 0.0
-        """Present power from the supply [W]."""
-        self.consumed = 0.0
-        """Energy from the supply since the first tick [J]."""
-        self.dissipated = 0.0
-        """Braking energy dissipated in a resistor [J]."""
+        self.temperatures = [AMBIENT] * len(ratings)  # temperatures of the joints [°C]
+        self.power = 0.0  # present power from the supply [W]
+        self.consumed = 0.0  # energy from the supply since the first tick [J]
+        self.dissipated = 0.0  # braking energy dissipated in a resistor [J]
 
     def _over(self, seconds: float) -> list[float]:
         """Return the fraction of the way to its steady value that each temperature covers in this time."""

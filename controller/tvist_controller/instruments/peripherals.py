@@ -17,12 +17,9 @@ from tvist_protocol.io import (
 )
 from tvist_protocol.values import Payload
 
-CURRENT = (0.004, 0.020)
-"""Range of an analogue terminal set to current [A]."""
-VOLTAGE = (0.0, 10.0)
-"""Range of an analogue terminal set to voltage [V]."""
-MIN_INTEGER, MAX_INTEGER = -(2**31), 2**31 - 1
-"""Range of an integer register."""
+CURRENT = (0.004, 0.020)  # range of an analogue terminal set to current [A]
+VOLTAGE = (0.0, 10.0)  # range of an analogue terminal set to voltage [V]
+MIN_INTEGER, MAX_INTEGER = -(2**31), 2**31 - 1  # range of an integer register
 _EMPTY: dict[str, list[Any]] = {"bit": [0] * (BITS // 32), "int": [0] * NUMBERS, "double": [0.0] * NUMBERS}
 """Initial registers of each kind."""
 
@@ -48,8 +45,7 @@ class Peripherals:
         """Digital terminals: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
         self.analog_inputs, self.tool_analog_inputs = [CURRENT[0], CURRENT[0]], [0.0, 0.0]
         """Analogue inputs of the control box and of the tool [A or V]."""
-        self.analog_shares = [0.0, 0.0]
-        """Analogue outputs as fractions of their ranges [-]."""
+        self.analog_shares = [0.0, 0.0]  # analogue outputs as fractions of their ranges [-]
         self._analog_types = 0
         self._registers: dict[Bank, list[Any]] = {
             bank: list(_EMPTY[bank.partition("_")[2]]) for bank in get_args(Bank)
@@ -60,8 +56,7 @@ class Peripherals:
             "tool_digital_output0_mode": 1, "tool_digital_output1_mode": 1,
         }  # fmt: skip
         """Settings of the tool, as fields of `Io`."""
-        self.changed = True
-        """Whether `io` has changed since it was last published; the publisher resets it."""
+        self.changed = True  # whether `io` has changed since it was last published; the publisher resets it
         self.wrench_zero: list[float] | None = None
         """Force and torque subtracted as zero [N, N m]: at the tool in the base frame, or of the flange sensor."""
         self.payload_change: tuple[Payload, int, int] | None = None

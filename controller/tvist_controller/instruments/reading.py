@@ -22,8 +22,7 @@ from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
 
-POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))
-"""Robot modes with arm power."""
+POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))  # robot modes with arm power
 
 if TYPE_CHECKING:
     computed_once = cached_property
@@ -60,16 +59,11 @@ class Reading:
         current: list[float],
         meters: Meters,
     ) -> None:
-        self.state = state
-        """State of the tick, as published."""
-        self.io = io
-        """Terminals and registers, as published."""
-        self.shared: dict[str, bytes] = {}
-        """Packages of this tick that interfaces share among all clients."""
-        self.current = current
-        """Currents of the motors [A]."""
-        self.temperatures = meters.temperatures
-        """Temperatures of the joints [°C]."""
+        self.state = state  # state of the tick, as published
+        self.io = io  # terminals and registers, as published
+        self.shared: dict[str, bytes] = {}  # packages of this tick that interfaces share among all clients
+        self.current = current  # currents of the motors [A]
+        self.temperatures = meters.temperatures  # temperatures of the joints [°C]
         self.power, self.consumed, self.dissipated = meters.power, meters.consumed, meters.dissipated
         """Power from the supply [W], energy from it and energy of braking since the first tick [J]."""
         self.rigid, self.ratings = rigid, ratings

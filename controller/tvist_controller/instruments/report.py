@@ -20,8 +20,7 @@ Topic = Literal["state", "event", "truth", "telemetry", "io"]
 """Topics published without a request."""
 Key = tuple[object, ...]
 MODES = ("f_d", "zeta", "participation")
-TRUE_MODES_EVERY = 50
-"""Ticks between computations of the arm's true modes, which take a good part of a tick."""
+TRUE_MODES_EVERY = 50  # ticks between computations of the arm's true modes, which take a good part of a tick
 NOTHING: Floats = np.empty((0, 0))
 NOWHERE: Floats = np.empty(0)
 
@@ -29,28 +28,17 @@ NOWHERE: Floats = np.empty(0)
 class Report(Struct, gc=False):
     """A tick, from which clients get a state; threads may share it."""
 
-    tick: int
-    """Number of the tick."""
-    sample: Sample
-    """Signals along the control line."""
-    modes: tuple[int, int, int]
-    """Robot mode, safety mode and runtime state."""
-    speed: float
-    """Fraction of the programmed speed [-]."""
-    f_d: Floats
-    """Damped frequencies used by the shaper, shape (modes,) [Hz]."""
-    zeta: Floats
-    """Damping ratios used by the shaper, shape (modes,) [-]."""
-    delay: float
-    """Time of the shaper's last impulse plus delay of the drive commands [s]."""
-    clipped: bool
-    """Whether the shaper cannot meet its specification."""
-    sequence: int | None
-    """Sequence number of the newest accepted set-point."""
-    missed: int
-    """Number of ticks that started late."""
-    arm: Arm
-    """The arm with its tool; it must not change."""
+    tick: int  # number of the tick
+    sample: Sample  # signals along the control line
+    modes: tuple[int, int, int]  # robot mode, safety mode and runtime state
+    speed: float  # fraction of the programmed speed [-]
+    f_d: Floats  # damped frequencies used by the shaper, shape (modes,) [Hz]
+    zeta: Floats  # damping ratios used by the shaper, shape (modes,) [-]
+    delay: float  # time of the shaper's last impulse plus delay of the drive commands [s]
+    clipped: bool  # whether the shaper cannot meet its specification
+    sequence: int | None  # sequence number of the newest accepted set-point
+    missed: int  # number of ticks that started late
+    arm: Arm  # the arm with its tool; it must not change
     layouts: dict[Key, Layout]
     """Layout of the last state, by everything it depends on; usually also that of the next."""
     made: State | None = None

@@ -14,8 +14,7 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_protocol.values import Payload
 
-ELBOW = 2
-"""Index of the joint whose axis is the elbow."""
+ELBOW = 2  # index of the joint whose axis is the elbow
 
 
 def add(a: list[float], b: list[float]) -> list[float]:

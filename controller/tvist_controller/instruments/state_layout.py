@@ -22,8 +22,7 @@ from tvist_protocol.stream import State
 Bytes = npt.NDArray[np.uint8]
 Integers = npt.NDArray[np.int64]
 
-NOWHERE = -1
-"""Place of an integer that the layout does not write."""
+NOWHERE = -1  # place of an integer that the layout does not write
 
 
 def width(number: int | None) -> int:
@@ -137,10 +136,8 @@ def write_state(
 class Layout(NamedTuple):
     """Bytes of a state and the places of its numbers."""
 
-    template: Bytes
-    """An encoded state."""
-    places: Integers
-    """Place of each number, in the order of the state's fields."""
+    template: Bytes  # an encoded state
+    places: Integers  # place of each number, in the order of the state's fields
     integers: Integers
     """Place and encoded size of the tick and of the set-point's sequence number, shape (2, 2)."""
 

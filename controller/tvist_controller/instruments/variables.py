@@ -27,10 +27,8 @@ START: Final = 40.0
 JOINT_MODES: dict[int, int] = {RobotMode.RUNNING: 253, RobotMode.POWER_OFF: 239, RobotMode.BACKDRIVE: 238}
 """RTDE's joint mode for each robot mode; the joints idle in all others."""
 JOINT_IDLE: Final = 255
-CONFIGURABLE: Final = 0xFF00
-"""Bits 8–15, the configurable terminals."""
-DEVIATION: Final = 0.05
-"""Difference between measured and shaped angle that counts as a ratio of 1 [rad]."""
+CONFIGURABLE: Final = 0xFF00  # bits 8–15, the configurable terminals
+DEVIATION: Final = 0.05  # difference between measured and shaped angle that counts as a ratio of 1 [rad]
 _STOPPED, _EMERGENCY = 1 << 10, 1 << 7
 SAFETY_BITS: dict[int, int] = {
     SafetyMode.NORMAL: 1 << 0,
@@ -55,13 +53,11 @@ class Variable(NamedTuple):
     """An RTDE output variable other than registers."""
 
     name: str
-    type: str
-    """RTDE's name of the type."""
+    type: str  # RTDE's name of the type
     source: Literal["state", "io", "computed", "constant"]
     """State, io: contained in that message; RTDE reads io variables only when `Io` changes. Computed: from
     both. Constant: not simulated."""
-    what: str
-    """Description for the reference page."""
+    what: str  # description for the reference page
     read: Read
 
 

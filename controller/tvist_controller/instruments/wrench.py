@@ -23,8 +23,7 @@ JOINT_LISTS = (
 ROWS = len(JOINT_LISTS)
 UNSHAPED, SHAPED = slice(0, 3), slice(3, 6)
 """Rows of positions, velocities and accelerations of the two references."""
-SHAPED_QD, SHAPED_QDD, SHAPED_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)
-"""Single rows."""
+SHAPED_QD, SHAPED_QDD, SHAPED_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)  # single rows
 
 
 def joint_lists(state: State) -> bytearray:
@@ -47,8 +46,7 @@ def as_rows(lists: bytearray) -> Floats:
 
 NEAR_SINGULAR = 0.01
 """Manipulability √det(J Jᵀ) below which estimates are damped; at most 0.11 on a UR5e [m³ with six joints]."""
-DAMPING = 0.08
-"""λ₀, the damping factor at a singularity [m, or -]."""
+DAMPING = 0.08  # λ₀, the damping factor at a singularity [m, or -]
 RUNNING = int(RobotMode.RUNNING)
 """Robot mode in which the drives hold the arm, as an int for quick comparison."""
 

@@ -18,8 +18,7 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, Floats, payload_inertia, rigid_model
 from tvist_plant.plant import GRAVITY
 
-AT_FLANGE = (0.0,) * 6
-"""Tool centre point of an arm without tool."""
+AT_FLANGE = (0.0,) * 6  # tool centre point of an arm without tool
 
 
 @compiled_for_ticks
@@ -82,8 +81,7 @@ class Arm:
         model = rigid_model(description, Payload())
         flange = model.getFrameId(FLANGE)
         self._flange = model.frames[flange].placement
-        self.chain = chain_of(model, flange)
-        """The links, including the load of the last one, shape (n+1, 22)."""
+        self.chain = chain_of(model, flange)  # the links, including the load of the last one, shape (n+1, 22)
         self.scratch = np.zeros((description.joints + 1, SCRATCH))
         """Scratch of `tvist_plant.chain`, shape (n+1, 28)."""
         self.bare = self.chain[-2, BODY:].copy()

@@ -15,11 +15,9 @@ FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
 ON_CURVE = 4
 """Added to these if a joint is free and a curve of postures was searched, which takes many times longer."""
 
-SAMPLES = 96
-"""Values of a free angle at which postures are computed before the nearest are refined."""
+SAMPLES = 96  # values of a free angle at which postures are computed before the nearest are refined
 
-OUTSIDE = 1e6
-"""Penalty on the squared distance of a posture outside a joint's range [rad^2]."""
+OUTSIDE = 1e6  # Penalty on the squared distance of a posture outside a joint's range [rad^2]
 
 
 @compiled

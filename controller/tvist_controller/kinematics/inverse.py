@@ -16,8 +16,7 @@ from tvist_controller.kinematics.postures import ANY, arm_table
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 
-STARTS = 63
-"""Number of further start postures for an arm without closed form."""
+STARTS = 63  # number of further start postures for an arm without closed form
 
 
 class InverseKinematicsError(ValueError):

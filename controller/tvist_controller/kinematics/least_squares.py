@@ -9,14 +9,11 @@ from tvist_controller.kinematics.pose import locate, pose_error
 from tvist_kernels.compiling import inlined
 from tvist_plant.model import Floats
 
-ACCURACY = 1e-9
-"""Permitted error of a solution [m and rad]."""
+ACCURACY = 1e-9  # permitted error of a solution [m and rad]
 
-AIM = 1e-12
-"""Error above which a solution is refined [m and rad]."""
+AIM = 1e-12  # error above which a solution is refined [m and rad]
 
-NO_PIVOT = 1e-30
-"""Smallest pivot, to avoid overflow with a singular matrix."""
+NO_PIVOT = 1e-30  # smallest pivot, to avoid overflow with a singular matrix
 
 
 @compiled

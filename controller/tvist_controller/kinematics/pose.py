@@ -12,12 +12,9 @@ from tvist_controller._compiled import compiled, compiled_for_ticks
 from tvist_plant.chain import bend, start, step_along
 from tvist_plant.model import Floats
 
-LOST = 1e-4
-"""Singular value of the Jacobian below which its direction counts as lost [m or rad per rad]."""
-SWEEPS = 15
-"""Largest number of sweeps over all pairs of rows; seven have always been enough."""
-ACCURATE = 1e-12
-"""Pose error at which Newton's method stops [m or rad]."""
+LOST = 1e-4  # singular value of the Jacobian below which its direction counts as lost [m or rad per rad]
+SWEEPS = 15  # largest number of sweeps over all pairs of rows; seven have always been enough
+ACCURATE = 1e-12  # pose error at which Newton's method stops [m or rad]
 
 
 @compiled_for_ticks

@@ -26,14 +26,12 @@ from tvist_plant.model import Floats
 ANY, PARALLEL, SPHERICAL = 0.0, 1.0, 2.0
 """No closed form; axes 2, 3 and 4 parallel (UR); axes 4, 5 and 6 intersect (spherical wrist)."""
 
-EXACT = 1e-9
-"""Tolerance of a sine, cosine or length [m] for recognising a form."""
+EXACT = 1e-9  # tolerance of a sine, cosine or length [m] for recognising a form
 
 AT_BORDER = 1e-10
 """Distance [m] beyond the reach that counts as rounding; sine or length [m] below which a joint is free."""
 
-AMPLIFIED = 1e-6
-"""Sine or length [m] below which an angle amplifies the pose's rounding a million times."""
+AMPLIFIED = 1e-6  # sine or length [m] below which an angle amplifies the pose's rounding a million times
 
 DEFINITE, LOOSE, FREE = 0, 1, 2
 """No angle is free; one nearly is and amplifies rounding of the pose; one is free."""

@@ -76,10 +76,8 @@ class ControlCycle:
         self.kernel_parts = dynamics.chain, dynamics.scratch, drives.rows
         """Links, scratch and joint controllers: arguments of `line_tick`."""
         self.mode = LineMode.REST
-        self.placements = 0
-        """Number of times the arm was placed at rest, which interrupts its motion."""
-        self.guard: Guard | None = None
-        """Checks references and stops of a guarded motion; None without one."""
+        self.placements = 0  # number of times the arm was placed at rest, which interrupts its motion
+        self.guard: Guard | None = None  # checks references and stops of a guarded motion; None without one
         self.sample = self.reset(q, carried=carried, seed=seed)
         """Signals of the last tick, or of the arm at rest after a reset."""
         check_measurement(self.sample.measured, description.joints, self._plant)

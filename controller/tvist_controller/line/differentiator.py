@@ -18,12 +18,9 @@ STILL = 1e-7
 class Target(Struct, frozen=True, eq=False, gc=False):
     """Shaped reference and its derivatives at the same tick."""
 
-    q: Floats
-    """q*, shape (n,) [rad]."""
-    qd: Floats
-    """q̇*, shape (n,) [rad/s]."""
-    qdd: Floats
-    """q̈*, shape (n,) [rad/s^2]."""
+    q: Floats  # q*, shape (n,) [rad]
+    qd: Floats  # q̇*, shape (n,) [rad/s]
+    qdd: Floats  # q̈*, shape (n,) [rad/s^2]
 
 
 def rests_at(reference: Floats, target: Target, period: float) -> bool:

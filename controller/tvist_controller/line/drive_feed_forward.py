@@ -10,17 +10,14 @@ from tvist_controller.line.line_tick import Q_R, QD_R, STATIC, TORQUE, TORQUE_FF
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 
-FADE = 150
-"""Duration of the transition in motion [ticks]."""
+FADE = 150  # duration of the transition in motion [ticks]
 
 
 class MotorReference(Struct, frozen=True, eq=False, gc=False):
     """Motion of the motors that elastic feed-forward commands."""
 
-    rows: Floats
-    """Velocity q̇* + ẇ [rad/s], acceleration q̈* + ẅ [rad/s^2] and torque [N m], shape (3, n)."""
-    limited: bool
-    """Whether ẅ was limited to the drives' remaining torque."""
+    rows: Floats  # velocity q̇* + ẇ [rad/s], acceleration q̈* + ẅ [rad/s^2] and torque [N m], shape (3, n)
+    limited: bool  # whether ẅ was limited to the drives' remaining torque
 
 
 class DriveFeedForward:

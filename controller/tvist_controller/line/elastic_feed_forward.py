@@ -27,10 +27,8 @@ from tvist_plant.model import FLANGE, flexible_model, rigid_model
 
 TORQUE_SHARE = 0.95
 """Fraction of a drive's torque limit that target and lead may use together [-]."""
-LEAST_ROOM = 0.05
-"""Fraction of a drive's torque limit that the lead may always use [-]."""
-SETTLED = 1e-8
-"""Lead below which the motors count as settled [rad]."""
+LEAST_ROOM = 0.05  # fraction of a drive's torque limit that the lead may always use [-]
+SETTLED = 1e-8  # lead below which the motors count as settled [rad]
 
 
 class ElasticFeedForward:
@@ -62,11 +60,9 @@ class ElasticFeedForward:
         law: Floats | None = None,
     ) -> None:
         flexible, rigid = flexible_model(description, Payload()), rigid_model(description, Payload())
-        self.delay = period
-        """Delay of commands behind their targets [s]."""
+        self.delay = period  # delay of commands behind their targets [s]
         self._memory = memory = memory_for(flexible.model.nv, description.joints, len(flexible.flexes))
-        self.lead = lead = parts(memory)
-        """The arm's memory as the kernels use it."""
+        self.lead = lead = parts(memory)  # the arm's memory as the kernels use it
         drives = description.drives
         memory[PERIOD], memory[FRICTION_WIDTH], memory[LINEAR] = (
             period,
@@ -95,8 +91,7 @@ class ElasticFeedForward:
         self._sag: Floats | None = None
         self.motors: Floats = np.zeros((3, description.joints))
         """Velocity [rad/s], acceleration [rad/s^2] and torque [N m] of the last command, shape (3, n)."""
-        self.limited = False
-        """Whether the lead's acceleration was limited at the last tick."""
+        self.limited = False  # whether the lead's acceleration was limited at the last tick
 
     def reset(self, stiction: Floats | float = 0.0) -> None:
         """Restart with the lead of the next targets and the motors' stiction [N m]."""

@@ -23,10 +23,8 @@ from tvist_kernels.compiling import inlined
 from tvist_plant.chain import SCRATCH, WIDTH, torques
 from tvist_plant.model import Floats
 
-DAMPED = 0.1
-"""λ, of the order of lever arms that may be neglected [m]."""
-RECOVERY = 120.0
-"""Rate of the lead's return after its acceleration was limited, critically damped [1/s]."""
+DAMPED = 0.1  # λ, of the order of lever arms that may be neglected [m]
+RECOVERY = 120.0  # rate of the lead's return after its acceleration was limited, critically damped [1/s]
 ROTOR, FRICTION, MOST, LEAST, STICTION, LAW = range(6)
 """Rows of a drive's parameters: rotor inertia [kg m^2]; fed-forward Coulomb friction [N m], or its slope if
 linear [N m s/rad]; torque that motion and lead may use together, and that the lead may always use [N m];
@@ -39,32 +37,20 @@ friction; torques include the lead; friction is known and replaces the descripti
 class Lead(NamedTuple):
     """Views of the memory of an arm with N coordinates, n joints and m bending joints."""
 
-    joints: Floats
-    """Indices of the joints among the coordinates, shape (n,)."""
-    flexes: Floats
-    """Indices of the bending joints, shape (m,)."""
-    chain: Floats
-    """Links of the arm, including bending ones, see `tvist_plant.chain`, shape (N+1, 22)."""
-    bodies: Floats
-    """Scratch of the chain, shape (N+1, 28)."""
-    springs: Floats
-    """Stiffness of each spring [N m/rad], and damping time in ticks [-], shape (2, N)."""
-    drives: Floats
-    """Rows of `ROTOR` etc., shape (14, n)."""
-    late: Floats
-    """Previous target and its torque, shape (4, n)."""
-    leads: Floats
-    """Wanted and actual leads of the last three ticks, newest first, shape (2, 3, n) [rad]."""
-    before: Floats
-    """Undamped deflections at the previous tick, shape (N,) [rad]."""
+    joints: Floats  # indices of the joints among the coordinates, shape (n,)
+    flexes: Floats  # indices of the bending joints, shape (m,)
+    chain: Floats  # links of the arm, including bending ones, see `tvist_plant.chain`, shape (N+1, 22)
+    bodies: Floats  # scratch of the chain, shape (N+1, 28)
+    springs: Floats  # stiffness of each spring [N m/rad], and damping time in ticks [-], shape (2, N)
+    drives: Floats  # rows of `ROTOR` etc., shape (14, n)
+    late: Floats  # previous target and its torque, shape (4, n)
+    leads: Floats  # wanted and actual leads of the last three ticks, newest first, shape (2, 3, n) [rad]
+    before: Floats  # undamped deflections at the previous tick, shape (N,) [rad]
     motion: Floats
     """Angles, velocities and accelerations of the coordinates; the first two are zero for bending, shape (3, N)."""
-    jacobian: Floats
-    """Translation Jacobian of the flange, shape (3, N) [m/rad]."""
-    loads: Floats
-    """Spring torques without gravity, without and with bending acceleration, shape (2, N) [N m]."""
-    bent: Floats
-    """Bending at the last three ticks, newest first, shape (3, m) [rad]."""
+    jacobian: Floats  # translation Jacobian of the flange, shape (3, N) [m/rad]
+    loads: Floats  # spring torques without gravity, without and with bending acceleration, shape (2, N) [N m]
+    bent: Floats  # bending at the last three ticks, newest first, shape (3, m) [rad]
 
 
 def memory_for(N: int, n: int, m: int) -> Floats:

@@ -10,17 +10,14 @@ from tvist_protocol.replies import Code
 class Obstacle(NamedTuple):
     """Reason for refusing a reference."""
 
-    why: str
-    """Reason for users."""
-    code: Code
-    """Reason for programs."""
+    why: str  # reason for users
+    code: Code  # reason for programs
 
 
 class Guard(Protocol):
     """Decides whether a shaped reference may be played, and supplies the stop otherwise."""
 
-    obstacle: Obstacle
-    """Reason for refusing the latest reference."""
+    obstacle: Obstacle  # reason for refusing the latest reference
 
     def __call__(self, state: Target) -> JointStop | None:
         """Return the stop to use if a reference that leads to this state must not be played, else None."""

@@ -7,8 +7,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_plant.chain import BODY
 from tvist_plant.description import Payload, RobotDescription
 
-SLEW = 250
-"""Default duration of a payload change [ticks]."""
+SLEW = 250  # default duration of a payload change [ticks]
 
 
 class InverseDynamics(Arm):

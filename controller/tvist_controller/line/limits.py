@@ -18,18 +18,13 @@ TORQUE_SHARE = 0.9
 REBOUND = 1.0
 """Overshoot of a flexible arm's torque relative to a sudden change of the rigid arm's torque: 1 without
 damping [-]. Stops bypass the filter, so their change is sudden."""
-GENTLEST_STOP = 1.0
-"""Lowest deceleration of a stop [rad/s^2]."""
+GENTLEST_STOP = 1.0  # lowest deceleration of a stop [rad/s^2]
 
-MOMENTS = 32
-"""Number of moments at which a stop's torque is checked."""
+MOMENTS = 32  # number of moments at which a stop's torque is checked
 _SHARES = np.arange(1, MOMENTS + 1) / MOMENTS
-_POINTS = np.linspace(0.0, 1.0, 17)[:, np.newaxis]
-"""Fractions of a path at which its torque is checked."""
-LOOK_EVERY = 4
-"""Ticks between torque checks along known references."""
-REDUCED_SHARE = 0.25
-"""Fraction of joint velocity that remains in reduced mode [-]."""
+_POINTS = np.linspace(0.0, 1.0, 17)[:, np.newaxis]  # fractions of a path at which its torque is checked
+LOOK_EVERY = 4  # ticks between torque checks along known references
+REDUCED_SHARE = 0.25  # fraction of joint velocity that remains in reduced mode [-]
 
 
 def arm_limits(description: RobotDescription) -> MotionLimits:
@@ -133,8 +128,7 @@ class StopTorque:
             asked = dynamics.effort(state.q, state.qd, state.qdd)
         self._share, self._most = np.maximum(TORQUE_SHARE * limits, asked), np.maximum(limits, asked)
         self._before = dynamics.torque(state.q, state.qd, state.qdd) - dynamics.gravity(state.q)
-        self._failed: int | None = None
-        """Moment at which the last failing stop exceeded the torques."""
+        self._failed: int | None = None  # moment at which the last failing stop exceeded the torques
 
     def holds(self, stop: AnyStop, *, rebound: bool = True) -> bool:
         """Return whether a stop keeps these torques and, with `rebound`, its overshoot keeps the limits.

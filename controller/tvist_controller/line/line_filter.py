@@ -15,11 +15,9 @@ class LineFilter:
     """Shapes with the latest chosen filter; in motion, the previous one fades into it."""
 
     def __init__(self, tvist: Filter, arm: MotionLimits) -> None:
-        self.tvist = tvist
-        """The latest chosen filter, in use or next."""
+        self.tvist = tvist  # the latest chosen filter, in use or next
         self._arm = arm
-        self.limits = arm
-        """Limits of the current motion."""
+        self.limits = arm  # limits of the current motion
         self._fade: Fade | None = None
 
     @property

@@ -6,18 +6,13 @@ from enum import Enum
 class LineMode(Enum):
     """Mode of the control line; a row has `shaped`, `guarded`, and the permitted next modes."""
 
-    REST = (True, False, "REST", "SHAPED", "GUARDED", "BYPASSED")
-    """The shaped reference rests."""
-    SHAPED = (True, False, "REST", "SHAPED", "BYPASSED", "RUNNING_OUT", "STOPPING")
-    """A shaped planned motion."""
-    GUARDED = (True, True, "REST", "GUARDED", "BYPASSED", "STOPPING")
-    """A shaped stream or guided motion."""
-    BYPASSED = (False, True, "REST", "BYPASSED", "STOPPING")
-    """An unshaped guided motion."""
+    REST = (True, False, "REST", "SHAPED", "GUARDED", "BYPASSED")  # the shaped reference rests
+    SHAPED = (True, False, "REST", "SHAPED", "BYPASSED", "RUNNING_OUT", "STOPPING")  # a shaped planned motion
+    GUARDED = (True, True, "REST", "GUARDED", "BYPASSED", "STOPPING")  # a shaped stream or guided motion
+    BYPASSED = (False, True, "REST", "BYPASSED", "STOPPING")  # an unshaped guided motion
     RUNNING_OUT = (True, False, "REST", "STOPPING")
     """A planned motion that continues to its end, which is sooner than any stop."""
-    STOPPING = (False, False, "REST", "STOPPING")
-    """An unshaped stop."""
+    STOPPING = (False, False, "REST", "STOPPING")  # an unshaped stop
 
     def __init__(self, shaped: bool, guarded: bool, *followed_by: str) -> None:
         self.at_rest = self.name == "REST"

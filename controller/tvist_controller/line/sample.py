@@ -14,22 +14,16 @@ from tvist_plant.plant import Measurement
 class Sample(Struct, frozen=True, eq=False, gc=False):
     """Signals along the control line in one tick."""
 
-    mode: LineMode
-    """Mode of the line."""
-    reference: Floats
-    """q before shaping, shape (n,) [rad]."""
+    mode: LineMode  # mode of the line
+    reference: Floats  # q before shaping, shape (n,) [rad]
     references: tuple[Floats, Floats, Floats]
     """The last three references before shaping, see `ShapedReference`."""
     window: tuple[Floats, Floats, Floats]
     """The last three shaped references, newest last, each of shape (n,) [rad]."""
-    signals: Floats
-    """All signals before the arm, shape (9, n), see `line_tick`."""
-    command: DriveCommand
-    """Command to the drives."""
-    measured: Measurement
-    """Measurement of the arm."""
-    motors: MotorReference | None = None
-    """Motor motion of elastic feed-forward; None without it."""
+    signals: Floats  # all signals before the arm, shape (9, n), see `line_tick`
+    command: DriveCommand  # command to the drives
+    measured: Measurement  # measurement of the arm
+    motors: MotorReference | None = None  # motor motion of elastic feed-forward; None without it
     refused: Obstacle | None = None
     """Reason for a stop instead of the reference; None if the reference was played."""
 

@@ -12,8 +12,7 @@ class ShapedReference:
 
     def __init__(self, q: Floats, period: float) -> None:
         self._period = period
-        self.joints = Differentiator(q, period)
-        """State of the joints."""
+        self.joints = Differentiator(q, period)  # state of the joints
         self.reset(q)
 
     def reset(self, q: Floats) -> None:

@@ -33,10 +33,8 @@ from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
 from tvist_urscript import Script
 
-HISTORY = 1000
-"""Number of past postures kept (2 s)."""
-STEADY = 250
-"""Ticks of rest after which the arm counts as steady (500 ms, as on UR robots)."""
+HISTORY = 1000  # number of past postures kept (2 s)
+STEADY = 250  # ticks of rest after which the arm counts as steady (500 ms, as on UR robots)
 
 
 class MotionControl:
@@ -47,20 +45,15 @@ class MotionControl:
     ) -> None:
         self.cycle = cycle
         self.collisions = collisions
-        self.changed = True
-        """Whether activity or modes may have changed since `RobotModes.update`."""
+        self.changed = True  # whether activity or modes may have changed since `RobotModes.update`
         self.activity = PUT[mode]
         self.safety = SafetySystem()
         self._emit = emit
-        self.stopper = Stopper(cycle)
-        """Prediction and stops of the control line's motion."""
-        self.ahead = RemainingMotion(cycle, self.stopper, collisions)
-        """Collision check of that motion."""
-        self.power = ArmPower.of(cycle.plant)
-        """Power of a real arm; None for simulated arms."""
+        self.stopper = Stopper(cycle)  # prediction and stops of the control line's motion
+        self.ahead = RemainingMotion(cycle, self.stopper, collisions)  # collision check of that motion
+        self.power = ArmPower.of(cycle.plant)  # power of a real arm; None for simulated arms
         self.motions = Motions(cycle, self.safety, emit)
-        self.streams = Setpoints(cycle.description)
-        """The present stream of set-points, if any."""
+        self.streams = Setpoints(cycle.description)  # the present stream of set-points, if any
         self.tcp: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self.tool = Arm(cycle.description)

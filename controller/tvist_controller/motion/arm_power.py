@@ -8,8 +8,7 @@ import numpy as np
 from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, Plant, PlantError, SimulatedArm
 from tvist_protocol.modes import RobotMode
 
-STALE = 10
-"""Ticks without a new timestamp after which measurements are stale."""
+STALE = 10  # ticks without a new timestamp after which measurements are stale
 
 
 class ArmPower:
@@ -21,8 +20,7 @@ class ArmPower:
         """Stop by the arm's own controller, until the drives are to hold the arm again."""
         self._told: RobotMode | None = None
         self._was_ready = False
-        self.begun = False
-        """Whether the drives have started to hold the arm in the last tick."""
+        self.begun = False  # whether the drives have started to hold the arm in the last tick
         self._measured: float | None = None
         self._same = 0
 

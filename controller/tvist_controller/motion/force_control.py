@@ -24,23 +24,16 @@ FRAME_DEADBAND = 1e-3
 """Distance of the tool from the frame's origin, and speed, below which axes stay unchanged [m, m/s]."""
 SMOOTHED = 0.04
 """Time constant for a wrench estimated from drive torques, which the arm's elasticity disturbs [s]."""
-HAND_SPEED = np.repeat([0.5, 1.5], 3)
-"""Largest speed in freedrive [m/s, rad/s]."""
+HAND_SPEED = np.repeat([0.5, 1.5], 3)  # largest speed in freedrive [m/s, rad/s]
 LIGHT, HEAVY = (30.0, 150.0), (70.0, 700.0)
 """Virtual mass [kg] and damping [N s/m] of freedrive, with a sensor and with an estimate. Light values with
 the disturbed estimate would oscillate when a hand presses the arm against something hard."""
-MAX_FORCE = 250.0
-"""Force at the tool that causes a protective stop, the widest limit of UR robots [N]."""
-DRIVES = "the drives' torques"
-"""Source of the force without a sensor."""
-TICKS = 5
-"""Ticks for which a force or deviation must last to cause a stop."""
-TOUCH = 10.0, 4
-"""Force of a contact [N] and number of ticks averaged, with a flange sensor."""
-ESTIMATED_TOUCH = 20.0, 16
-"""The same for an estimated force, which a late set-point disturbs for a few ticks."""
-GENTLE = 1.0
-"""Deceleration of the fastest joint at the end of force mode, the lowest of any stop [rad/s^2]."""
+MAX_FORCE = 250.0  # force at the tool that causes a protective stop, the widest limit of UR robots [N]
+DRIVES = "the drives' torques"  # source of the force without a sensor
+TICKS = 5  # ticks for which a force or deviation must last to cause a stop
+TOUCH = 10.0, 4  # force of a contact [N] and number of ticks averaged, with a flange sensor
+ESTIMATED_TOUCH = 20.0, 16  # the same for an estimated force, which a late set-point disturbs for a few ticks
+GENTLE = 1.0  # deceleration of the fastest joint at the end of force mode, the lowest of any stop [rad/s^2]
 
 
 class ForceControl(Monitor):
@@ -48,8 +41,7 @@ class ForceControl(Monitor):
 
     def __init__(self, guidance: Guidance, forces: ToolForces, *, timeouts: bool) -> None:
         self._guidance, self._forces = guidance, forces
-        self.external = ExternalSensor(timeouts=timeouts)
-        """A user's own force sensor."""
+        self.external = ExternalSensor(timeouts=timeouts)  # a user's own force sensor
         self._motion, self._cycle = guidance.motion, guidance.motion.cycle
         self._smooth = np.zeros(6)
         self._by_hand, self._beyond = False, 0

@@ -8,14 +8,10 @@ import numpy as np
 from tvist_controller.line.differentiator import Floats
 from tvist_plant.plant import PERIOD
 
-REMEMBERED = 500
-"""Ticks recorded, and after which an unused watch ends."""
-FIRST = 20
-"""Ticks at the start of a watch averaged as the force without contact."""
-ONSET = 0.2
-"""Fraction of the threshold that marks the start of a contact [-]."""
-SILENT = 0.1
-"""Time without values after which the sensor counts as silent [s]."""
+REMEMBERED = 500  # ticks recorded, and after which an unused watch ends
+FIRST = 20  # ticks at the start of a watch averaged as the force without contact
+ONSET = 0.2  # fraction of the threshold that marks the start of a contact [-]
+SILENT = 0.1  # time without values after which the sensor counts as silent [s]
 
 
 class ContactWatch:
@@ -61,8 +57,7 @@ class ExternalSensor:
     def __init__(self, *, timeouts: bool) -> None:
         self._most = round(SILENT / PERIOD) if timeouts else np.inf
         self._offset: Sequence[float] | None = None
-        self.latest: Floats | None = None
-        """Last value; None if too old."""
+        self.latest: Floats | None = None  # last value; None if too old
         self._age = 0
 
     def use(self, offset: Sequence[float] | None) -> None:

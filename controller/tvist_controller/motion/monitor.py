@@ -10,10 +10,8 @@ from tvist_protocol.replies import Code
 class MonitorFinding(NamedTuple):
     """A monitor's finding and its consequence."""
 
-    why: str
-    """Reason for users."""
-    code: Code | None = None
-    """Reason for programs."""
+    why: str  # reason for users
+    code: Code | None = None  # reason for programs
     then: Literal["warning", "interruption", "protective_stop"] = "warning"
     """Warn, end the present motion or stream, or make a protective stop."""
 
@@ -24,8 +22,7 @@ class Monitor(ABC):
     needs: ClassVar[Literal["nothing", "drives", "drives alone"]] = "nothing"
     """Run every tick, only while the drives hold the arm, or only if also no motion is compliant."""
 
-    awake = True
-    """False to skip ticks without a measured force."""
+    awake = True  # false to skip ticks without a measured force
 
     @abstractmethod
     def look(self, sample: Sample) -> MonitorFinding | None:

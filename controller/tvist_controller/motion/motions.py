@@ -39,12 +39,10 @@ class RunningMove:
         self._window, self._peak = planned.window, planned.peak
         self._room, self._surplus = planned.room, planned.surplus
         self._held = False
-        self.course = planned.course
-        """State from which its last part can be extended; None if it cannot."""
+        self.course = planned.course  # state from which its last part can be extended; None if it cannot
         self._parts = len(planned.parts)
         self._trajectory, *coming = planned.parts
-        self.coming: tuple[PlannedMotion, ...] = tuple(coming)
-        """Parts that have not started."""
+        self.coming: tuple[PlannedMotion, ...] = tuple(coming)  # parts that have not started
         self._begin()
 
     def go_on(self, speed: float, slowest: float | None) -> None:
@@ -149,8 +147,7 @@ class Motions:
         self._reduced_velocity = REDUCED_SHARE * min(cycle.description.limits.velocity)
         self._started = 0
         self._running: RunningMotion | None = None
-        self.asked_speed = 1.0
-        """Set speed [-]."""
+        self.asked_speed = 1.0  # set speed [-]
         self._scale = 1.0
 
     @property

@@ -32,14 +32,10 @@ _LIVE = _MOTION | frozenset(
 class SafetySystem:
     """Safety inputs and latched faults, independent of the robot's activity."""
 
-    reduced: bool = False
-    """Whether the speed is reduced."""
-    safeguard: bool = False
-    """Whether a safeguard requests a stop."""
-    emergencies: set[Emergency] = field(default_factory=set)
-    """Pressed emergency stops."""
-    latched: Latched | None = None
-    """Fault or violation latched until a restart."""
+    reduced: bool = False  # whether the speed is reduced
+    safeguard: bool = False  # whether a safeguard requests a stop
+    emergencies: set[Emergency] = field(default_factory=set)  # pressed emergency stops
+    latched: Latched | None = None  # fault or violation latched until a restart
 
     def mode(self, activity: Activity) -> SafetyMode:
         """Return the most severe present condition as RTDE's safety mode."""

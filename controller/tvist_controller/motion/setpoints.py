@@ -10,8 +10,7 @@ from tvist_controller.trajectory import SetpointStream
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Setpoint
 
-TIMEOUT = 0.25
-"""Time without set-points that stops a stream [s]."""
+TIMEOUT = 0.25  # time without set-points that stops a stream [s]
 
 
 class Unreadable(NamedTuple):

@@ -19,22 +19,17 @@ from tvist_controller.trajectory.spline import Knots
 
 LOOKS, HALVINGS = 64, 40
 """Places at which a distance from an end is checked, and bisections of the step in which it is exceeded."""
-OFF = 1e-5
-"""Largest deviation from a line where two blends meet, outside their radii [m]."""
-SHALLOW = 0.3
-"""Largest turn of the path at a corner next to such a line [rad]."""
-STEEPER = 1.5
-"""Largest ratio of the curvature where two blends meet to the smaller of both [-]."""
+OFF = 1e-5  # largest deviation from a line where two blends meet, outside their radii [m]
+SHALLOW = 0.3  # largest turn of the path at a corner next to such a line [rad]
+STEEPER = 1.5  # largest ratio of the curvature where two blends meet to the smaller of both [-]
 
 
 @dataclass(frozen=True)
 class JointWay:
     """Straight line in joint space."""
 
-    start: Floats
-    """Joint positions at the start, shape (n,) [rad]."""
-    end: Floats
-    """Joint positions at the end, shape (n,) [rad]."""
+    start: Floats  # joint positions at the start, shape (n,) [rad]
+    end: Floats  # joint positions at the end, shape (n,) [rad]
 
     @property
     def length(self) -> float:
@@ -76,14 +71,10 @@ class JointWay:
 class LegSpeed:
     """Speed limits of a part of a path."""
 
-    velocity: float
-    """Largest speed [m/s]."""
-    acceleration: float
-    """Largest acceleration [m/s^2]."""
-    duration: float | None = None
-    """Duration that replaces both limits [s]."""
-    even: bool = False
-    """Whether blends keep the tool's speed, so that only the joints limit acceleration."""
+    velocity: float  # largest speed [m/s]
+    acceleration: float  # largest acceleration [m/s^2]
+    duration: float | None = None  # duration that replaces both limits [s]
+    even: bool = False  # whether blends keep the tool's speed, so that only the joints limit acceleration
 
     def meeting(self, other: "LegSpeed") -> "LegSpeed":
         """Return the pacing of a blend between two parts."""
@@ -100,15 +91,11 @@ class Leg:
     """One requested part of a path."""
 
     way: ToolWay | JointWay
-    knots: Knots
-    """The joints' motion along the whole part."""
-    corner: Placement
-    """Pose of the tool at its end."""
+    knots: Knots  # the joints' motion along the whole part
+    corner: Placement  # pose of the tool at its end
     pacing: LegSpeed
-    blend: float
-    """Radius of the blend at its end [m]."""
-    where: str
-    """Field of the command, for messages."""
+    blend: float  # radius of the blend at its end [m]
+    where: str  # field of the command, for messages
 
     @property
     def q(self) -> Floats:
@@ -120,10 +107,8 @@ class Leg:
 class BlendJunction(NamedTuple):
     """Point of a leg where the blends before and behind it meet."""
 
-    s: float
-    """Length from the leg's start [m]."""
-    bend: Floats
-    """Second derivatives of the tool's position and turn, shape (6,) [1/m, rad/m^2]."""
+    s: float  # length from the leg's start [m]
+    bend: Floats  # second derivatives of the tool's position and turn, shape (6,) [1/m, rad/m^2]
 
 
 def meetings(legs: Sequence[Leg]) -> list[BlendJunction | None]:

@@ -13,36 +13,24 @@ from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.retiming import Cells, RetimedLaw, RetimingLimits, longer_law, quickest_law
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 
-FINEST, CELLS = 5e-4, 400
-"""Smallest cell length [m], and largest number of cells of a run."""
-MARGIN = 1.01
-"""Factor by which a derivative may exceed its samples within a cell [-]."""
-FASTEST = 1e3
-"""Largest factor of speeding up for a duration; the joints then limit by far [-]."""
-JOLT_SHARE = 0.3
-"""Fraction of joint jerk available to each effect of the curve [-]."""
-BRIEFEST = 1e-3
-"""Shortest duration planned for [s]."""
-TRIES = 4
-"""Attempts to plan an extended motion more slowly after slightly exceeding limits."""
-MOMENTS = 500
-"""Number of moments at which a motion's velocity is checked."""
-MIN_DERIVATIVE = 1e-3
-"""Smallest derivative by which a speed is divided [-]."""
-CLOSE = 1e-6
-"""Permitted relative error of a duration [-]."""
+FINEST, CELLS = 5e-4, 400  # smallest cell length [m], and largest number of cells of a run
+MARGIN = 1.01  # factor by which a derivative may exceed its samples within a cell [-]
+FASTEST = 1e3  # largest factor of speeding up for a duration; the joints then limit by far [-]
+JOLT_SHARE = 0.3  # fraction of joint jerk available to each effect of the curve [-]
+BRIEFEST = 1e-3  # shortest duration planned for [s]
+TRIES = 4  # attempts to plan an extended motion more slowly after slightly exceeding limits
+MOMENTS = 500  # number of moments at which a motion's velocity is checked
+MIN_DERIVATIVE = 1e-3  # smallest derivative by which a speed is divided [-]
+CLOSE = 1e-6  # permitted relative error of a duration [-]
 
 
 @dataclass(frozen=True)
 class JointLimits:
     """Limits of each joint on a path."""
 
-    velocity: Floats
-    """Shape (n,) [rad/s]."""
-    acceleration: Floats
-    """Shape (n,) [rad/s^2]."""
-    jerk: float
-    """Smallest over all joints [rad/s^3]."""
+    velocity: Floats  # shape (n,) [rad/s]
+    acceleration: Floats  # shape (n,) [rad/s^2]
+    jerk: float  # smallest over all joints [rad/s^3]
 
 
 def joined(run: Run, before: Knots | None = None) -> Knots:
@@ -137,20 +125,13 @@ def fastest(law: RetimedLaw, curve: SplineCurve) -> float:
 class PathLimits(NamedTuple):
     """Limits of a run, cell by cell, before speeding up."""
 
-    places: Floats
-    """Cell boundaries, shape (c + 1,) [m]."""
-    speed: Floats
-    """Requested tool speed, shape (c,) [m/s]."""
-    p: Floats
-    """Fraction of its acceleration limit per unit of s̈, shape (c,) [s^2/m]."""
-    q: Floats
-    """Fraction of its acceleration limit per unit of ṡ², shape (c,) [s^2/m^2]."""
-    slope: Floats
-    """Bound of |dq/ds|, shape (c, n) [rad/m]."""
-    second: Floats
-    """Bound of |d²q/ds²|, shape (c, n) [rad/m^2]."""
-    third: Floats
-    """Bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]."""
+    places: Floats  # cell boundaries, shape (c + 1,) [m]
+    speed: Floats  # requested tool speed, shape (c,) [m/s]
+    p: Floats  # fraction of its acceleration limit per unit of s̈, shape (c,) [s^2/m]
+    q: Floats  # fraction of its acceleration limit per unit of ṡ², shape (c,) [s^2/m^2]
+    slope: Floats  # bound of |dq/ds|, shape (c, n) [rad/m]
+    second: Floats  # bound of |d²q/ds²|, shape (c, n) [rad/m^2]
+    third: Floats  # bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]
 
     def then(self, first: int, last: int, run: Run, curve: SplineCurve) -> "PathLimits":
         """Return the limits of the part between two edges followed by a run, on a curve."""

@@ -17,12 +17,10 @@ INSIDE, CLOSE = 1.0 + 1e-9, 1e-6
 """Tolerance of a blend's radius for rounding [-] and for the joints' interpolation [m]."""
 SMALLEST, SLIVER = 2e-4, 5e-4
 """Smallest blend radius, and shortest remainder between two blends; rounding would slow shorter ones [m]."""
-SAME = 1e-9
-"""Posture differences below this are rounding errors [rad]."""
+SAME = 1e-9  # posture differences below this are rounding errors [rad]
 SHARPEST = 0.15
 """Smallest ratio of a blend's chord to its radius used for its length; it is 0 for a reversal [-]."""
-BETWEEN = 8
-"""Places per knot of a blend at which its distance from the corner is checked."""
+BETWEEN = 8  # places per knot of a blend at which its distance from the corner is checked
 SHRINK, TRIES = 0.85, 12
 """Factor by which a blend that leaves its radius is shortened, and number of attempts."""
 
@@ -31,56 +29,41 @@ SHRINK, TRIES = 0.85, 12
 class Piece:
     """A leg without its blended parts, or a blend."""
 
-    knots: Knots
-    """The joints' motion."""
+    knots: Knots  # the joints' motion
     pacing: LegSpeed
-    bent: ToolBlend | EvenBlend | None
-    """Tool blend whose curvature affects acceleration."""
-    by_joints: bool
-    """Whether acceleration refers to the joints rather than the tool."""
-    where: str
-    """Field of the command."""
+    bent: ToolBlend | EvenBlend | None  # tool blend whose curvature affects acceleration
+    by_joints: bool  # whether acceleration refers to the joints rather than the tool
+    where: str  # field of the command
 
 
-Run = list[Piece]
-"""Pieces without stops between them."""
+Run = list[Piece]  # pieces without stops between them
 
 
 @dataclass(frozen=True)
 class _Cut:
-    before: float
-    """Length of the first leg replaced [m]."""
-    after: float
-    """Length of the second leg replaced [m]."""
+    before: float  # length of the first leg replaced [m]
+    after: float  # length of the second leg replaced [m]
     piece: Piece
-    curve: ToolCurve | None
-    """Curve of the tool; None if the joints blend."""
+    curve: ToolCurve | None  # curve of the tool; None if the joints blend
 
 
 @dataclass(frozen=True)
 class Branch:
     """Point of a run behind which further legs may change it."""
 
-    s: float
-    """Length of the run up to it [m]."""
-    legs: tuple[Leg, ...]
-    """Legs from it on."""
-    begun: float
-    """Length of the first of them before the point [m]."""
-    q: Floats
-    """Joint positions there, shape (n,) [rad]."""
-    bend: Floats | None = None
-    """Curvature of two blends that meet there, see `BlendJunction`; else None."""
+    s: float  # length of the run up to it [m]
+    legs: tuple[Leg, ...]  # legs from it on
+    begun: float  # length of the first of them before the point [m]
+    q: Floats  # joint positions there, shape (n,) [rad]
+    bend: Floats | None = None  # curvature of two blends that meet there, see `BlendJunction`; else None
 
 
 class Route(NamedTuple):
     """A path divided into runs."""
 
     runs: list[Run]
-    skipped: list[str]
-    """Message for each omitted blend."""
-    branches: list[Branch]
-    """Points at which its last run may continue differently, in order."""
+    skipped: list[str]  # message for each omitted blend
+    branches: list[Branch]  # points at which its last run may continue differently, in order
 
 
 def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:

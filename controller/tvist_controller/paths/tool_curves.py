@@ -11,20 +11,13 @@ from tvist_controller.paths.poses import Placement
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import evaluate, hermite
 
-PER_RADIAN = 0.25
-"""Length equivalent to a turn by one radian [m]."""
-SHORTEST = 1e-6
-"""Length below which a part of a path is no motion [m]."""
-STRAIGHT = 1e-6
-"""Sine of the angle below which three points are collinear [-]."""
-DIFFERENCE_STEP = 1e-5
-"""Step of numerical differences relative to a blend's length [-]."""
-SLOWEST = 0.25
-"""Tool speed per parameter below which a blend is too sharp to be reparametrized [-]."""
-PIECES = 64
-"""Number of pieces for reparametrizing a blend by arc length."""
-EVEN = 1e-9
-"""Deviation from constant speed at the ends that counts as rounding [-]."""
+PER_RADIAN = 0.25  # length equivalent to a turn by one radian [m]
+SHORTEST = 1e-6  # length below which a part of a path is no motion [m]
+STRAIGHT = 1e-6  # sine of the angle below which three points are collinear [-]
+DIFFERENCE_STEP = 1e-5  # step of numerical differences relative to a blend's length [-]
+SLOWEST = 0.25  # tool speed per parameter below which a blend is too sharp to be reparametrized [-]
+PIECES = 64  # number of pieces for reparametrizing a blend by arc length
+EVEN = 1e-9  # deviation from constant speed at the ends that counts as rounding [-]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
@@ -32,10 +25,8 @@ class ToolState(NamedTuple):
     """Pose of the tool on a path, with derivatives by length."""
 
     pose: Placement
-    first: Floats
-    """Velocity and angular velocity per unit of length, base frame, shape (6,) [-, rad/m]."""
-    second: Floats
-    """Derivative of `first`, shape (6,) [1/m, rad/m^2]."""
+    first: Floats  # velocity and angular velocity per unit of length, base frame, shape (6,) [-, rad/m]
+    second: Floats  # derivative of `first`, shape (6,) [1/m, rad/m^2]
 
 
 class ToolCurve(ABC):

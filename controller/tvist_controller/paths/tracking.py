@@ -12,20 +12,13 @@ from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import Knots, hermite
 from tvist_plant.description import RobotDescription
 
-SPACING = 0.03
-"""Largest distance between knots [m]."""
-SHORT = 0.003
-"""Length below which a path needs no inner knots [m]."""
-CLOSEST = 1e-5
-"""Smallest distance between knots; a path that needs closer ones passes a singular posture [m]."""
-TOLERANCE = 1e-6
-"""Largest tool error between two knots [m, rad]."""
-REFRESHED = 3
-"""Number of Jacobian updates in Newton's method per knot."""
-FARTHEST = 1.0
-"""Joint angle beyond which a solution counts as another posture [rad]."""
-STEEPEST = 300.0
-"""Joint turn per metre of path above which the arm is close to a singular posture [rad/m]."""
+SPACING = 0.03  # largest distance between knots [m]
+SHORT = 0.003  # length below which a path needs no inner knots [m]
+CLOSEST = 1e-5  # smallest distance between knots; a path that needs closer ones passes a singular posture [m]
+TOLERANCE = 1e-6  # largest tool error between two knots [m, rad]
+REFRESHED = 3  # number of Jacobian updates in Newton's method per knot
+FARTHEST = 1.0  # joint angle beyond which a solution counts as another posture [rad]
+STEEPEST = 300.0  # joint turn per metre of path above which the arm is close to a singular posture [rad/m]
 
 
 class WayError(Exception):
@@ -33,12 +26,9 @@ class WayError(Exception):
 
     def __init__(self, s: float, pose: Placement, q: Floats) -> None:
         super().__init__(f"no way on from {s:g} m")
-        self.s = s
-        """Length at which tracking ends [m]."""
-        self.pose = pose
-        """Pose that cannot be reached."""
-        self.q = q
-        """Joint positions near that pose, shape (n,) [rad]."""
+        self.s = s  # length at which tracking ends [m]
+        self.pose = pose  # pose that cannot be reached
+        self.q = q  # joint positions near that pose, shape (n,) [rad]
 
 
 class Tracker:
@@ -114,8 +104,7 @@ class Tracker:
         return s, q, *rates
 
 
-Knot = tuple[float, Floats, Floats, Floats]
-"""Place, joint positions, and their first two derivatives."""
+Knot = tuple[float, Floats, Floats, Floats]  # place, joint positions, and their first two derivatives
 
 
 def _solved(jacobian: Floats, wanted: Floats) -> Floats | None:

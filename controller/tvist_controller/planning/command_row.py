@@ -16,16 +16,12 @@ class CommandCall(NamedTuple, Generic[C]):
     """A command being carried out between two ticks."""
 
     command: C
-    tick: int
-    """Number of the next control period."""
-    now: float
-    """Time; only ticks advance it [s]."""
-    session: str | None
-    """Session of the client that gets control, if `client_gone` will report its end."""
+    tick: int  # number of the next control period
+    now: float  # time; only ticks advance it [s]
+    session: str | None  # session of the client that gets control, if `client_gone` will report its end
     planned: Callable[[], Any]
     """Returns the plan, making it if necessary; raises `RefusalError` if the command is impossible."""
-    origin: str | None = None
-    """IP address of the sender; None if unknown."""
+    origin: str | None = None  # IP address of the sender; None if unknown
 
 
 class CommandRow(NamedTuple):
@@ -41,16 +37,12 @@ class CommandRow(NamedTuple):
     lease: Literal["needed", "if named", "none"] = "needed"
     """When the command's token must be that of the lease: always, if present, or never, because it has
     another meaning."""
-    changes_io: bool = False
-    """Whether the command may change what `io` reports."""
+    changes_io: bool = False  # whether the command may change what `io` reports
     check: Callable[[Any, RobotDescription], None] | None = None
     """Refuses a command that this robot can never carry out; None if the types of the fields suffice."""
-    plan: Planning | None = None
-    """How it is planned; None if it is quick enough for a tick."""
-    long: bool = False
-    """Whether the message may be longer than `EXPLAINED_BYTES`."""
-    stops: bool = False
-    """Whether it stops the arm and so must not wait for earlier plans."""
+    plan: Planning | None = None  # how it is planned; None if it is quick enough for a tick
+    long: bool = False  # whether the message may be longer than `EXPLAINED_BYTES`
+    stops: bool = False  # whether it stops the arm and so must not wait for earlier plans
 
     @property
     def asks(self) -> bool:

@@ -25,8 +25,7 @@ from tvist_shaping.named import BUILT_IN, AnyShaper, Registry
 
 SURPLUSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
 """Cache of `surplus` for all robots: source of modes, own shaper, name, number of modes, result."""
-REHEARSED = 9
-"""Ticks of a rehearsal; some filters update weights only every fourth tick."""
+REHEARSED = 9  # ticks of a rehearsal; some filters update weights only every fourth tick
 ESTIMATORS = ("fixed", "polynomial", "modal")
 
 
@@ -34,13 +33,10 @@ ESTIMATORS = ("fixed", "polynomial", "modal")
 class FilterChoice:
     """A filter and what it needs."""
 
-    source: ModeSource
-    """Source of its modes."""
+    source: ModeSource  # source of its modes
     tvist: Filter
-    elastic: ElasticFeedForward | None
-    """Elastic feed-forward for the drives; None if not used."""
-    law: Floats | None = None
-    """Known friction of the joints, see `known_friction`; None if unknown."""
+    elastic: ElasticFeedForward | None  # elastic feed-forward for the drives; None if not used
+    law: Floats | None = None  # known friction of the joints, see `known_friction`; None if unknown
 
 
 class FilterPlanner:

@@ -22,22 +22,15 @@ from tvist_shaping.base import Filter
 
 EASY = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 """Limits up to which a filter's `excess` was determined and holds."""
-KEEPING_TRIES = 4
-"""Number of trial motions to keep the requested acceleration."""
-SHARE = 1.0 - 1e-4
-"""Fraction of the limit to aim at; the peak varies slightly with the motion [-]."""
-TRIES = 10
-"""Number of trial motions before each further one is slower by a fraction that doubles."""
-HASTE = 0.001
-"""The first such fraction [-]."""
-SPLIT = 6
-"""Number of trials that reduce either velocity or acceleration, before both."""
+KEEPING_TRIES = 4  # number of trial motions to keep the requested acceleration
+SHARE = 1.0 - 1e-4  # fraction of the limit to aim at; the peak varies slightly with the motion [-]
+TRIES = 10  # number of trial motions before each further one is slower by a fraction that doubles
+HASTE = 0.001  # the first such fraction [-]
+SPLIT = 6  # number of trials that reduce either velocity or acceleration, before both
 SAMPLES = 64
 """Number of evenly spaced moments checked, in addition to those of the law, if not shaped in advance."""
-BLUNTED = 1.05
-"""Largest ratio of the shaped motion's torque to the unshaped motion's, due to the lag [-]."""
-ROUNDING = 1e-6
-"""Relative excess of a limit that counts as rounding [-]."""
+BLUNTED = 1.05  # largest ratio of the shaped motion's torque to the unshaped motion's, due to the lag [-]
+ROUNDING = 1e-6  # relative excess of a limit that counts as rounding [-]
 MIN_TORQUE_SHARE = 0.01
 """Smallest usable fraction of a motion's own torque; below it, gravity alone exceeds the limit [-]."""
 
@@ -61,24 +54,18 @@ class Need(NamedTuple):
     """How much slower a motion must be, and the limit that requires it."""
 
     slower: Slower
-    binding: Binding
-    """The limit."""
-    q: Floats
-    """Posture at which it would be exceeded most, shape (n,) [rad]."""
-    exceeds: str | None = None
-    """Message if a torque limit is exceeded at any speed; else None."""
+    binding: Binding  # the limit
+    q: Floats  # posture at which it would be exceeded most, shape (n,) [rad]
+    exceeds: str | None = None  # message if a torque limit is exceeded at any speed; else None
 
 
 class Fitted(NamedTuple):
     """A motion within the limits."""
 
     motion: PlannedMotion
-    slower: Slower = AS_ASKED
-    """How much slower it is than requested."""
-    limited: Limited | None = None
-    """Limit that slows it down, or that it exceeds; see `PlannedMove.limited`."""
-    q: Floats | None = None
-    """Posture that made it slower, shape (n,) [rad]; else None."""
+    slower: Slower = AS_ASKED  # how much slower it is than requested
+    limited: Limited | None = None  # limit that slows it down, or that it exceeds; see `PlannedMove.limited`
+    q: Floats | None = None  # posture that made it slower, shape (n,) [rad]; else None
 
 
 class Fitter:

@@ -32,27 +32,20 @@ AGILE = MotionLimits(1.5, 2.0, 100.0)
 class PlannedMove(NamedTuple):
     """A motion ready to start."""
 
-    parts: tuple[PlannedMotion, ...]
-    """Consecutive trajectories of the reference, each from rest to rest."""
-    velocity: float
-    """Largest velocity of any joint [rad/s]."""
-    limited: Limited | None
-    """Limit, with a message, that slows it down or that it will exceed; else None."""
-    skipped: tuple[str, ...] = ()
-    """Message for each omitted blend."""
-    window: float = math.inf
-    """Longest shaper delay at which the limits hold at full rate [s]."""
+    parts: tuple[PlannedMotion, ...]  # consecutive trajectories of the reference, each from rest to rest
+    velocity: float  # largest velocity of any joint [rad/s]
+    limited: Limited | None  # limit, with a message, that slows it down or that it will exceed; else None
+    skipped: tuple[str, ...] = ()  # message for each omitted blend
+    window: float = math.inf  # longest shaper delay at which the limits hold at full rate [s]
     marks: tuple[tuple[int, float], ...] = ()
     """For each segment of a path, the part and the length on it [m] where the blend at its end begins, or
     where it ends without one."""
-    peak: float = math.inf
-    """Largest `Filter.peak` at which the limits hold at full rate [-]."""
+    peak: float = math.inf  # largest `Filter.peak` at which the limits hold at full rate [-]
     room: tuple[float, float] = (math.inf, math.inf)
     """Ratios of the arm's velocity and acceleration limits to the motion's [-]."""
     course: Course | None = None
     """State from which its last part can be extended while it runs; None if it cannot."""
-    surplus: tuple[float, float] = (0.0, 0.0)
-    """`Filter.surplus` of the filter it was planned for [-]."""
+    surplus: tuple[float, float] = (0.0, 0.0)  # `Filter.surplus` of the filter it was planned for [-]
 
 
 class MovePlanner(Fitter):

@@ -22,10 +22,8 @@ Found = PlannedMove | FilterChoice | Filter | Posture | ToolPose | Script | None
 class Planning(NamedTuple):
     """How a type of command is planned."""
 
-    needs: tuple[str, ...]
-    """Fields of the snapshot that the plan depends on."""
-    by: type
-    """Class of the planner; a `Planner` has one instance."""
+    needs: tuple[str, ...]  # fields of the snapshot that the plan depends on
+    by: type  # class of the planner; a `Planner` has one instance
     make: Callable[[Any, Any, PlanningState], Found]
     """Returns the plan for planner, command and state; raises `RefusalError`."""
     within_tick: Callable[[Any, Any, PlanningState], Found] | None = None
@@ -35,12 +33,9 @@ class Planning(NamedTuple):
 class Plan(NamedTuple):
     """Result of planning a command, valid while the underlying state holds."""
 
-    state: Mapping[str, Any]
-    """Fields of the snapshot that it depends on."""
-    found: Found | RefusalError
-    """What was planned, or the refusal; None if no motion may start."""
-    until: float = 0.0
-    """See `PlanningState.until`."""
+    state: Mapping[str, Any]  # fields of the snapshot that it depends on
+    found: Found | RefusalError  # what was planned, or the refusal; None if no motion may start
+    until: float = 0.0  # see `PlanningState.until`
 
 
 def _same(one: Any, other: Any) -> bool:

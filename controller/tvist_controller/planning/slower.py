@@ -16,31 +16,24 @@ REACHED = 0.9
 """Fraction of the speed that counts as reached; a peak between two acceleration ramps stays a little lower [-]."""
 BLUNTED = 3.0
 """The same as a ratio if the way is too short for the speed, since ramps take much of a few millimetres [-]."""
-DURATION_TOLERANCE = 1.01
-"""Ratio of durations up to which a motion counts as on time [-]."""
-USED_UP = 0.95
-"""Fraction of a limit above which it is responsible [-]."""
-SAMPLES = 65
-"""Number of places of a curve at which the joints' permitted speed is computed."""
-MIN_DERIVATIVE = 1e-9
-"""Smallest derivative by which a speed is divided [rad/m]."""
+DURATION_TOLERANCE = 1.01  # ratio of durations up to which a motion counts as on time [-]
+USED_UP = 0.95  # fraction of a limit above which it is responsible [-]
+SAMPLES = 65  # number of places of a curve at which the joints' permitted speed is computed
+MIN_DERIVATIVE = 1e-9  # smallest derivative by which a speed is divided [rad/m]
 
 
 class Binding(NamedTuple):
     """The limit that slows a motion down."""
 
-    code: Code
-    """The limit, for programs."""
-    keeps: str
-    """The limit, in words."""
+    code: Code  # the limit, for programs
+    keeps: str  # the limit, in words
 
     def makes(self, what: str) -> "Limited":
         """Return the limit with a message about what it slows down."""
         return self.code, f"{what}, so that {self.keeps}"
 
 
-Limited = tuple[Code, str]
-"""A limit, and a message about what it slows down."""
+Limited = tuple[Code, str]  # a limit, and a message about what it slows down
 
 
 _LIMITS: dict[str, tuple[Code, str, str]] = {

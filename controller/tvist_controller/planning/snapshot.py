@@ -16,39 +16,29 @@ from tvist_plant.description import Payload as Body
 from tvist_protocol.values import Payload
 from tvist_urscript import Script
 
-KEPT = 1.2
-"""Part of a motion kept behind the arm [s]; filters keep up to a second."""
-SAME = 1e-9
-"""Distance below which two knots are one [m]."""
+KEPT = 1.2  # part of a motion kept behind the arm [s]; filters keep up to a second
+SAME = 1e-9  # distance below which two knots are one [m]
 
 
 @dataclass(frozen=True)
 class Cuts:
     """Edges of a law at which it is cut for an extension."""
 
-    first: int
-    """First one kept."""
-    known: int
-    """Last one up to which the law stays unchanged."""
-    branch: int
-    """Behind this one the path may change."""
+    first: int  # first one kept
+    known: int  # last one up to which the law stays unchanged
+    branch: int  # behind this one the path may change
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
     """A motion to the end of the known moves, and where it can be extended."""
 
-    curve: SplineCurve
-    """The joints' motion."""
-    ground: PathLimits
-    """Limits along the curve."""
+    curve: SplineCurve  # the joints' motion
+    ground: PathLimits  # limits along the curve
     law: RetimedLaw
-    branches: tuple[Branch, ...]
-    """Points of the curve at which further moves may change it, in order."""
-    segments: int
-    """Number of moves so far."""
-    window: float
-    """Longest shaper delay it was planned for [s]."""
+    branches: tuple[Branch, ...]  # points of the curve at which further moves may change it, in order
+    segments: int  # number of moves so far
+    window: float  # longest shaper delay it was planned for [s]
 
     @property
     def end(self) -> Floats:
@@ -86,53 +76,35 @@ class Course:
 class FilterState(NamedTuple):
     """State that a new filter depends on."""
 
-    name: str
-    """Name of the present filter."""
-    modes: int
-    """Number of modes that it uses."""
-    source: ModeSource
-    """Source of the modes."""
-    declared: Payload
-    """Payload for its modes."""
-    given: Payload
-    """Payload declared by a client; differs from it if the robot has learnt another."""
+    name: str  # name of the present filter
+    modes: int  # number of modes that it uses
+    source: ModeSource  # source of the modes
+    declared: Payload  # payload for its modes
+    given: Payload  # payload declared by a client; differs from it if the robot has learnt another
 
 
 class PlanningState(Struct, frozen=True, eq=False, gc=False):
     """State that plans depend on."""
 
     filter: FilterState
-    movable: bool
-    """Whether a planned motion may start or be extended."""
-    q: Floats
-    """Joint angles of the present reference, or of the end to be extended, shape (n,) [rad]."""
-    speed: float
-    """Programmed speed fraction [-]."""
-    slowest: float | None
-    """Velocity limit of reduced mode; None if inactive [rad/s]."""
-    excess: float
-    """`Filter.excess` of the filter: relative excess of acceleration [-]."""
+    movable: bool  # whether a planned motion may start or be extended
+    q: Floats  # joint angles of the present reference, or of the end to be extended, shape (n,) [rad]
+    speed: float  # programmed speed fraction [-]
+    slowest: float | None  # velocity limit of reduced mode; None if inactive [rad/s]
+    excess: float  # `Filter.excess` of the filter: relative excess of acceleration [-]
     surplus: tuple[float, float]
     """`Filter.surplus` of the filter: relative excess of velocity and acceleration at the arm's limits [-]."""
-    tcp: tuple[float, ...]
-    """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
-    body: Body
-    """Payload in the collision model."""
-    bodies: tuple[Floats, ...]
-    """Possible inertial parameters of the last link, see `InverseDynamics.bodies`."""
-    after: Course | None = None
-    """Running motion to be extended; None for a motion from rest."""
-    until: float = 0.0
-    """Time up to which that motion stays unchanged [s]."""
+    tcp: tuple[float, ...]  # tool centre point in the flange frame: x y z [m] and rotation vector [rad]
+    body: Body  # payload in the collision model
+    bodies: tuple[Floats, ...]  # possible inertial parameters of the last link, see `InverseDynamics.bodies`
+    after: Course | None = None  # running motion to be extended; None for a motion from rest
+    until: float = 0.0  # time up to which that motion stays unchanged [s]
     script: Script | None = None
     """The program or its last added statement; None if no program accepts statements."""
 
 
-FILTER = ("filter",)
-"""Fields that a filter depends on."""
+FILTER = ("filter",)  # fields that a filter depends on
 MOTION = ("movable", "q", "speed", "slowest", "excess", "surplus", "tcp", "body", "bodies", "filter", "after")
 """Fields that a motion depends on."""
-TOOL = ("tcp",)
-"""Fields that an answer about the tool depends on; its reference may have passed meanwhile."""
-SCRIPT = ("script",)
-"""Fields that a statement for a running program depends on."""
+TOOL = ("tcp",)  # fields that an answer about the tool depends on; its reference may have passed meanwhile
+SCRIPT = ("script",)  # fields that a statement for a running program depends on

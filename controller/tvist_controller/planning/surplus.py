@@ -12,18 +12,12 @@ from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.failures import FAILURES
 from tvist_shaping.filter import QUICKEST
 
-POSTURES = 40
-"""Number of postures at which modes are computed."""
-HALF_STEP = 0.03
-"""Half the travel over which their change is measured [rad]."""
-TIME = 0.01
-"""Time over which the quickest change of modes is measured [s]."""
-MARGIN = 1.1
-"""Margin for postures not computed [-]."""
-RISE = 15.0
-"""Ratio of largest D̈ to largest Ḋ, twice that of random streams [1/s]."""
-STEADY = 2.0
-"""Ratio of a constant-delay filter's excess in a stream to that in a motion, its `excess` [-]."""
+POSTURES = 40  # number of postures at which modes are computed
+HALF_STEP = 0.03  # half the travel over which their change is measured [rad]
+TIME = 0.01  # time over which the quickest change of modes is measured [s]
+MARGIN = 1.1  # margin for postures not computed [-]
+RISE = 15.0  # ratio of largest D̈ to largest Ḋ, twice that of random streams [1/s]
+STEADY = 2.0  # ratio of a constant-delay filter's excess in a stream to that in a motion, its `excess` [-]
 
 
 def surplus_of(

@@ -45,19 +45,11 @@ class Access:
     emit: Emit
     send: Callable[[Command, Plan | None], Reply | None]
     """Carries out a command, optionally with an existing plan; raises `RefusalError`."""
-    plans: Plans
-    """Access to plans."""
-    latest: Callable[[], State]
-    """State of the last tick."""
-    io: Callable[[], Io]
-    """Terminals, registers and settings, as published."""
-    declared: Callable[[], Payload]
-    """Declared payload."""
-    force: ForceControl
-    """Force mode, freedrive and contacts."""
-    forces: ToolForces
-    """Forces and torques on the arm in the last tick."""
-    shape_guided: bool = False
-    """Whether guided motions of programs that start at rest are shaped."""
-    cell: LiveCell | None = None
-    """The cell around the robot; None for none."""
+    plans: Plans  # access to plans
+    latest: Callable[[], State]  # state of the last tick
+    io: Callable[[], Io]  # terminals, registers and settings, as published
+    declared: Callable[[], Payload]  # declared payload
+    force: ForceControl  # force mode, freedrive and contacts
+    forces: ToolForces  # forces and torques on the arm in the last tick
+    shape_guided: bool = False  # whether guided motions of programs that start at rest are shaped
+    cell: LiveCell | None = None  # the cell around the robot; None for none

@@ -18,8 +18,7 @@ from tvist_protocol.values import Coordinate
 from tvist_urscript import Array, Fault, Pose
 
 Value = object
-Check = Callable[[str, Value], Any]
-"""Converts a program's value for a named parameter, or raises a `Fault`."""
+Check = Callable[[str, Value], Any]  # Converts a program's value for a named parameter, or raises a `Fault`
 OF_JOINTS: Final = "joints"
 """Stands for `several` with the arm's number of joints, which annotations do not know."""
 

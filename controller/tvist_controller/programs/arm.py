@@ -11,10 +11,8 @@ from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity, after
 from tvist_urscript import Fault, Machine
 
-BRAKING = 2.0
-"""Deceleration of the fastest joint before a move that follows an unfinished motion [rad/s^2]."""
-AGAIN = 10
-"""Ticks in which a thread may restart force mode after a pause or protective stop ended it."""
+BRAKING = 2.0  # deceleration of the fastest joint before a move that follows an unfinished motion [rad/s^2]
+AGAIN = 10  # ticks in which a thread may restart force mode after a pause or protective stop ended it
 LOST = (
     "force mode has ended, by a pause or a protective stop, and the arm does not move on without it: call force_mode "
     "again, or end_force_mode, before it moves"
@@ -40,24 +38,17 @@ class ProgramArm:
         self._access, self._motion, self._thread, self.spend = access, access.motion, thread, spend
         self._lives = lives
         self._rate_limit = RateLimit(access.motion, access.latest)
-        self._inside: object | None = None
-        """Thread whose move has not returned yet."""
+        self._inside: object | None = None  # thread whose move has not returned yet
         self.driver: tuple[Machine, int] | None = None
         """Program and thread number that started the guided motion."""
-        self._journeys: dict[object, Journey] = {}
-        """Blended moves of each thread, until the last one is done."""
-        self._journey: Journey | None = None
-        """The journey in progress."""
+        self._journeys: dict[object, Journey] = {}  # blended moves of each thread, until the last one is done
+        self._journey: Journey | None = None  # the journey in progress
         self._guided: int | None = None
         self._abandoned = False
-        self._asked = 0
-        """Number of threads waiting to start compliance."""
-        self._gives: object | None = None
-        """Program that made the arm compliant, until it ends that."""
-        self.lead: Callable[[Segment], Turns] | None = None
-        """Makes a move while the arm is compliant."""
-        self.waypoint: Segment | None = None
-        """Target of the present or last move."""
+        self._asked = 0  # number of threads waiting to start compliance
+        self._gives: object | None = None  # program that made the arm compliant, until it ends that
+        self.lead: Callable[[Segment], Turns] | None = None  # makes a move while the arm is compliant
+        self.waypoint: Segment | None = None  # target of the present or last move
 
     # ------------------------------------------------------------------ planned moves
 

@@ -19,14 +19,11 @@ _UNKNOWN = re.compile(r"compile_error_name_not_found:(\.?\w+):")
 class ProgramFinding:
     """A place in a program that needs attention."""
 
-    line: int
-    """Line of the text, from 1."""
-    column: int
-    """Column of the token at fault, from 1."""
+    line: int  # line of the text, from 1
+    column: int  # column of the token at fault, from 1
     level: Literal["error", "warning"]
     """Errors prevent the start; warnings mostly end the program when it reaches them."""
-    text: str
-    """Message."""
+    text: str  # message
 
 
 def check_program(text: str) -> list[ProgramFinding]:

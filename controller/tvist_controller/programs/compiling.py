@@ -11,14 +11,10 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
 from tvist_urscript import Script, ScriptError
 
-KEPT = 8
-"""Size of the cache of compiled programs; many clients send the same text repeatedly."""
-MAX_KEPT = 100
-"""Largest number of stored programs."""
-WAIT: Final = "wait_program.urp"
-"""Runs until it is stopped, for trying play, pause and stop."""
-PAPER: Final = "paper.urp"
-"""Visits the poses in order and returns the same way."""
+KEPT = 8  # size of the cache of compiled programs; many clients send the same text repeatedly
+MAX_KEPT = 100  # largest number of stored programs
+WAIT: Final = "wait_program.urp"  # runs until it is stopped, for trying play, pause and stop
+PAPER: Final = "paper.urp"  # Visits the poses in order and returns the same way
 
 
 class ScriptCompiler:

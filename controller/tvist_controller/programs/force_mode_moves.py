@@ -13,12 +13,9 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, ProcessSegment, Segment
 from tvist_urscript import Fault
 
-ARRIVED = 1e-5
-"""Distance at which a move without blend has arrived [m, and rad times `TURN`]."""
-TURN = 0.25
-"""Length equivalent to a turn by 1 rad [m]."""
-SETTLING = 4.0
-"""Ticks in which the remaining distance decays at the end."""
+ARRIVED = 1e-5  # distance at which a move without blend has arrived [m, and rad times `TURN`]
+TURN = 0.25  # length equivalent to a turn by 1 rad [m]
+SETTLING = 4.0  # ticks in which the remaining distance decays at the end
 
 
 class ForceModeMoves:

@@ -14,8 +14,7 @@ from tvist_protocol.io import BITS, NUMBERS, Bank
 from tvist_protocol.stream import PopupKind
 from tvist_urscript import EVALUATIONS, Fault
 
-SILENT = 5
-"""Consecutive missed turns after which the arm slows down."""
+SILENT = 5  # consecutive missed turns after which the arm slows down
 _NAME = re.compile(r"input_(int|double|bit)_register_(\d+)|input_bit_registers(\d+)_to_(\d+)")
 _BANKS: dict[str, tuple[Bank, int]] = {
     "int": ("input_int", NUMBERS), "double": ("input_double", NUMBERS), "bit": ("input_bit", BITS)
@@ -23,8 +22,7 @@ _BANKS: dict[str, tuple[Bank, int]] = {
 Group = Literal["digital", "analog", "bit"]
 """Kind of output: digital terminal, analogue terminal, or output bit register."""
 
-SHOWS_UNTIL_FAILURE = 5
-"""Largest simulated number of UR's output actions."""
+SHOWS_UNTIL_FAILURE = 5  # largest simulated number of UR's output actions
 _DOES = {
     1: (None, False, False),
     2: (None, True, True),
@@ -101,8 +99,7 @@ class _Watchdog:
     name: str
     bank: Bank
     place: int
-    ticks: int
-    """Largest interval between two writes [ticks]."""
+    ticks: int  # largest interval between two writes [ticks]
     action: str
     since: int
 

@@ -14,8 +14,7 @@ from tvist_urscript import Fault, Machine, Script
 
 MAX_STATEMENTS = 1000
 """Largest number of statements, with `MAX_SCRIPT` characters in total, before they must be cleared."""
-HELD = 2
-"""Storage for statements not yet cleared, in multiples of the limits above."""
+HELD = 2  # Storage for statements not yet cleared, in multiples of the limits above
 WAITS, CLEAR = "interpreter_mode", "clear_interpreter"
 """Functions that wait for statements, and that clear them."""
 
@@ -31,13 +30,11 @@ class StatementQueue:
         self, machine: Callable[[], Machine], arm: ProgramArm, peripherals: Peripherals, emit: Emit
     ) -> None:
         self._machine, self._arm, self._peripherals, self._emit = machine, arm, peripherals, emit
-        self._program: Machine | None = None
-        """The main program if it accepts statements."""
+        self._program: Machine | None = None  # the main program if it accepts statements
         self._queue: deque[tuple[int, Script]] = deque()
         self.last: Script | None = None
         """What the next statement is compiled after: the last one, or the program; None if none are accepted."""
-        self._lengths: deque[tuple[int, int]] = deque()
-        """Number and length of each stored statement."""
+        self._lengths: deque[tuple[int, int]] = deque()  # number and length of each stored statement
         self._waiting = self._ending = self._clearing = self._published = False
         self._interpreted = self._executed = self._cleared = self._forgotten = 0
 

@@ -15,8 +15,7 @@ from tvist_protocol.stream import State
 from tvist_protocol.transitions import Activity
 from tvist_urscript import Fault
 
-Turns = Generator[None, None, None]
-"""Run of a waiting function; it yields once per tick."""
+Turns = Generator[None, None, None]  # run of a waiting function; it yields once per tick
 Effect = Callable[[], None]
 
 DELAY, DELAY_PER_PART = 10, 4
@@ -26,12 +25,9 @@ FURTHER, FURTHER_PER_PART = 12, 1
 """Ticks from ordering an extension of the running motion until it applies, plus ticks per move."""
 MAX_PARTS = 50
 """Largest number of moves planned together from rest, and waiting; with more, the program waits."""
-MAX_FURTHER = 25
-"""Largest number of moves per extension of a running motion."""
-AHEAD = 150
-"""Number of moves ahead of the arm from which on no more are planned."""
-SPARE_TICKS = 4
-"""Further ticks for which the running motion stays unchanged, since rate changes look ahead."""
+MAX_FURTHER = 25  # largest number of moves per extension of a running motion
+AHEAD = 150  # number of moves ahead of the arm from which on no more are planned
+SPARE_TICKS = 4  # further ticks for which the running motion stays unchanged, since rate changes look ahead
 PAUSE = 300
 """Ticks charged for a stop or a `movej` planned within a tick. These take longest in a tick, so fewer than
 one tick in a hundred may have one."""
@@ -44,10 +40,8 @@ class RateLimit:
 
     def __init__(self, motion: MotionControl, latest: Callable[[], State]) -> None:
         self._motion, self._latest = motion, latest
-        self.planning = 0
-        """Remaining ticks of the last ordered plan."""
-        self._paid = 0
-        """Tick at which all stops and plans are paid."""
+        self.planning = 0  # remaining ticks of the last ordered plan
+        self._paid = 0  # tick at which all stops and plans are paid
 
     @property
     def debt(self) -> int:
@@ -77,24 +71,16 @@ class Journey:
     ) -> None:
         self._access, self._motion, self.owner = access, access.motion, owner
         self._rate_limit, self._rest = rate_limit, rest
-        self.legs: list[Segment] = []
-        """Moves not yet passed by the arm."""
-        self._effects: list[list[Effect]] = []
-        """Effects of the program after each of them."""
-        self.closed = False
-        """Whether no more moves will come."""
-        self.number: int | None = None
-        """Number of the motion while it runs."""
-        self.outcome: str | None = None
-        """Event that ended it."""
+        self.legs: list[Segment] = []  # moves not yet passed by the arm
+        self._effects: list[list[Effect]] = []  # effects of the program after each of them
+        self.closed = False  # whether no more moves will come
+        self.number: int | None = None  # number of the motion while it runs
+        self.outcome: str | None = None  # event that ended it
         self._stops_at: tuple[int, float] | None = None
         """Progress at the end of its protective stop, see `stop`; None without one."""
-        self.skipped = False
-        """Whether `abort` was called; a motion then being planned is not started."""
-        self.over = False
-        """Whether it is complete."""
-        self.fault: Exception | None = None
-        """Error that its thread raises."""
+        self.skipped = False  # whether `abort` was called; a motion then being planned is not started
+        self.over = False  # whether it is complete
+        self.fault: Exception | None = None  # error that its thread raises
         self._steps: Turns | None = None
         self._marks: list[tuple[int, float]] = []
         """Where the blend at the end of each present move begins, see `PlannedMove.marks`."""
@@ -102,8 +88,7 @@ class Journey:
         """Ordered plan of an extension, tick at which it applies, and number of moves."""
         self._ends = self._refuses = False
         """Whether the running motion cannot be extended, and whether because a further move is impossible."""
-        self._count = 0
-        """Number of moves of the running motion."""
+        self._count = 0  # number of moves of the running motion
 
     # ------------------------------------------------------------------ for the program
 

@@ -13,8 +13,7 @@ from tvist_controller.paths.poses import placement, placement_vector
 from tvist_plant.description import RobotDescription
 from tvist_urscript import Fault
 
-SEARCH = 900
-"""Additional evaluations of inverse kinematics that searches a curve of postures."""
+SEARCH = 900  # additional evaluations of inverse kinematics that searches a curve of postures
 PoseNumbers = tuple[float, float, float, float, float, float]
 
 

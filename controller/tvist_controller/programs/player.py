@@ -20,20 +20,16 @@ from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
 from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
 
-TOLD_EVERY = 50
-"""Ticks between updates of the line in `io`; the line changes almost every tick."""
-GUIDED = 100
-"""Evaluations charged to a tick's budget for a guided motion of the program."""
-MAX_BESIDE = 8
-"""Largest number of concurrent secondary programs."""
+TOLD_EVERY = 50  # ticks between updates of the line in `io`; the line changes almost every tick
+GUIDED = 100  # evaluations charged to a tick's budget for a guided motion of the program
+MAX_BESIDE = 8  # largest number of concurrent secondary programs
 
 
 @dataclass(frozen=True, eq=False)
 class _Running:
     name: str
     machine: Machine
-    origin: str | None
-    """Address of the machine that both sent and started it; None if unknown or different."""
+    origin: str | None  # address of the machine that both sent and started it; None if unknown or different
 
 
 class ProgramPlayer:
@@ -61,32 +57,23 @@ class ProgramPlayer:
                 self._runstate,
             )
         )  # fmt: skip
-        self.kept = KeptPrograms(built_in(access.description))
-        """Programs that can be loaded."""
-        self.name: str | None = None
-        """Name of the loaded program; None without one."""
+        self.kept = KeptPrograms(built_in(access.description))  # programs that can be loaded
+        self.name: str | None = None  # name of the loaded program; None without one
         self.state: ProgramState = "STOPPED"
         self.loaded: Kept | None = None
         self._main: _Running | None = None
-        self._all: list[_Running] = []
-        """Programs, oldest first."""
-        self._starved: set[_Running] = set()
-        """Programs that got none of the last tick's evaluations."""
+        self._all: list[_Running] = []  # programs, oldest first
+        self._starved: set[_Running] = set()  # programs that got none of the last tick's evaluations
         self.idle = True
         """Whether no program runs and no evaluations are owed, so that `advance` is not needed."""
         self._told: tuple[object, ...] = ()
         self._left = EVALUATIONS
         """Evaluations left by the last tick; a negative number is a debt to be paid first."""
-        self._now: _Running | None = None
-        """The program whose turn it is."""
-        self._failed = False
-        """Whether the program ends by an error or a stop."""
-        self.raised: list[Exception] = []
-        """Unexpected exceptions of functions, until logged."""
-        self.line = 0
-        """Present line, or the one at which playing would resume, from 1; 0 for none."""
-        self.label: ProgramLabel | None = None
-        """Label passed by the program at that line; None for none."""
+        self._now: _Running | None = None  # the program whose turn it is
+        self._failed = False  # whether the program ends by an error or a stop
+        self.raised: list[Exception] = []  # unexpected exceptions of functions, until logged
+        self.line = 0  # present line, or the one at which playing would resume, from 1; 0 for none
+        self.label: ProgramLabel | None = None  # label passed by the program at that line; None for none
 
     @property
     def present_line(self) -> int:

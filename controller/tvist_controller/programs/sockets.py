@@ -18,8 +18,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.journal import Entry, SocketChange
 from tvist_urscript import Fault, Machine
 
-MAX_SOCKETS = 16
-"""Largest number of open sockets per program."""
+MAX_SOCKETS = 16  # largest number of open sockets per program
 
 T = TypeVar("T")
 Take = Callable[[bytes], tuple[T, int] | None]
@@ -48,12 +47,9 @@ class SocketNews(NamedTuple):
 class Open(NamedTuple):
     """Connect a socket; answered by `opened` or `failed`."""
 
-    socket: int
-    """Unique number of the socket."""
-    origin: str | None
-    """Address of the machine that sent and started the program; None if unknown."""
-    address: str
-    """Name or IP address of the machine to connect to."""
+    socket: int  # unique number of the socket
+    origin: str | None  # address of the machine that sent and started the program; None if unknown
+    address: str  # name or IP address of the machine to connect to
     port: int
 
 
@@ -80,8 +76,7 @@ class Taken(NamedTuple):
 class Wait(NamedTuple):
     """A program starts to wait for a socket."""
 
-    wait: int
-    """Unique number of the wait."""
+    wait: int  # unique number of the wait
     socket: int
 
 
@@ -117,12 +112,9 @@ class SocketPorts:
 class _Socket:
     number: int
     received: bytearray = field(default_factory=bytearray)
-    connected: bool | None = None
-    """True after opening, False after failing, None in between."""
-    open: bool = False
-    """Whether it is connected."""
-    requests: Requests | None = None
-    """Parser of requests to the cell's gripper; None for a network socket."""
+    connected: bool | None = None  # true after opening, False after failing, None in between
+    open: bool = False  # whether it is connected
+    requests: Requests | None = None  # parser of requests to the cell's gripper; None for a network socket
 
     def shut(self) -> None:
         """Mark as closed or failed."""
@@ -143,15 +135,12 @@ class Sockets:
         cell: LiveCell | None = None,
     ) -> None:
         self._emit, self._owner, self._origin, self._cell = emit, owner, origin, cell
-        self.orders: list[SocketOrder] = []
-        """Orders for the network, in order; the host removes them."""
+        self.orders: list[SocketOrder] = []  # orders for the network, in order; the host removes them
         self._named: dict[tuple[Machine, str], _Socket] = {}
         self._numbered: dict[int, _Socket] = {}
         self._last = self._last_wait = 0
-        self._answers: list[tuple[_Socket, bytes]] = []
-        """Gripper answers for the next tick."""
-        self._waits: dict[int, bool] = {}
-        """Present waits, and whether the wall time of each has also expired."""
+        self._answers: list[tuple[_Socket, bytes]] = []  # gripper answers for the next tick
+        self._waits: dict[int, bool] = {}  # present waits, and whether the wall time of each has also expired
 
     def hear(self, news: SocketNews) -> None:
         """Take news about a socket or a wait."""

@@ -8,8 +8,7 @@ from tvist_controller.trajectory import SampledPositions
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, payload_inertia, rigid_model
 
-HOLD = 1.25
-"""Least ratio of a brake's torque to the load by gravity and other joints [-]."""
+HOLD = 1.25  # least ratio of a brake's torque to the load by gravity and other joints [-]
 LONGEST = 5.0
 """Time after which the arm counts as stopped [s]."""
 

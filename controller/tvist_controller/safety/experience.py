@@ -16,24 +16,18 @@ from tvist_protocol.lessons import PayloadLesson
 
 LONGEST = 10_000
 """Longest recorded motion; longer ones are dropped [ticks]."""
-AFTER = 150
-"""Recording time after the end of a motion, for the ring-down [ticks]."""
+AFTER = 150  # recording time after the end of a motion, for the ring-down [ticks]
 
 
 @dataclass(frozen=True)
 class MotionRecord:
     """A motion of T ticks with its ring-down."""
 
-    q: Floats
-    """Measured joint angles, shape (T, n) [rad]."""
-    moments: Floats
-    """Measured motor torques on the joint side, shape (T, n) [N m]."""
-    stop: int
-    """Number of ticks until the commands came to rest."""
-    whole: bool
-    """Whether it was a shaped motion from rest to rest, without stop, stream or bypass."""
-    beliefs: FilterState
-    """State of filter and payload assumed by the controller."""
+    q: Floats  # measured joint angles, shape (T, n) [rad]
+    moments: Floats  # measured motor torques on the joint side, shape (T, n) [N m]
+    stop: int  # number of ticks until the commands came to rest
+    whole: bool  # whether it was a shaped motion from rest to rest, without stop, stream or bypass
+    beliefs: FilterState  # state of filter and payload assumed by the controller
 
 
 Record = Callable[[], MotionRecord]
@@ -87,8 +81,7 @@ class MotionRecorder:
         return record
 
 
-Work = Callable[[], None]
-"""A study; it takes a fraction of a second and touches nothing that ticks use."""
+Work = Callable[[], None]  # a study; it takes a fraction of a second and touches nothing that ticks use
 Later = Callable[[Work], Callable[[], bool]]
 """Starts a study outside the ticks; returns a function that tells whether it has ended."""
 
@@ -96,8 +89,7 @@ Later = Callable[[Work], Callable[[], bool]]
 Study = Callable[[MotionRecord], PayloadLesson | None]
 """Returns what a motion teaches, None for nothing; called by one thread at a time. All results are in the
 lessons, so a replay studies nothing."""
-Plans = Callable[[PayloadLesson, FilterState], Plan]
-"""Plans the change that a lesson requires."""
+Plans = Callable[[PayloadLesson, FilterState], Plan]  # plans the change that a lesson requires
 
 
 def at_once(work: Work) -> Callable[[], bool]:
@@ -113,12 +105,9 @@ WAITING = 16
 class Taught(NamedTuple):
     """A lesson and what it depends on."""
 
-    beliefs: FilterState
-    """State assumed by the controller during the motion."""
-    lesson: PayloadLesson
-    """What was learnt."""
-    plan: Plan | None
-    """Plan for the lesson; None if not yet planned."""
+    beliefs: FilterState  # state assumed by the controller during the motion
+    lesson: PayloadLesson  # what was learnt
+    plan: Plan | None  # plan for the lesson; None if not yet planned
 
 
 class Experience:

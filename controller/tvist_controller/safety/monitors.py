@@ -13,8 +13,7 @@ from tvist_controller.line.sample import Sample
 from tvist_controller.motion.monitor import Monitor, MonitorFinding
 from tvist_plant.plant import PERIOD
 
-ALLOWED = 0.01
-"""Permitted duration of an overload [s]."""
+ALLOWED = 0.01  # permitted duration of an overload [s]
 TICKS = round(ALLOWED / PERIOD)
 
 

@@ -25,8 +25,7 @@ REFUSED = (
 )
 """Refusal of commands that affect a watched arm."""
 _NO_STOP = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.UNDEFINED})
-SAME_MASS = 0.05
-"""Mass difference below which masses count as equal [kg]."""
+SAME_MASS = 0.05  # mass difference below which masses count as equal [kg]
 
 
 class RemoteStatus:

@@ -16,22 +16,15 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import carries_weight
 from tvist_plant.plant import GRAVITY, PERIOD
 
-TICKS_AVERAGED = 10
-"""Ticks averaged per measurement."""
-MEMORY = 2.0
-"""Time constant of the memory, many periods of a vibration [s]."""
+TICKS_AVERAGED = 10  # ticks averaged per measurement
+MEMORY = 2.0  # time constant of the memory, many periods of a vibration [s]
 RECENT = 0.1
 """Shorter time constant for the mass in a warning, because the long memory includes the time before a pick-up [s]."""
-ENOUGH = 1.0
-"""Observation time before a judgement [s]."""
-TOLERATED = 0.5
-"""Tolerated error of the declared mass [kg]."""
-FRICTION = 0.4
-"""Fraction of each joint's Coulomb friction that may be unknown, with the worst sign [-]."""
-STUDIED = 1.0
-"""Time at rest after which a robot that learns its payload has studied a motion [s]."""
-PATIENCE = 20.0
-"""Longest time that a doubt waits for that [s]."""
+ENOUGH = 1.0  # Observation time before a judgement [s]
+TOLERATED = 0.5  # tolerated error of the declared mass [kg]
+FRICTION = 0.4  # fraction of each joint's Coulomb friction that may be unknown, with the worst sign [-]
+STUDIED = 1.0  # time at rest after which a robot that learns its payload has studied a motion [s]
+PATIENCE = 20.0  # longest time that a doubt waits for that [s]
 
 
 @compiled_for_ticks

@@ -24,10 +24,8 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.values import Payload
 
-BLOCK = 10
-"""Ticks averaged per block."""
-MIN_BLOCKS = 20
-"""Smallest number of blocks of a motion."""
+BLOCK = 10  # ticks averaged per block
+MIN_BLOCKS = 20  # smallest number of blocks of a motion
 UNKNOWN = {
     "friction": 0.2,
     "friction's width": 1.0,
@@ -39,40 +37,26 @@ UNKNOWN = {
 }
 """Prior deviations per joint [-]: Coulomb friction, relative; effect of half its width; viscous friction at 1 rad/s
 relative to Coulomb friction; gain of the torque sensor; friction at rest; mass of the link; rotor inertia."""
-FRICTION = ("friction", "friction's width", "viscous friction", "standing")
-"""Which of these are friction."""
-NOISE = (0.08, 0.001)
-"""Noise of a mean: fraction of Coulomb friction plus fraction of the torque limit [-]."""
-STICKING = 0.3
-"""Fraction of Coulomb friction that is noise at speeds too low for a certain sign [-]."""
-CENTRE = 0.05
-"""Deviation of an unknown payload's centre from the robot file's, per axis [m]."""
-FARTHEST = 0.3
-"""Largest plausible distance of a centre of mass from the flange, per axis [m]."""
-DECLARED = (0.1, 0.01)
-"""Deviation of a declared payload: mass [kg] and centre [m]."""
-DRIFT = (0.2, 0.01)
-"""Deviation due to changes since the last motion: mass [kg] and centre [m]."""
-LIGHT = 0.25
-"""Mass below which the centre of mass is not estimated [kg]."""
-DEAD = 0.25
-"""Smallest change of mass that is reported [kg]."""
-SURE_DEVIATIONS = 2.0
-"""Number of standard deviations for a certain change [-]."""
-VAGUE = 0.35
-"""Deviation of the mass above which a motion teaches nothing [kg]."""
-PUSHED = 3.0
-"""Mean squared residual relative to noise above which something else pushed the arm [-]."""
+FRICTION = ("friction", "friction's width", "viscous friction", "standing")  # which of these are friction
+NOISE = (0.08, 0.001)  # noise of a mean: fraction of Coulomb friction plus fraction of the torque limit [-]
+STICKING = 0.3  # fraction of Coulomb friction that is noise at speeds too low for a certain sign [-]
+CENTRE = 0.05  # deviation of an unknown payload's centre from the robot file's, per axis [m]
+FARTHEST = 0.3  # largest plausible distance of a centre of mass from the flange, per axis [m]
+DECLARED = (0.1, 0.01)  # deviation of a declared payload: mass [kg] and centre [m]
+DRIFT = (0.2, 0.01)  # deviation due to changes since the last motion: mass [kg] and centre [m]
+LIGHT = 0.25  # mass below which the centre of mass is not estimated [kg]
+DEAD = 0.25  # smallest change of mass that is reported [kg]
+SURE_DEVIATIONS = 2.0  # number of standard deviations for a certain change [-]
+VAGUE = 0.35  # deviation of the mass above which a motion teaches nothing [kg]
+PUSHED = 3.0  # mean squared residual relative to noise above which something else pushed the arm [-]
 
 
 @dataclass(frozen=True)
 class Estimate:
     """Mass and centre of mass with covariance, in the units of `x`."""
 
-    x: Floats
-    """Mass [kg] and centre of mass [m], shape (4,)."""
-    covariance: Floats
-    """Covariance, shape (4, 4)."""
+    x: Floats  # mass [kg] and centre of mass [m], shape (4,)
+    covariance: Floats  # covariance, shape (4, 4)
 
     @property
     def deviation(self) -> float:
@@ -88,18 +72,12 @@ def _independent(x: Floats, mass: float, centre: float) -> Estimate:
 class Equations:
     """Linear equations of a motion, weighted by their noise."""
 
-    at: Floats
-    """Mass [kg] and centre of mass [m] of the linearisation, shape (4,)."""
-    rows: Floats
-    """Columns of mass, first moment, and all other uncertain quantities, shape (N n, 4 + k)."""
-    bare: Floats
-    """Torques of the arm without payload, shape (N n,)."""
-    measured: Floats
-    """Measured torques, shape (N n,)."""
-    others: Floats
-    """Prior deviations of the others and of sensor gains, shape (k + n,) [-]."""
-    joints: int
-    """Number n of joints."""
+    at: Floats  # mass [kg] and centre of mass [m] of the linearisation, shape (4,)
+    rows: Floats  # columns of mass, first moment, and all other uncertain quantities, shape (N n, 4 + k)
+    bare: Floats  # torques of the arm without payload, shape (N n,)
+    measured: Floats  # measured torques, shape (N n,)
+    others: Floats  # prior deviations of the others and of sensor gains, shape (k + n,) [-]
+    joints: int  # number n of joints
 
     def solve(self, prior: Estimate) -> Estimate | None:
         """Return mass and centre of mass, given a prior about `at`; None if pushed, or not finite."""

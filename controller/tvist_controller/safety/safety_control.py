@@ -27,8 +27,7 @@ class SafetyControl:
         self._motion, self._emit = motion, emit
         self.monitors: Sequence[Monitor] = ()
         self._held = True
-        self._resumes_by_itself = False
-        """Whether a motion paused by a safeguard resumes when it is released."""
+        self._resumes_by_itself = False  # whether a motion paused by a safeguard resumes when it is released
 
     def reduce(self, *, reduced: bool) -> None:
         """Slow motions down or end that; stop a stream, since its client determines its speed."""

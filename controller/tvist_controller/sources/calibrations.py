@@ -38,8 +38,7 @@ FRICTION: tuple[Quantity, ...] = (
 """Quantities of a joint's friction, in the order of `friction_law`."""
 MOTORS: tuple[Quantity, ...] = ("rotor_inertia", "velocity_gain", "position_gain")
 """Quantities of a joint's motor, in the order of `Drivetrain`."""
-MODES = 4
-"""Default number of estimated modes."""
+MODES = 4  # default number of estimated modes
 
 
 def available() -> tuple[str, ...]:

@@ -24,8 +24,7 @@ class OwnFile(NamedTuple):
 
     file: str
     attribute: str
-    sha256: str
-    """SHA-256 of the bytes that were run, in hexadecimal, without imported files."""
+    sha256: str  # SHA-256 of the bytes that were run, in hexadecimal, without imported files
     found: object
 
 

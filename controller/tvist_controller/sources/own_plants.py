@@ -15,8 +15,7 @@ from tvist_plant.user_file import named
 from tvist_plant.variants import VARIANTS, Variant
 from tvist_plant.world.scene_file import SceneError, find_scene
 
-GROUP = "tvist.plants"
-"""Entry-point group for plants of installed packages."""
+GROUP = "tvist.plants"  # entry-point group for plants of installed packages
 WORLD = "world:"
 """Prefix of the place of a plant that is the arm in a scene."""
 Maker = Callable[[RobotDescription, Payload], Plant]

@@ -13,26 +13,16 @@ from tvist_controller.trajectory.limiter import TorqueMargin
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.speed import abrupt
 
-NEWTON = 3
-"""Newton steps from tool pose to joint angles; two suffice for the travel of a tick."""
-OFF = 1e-5
-"""Pose error in a stiff direction above which the motion cannot continue [m or rad]."""
-FASTEST = 0.5
-"""Fraction of joint velocity available to compliance [-]."""
-CRAWL = 0.05
-"""Fraction of it below which a singular posture counts as hindering compliance [-]."""
-LEVER = 0.22
-"""Length equivalent to a turn by 1 rad; its square scales virtual inertias and dampings [m]."""
-MASS = 70.0
-"""Virtual mass M [kg]; the time constant M/D keeps the arm's elasticity out of the loop."""
-FREE_DAMPING = 2000.0
-"""Damping in free space at damping parameter 1 [N s/m]."""
-CONTACT_DAMPING = 1500.0
-"""Least damping in contact, as needed by the stiffest surface [N s/m]."""
-CONTACT = 8.0
-"""Force above which an axis counts as in contact, or torque divided by `LEVER` [N]."""
-RELEASE = 3.0, 3.0 / LEVER
-"""Deceleration of an axis after its compliance ends [m/s², rad/s²]."""
+NEWTON = 3  # newton steps from tool pose to joint angles; two suffice for the travel of a tick
+OFF = 1e-5  # pose error in a stiff direction above which the motion cannot continue [m or rad]
+FASTEST = 0.5  # fraction of joint velocity available to compliance [-]
+CRAWL = 0.05  # fraction of it below which a singular posture counts as hindering compliance [-]
+LEVER = 0.22  # length equivalent to a turn by 1 rad; its square scales virtual inertias and dampings [m]
+MASS = 70.0  # virtual mass M [kg]; the time constant M/D keeps the arm's elasticity out of the loop
+FREE_DAMPING = 2000.0  # damping in free space at damping parameter 1 [N s/m]
+CONTACT_DAMPING = 1500.0  # least damping in contact, as needed by the stiffest surface [N s/m]
+CONTACT = 8.0  # force above which an axis counts as in contact, or torque divided by `LEVER` [N]
+RELEASE = 3.0, 3.0 / LEVER  # deceleration of an axis after its compliance ends [m/s², rad/s²]
 
 Frame = Callable[[tuple[Floats, Floats], Floats], Floats]
 """Function from tool pose and velocity (3,) to the task's axes in the base frame, columns (3, 3)."""
@@ -107,14 +97,12 @@ class Compliant(LimitedFollower):
         felt: Callable[[], Floats],  # on the tool centre point in the last tick, base frame [N, N m]
     ) -> None:
         super().__init__(state, abrupt(limits, period), reach, torque, period)
-        self._tool, self.inner = tool, inner
-        """Reference that moves the tool in stiff axes."""
+        self._tool, self.inner = tool, inner  # reference that moves the tool in stiff axes
         self._felt = felt
         self._speed: tuple[float, float | None] = (1.0, None)
         self._task: ForceTask | None = None
         self._frame: Frame = lambda _pose, _velocity: np.eye(3)
-        self.axes = np.eye(3)
-        """Axes of the task in the base frame, columns (3, 3)."""
+        self.axes = np.eye(3)  # axes of the task in the base frame, columns (3, 3)
         self.hindered = 1.0
         """Fraction of the force law's velocity that a singular posture allowed in the last tick [-]."""
         self._begin(tool())

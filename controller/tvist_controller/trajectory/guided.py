@@ -12,17 +12,13 @@ from tvist_controller.trajectory.base import Trajectory
 from tvist_controller.trajectory.limiter import Limiter, TorqueMargin
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
-LOOKAHEAD = (0.03, 0.2)
-"""Range of the time constant [s]."""
-GAIN = (100.0, 2000.0)
-"""Range of the gain [1/s^2]."""
-DAMPED = 3.0
-"""Smallest gain times squared lag: damping 0.87, overshoot 0.4 % [-]."""
+LOOKAHEAD = (0.03, 0.2)  # range of the time constant [s]
+GAIN = (100.0, 2000.0)  # range of the gain [1/s^2]
+DAMPED = 3.0  # smallest gain times squared lag: damping 0.87, overshoot 0.4 % [-]
 DELAY = 1.5
 """Ticks by which T exceeds the lookahead. With half a tick because postures are held for one, `target_q` lags
 by the lookahead plus two ticks, one of them in the differentiator."""
-THERE = 1e-7
-"""Distance, and change per tick, below which the posture is reached [rad]."""
+THERE = 1e-7  # distance, and change per tick, below which the posture is reached [rad]
 
 
 class StuckError(Exception):

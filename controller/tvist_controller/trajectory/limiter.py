@@ -15,16 +15,12 @@ Bools = npt.NDArray[np.bool_]
 STOPS = 0.8
 """Fraction of the acceleration allowed by torque with which a joint must be able to stop in range; the margin
 is for changes on the way [-]."""
-HEAVY = 8.0
-"""Acceleration below which torque hardly ever limits a joint [rad/s^2]."""
-TOLERANCE = 1e-6
-"""Relative excess of a limit that counts as rounding [-]."""
-ROUNDING = 2e-15
-"""Error of differences due to rounding of positions [rad]."""
+HEAVY = 8.0  # acceleration below which torque hardly ever limits a joint [rad/s^2]
+TOLERANCE = 1e-6  # relative excess of a limit that counts as rounding [-]
+ROUNDING = 2e-15  # error of differences due to rounding of positions [rad]
 STEP, BEND, QD, QDD, DIFFERENCES = range(5)
 """Rows of differences: first and second [rad], then as velocity and acceleration; number of rows."""
-FIT, FAR = 1, 2
-"""Bits of `judge`: all joints fit; all are far from the ends of their range."""
+FIT, FAR = 1, 2  # bits of `judge`: all joints fit; all are far from the ends of their range
 
 
 @compiled_for_ticks
@@ -100,12 +96,9 @@ class Limiter:
 
     ADVANTAGE = 0.001
     """Fraction of the velocity limit by which a lagging joint may always be faster than its signal [-]."""
-    NEAR = 1e-4
-    """Permitted overshoot over a braking signal [rad]."""
-    HOPELESS = 0.95
-    """Fraction of a limit above which a signal is at the limit [-]."""
-    AUTHORITY = 0.001
-    """Fraction of the acceleration limit reserved for catching up [-]."""
+    NEAR = 1e-4  # permitted overshoot over a braking signal [rad]
+    HOPELESS = 0.95  # fraction of a limit above which a signal is at the limit [-]
+    AUTHORITY = 0.001  # fraction of the acceleration limit reserved for catching up [-]
 
     def __init__(
         self,
@@ -119,8 +112,7 @@ class Limiter:
         self._limits, self._period = limits, period
         self._reach = np.array(reach, dtype=float)
         self._torque = torque
-        self.q = np.array(q, dtype=float)
-        """Position of the reference, shape (n,) [rad]."""
+        self.q = np.array(q, dtype=float)  # position of the reference, shape (n,) [rad]
         # Velocity of the signal; differences of the reference, and its second difference a tick earlier.
         self._signal_qd, self._bend_before, self._now = qd, period * period * qdd, np.zeros((DIFFERENCES, n))
         self._now[STEP], self._now[BEND] = period * (qd - 0.5 * period * qdd), self._bend_before
@@ -128,8 +120,7 @@ class Limiter:
             state
         )  # derivatives, if they differ from those of the differences
         self._behind: Bools | None = None  # which joints are not on the signal, if any
-        self.behind = 0.0
-        """Lag of joints that cannot catch up with a signal at its limits [s]."""
+        self.behind = 0.0  # lag of joints that cannot catch up with a signal at its limits [s]
         # Within this position, no state within the limits needs a check of the range.
         slow = limits.acceleration if torque is None else min(limits.acceleration, HEAVY)
         ramp, swing = limits.acceleration / limits.jerk, limits.velocity / slow

@@ -12,13 +12,10 @@ from tvist_controller.trajectory.pace import TimeScaling
 from tvist_controller.trajectory.path import Path
 from tvist_controller.trajectory.spline import SplineCurve
 
-LOOK_AHEAD = 2.0
-"""Ticks that a rate change looks ahead on the path."""
+LOOK_AHEAD = 2.0  # ticks that a rate change looks ahead on the path
 
-LONGEST_LOOK = 1500
-"""Ticks over which a motion is compared with its pause; longer ones are not about to end."""
-SOONER = 25
-"""Ticks that a pause must save to be worthwhile."""
+LONGEST_LOOK = 1500  # ticks over which a motion is compared with its pause; longer ones are not about to end
+SOONER = 25  # ticks that a pause must save to be worthwhile
 
 SURELY = 0.12
 """If the motion brakes later than this plus the pause's extra time, the pause is certainly sooner [s]."""
@@ -27,14 +24,10 @@ SURELY = 0.12
 class TimeLaw(Protocol):
     """Time law of a path's parameter from rest at its start to rest at its end, never turning back."""
 
-    limits: MotionLimits
-    """Limits for every entry of the parameter."""
-    duration: float
-    """Duration from rest to rest [s]."""
-    brakes_at: float
-    """Time at which it starts braking [s]."""
-    begins: float
-    """Time from which it is known, above 0 if its beginning was dropped [s]."""
+    limits: MotionLimits  # limits for every entry of the parameter
+    duration: float  # duration from rest to rest [s]
+    brakes_at: float  # time at which it starts braking [s]
+    begins: float  # time from which it is known, above 0 if its beginning was dropped [s]
 
     @property
     def moments(self) -> Floats:
@@ -69,14 +62,11 @@ class DoubleS:
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
             ) from error
         self.limits = limits
-        self.begins = 0.0
-        """Time from which it is known [s]."""
-        self.duration = float(self._trajectory.duration)
-        """Duration from rest to rest [s]."""
+        self.begins = 0.0  # time from which it is known [s]
+        self.duration = float(self._trajectory.duration)  # duration from rest to rest [s]
         # Motion from rest to rest is symmetric in time.
         leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
-        self.brakes_at = self.duration - sum(leading.t[:3])
-        """Time at which it starts braking [s]."""
+        self.brakes_at = self.duration - sum(leading.t[:3])  # time at which it starts braking [s]
         self.moments: Floats = np.cumsum(leading.t)
         """Times at which the jerk changes, with possibly largest velocity or acceleration [s]."""
 
@@ -106,13 +96,10 @@ class PlannedMotion(Trajectory):
     ) -> None:
         self.path, self._period = path, period
         self.law = law
-        self.agility = law.limits if agility is None else agility
-        """Limits of a rate change."""
+        self.agility = law.limits if agility is None else agility  # limits of a rate change
         self.limits = law.limits
-        self.duration = law.duration
-        """Duration at full speed [s]."""
-        self.speed = speed
-        """Target time rate, 0 to 1 [-]."""
+        self.duration = law.duration  # duration at full speed [s]
+        self.speed = speed  # target time rate, 0 to 1 [-]
         self._pace = TimeScaling(self.agility, period, speed)
         # Time on the path, as whole ticks since the rate last changed, so that rounding errors do not add up.
         self._since, self._ticks = 0.0, 0

@@ -9,8 +9,7 @@ import ruckig
 
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
-QUICKEST = 20.0
-"""Largest change of the rate; from standstill to full speed takes at least 1/20 s [1/s]."""
+QUICKEST = 20.0  # largest change of the rate; from standstill to full speed takes at least 1/20 s [1/s]
 
 
 class TimeScaling:

@@ -37,8 +37,7 @@ class Path(ABC):
         farthest = float(np.abs(way).max())
         self.direction = way / farthest if farthest > 0.0 else np.zeros(len(start))
         """Direction from start to end with a largest entry of ±1, or zeros if equal, shape (m,)."""
-        self.leading = int(np.argmax(np.abs(self.direction)))
-        """Index of the entry that moves farthest."""
+        self.leading = int(np.argmax(np.abs(self.direction)))  # index of the entry that moves farthest
         self._sign = float(self.direction[self.leading])
 
     @abstractmethod

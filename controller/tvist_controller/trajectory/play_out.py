@@ -5,22 +5,15 @@ from collections import deque
 
 from tvist_controller.trajectory.limits import MotionLimits
 
-WINDOW = 128
-"""Number of set-points over which lateness is observed, in four parts."""
+WINDOW = 128  # number of set-points over which lateness is observed, in four parts
 MAX_PERIODS, MAX_SECONDS = 2.0, 0.02
 """Longest wait for late set-points relative to the earliest; the larger value applies."""
-SPARE_PERIODS = 1
-"""Additional delay of a stream slower than the tick, for jitter at the start [periods]."""
-SLACK = 0.3
-"""Tolerated excess delay, which avoids constant changes [periods]."""
-SHARE = 0.05
-"""Fraction of the limits available to a change of delay [-]."""
-CALM = 0.5
-"""Time after which a delay required by the limits is reduced if no longer needed [s]."""
-SLOW_SHARE = 0.05
-"""Fraction of the velocity limit below which the stream must be for that [-]."""
-CLOSE = 1e-6
-"""Difference below which the delay equals its target [ticks]."""
+SPARE_PERIODS = 1  # additional delay of a stream slower than the tick, for jitter at the start [periods]
+SLACK = 0.3  # tolerated excess delay, which avoids constant changes [periods]
+SHARE = 0.05  # fraction of the limits available to a change of delay [-]
+CALM = 0.5  # time after which a delay required by the limits is reduced if no longer needed [s]
+SLOW_SHARE = 0.05  # fraction of the velocity limit below which the stream must be for that [-]
+CLOSE = 1e-6  # difference below which the delay equals its target [ticks]
 
 
 class PlayOut:

@@ -19,44 +19,31 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 TOOL_SHARE = 0.25
 """Fraction of the shaper's window for which tool limits hold [-]. The speed changes so little within it that the shaped
 tool exceeds its acceleration in a bend by a hundredth; the whole window would cost half a second on some bends."""
-MIN_DIVISOR = 1e-9
-"""Smallest divisor."""
-ROUNDS = 3
-"""Rounds of applying windowed limits to a motion, an odd number."""
-ROUNDING = 1e-9
-"""Relative excess of a limit that counts as rounding [-]."""
-AT_REST: Floats = np.zeros(1)
-"""Known ṡ² of a motion from rest."""
-SHORTLY = 1e-9
-"""Time offset from a change of acceleration at which it is evaluated [s]."""
+MIN_DIVISOR = 1e-9  # smallest divisor
+ROUNDS = 3  # rounds of applying windowed limits to a motion, an odd number
+ROUNDING = 1e-9  # relative excess of a limit that counts as rounding [-]
+AT_REST: Floats = np.zeros(1)  # known ṡ² of a motion from rest
+SHORTLY = 1e-9  # time offset from a change of acceleration at which it is evaluated [s]
 
 
 @dataclass(frozen=True)
 class Cells:
     """Limits along a curve, constant per cell: ṡ ≤ fastest, and p |s̈| + q ṡ² ≤ 1 for each of r rows."""
 
-    fastest: Floats
-    """Largest ṡ per cell, shape (c,) [1/s]."""
-    p: Floats
-    """Shape (c, r) [s^2 per unit of s]."""
-    q: Floats
-    """Shape (c, r) [s^2 per unit of s, squared]."""
+    fastest: Floats  # largest ṡ per cell, shape (c,) [1/s]
+    p: Floats  # shape (c, r) [s^2 per unit of s]
+    q: Floats  # shape (c, r) [s^2 per unit of s, squared]
 
 
 @dataclass(frozen=True)
 class RetimingLimits:
     """All limits of a motion along a curve."""
 
-    edges: Floats
-    """Cell boundaries, rising from 0, shape (c + 1,)."""
-    joints: Cells
-    """Joint limits, which the shaped motion also keeps."""
-    tool: Cells
-    """Tool limits, which the shaped motion may exceed slightly."""
-    slope: Floats
-    """Bound of any joint's |dq/ds| per cell, shape (c,)."""
-    jerk: float
-    """Joint jerk available for changes of s̈ [rad/s^3]."""
+    edges: Floats  # cell boundaries, rising from 0, shape (c + 1,)
+    joints: Cells  # joint limits, which the shaped motion also keeps
+    tool: Cells  # tool limits, which the shaped motion may exceed slightly
+    slope: Floats  # bound of any joint's |dq/ds| per cell, shape (c,)
+    jerk: float  # joint jerk available for changes of s̈ [rad/s^3]
 
 
 @compiled
@@ -156,11 +143,9 @@ class RetimedLaw:
     def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0, start: float = 0.0) -> None:
         self.edges, self.b = edges, b
         """Places where acceleration may change, and ṡ² there, each of shape (c + 1,)."""
-        self.ramp, self.rate = ramp, rate
-        """Averaging time at rate 1 [s], and time rate [-]."""
+        self.ramp, self.rate = ramp, rate  # Averaging time at rate 1 [s], and time rate [-]
         speeds, times = np.sqrt(b), start + arrivals(edges, b)
-        self.times: Floats = times
-        """Times at the edges before the mean, at rate 1, shape (c + 1,) [s]."""
+        self.times: Floats = times  # times at the edges before the mean, at rate 1, shape (c + 1,) [s]
         spans, here = np.diff(times), edges - edges[0]
         accelerations = 0.5 * np.diff(b) / np.diff(edges)
         areas = np.cumsum(spans * (here[:-1] + spans * (speeds[:-1] / 2.0 + spans * accelerations / 6.0)))
@@ -174,13 +159,10 @@ class RetimedLaw:
         self._origin = float(edges[0])
         self._rows = list(zip(self._begun.tolist(), *self._pieces.tolist(), strict=True))
         self._starts = self._times.tolist()
-        self.duration = float(times[-1] + ramp) / rate
-        """Duration from rest to rest [s]."""
-        self.begins = 0.0 if b[0] == 0.0 else (start + ramp) / rate
-        """Time from which it is known [s]."""
+        self.duration = float(times[-1] + ramp) / rate  # duration from rest to rest [s]
+        self.begins = 0.0 if b[0] == 0.0 else (start + ramp) / rate  # time from which it is known [s]
         braking = int(np.flatnonzero(accelerations < 0.0)[0])
-        self.brakes_at = float(times[braking]) / rate
-        """Time at which it starts braking [s]."""
+        self.brakes_at = float(times[braking]) / rate  # time at which it starts braking [s]
         changes = np.concatenate((times + SHORTLY, times + ramp - SHORTLY))
         changes = changes if b[0] == 0.0 else changes[changes >= start + ramp]
         jerk = (

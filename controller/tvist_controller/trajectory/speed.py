@@ -11,16 +11,11 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.speed_step import FOUND, SINGULAR, speed_step
 from tvist_plant.chain import WIDTH
 
-HALVINGS = 8
-"""Number of times a velocity change may be halved if torque or joints do not permit it."""
-TRIES = 4
-"""Number of halvings tried per tick, starting at twice the last fraction."""
-STANDING = 1e-6
-"""Velocity below which joints count as standing when a motion is taken over [rad/s]."""
-STEADY = 1e-12
-"""Velocity below which a motion with nearly stopped time is at rest [rad/s or m/s]."""
-ROUNDING = 1e-9
-"""Fraction of a tick by which rounding may delay the end of a change [-]."""
+HALVINGS = 8  # number of times a velocity change may be halved if torque or joints do not permit it
+TRIES = 4  # number of halvings tried per tick, starting at twice the last fraction
+STANDING = 1e-6  # velocity below which joints count as standing when a motion is taken over [rad/s]
+STEADY = 1e-12  # velocity below which a motion with nearly stopped time is at rest [rad/s or m/s]
+ROUNDING = 1e-9  # fraction of a tick by which rounding may delay the end of a change [-]
 USED = 0.95
 """Fraction of joint acceleration used to plan the tool; the rest is for curvature within a tick [-]."""
 LOST_SHARE = 1e-3
@@ -54,8 +49,7 @@ class Speed(Guided):
         self._q, self._qd, self._qdd = (np.array(values, dtype=float) for values in state)
         self._torque, self._period = torque, period
         self.adopt(limits)
-        self.arm = arm
-        """The arm whose tool has the velocity; None for joint velocities."""
+        self.arm = arm  # the arm whose tool has the velocity; None for joint velocities
         n, fastest = len(self._q), float(np.abs(self._qd).max())
         # A tool continues from the actual step, even if the joints count as standing.
         self._step = period * (self._qd - 0.5 * period * self._qdd)
@@ -63,11 +57,9 @@ class Speed(Guided):
             self._qd = np.zeros(n)
         self.rate = max(rate, min(fastest / limits.velocity, 1.0))
         self._speed, self._slowest = rate, limits.velocity
-        self._share = 1.0
-        """Fraction of the acceleration tried last [-]."""
+        self._share = 1.0  # fraction of the acceleration tried last [-]
         self._chain, self._inverse = np.empty((0, WIDTH)), np.eye(n)
-        self._place, moving = np.zeros((4, 3)), self._qd
-        """Rotation and position of the tool, shape (4, 3)."""
+        self._place, moving = np.zeros((4, 3)), self._qd  # rotation and position of the tool, shape (4, 3)
         if arm is not None:
             rotation, position, jacobian = arm.located(self._q)
             self._chain, self._place, moving = arm.chain, np.vstack((rotation, position)), jacobian @ self._qd

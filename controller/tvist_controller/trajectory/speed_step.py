@@ -13,20 +13,13 @@ FOUND, IMPOSSIBLE, SINGULAR = 0, 1, 2
 
 BENT_SHARE = 0.5
 """Fraction of joint acceleration available to the curvature of the joints' path at constant speed [-]."""
-MORE = 1e-6
-"""Relative excess of a limit that counts as rounding [-]."""
-LOOK = 5.0
-"""Ticks ahead over which the curvature is measured."""
-FARTHEST_LOOK = 0.05
-"""Largest joint angle over which it is measured [rad]."""
-SLOWEST = 0.01
-"""Fraction of the commanded speed below which the tool is stuck [-]."""
-CORRECTIONS = 4
-"""Largest number of Newton steps."""
-OFF = 1e-7
-"""Permitted error of the tool's pose [m or rad]."""
-FLAT = 1e-12
-"""Factor of a rate treated as zero."""
+MORE = 1e-6  # relative excess of a limit that counts as rounding [-]
+LOOK = 5.0  # ticks ahead over which the curvature is measured
+FARTHEST_LOOK = 0.05  # largest joint angle over which it is measured [rad]
+SLOWEST = 0.01  # fraction of the commanded speed below which the tool is stuck [-]
+CORRECTIONS = 4  # largest number of Newton steps
+OFF = 1e-7  # permitted error of the tool's pose [m or rad]
+FLAT = 1e-12  # factor of a rate treated as zero
 
 
 @compiled_for_ticks

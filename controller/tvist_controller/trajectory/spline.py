@@ -8,38 +8,28 @@ from tvist_controller._compiled import compiled
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.path import CheckedMotion, Path
 
-SAMPLES = np.linspace(0.0, 1.0, 9)
-"""Places in each interval at which derivatives are sampled for bounds."""
-ENOUGH = 1.05
-"""Factor from a derivative's largest sample to its bound [-]."""
+SAMPLES = np.linspace(0.0, 1.0, 9)  # places in each interval at which derivatives are sampled for bounds
+ENOUGH = 1.05  # factor from a derivative's largest sample to its bound [-]
 CURVED_SHARE = 0.5
 """Largest fraction of joint acceleration and jerk that the curve itself may use in a motion [-]."""
-MAX_WIDENINGS = 12
-"""Number of times a stop's range is widened before the whole rest of the curve is used."""
+MAX_WIDENINGS = 12  # number of times a stop's range is widened before the whole rest of the curve is used
 
 
 class Bends(NamedTuple):
     """Bounds of derivatives with respect to s on a part of a curve."""
 
-    slope: Floats
-    """|dq/ds| of each joint, shape (n,) [rad per unit of s]."""
-    second: float
-    """|d²q/ds²| of any joint."""
-    third: float
-    """|d³q/ds³| of any joint."""
+    slope: Floats  # |dq/ds| of each joint, shape (n,) [rad per unit of s]
+    second: float  # |d²q/ds²| of any joint
+    third: float  # |d³q/ds³| of any joint
 
 
 class Knots(NamedTuple):
     """Points of a curve with first and second derivatives."""
 
-    s: Floats
-    """Parameters, rising, from 0 for a part of a path, shape (k,)."""
-    q: Floats
-    """Joint positions, shape (k, n) [rad]."""
-    slope: Floats
-    """dq/ds, shape (k, n)."""
-    second: Floats
-    """d²q/ds², shape (k, n)."""
+    s: Floats  # parameters, rising, from 0 for a part of a path, shape (k,)
+    q: Floats  # joint positions, shape (k, n) [rad]
+    slope: Floats  # dq/ds, shape (k, n)
+    second: Floats  # d²q/ds², shape (k, n)
 
 
 def hermite(

@@ -123,8 +123,7 @@ class PathStop(Slowing):
             speed = bend = 0.0
         super().__init__(([0.0], [speed], [bend]), braking, jerk, period)
         self.path, self._origin, self.acceleration = path, x, acceleration
-        self.braking = braking
-        """Acceleration limit of the parameter [rad/s^2]."""
+        self.braking = braking  # acceleration limit of the parameter [rad/s^2]
 
     def share(self, time: float) -> float:
         """Return the distance covered by the parameter at a time after the start [rad]."""
@@ -170,8 +169,7 @@ class SlowedStop(Trajectory):
     ) -> None:
         self.path, self.acceleration, self.jerk = path, acceleration, jerk
         slowing = _slowing(([0.0], [1.0], [0.0]), acceleration / fastest, jerk / fastest)
-        self.duration = float(slowing.duration)
-        """Duration [s]."""
+        self.duration = float(slowing.duration)  # duration [s]
         self._period, self._ticks = period, 0
         ticks = np.arange(int(np.ceil(self.duration / period)) + 1)
         times = [float(slowing.at_time(min(tick * period, self.duration))[0][0]) for tick in ticks.tolist()]

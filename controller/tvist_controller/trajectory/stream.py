@@ -13,8 +13,7 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.play_out import PlayOut
 from tvist_controller.trajectory.stop import JointStop
 
-BRIDGED = 2
-"""Largest number of consecutive missing set-points that are extrapolated."""
+BRIDGED = 2  # largest number of consecutive missing set-points that are extrapolated
 
 
 class SetpointStream(LimitedFollower):
@@ -56,12 +55,9 @@ class SetpointStream(LimitedFollower):
         self._pause: JointStop | None = None
         self.sequence: int | None = None
         """Number of the newest accepted set-point, which the reference reaches after the delay."""
-        self.late = 0
-        """Number of late or duplicate set-points."""
-        self.lost = 0
-        """Number of skipped sequence numbers; a gap counts at most `MAX_WAITING`."""
-        self.limited = 0
-        """Number of ticks in which limits kept the reference from the set-points."""
+        self.late = 0  # number of late or duplicate set-points
+        self.lost = 0  # number of skipped sequence numbers; a gap counts at most `MAX_WAITING`
+        self.limited = 0  # number of ticks in which limits kept the reference from the set-points
 
     MAX_WAITING = 1000
     """Largest number of set-points waiting for play-out."""

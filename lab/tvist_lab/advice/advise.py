@@ -17,16 +17,12 @@ from tvist_lab.recordings.recording import MissingColumnError
 
 EARLY = 0.15
 """How much later than the earliest shaper one may settle, as a share of the settling time without any [-]."""
-CLOSE = 5.0
-"""Vibration that a shaper may leave beyond the least of these [percentage points]."""
-SIMPLE = (ROBOT, ONE, EACH)
-"""Where modes can come from, the simplest first."""
+CLOSE = 5.0  # vibration that a shaper may leave beyond the least of these [percentage points]
+SIMPLE = (ROBOT, ONE, EACH)  # where modes can come from, the simplest first
 RIPPLES = ("actual_qd", "actual_current", "actual_moment", "actual_q")
 """Columns in which a joint shows that the arm shakes it."""
-LIGHTEST = 0.005
-"""Smallest damping ratio of an arm [-]; anything damped less is hum of the sensor."""
-AGREED = 2
-"""Smallest number of motions that must show the same frequency."""
+LIGHTEST = 0.005  # smallest damping ratio of an arm [-]; anything damped less is hum of the sensor
+AGREED = 2  # smallest number of motions that must show the same frequency
 
 
 class RingingMode(NamedTuple):

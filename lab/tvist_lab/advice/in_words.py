@@ -11,8 +11,7 @@ from tvist_lab.metrics import MeasuredRecording
 from tvist_lab.words import counted, spread
 
 NEVER = "ring longer than the recorded rest"
-NAMED = 3
-"""Largest number of modes that a sentence names."""
+NAMED = 3  # largest number of modes that a sentence names
 
 
 def verdict(advice: Advice, logs: Sequence[MeasuredRecording]) -> list[str]:

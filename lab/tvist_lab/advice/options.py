@@ -15,34 +15,25 @@ from tvist_lab.metrics.ring_down import decay_rate
 from tvist_lab.recordings import Floats
 from tvist_shaping import SHAPERS, Impulses, ShapingError, product, residual
 
-Modes = tuple[tuple[float, float], ...]
-"""(f_d, ζ) of each mode, the lowest first [Hz, -]."""
-BEGIN = (0.05, 0.2)
-"""Damping ratios from which a search starts [-]."""
-DAMPED = (0.005, 0.4)
-"""Range of damping ratios in a search [-]."""
+Modes = tuple[tuple[float, float], ...]  # (f_d, ζ) of each mode, the lowest first [Hz, -]
+BEGIN = (0.05, 0.2)  # damping ratios from which a search starts [-]
+DAMPED = (0.005, 0.4)  # range of damping ratios in a search [-]
 BESIDE = (0.7, 1.4)
 """Range of frequencies in a search, relative to the lowest and the highest fitted mode [-]."""
-ANY = (5.0, 25.0)
-"""Range of frequencies in a search if no modes are known [Hz]."""
-TRIALS = 60
-"""Largest number of search steps for each mode."""
-ENOUGH = 12
-"""Number of stops from which modes are found; if there are more, the loudest count."""
+ANY = (5.0, 25.0)  # range of frequencies in a search if no modes are known [Hz]
+TRIALS = 60  # largest number of search steps for each mode
+ENOUGH = 12  # number of stops from which modes are found; if there are more, the loudest count
 ONE, EACH, ROBOT = "one for all", "each its own", "the robot's calibration"
 """Scope of the modes: one set for all motions, one for each motion, or the robot's own estimate."""
-COPIES = 48
-"""Number of copies of the reference that approximate a running mean."""
+COPIES = 48  # number of copies of the reference that approximate a running mean
 
 
 @dataclass(frozen=True)
 class Aim:
     """Modes for which a shaper is designed, by motion."""
 
-    scope: str
-    """`ONE`, `EACH` or `ROBOT`."""
-    modes: Mapping[int, Modes]
-    """Modes to use from now on, by number of the motion."""
+    scope: str  # `ONE`, `EACH` or `ROBOT`
+    modes: Mapping[int, Modes]  # modes to use from now on, by number of the motion
     judged: Mapping[StopWithRest, Modes]
     """Modes by which each stop is judged, found without it if there are repetitions."""
     optimistic: frozenset[StopWithRest] = frozenset()

@@ -15,30 +15,24 @@ from scipy.signal import lfilter
 from tvist_lab.metrics.ring_down import decay_rate
 from tvist_lab.recordings import Floats
 
-WAVES = 202.0
-"""Waves of the error per turn of a joint [-]: of gears with a ratio of 101, as most of UR's."""
-WINDOW = (-0.6, 0.5)
-"""Time around the stop in which the waves are fitted [s]."""
+WAVES = 202.0  # waves of the error per turn of a joint [-]: of gears with a ratio of 101, as most of UR's
+WINDOW = (-0.6, 0.5)  # time around the stop in which the waves are fitted [s]
 BRAKING = 0.5
 """Weight of the time before the stop [-], in which the arm's own acceleration is described less well."""
-ERROR = 2e-5
-"""Displacement of the tool by which gear errors may move it: 2e-5 rad at one metre [m]."""
+ERROR = 2e-5  # displacement of the tool by which gear errors may move it: 2e-5 rad at one metre [m]
 ALIKE = 15.0
 """Factor by which neighbouring samples of a fit's residual are worth less than independent ones [-]."""
 PHASES = (np.sin, np.cos)
-TURNS = 0.05
-"""Smallest travel of a joint that counts [rad]."""
+TURNS = 0.05  # smallest travel of a joint that counts [rad]
 
-Poles = tuple[complex, ...]
-"""Pole of each mode [1/s]."""
+Poles = tuple[complex, ...]  # pole of each mode [1/s]
 
 
 class Ripple(NamedTuple):
     """The gears' part of the vibration around a stop."""
 
     poles: Poles
-    weights: Floats
-    """Shape (columns of `_excited`, 3)."""
+    weights: Floats  # shape (columns of `_excited`, 3)
 
     def along(self, q: Floats, ends: Floats, period: float) -> Floats:
         """Return the acceleration that the gears excite along a path of the joints [m/s²].

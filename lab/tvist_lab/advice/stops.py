@@ -25,18 +25,13 @@ from tvist_shaping import Impulses
 
 COUNTED_FROM = 0.02
 """Time after a stop from which vibration counts [s]; until then a filtered sensor still shows the braking."""
-COUNTED = (0.2, 0.5)
-"""Shortest and longest time for which vibration counts [s]."""
-TAIL = 0.2
-"""Time at the end of a rest from which the sensor's noise is found [s]."""
-SAME_DURATION = 0.05
-"""Largest relative difference between the durations of repetitions [-]."""
-LOUD = 3.0
-"""Smallest rms of a vibration over that of the sensor's noise [-]."""
+COUNTED = (0.2, 0.5)  # shortest and longest time for which vibration counts [s]
+TAIL = 0.2  # time at the end of a rest from which the sensor's noise is found [s]
+SAME_DURATION = 0.05  # largest relative difference between the durations of repetitions [-]
+LOUD = 3.0  # smallest rms of a vibration over that of the sensor's noise [-]
 NONLINEAR = 0.05
 """Share that always remains [-]: f_d of a real UR5 rises by 3 % during a ring-down, for which zv leaves 5 %."""
-FELT = 0.05
-"""Smallest rms of a vibration that is worth a shaper [m/s²]."""
+FELT = 0.05  # smallest rms of a vibration that is worth a shaper [m/s²]
 
 
 class Left(NamedTuple):

@@ -35,8 +35,7 @@ TICKS = 500
 LIMITS = MotionLimits(1.5, 2.0, 100.0)
 
 Floats = NDArray[np.float64]
-Run = Callable[[], float]
-"""Makes one run and returns its result, here the processor time of a tick [µs]."""
+Run = Callable[[], float]  # makes one run and returns its result, here the processor time of a tick [µs]
 
 
 class MeasuredArm(Protocol):

@@ -25,20 +25,14 @@ from tvist_protocol import keys
 from tvist_protocol.codec import decode
 from tvist_protocol.stream import State, Telemetry
 
-SWING = 0.05
-"""Amplitude of the streamed sine [rad]."""
-COMMANDS = 200
-"""Number of commands whose response time is measured."""
-NUMBERS = (1, 2, 4, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64)
-"""Numbers of robots to try, in order."""
+SWING = 0.05  # amplitude of the streamed sine [rad]
+COMMANDS = 200  # number of commands whose response time is measured
+NUMBERS = (1, 2, 4, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64)  # numbers of robots to try, in order
 FAILURES = 2
 """Consecutive failures after which no larger numbers are tried; a single one may be the machine's fault."""
-TRIES = 2
-"""Number of tries, of which the better counts, since other load only adds lateness."""
-MISSED = 0.001
-"""Share of its ticks that each robot may miss [-]."""
-SETTLE = 2
-"""Number of telemetry messages ignored at first, to exclude the start."""
+TRIES = 2  # number of tries, of which the better counts, since other load only adds lateness
+MISSED = 0.001  # share of its ticks that each robot may miss [-]
+SETTLE = 2  # number of telemetry messages ignored at first, to exclude the start
 
 
 async def one_robot(

@@ -18,10 +18,8 @@ from tvist_lab.bench.served_robots import one_robot, robots_at_500_hz
 from tvist_plant.plant import PERIOD
 from tvist_server.punctual import processors
 
-REPETITIONS = 7
-"""Number of runs of which the median counts, after a warm-up."""
-OF_MANY = 0.4
-"""Time for which each number of robots is measured, as a share of the time for one robot [-]."""
+REPETITIONS = 7  # number of runs of which the median counts, after a warm-up
+OF_MANY = 0.4  # time for which each number of robots is measured, as a share of the time for one robot [-]
 LIBRARIES = ("tvist", "eclipse-zenoh", "mcap", "msgspec", "mujoco", "numba", "numpy", "pin", "ruckig")
 """Distributions whose versions affect speed."""
 
@@ -30,13 +28,11 @@ class MachineInfo(Struct, frozen=True):
     """The machine on which figures depend."""
 
     cpu: str
-    cores: int
-    """Number of cores available to this process."""
+    cores: int  # number of cores available to this process
     system: str
     python: str
     libraries: dict[str, str]
-    load: float
-    """Average number of running processes in the minute before the start."""
+    load: float  # average number of running processes in the minute before the start
 
 
 def speed(seconds: float, shaper: str, tell: Callable[[str], None]) -> dict[str, Any]:

@@ -23,16 +23,11 @@ from tvist_lab.figures.style import (
 from tvist_lab.metrics import amplitude
 from tvist_lab.metrics.common_clock import STILL
 
-LARGE = 1.65
-"""Factor on the usual size of text [-]: these figures are often viewed on a phone."""
-SHOWN = (-100.0, 1000.0)
-"""Time shown before and after the stop [ms]."""
-NAMED = 4
-"""Number of shapers on the front that are named besides the recommended one."""
-MIN_DRAWN_PERCENT = 0.5
-"""Lowest share that is drawn [%]."""
-OTHERS = np.linspace(0.01, 1.0, 30)
-"""Durations of smoothing, as shares of the longest shaper's [-]."""
+LARGE = 1.65  # factor on the usual size of text [-]: these figures are often viewed on a phone
+SHOWN = (-100.0, 1000.0)  # time shown before and after the stop [ms]
+NAMED = 4  # number of shapers on the front that are named besides the recommended one
+MIN_DRAWN_PERCENT = 0.5  # lowest share that is drawn [%]
+OTHERS = np.linspace(0.01, 1.0, 30)  # durations of smoothing, as shares of the longest shaper's [-]
 
 
 def advice_figures(advice: Advice) -> tuple[Figure, Figure]:

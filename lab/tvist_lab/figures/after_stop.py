@@ -39,14 +39,11 @@ from tvist_lab.metrics.common_clock import AFTER_STOP, STILL
 from tvist_lab.metrics.felt import acceleration_of
 from tvist_lab.recordings import Floats, Recording
 
-SHOWN = (-50.0, 350.0)
-"""Time shown before and after the end of the unshaped motion's reference [ms]."""
+SHOWN = (-50.0, 350.0)  # time shown before and after the end of the unshaped motion's reference [ms]
 HEADROOM = 1.6
 """Height of the axis over the larger peak [-]: shows the end of the braking without shrinking the peaks."""
-WORDS_AT = 100.0
-"""Time at which the names of the curves start [ms]."""
-BEFORE, AFTER = 100.0, 600.0
-"""Time shown before and after the stop of the first of several curves [ms]."""
+WORDS_AT = 100.0  # time at which the names of the curves start [ms]
+BEFORE, AFTER = 100.0, 600.0  # time shown before and after the stop of the first of several curves [ms]
 
 
 def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure:

@@ -28,10 +28,8 @@ LABELS = {
     "zeta": (r"$\zeta$", "damping ratio of the lowest mode", "–"),
 }
 """Symbol, meaning and unit of each map, by its key."""
-NARROW = 5.0
-"""Width up to which maps are drawn one below the other [inch]."""
-LEVELS = 9
-"""Largest number of levels of a map."""
+NARROW = 5.0  # width up to which maps are drawn one below the other [inch]
+LEVELS = 9  # largest number of levels of a map
 
 
 def identified_figure(name: str, measured: Floats, fitted: Floats) -> Figure:

@@ -34,12 +34,9 @@ from tvist_plant.model import flexible_model
 from tvist_plant.plant import PERIOD
 from tvist_shaping import Fixed
 
-RAISED = 0.6
-"""Angle of the shoulder above the stretched arm at which the motion starts [rad]."""
-WATCHED = 0.3
-"""Time after the stop in which the largest deflection is sought [s]."""
-MAGNIFIED = 600.0
-"""Magnification of the deflection [-]."""
+RAISED = 0.6  # angle of the shoulder above the stretched arm at which the motion starts [rad]
+WATCHED = 0.3  # time after the stop in which the largest deflection is sought [s]
+MAGNIFIED = 600.0  # magnification of the deflection [-]
 
 
 class _Arm:

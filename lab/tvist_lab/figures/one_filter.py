@@ -24,12 +24,9 @@ from tvist_lab.figures.style import (
 )
 from tvist_lab.recordings import Floats
 
-PERIOD = 0.002
-"""Control period [s]."""
-ACCELERATION = 2.0
-"""Acceleration of the references [rad/s²]."""
-RISE = 0.15
-"""Time in which the reference of figure 3 reaches its target [s]."""
+PERIOD = 0.002  # control period [s]
+ACCELERATION = 2.0  # acceleration of the references [rad/s²]
+RISE = 0.15  # time in which the reference of figure 3 reaches its target [s]
 BUFFERED = 22
 
 

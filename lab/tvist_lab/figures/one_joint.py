@@ -20,8 +20,7 @@ from tvist_lab.figures.style import (
 )
 from tvist_lab.one_joint import OneJointModes, Plucked
 
-APART = 0.62
-"""Distance between the shoulders of neighbouring poses in the figure [m]."""
+APART = 0.62  # distance between the shoulders of neighbouring poses in the figure [m]
 WORDS = ("\nincreased inertia", "", "\ndecreased inertia")
 """The paper's words for the first and the last pose."""
 SPRING_TURNS = 2.5

@@ -43,8 +43,7 @@ SYMBOLS = {
 }
 LEAD, TAIL = 0.1, 0.4
 """Time shown in figure 16 before the unshaped reference's stop and after the shaped one's [s]."""
-NOISE_TIME = 0.2
-"""Time at the end of the recorded rest from which the noise is found [s]."""
+NOISE_TIME = 0.2  # time at the end of the recorded rest from which the noise is found [s]
 LOUD = 1.2
 """Ratio to the largest noise above which a peak belongs to a vibration [-]; a decay needs two such peaks."""
 DASHES = (0, (4, 2))

@@ -23,8 +23,7 @@ from tvist_lab.metrics.settling import REPEATABILITY, distance
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
 
-LEAD, REST = 0.1, 1.0
-"""Time shown before the reference's start and after the shaped reference's stop [s]."""
+LEAD, REST = 0.1, 1.0  # time shown before the reference's start and after the shaped reference's stop [s]
 POSITION_RANGE_MM = 0.15
 """Largest distance to the final position on the axis [mm]; five times the repeatability."""
 SYMBOLS = {

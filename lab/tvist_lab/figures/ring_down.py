@@ -25,16 +25,11 @@ from tvist_lab.metrics.ring_down import WINDOWS, RingDown
 from tvist_lab.metrics.table import ring_down_of
 from tvist_lab.recordings import Floats
 
-BEFORE, AFTER = 0.1, 0.7
-"""Time shown before and after the stop [s]."""
-BLOCK = 0.2
-"""Duration of the data of one spectrum of the spectrogram [s]; faster changes are smeared over it."""
-HIGHEST = 45.0
-"""Largest frequency shown [Hz]."""
-RANGE = 40.0
-"""Levels shown below the largest one [dB]."""
-LINES = 4096
-"""Number of samples to which the ring-down is padded for its spectrum."""
+BEFORE, AFTER = 0.1, 0.7  # time shown before and after the stop [s]
+BLOCK = 0.2  # duration of the data of one spectrum of the spectrogram [s]; faster changes are smeared over it
+HIGHEST = 45.0  # largest frequency shown [Hz]
+RANGE = 40.0  # levels shown below the largest one [dB]
+LINES = 4096  # number of samples to which the ring-down is padded for its spectrum
 
 
 def ring_down_figure(name: str, recorded: Recorded) -> Figure:

@@ -19,14 +19,11 @@ STYLES = ("paper", "slides")
 SUFFIX = ".mplstyle"
 RANGES = {"figure.figsize": (2.0, 40.0), "savefig.dpi": (30.0, 2400.0)}
 """Range of width [inch] and resolution [dots per inch] in a style sheet."""
-WIDTH, COLUMN = 183.0 / 25.4, 89.0 / 25.4
-"""Width of two columns of a journal, and of one [inch]."""
+WIDTH, COLUMN = 183.0 / 25.4, 89.0 / 25.4  # width of two columns of a journal, and of one [inch]
 NOT_OF_STYLE = ("backend", "interactive", "savefig.directory", "savefig.format", "toolbar")
 """Settings of the drawing program rather than of its figures."""
-SMALLER = 0.8
-"""Size of text and lines for one column, relative to that for two [-]."""
-SIZES = ("font.size", "lines.linewidth", "lines.markersize")
-"""Settings to which all other sizes are relative."""
+SMALLER = 0.8  # size of text and lines for one column, relative to that for two [-]
+SIZES = ("font.size", "lines.linewidth", "lines.markersize")  # settings to which all other sizes are relative
 STABLE: dict[str, dict[str, Any]] = {
     ".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}
 }  # fmt: skip

@@ -26,10 +26,8 @@ from tvist_lab.words import QUANTILES_FROM
 
 EACH = 0.22
 """Height for each setting of a sweep [inch]."""
-LONG_NAME = 16
-"""Length from which a name takes two lines [letters]."""
-FLOOR = 1e-4
-"""Smaller peaks are drawn at this value [m/s²]."""
+LONG_NAME = 16  # length from which a name takes two lines [letters]
+FLOOR = 1e-4  # smaller peaks are drawn at this value [m/s²]
 
 
 def study_figure(

@@ -28,15 +28,12 @@ FAINT = "#8A8A8A"
 """Colour of limits and other auxiliary lines."""
 MUTED = "#5B6670"
 """Colour of secondary text."""
-LIMIT = (0, (4, 3))
-"""Dashes of limits and other auxiliary lines."""
-ALPHA = r"$|\alpha|$ (m/s²)"
-"""Axis label for the tool's acceleration."""
+LIMIT = (0, (4, 3))  # Dashes of limits and other auxiliary lines
+ALPHA = r"$|\alpha|$ (m/s²)"  # axis label for the tool's acceleration
 OF_ALPHA = {r"$|\alpha|$": "acceleration of the tool, without gravity"}
 USUAL = {"lines.linewidth": 1.4, "lines.markersize": 4.0, "font.size": 8.0}
 """Sizes of the default style, to which those in this package are relative [pt]."""
-SHARED_LABEL_DISTANCE = 0.035
-"""Share of the axis below which neighbouring points share a name [-]."""
+SHARED_LABEL_DISTANCE = 0.035  # share of the axis below which neighbouring points share a name [-]
 
 
 class Series(NamedTuple):

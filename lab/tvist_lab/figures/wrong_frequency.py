@@ -27,22 +27,17 @@ from tvist_shaping import Shaper, residual
 
 DESIGN, SPAN = 10.5, (6.0, 15.0)
 """Design frequency of the shapers of figure 4, and range of the UR5e's first mode with 5 kg [Hz]."""
-SHOWN_HZ = (5.5, 16.0)
-"""Range of the frequency axis in figure 4 [Hz]."""
-ERRORS = (0.0, 0.1, 0.2)
-"""Frequency errors for which settling is drawn [-]."""
+SHOWN_HZ = (5.5, 16.0)  # range of the frequency axis in figure 4 [Hz]
+ERRORS = (0.0, 0.1, 0.2)  # frequency errors for which settling is drawn [-]
 FAMILIES = {
     "Zero vibration": ("zv", "mzv", "zvd", "zvdd", "zvddd"),
     "Extra-insensitive": ("ei", "ei_exact", "si", "ei2", "ei2_exact", "ei3", "ei3_exact"),
     "Negative impulses: short, but beyond the reference's limits": ("um_zv", "um_zvd"),
 }
 """Panels and their shapers; all others share a last panel."""
-SHOWN_SHARE = (0.4, 1.7)
-"""Range of the axis: true divided by assumed frequency [-]."""
-HIGHEST = 25.0
-"""Largest residual vibration on the axis [%]."""
-WIDEST = 1.6
-"""Largest band width on the axis; unlimited bands are drawn here [-]."""
+SHOWN_SHARE = (0.4, 1.7)  # range of the axis: true divided by assumed frequency [-]
+HIGHEST = 25.0  # largest residual vibration on the axis [%]
+WIDEST = 1.6  # largest band width on the axis; unlimited bands are drawn here [-]
 
 
 def figure_4() -> Figure:

@@ -17,24 +17,18 @@ from tvist_protocol.errors import ProtocolError
 
 _, Y, Z = np.eye(3)
 BASE, PAYLOAD = "world", "payload"
-THIN = 0.04
-"""Radius of a link of unknown shape, relative to the arm's reach [-]."""
+THIN = 0.04  # radius of a link of unknown shape, relative to the arm's reach [-]
 
 
 @dataclass(frozen=True)
 class FoxgloveArm:
     """An arm of n joints; a link's frame is at its far end, the last one is the flange."""
 
-    frames: tuple[str, ...]
-    """Names of the frames: the base, and one for each link."""
-    turns: Rotation
-    """Rotation of each link's frame relative to its joint at angle 0, n of them."""
-    shifts: Floats
-    """Position of each link's frame in that of its joint, shape (n, 3) [m]."""
-    bending: tuple[int, ...]
-    """Links that bend in their middle, about y and then z."""
-    bodies: tuple[Body, ...]
-    """Bodies to draw, each in the frame of its link, or -1 for the base."""
+    frames: tuple[str, ...]  # names of the frames: the base, and one for each link
+    turns: Rotation  # rotation of each link's frame relative to its joint at angle 0, n of them
+    shifts: Floats  # position of each link's frame in that of its joint, shape (n, 3) [m]
+    bending: tuple[int, ...]  # links that bend in their middle, about y and then z
+    bodies: tuple[Body, ...]  # bodies to draw, each in the frame of its link, or -1 for the base
 
     def steps(self, q: Floats, bends: Floats) -> tuple[Floats, Floats]:
         """Return each link's position, shape (T, n, 3) [m], and quaternion x y z w in the frame of the link before.

@@ -29,8 +29,7 @@ from tvist_protocol.stream import State
 
 PICTURE_TICKS = 10
 """Ticks between two frames messages: 50 a second show a vibration of 10 Hz, and viewers interpolate."""
-DIGITS = 9
-"""Decimals of positions [m] and quaternions; rounding makes the file a third smaller."""
+DIGITS = 9  # decimals of positions [m] and quaternions; rounding makes the file a third smaller
 LIGHT, DARK = (0.85, 0.87, 0.89), (0.36, 0.40, 0.44)
 """Colours of the arm's links, and of its base and payload: red, green, blue."""
 SCHEMAS = {"frames": "foxglove.FrameTransforms", "arm": "foxglove.SceneUpdate", "curves": "tvist.curves"}

@@ -14,14 +14,10 @@ CONTRADICTION = 0.2
 """Share of a ring-down explained only by its own poles from which it contradicts the others [-]."""
 SIGNIFICANT = 60.0
 """Significance required for a contradiction, to exclude noise; see `OwnPoles.significance` [-]."""
-SUSPECTS = 3
-"""Number of ring-downs that are left out in turn."""
-GUILTY = 3
-"""If more than one in this number is wrong, the wrong ring-downs cannot be determined."""
-SINGLY = 14
-"""Largest number of configurations that are left out one by one."""
-FOLDS = 10
-"""Number of parts into which more configurations are divided."""
+SUSPECTS = 3  # number of ring-downs that are left out in turn
+GUILTY = 3  # if more than one in this number is wrong, the wrong ring-downs cannot be determined
+SINGLY = 14  # largest number of configurations that are left out one by one
+FOLDS = 10  # number of parts into which more configurations are divided
 
 
 def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:

@@ -49,23 +49,18 @@ from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
-REPORTED_MODES = 3
-"""Number of modes whose errors are reported."""
+REPORTED_MODES = 3  # number of modes whose errors are reported
 MAX_RING_DOWNS = 48
 """Number of ring-downs to which springs and drives are fitted; more take longer and add little."""
-WORKSPACE = 200
-"""Number of configurations over which the range of the modes is determined."""
+WORKSPACE = 200  # number of configurations over which the range of the modes is determined
 MARGIN = 0.85
 """Margin on the lowest frequency over the workspace, and on the distance to the highest damping ratio [-]."""
-PLACES = 100
-"""Number of configurations over which the calibration's accuracy is determined."""
-UNSEEN = 60
-"""Number of configurations at which a calibration is compared with the truth."""
+PLACES = 100  # number of configurations over which the calibration's accuracy is determined
+UNSEEN = 60  # number of configurations at which a calibration is compared with the truth
 KNOWN = 5.0
 """Largest half-width of the 95 % interval of the lowest f_d for a configuration to count as known [%]."""
 PROPOSED = 3
-CANDIDATES = 40
-"""Number of configurations from which proposed moves are chosen."""
+CANDIDATES = 40  # number of configurations from which proposed moves are chosen
 
 
 @dataclass(frozen=True)
@@ -83,17 +78,14 @@ class Found:
     calibration: Calibration
     stops: tuple[RingDownStop, ...]
     """All stops; those that were not used have a reason, also if they contradict others."""
-    left: tuple[LeftOut, ...]
-    """The fitted ring-downs, with their modes from fits without them."""
+    left: tuple[LeftOut, ...]  # the fitted ring-downs, with their modes from fits without them
     forecast: ModeForecast
     known_percent: float
     """Share of the workspace in which the lowest f_d is known within `KNOWN` with the heaviest payload [%]."""
     least_known: tuple[Floats, ForecastModes]
     """Configuration of the workspace with the least known mode, and that mode."""
-    proposals: tuple[Jog, ...]
-    """Jogs that would add most information."""
-    no_polynomial: str
-    """Why the calibration has no polynomials; empty if it has."""
+    proposals: tuple[Jog, ...]  # jogs that would add most information
+    no_polynomial: str  # why the calibration has no polynomials; empty if it has
 
     @property
     def used(self) -> int:

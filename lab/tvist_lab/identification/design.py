@@ -25,8 +25,7 @@ LENGTH, SHARES = 0.06, (0.6, 0.6, 1.0)
 LIMITS = MotionLimits(velocity=2.6, acceleration=6.1, jerk=540.0)
 """Limits of the quickest jog: quicker than a client's `move_j`, so that an arm with a soft servo rings as well."""
 SKIPPED, SAMPLES = round(BEGINS / PERIOD), round(LONGEST / PERIOD)
-NOISE = 0.03
-"""Assumed noise, rms per axis [m/s²]."""
+NOISE = 0.03  # assumed noise, rms per axis [m/s²]
 
 
 def jog_of(joints: int) -> Floats:

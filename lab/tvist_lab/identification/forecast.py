@@ -10,12 +10,10 @@ from tvist_lab.identification.ring_downs import Ringing
 from tvist_lab.identification.unknowns import Z_95, ArmModes
 from tvist_lab.recordings import Floats
 
-DIFFERENCE_STEP = 1e-3
-"""Step of a logarithm for finite differences [-]."""
+DIFFERENCE_STEP = 1e-3  # step of a logarithm for finite differences [-]
 MIN_ERRORS = (0.015, 0.06)
 """Smallest assumed errors of f_d and ζ [-]: joints that share a parameter differ; friction and gears are nonlinear."""
-FEWEST = 6
-"""Number of modes in left-out ring-downs needed to check the intervals."""
+FEWEST = 6  # number of modes in left-out ring-downs needed to check the intervals
 
 
 @dataclass(frozen=True)
@@ -23,26 +21,19 @@ class LeftOut:
     """A ring-down, and the modes at its configuration from a fit without it."""
 
     ringing: Ringing
-    f_d: Floats
-    """Shape (k,) [Hz]."""
-    zeta: Floats
-    """Shape (k,) [-]."""
-    own: OwnPoles
-    """The same modes fitted to the ring-down alone."""
+    f_d: Floats  # shape (k,) [Hz]
+    zeta: Floats  # shape (k,) [-]
+    own: OwnPoles  # the same modes fitted to the ring-down alone
 
 
 @dataclass(frozen=True)
 class ForecastModes:
     """Modes at a configuration, each an array with one entry per mode, the lowest first."""
 
-    f_d: Floats
-    """Damped frequencies [Hz]."""
-    zeta: Floats
-    """Damping ratios [-]."""
-    f_d_error: Floats
-    """Standard deviation of the logarithm of f_d [-]."""
-    zeta_error: Floats
-    """Standard deviation of the logarithm of ζ [-]."""
+    f_d: Floats  # damped frequencies [Hz]
+    zeta: Floats  # damping ratios [-]
+    f_d_error: Floats  # standard deviation of the logarithm of f_d [-]
+    zeta_error: Floats  # standard deviation of the logarithm of ζ [-]
 
     @property
     def f_d_percent(self) -> Floats:
@@ -56,10 +47,8 @@ class ModeForecast:
 
     arm: ArmModes
     fit: ModalFit
-    covariance: Floats
-    """Covariance of the parameters' logarithms due to noise and model errors, shape (P, P)."""
-    moved: Floats
-    """Shift of these logarithms by the deviation of each mass, shape (P, masses)."""
+    covariance: Floats  # covariance of the parameters' logarithms due to noise and model errors, shape (P, P)
+    moved: Floats  # shift of these logarithms by the deviation of each mass, shape (P, masses)
     wider: tuple[float, float] = (1.0, 1.0)
     """Factors on the errors of f_d and ζ, at least 1, found from ring-downs left out of fits [-]."""
 

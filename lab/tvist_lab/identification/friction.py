@@ -27,26 +27,17 @@ from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import ModalParameter
 
-LENGTH = 0.45
-"""Length of the way, of every joint [rad]."""
+LENGTH = 0.45  # length of the way, of every joint [rad]
 LIMITS = MotionLimits(velocity=0.3, acceleration=0.2, jerk=100.0)
 """Limits of the motion: slow enough for many samples near standstill, quick enough for viscous friction."""
-REST = 0.3
-"""Rest before the way there and back [s]."""
-PLACES = 8
-"""Number of configurations tried for a free way."""
-BLOCK = 10
-"""Number of ticks over which speeds and torques are averaged."""
-SETTLING = 2
-"""Number of blocks left out at both ends, where friction still holds the earlier state."""
-GROWTH = (0, 1, 4)
-"""Powers of the speed with which the noise grows, since the gears' ripple grows with speed."""
-LEAST_NOISE = 0.003
-"""Smallest assumed noise, relative to the joint's friction [-]."""
-ROUNDS = 4
-"""Number of fits, each weighted with the residuals of the one before."""
-LEAST_BREAKAWAY = 1.0
-"""Smallest ratio of friction at breakaway to that in motion [-]."""
+REST = 0.3  # rest before the way there and back [s]
+PLACES = 8  # number of configurations tried for a free way
+BLOCK = 10  # number of ticks over which speeds and torques are averaged
+SETTLING = 2  # number of blocks left out at both ends, where friction still holds the earlier state
+GROWTH = (0, 1, 4)  # powers of the speed with which the noise grows, since the gears' ripple grows with speed
+LEAST_NOISE = 0.003  # smallest assumed noise, relative to the joint's friction [-]
+ROUNDS = 4  # number of fits, each weighted with the residuals of the one before
+LEAST_BREAKAWAY = 1.0  # smallest ratio of friction at breakaway to that in motion [-]
 
 
 def unknown_friction(description: RobotDescription) -> tuple[tuple[Unknown, ...], ...]:

@@ -42,36 +42,25 @@ from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
 
 RING_DOWNS = 12
-MIN_RING_DOWNS = 4
-"""Smallest useful number of ring-downs; with fewer, the model would be mostly guesses."""
+MIN_RING_DOWNS = 4  # smallest useful number of ring-downs; with fewer, the model would be mostly guesses
 MAX_CHOSEN = 37
 """Largest number of ring-downs chosen as the most informative; more are spread over the workspace."""
-CANDIDATES = 60
-"""Smallest number of configurations to choose from."""
-CANDIDATES_PER_JOG = 3
-"""Number of candidates for each jog, since the way to some is not free."""
-CHECK_STEP = 0.03
-"""Step of the fastest joint between postures at which a way is checked [rad]."""
-GENTLEST = 0.4
-"""Smallest quickness of a jog relative to the quickest [-]."""
+CANDIDATES = 60  # smallest number of configurations to choose from
+CANDIDATES_PER_JOG = 3  # number of candidates for each jog, since the way to some is not free
+CHECK_STEP = 0.03  # step of the fastest joint between postures at which a way is checked [rad]
+GENTLEST = 0.4  # smallest quickness of a jog relative to the quickest [-]
 FIRST = 0.55
 """Quickness of the first jog relative to what its torques permit [-], since its vibration is still unknown."""
 LOUD, LATER = 0.15, 0.1
 """Rms acceleration per axis to aim at, as after a program's motion [m/s²], and the time after the stop [s]."""
-INEXACT, STICKING = 0.03, 0.2
-"""Share of a ring-down that no model explains [-], normally and if motors stick."""
-STICKS = 1.5
-"""Ratio of friction at breakaway to that in motion from which a motor sticks [-]."""
-WAYS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
-"""Limits of the ways to the jogs."""
-GENTLE = 1.0
-"""Acceleration on the ways of a robot that takes only positions [rad/s²]."""
+INEXACT, STICKING = 0.03, 0.2  # share of a ring-down that no model explains [-], normally and if motors stick
+STICKS = 1.5  # ratio of friction at breakaway to that in motion from which a motor sticks [-]
+WAYS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)  # limits of the ways to the jogs
+GENTLE = 1.0  # acceleration on the ways of a robot that takes only positions [rad/s²]
 TURN, TURNS = 0.1, 2
 """Angle by which its last joint turns there and back to find the lag [rad], and how often."""
-UNKNOWN = 0.15
-"""Time after the stop that is ignored if the lag is unknown [s]."""
-PAUSE, AFTER = 0.3, 0.6
-"""Rest before a jog, and time recorded after it [s]."""
+UNKNOWN = 0.15  # time after the stop that is ignored if the lag is unknown [s]
+PAUSE, AFTER = 0.3, 0.6  # rest before a jog, and time recorded after it [s]
 
 
 @dataclass(frozen=True)
@@ -81,8 +70,7 @@ class Jog:
     payload: int
     way: tuple[Floats, ...]
     """Postures to pass one after the other, ending at the jog's start, each of shape (n,) [rad]."""
-    q: Floats
-    """End of the jog, where the arm rings, shape (n,) [rad]."""
+    q: Floats  # end of the jog, where the arm rings, shape (n,) [rad]
     limits: MotionLimits
 
 
@@ -90,16 +78,12 @@ class Jog:
 class JogPlan:
     """Moves of a robot, checked for collisions with itself and the floor."""
 
-    arm: ArmModes
-    """The robot file's arm with the carried payloads."""
-    at: Floats
-    """Present joint angles, shape (n,) [rad]."""
+    arm: ArmModes  # the robot file's arm with the carried payloads
+    at: Floats  # present joint angles, shape (n,) [rad]
     jogs: tuple[Jog, ...]
-    ways: MotionLimits
-    """Limits of all other moves."""
+    ways: MotionLimits  # limits of all other moves
     seed: int
-    changed: bool
-    """Whether the payload of a simulated arm changes between jogs."""
+    changed: bool  # whether the payload of a simulated arm changes between jogs
     turned: Floats | None
     """Target of the last joint's turn if the robot takes only positions, shape (n,) [rad]; else None."""
 
@@ -130,14 +114,11 @@ class RingDownLogs:
     friction: tuple[ModalParameter, ...] = ()
     no_friction: str = "it is measured in a slow sweep of a served robot"
     """Why friction was not measured; empty if it was."""
-    seed: int | None = None
-    """Seed of the choice of jogs; None if there was none."""
-    refused: int = 0
-    """Number of jogs that the robot refused because of a collision."""
+    seed: int | None = None  # seed of the choice of jogs; None if there was none
+    refused: int = 0  # number of jogs that the robot refused because of a collision
     servo: ServoResponse | None = None
     """Lag of a robot that takes only positions; None if it follows in another way."""
-    seconds: float = 0.0
-    """Robot time that the measurement took [s]."""
+    seconds: float = 0.0  # robot time that the measurement took [s]
 
 
 async def plan_jogs(

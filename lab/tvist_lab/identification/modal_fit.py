@@ -31,39 +31,29 @@ from tvist_shaping.estimators.poles import follow
 
 Complex = npt.NDArray[np.complex128]
 
-MODES = 4
-"""Number of modes in a ring-down; a robot arm's higher modes decay within a few ticks."""
+MODES = 4  # number of modes in a ring-down; a robot arm's higher modes decay within a few ticks
 RAYLEIGH = 2.0 / (3.0 * np.pi) + 0.5j
 """Change of damping ratio (real) and frequency (imaginary) per share by which hysteresis softens [-]."""
-SMOOTHED = 0.03
-"""Width of the window in which the amplitude is determined [s]."""
-DIFFERENCE_STEP = 1e-4
-"""Step of a logarithm for finite differences [-]."""
-INSIDE = 1e-3
-"""Distance of a starting point from the bounds of the search [-]."""
+SMOOTHED = 0.03  # width of the window in which the amplitude is determined [s]
+DIFFERENCE_STEP = 1e-4  # step of a logarithm for finite differences [-]
+INSIDE = 1e-3  # distance of a starting point from the bounds of the search [-]
 EVALUATIONS = 60
 SOFTENINGS = (0.0, 50.0, 100.0, 200.0, 300.0)
 """Softening by hysteresis to try [1/m]: 200 is 3 % for an amplitude of 1 m/s² at 13 Hz."""
 CERTAIN = (0.05, 0.2)
 """Largest standard errors of a ring-down's own f_d and ζ with which it can judge a model [-]."""
-STARTS = 4
-"""Number of starting points of the search; the first one is the guess."""
-SPREAD = 0.35
-"""Standard deviation of the other starting points about the guess [-]."""
+STARTS = 4  # number of starting points of the search; the first one is the guess
+SPREAD = 0.35  # standard deviation of the other starting points about the guess [-]
 
 
 @dataclass(frozen=True)
 class ModalFit:
     """Parameters and their accuracy."""
 
-    logarithms: Floats
-    """Logarithms of the parameters, shape (P,)."""
-    covariance: Floats
-    """Covariance of the logarithms, shape (P, P)."""
-    residual_to_noise: Floats
-    """rms of each ring-down's residual relative to its noise, shape (N,) [-]."""
-    cost: float
-    """Half the sum of squares, including that of the guess [-]."""
+    logarithms: Floats  # logarithms of the parameters, shape (P,)
+    covariance: Floats  # covariance of the logarithms, shape (P, P)
+    residual_to_noise: Floats  # rms of each ring-down's residual relative to its noise, shape (N,) [-]
+    cost: float  # half the sum of squares, including that of the guess [-]
     drivetrain: Drivetrain
 
     @property
@@ -227,16 +217,11 @@ def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
 class OwnPoles:
     """Modes of one ring-down with their accuracy, and how much worse other poles explain it."""
 
-    f_d: Floats
-    """Damped frequencies, shape (k,) [Hz]."""
-    zeta: Floats
-    """Damping ratios, shape (k,) [-]."""
-    f_d_error: Floats
-    """Standard deviation of the logarithm of f_d, shape (k,) [-]."""
-    zeta_error: Floats
-    """Standard deviation of the logarithm of ζ, shape (k,) [-]."""
-    amplitude: Floats
-    """Largest initial |α| of each mode, shape (k,) [m/s²]."""
+    f_d: Floats  # damped frequencies, shape (k,) [Hz]
+    zeta: Floats  # damping ratios, shape (k,) [-]
+    f_d_error: Floats  # standard deviation of the logarithm of f_d, shape (k,) [-]
+    zeta_error: Floats  # standard deviation of the logarithm of ζ, shape (k,) [-]
+    amplitude: Floats  # largest initial |α| of each mode, shape (k,) [m/s²]
     significance: float
     """Increase of the residual's sum of squares with the other poles, over the noise's variance [-]; 8 by chance."""
     share: float

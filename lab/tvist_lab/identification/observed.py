@@ -18,20 +18,13 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, Response
 from tvist_protocol.values import Payload
 
-AFTER = 0.5
-"""Time after a stop that is compared, if the arm rests that long [s]."""
-BEFORE = 0.1
-"""Time before a stop from which the acceleration is compared [s]."""
-COUNTED_FROM = 0.01
-"""Time after a stop from which the vibration counts as residual [s]."""
-LEAST_AFTER = 0.15
-"""Shortest rest after a stop that can be compared [s]."""
-ANGLE = 3e-4
-"""Accuracy of a simulated joint angle [rad]."""
-TORQUE = 0.01
-"""Accuracy of a simulated torque, relative to the joint's largest one [-]."""
-BLOCK = 10
-"""Number of ticks over which angles and torques are averaged."""
+AFTER = 0.5  # time after a stop that is compared, if the arm rests that long [s]
+BEFORE = 0.1  # time before a stop from which the acceleration is compared [s]
+COUNTED_FROM = 0.01  # time after a stop from which the vibration counts as residual [s]
+LEAST_AFTER = 0.15  # shortest rest after a stop that can be compared [s]
+ANGLE = 3e-4  # accuracy of a simulated joint angle [rad]
+TORQUE = 0.01  # accuracy of a simulated torque, relative to the joint's largest one [-]
+BLOCK = 10  # number of ticks over which angles and torques are averaged
 
 
 @dataclass(frozen=True)
@@ -41,24 +34,18 @@ class Observed:
     log: str
     motion: int
     payload: int
-    start: Floats
-    """Joint angles at rest before it, shape (n,) [rad]."""
-    reference: Floats
-    """Reference, shape (T, n) [rad]."""
-    late: int
-    """Ticks by which another controller's arm follows later than a twin."""
+    start: Floats  # joint angles at rest before it, shape (n,) [rad]
+    reference: Floats  # reference, shape (T, n) [rad]
+    late: int  # ticks by which another controller's arm follows later than a twin
     felt: tuple[Floats, Floats, float]
     """Ticks (k,) and specific force (k, 3) near the stop, and the force's inaccuracy [m/s²]."""
-    residual: slice
-    """Rows of `felt` in which the vibration counts as residual."""
-    noise: float
-    """Noise of the accelerometer, rms per axis [m/s²]."""
+    residual: slice  # rows of `felt` in which the vibration counts as residual
+    noise: float  # noise of the accelerometer, rms per axis [m/s²]
     angles: tuple[Floats, Floats]
     """Ticks (m,) and measured angles, block means (m, n) [rad]; empty if not recorded."""
     torques: tuple[Floats, Floats]
     """Ticks and measured torques likewise [N m], up to the stop: at rest, friction hides the torque."""
-    foreign: bool
-    """Whether another controller moved the arm."""
+    foreign: bool  # whether another controller moved the arm
 
     @property
     def ticks(self) -> int:

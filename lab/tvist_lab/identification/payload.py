@@ -31,45 +31,30 @@ from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
 
 POSES = 6
-CANDIDATES = 60
-"""Number of poses to choose from."""
-ASIDE = 0.08
-"""Distance from which each joint approaches a pose, on both sides [rad]."""
-REST = 0.8
-"""Time for the arm to come to rest in a pose [s]."""
-LOOK = 0.2
-"""Time over which torques are averaged [s]."""
-SWING = 0.5
-"""Length of the short motion [rad]."""
-BLOCK = 10
-"""Number of ticks over which a motion's torques are averaged."""
+CANDIDATES = 60  # number of poses to choose from
+ASIDE = 0.08  # distance from which each joint approaches a pose, on both sides [rad]
+REST = 0.8  # time for the arm to come to rest in a pose [s]
+LOOK = 0.2  # time over which torques are averaged [s]
+SWING = 0.5  # length of the short motion [rad]
+BLOCK = 10  # number of ticks over which a motion's torques are averaged
 MIN_POSES = 3
-LEAST_ERROR = 0.01
-"""Smallest assumed error of a torque, relative to the joint's friction [-]."""
-ROTOR = 3.0
-"""Largest assumed inertia of a rotor [kg m^2]."""
+LEAST_ERROR = 0.01  # smallest assumed error of a torque, relative to the joint's friction [-]
+ROTOR = 3.0  # largest assumed inertia of a rotor [kg m^2]
 DISAGREEMENT = (0.3, 4.0)
 """Masses at rest and in motion that differ by more than this [kg] and these standard deviations contradict."""
-CERTAIN = 4.0
-"""Number of standard deviations for the bounds of a mass [-]."""
-LIGHT = 0.1
-"""Mass below which the centre of mass is not reported [kg]."""
+CERTAIN = 4.0  # number of standard deviations for the bounds of a mass [-]
+LIGHT = 0.1  # mass below which the centre of mass is not reported [kg]
 
 
 @dataclass(frozen=True)
 class PayloadFound:
     """Mass and centre of mass, with their accuracy."""
 
-    payload: Payload
-    """Payload to declare; its inertia is that of a steel ball of the same mass."""
-    mass_deviation: float
-    """Standard deviation of the mass [kg]."""
-    com_deviation: tuple[float, float, float]
-    """Standard deviation of each coordinate [m]."""
-    mass_in_motion: float
-    """Mass according to the short motion [kg]."""
-    mass_in_motion_deviation: float
-    """Standard deviation of that mass [kg]."""
+    payload: Payload  # payload to declare; its inertia is that of a steel ball of the same mass
+    mass_deviation: float  # standard deviation of the mass [kg]
+    com_deviation: tuple[float, float, float]  # standard deviation of each coordinate [m]
+    mass_in_motion: float  # mass according to the short motion [kg]
+    mass_in_motion_deviation: float  # standard deviation of that mass [kg]
     declared: Payload
     poses: int
 

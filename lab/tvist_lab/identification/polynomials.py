@@ -16,8 +16,7 @@ from tvist_shaping import terms
 FOLDS = 10
 DEGREES = (4, 3, 2)
 """Degree of the polynomials in one, two or three joints; with fewer joints, each term has more data."""
-ROUGH = 10.0
-"""Largest error at nine of ten left-out ring-downs with which a polynomial is kept [%]."""
+ROUGH = 10.0  # largest error at nine of ten left-out ring-downs with which a polynomial is kept [%]
 
 
 class FitError(ValueError):
@@ -31,8 +30,7 @@ class Fit:
     model: PolynomialModel
     residual_f_d: Spread
     residual_zeta: Spread
-    cross_validated_f_d: Spread
-    """Deviation of each measurement from a fit without it."""
+    cross_validated_f_d: Spread  # deviation of each measurement from a fit without it
     cross_validated_zeta: Spread
 
 

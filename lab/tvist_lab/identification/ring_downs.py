@@ -18,26 +18,19 @@ from tvist_protocol.values import Payload
 
 BEGINS = 7 * PERIOD
 """Time after a stop that is ignored, since the end of the deceleration ramp is no ring-down [s]."""
-LONGEST, SHORTEST = 0.4, 0.2
-"""Longest and shortest ring-down used [s]."""
-SLOWEST = 0.01
-"""Longest sampling period that shows an arm's vibration [s]."""
-LEAST_NOISE = 0.01
-"""Smallest assumed noise, since no model is more accurate [m/s²]."""
-SIGNAL_TO_NOISE = 1.15
-"""Smallest rms of a ring-down over its noise to contain information [-]."""
-BEFORE = 0.15
-"""Time before a motion in which the noise is measured [s]."""
+LONGEST, SHORTEST = 0.4, 0.2  # longest and shortest ring-down used [s]
+SLOWEST = 0.01  # longest sampling period that shows an arm's vibration [s]
+LEAST_NOISE = 0.01  # smallest assumed noise, since no model is more accurate [m/s²]
+SIGNAL_TO_NOISE = 1.15  # smallest rms of a ring-down over its noise to contain information [-]
+BEFORE = 0.15  # time before a motion in which the noise is measured [s]
 INEXACT = 0.1
 """Share of an everyday ring-down that no linear model explains [-], since friction and gears are nonlinear."""
-UNSHAPED = 1.5
-"""Number of ticks by which an unshaped reference may seem longer than it is."""
+UNSHAPED = 1.5  # number of ticks by which an unshaped reference may seem longer than it is
 CONTRADICTS = "it contradicts the others"
 """Reason for a ring-down that no springs and drives explain together with the others."""
 
 
-Progress = Callable[[str], None]
-"""Receives a description before each step of an identification."""
+Progress = Callable[[str], None]  # receives a description before each step of an identification
 
 
 class IdentificationError(ClientError):
@@ -48,21 +41,15 @@ class IdentificationError(ClientError):
 class Ringing:
     """Acceleration of the tool at a configuration after a stop."""
 
-    q: Floats
-    """Configuration, shape (n,) [rad]."""
+    q: Floats  # configuration, shape (n,) [rad]
     payload: int
-    force: Floats
-    """Specific force from shortly after the stop, shape (T, 3) [m/s²]."""
-    noise: float
-    """Noise of the force at rest, rms per axis [m/s²]."""
-    time: Floats
-    """Times of the samples after the first, shape (T,) [s]."""
-    inexact: float = 0.0
-    """Residual of a linear model beyond the noise, rms per axis [m/s²]."""
+    force: Floats  # specific force from shortly after the stop, shape (T, 3) [m/s²]
+    noise: float  # noise of the force at rest, rms per axis [m/s²]
+    time: Floats  # times of the samples after the first, shape (T,) [s]
+    inexact: float = 0.0  # residual of a linear model beyond the noise, rms per axis [m/s²]
     driven: tuple[complex, ...] = ()
     """Poles with which the set-point still comes to rest, one of each pair [1/s]; empty if it rests."""
-    softening: float = 0.0
-    """Share by which hysteresis softens the springs, per amplitude of the tool [1/m]."""
+    softening: float = 0.0  # share by which hysteresis softens the springs, per amplitude of the tool [1/m]
 
     @property
     def rms(self) -> float:
@@ -79,15 +66,11 @@ class Ringing:
 class Log:
     """A recording of a robot or a log of another, with how to read its ring-downs."""
 
-    name: str
-    """Name for users: that of the file, or the number of a jog."""
+    name: str  # name for users: that of the file, or the number of a jog
     recording: Recording
-    payload: Payload | None = None
-    """The carried payload; None means as recorded."""
-    begins: float = BEGINS
-    """Time after a stop that a ring-down ignores [s]."""
-    inexact: float = INEXACT
-    """Share of a ring-down that no linear model explains [-]."""
+    payload: Payload | None = None  # the carried payload; None means as recorded
+    begins: float = BEGINS  # time after a stop that a ring-down ignores [s]
+    inexact: float = INEXACT  # share of a ring-down that no linear model explains [-]
     driven: tuple[complex, ...] = ()
     """Poles with which the set-point still comes to rest, one of each pair [1/s]."""
 
@@ -113,11 +96,9 @@ class RingDownStop:
     """A motion's stop, and the ring-down after it if it is usable."""
 
     log: str
-    motion: int
-    """Number of the motion in the log, from 1."""
+    motion: int  # number of the motion in the log, from 1
     ringing: Ringing | None
-    reason: str = ""
-    """Why it is not usable, worded alike for stops of the same kind."""
+    reason: str = ""  # why it is not usable, worded alike for stops of the same kind
 
 
 def stops_of(logs: Sequence[Log]) -> tuple[list[RingDownStop], tuple[Payload, ...]]:

@@ -12,28 +12,20 @@ from tvist_lab.identification.ring_downs import fresh
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.plant import PERIOD
 
-GUESS = (0.008, 0.04, 1500.0)
-"""Delay [s], T [s] and k [1/s²] from which the search starts."""
-LATEST = 0.2
-"""Longest delay in the search [s]."""
-FOLLOWS = 0.02
-"""Largest rms error of an arm that follows like this, relative to its way [-]."""
-MAX_DEVIATION = 0.3
-"""Largest deviation of the logarithms of T and k with which a lag counts as known [-]."""
+GUESS = (0.008, 0.04, 1500.0)  # delay [s], T [s] and k [1/s²] from which the search starts
+LATEST = 0.2  # longest delay in the search [s]
+FOLLOWS = 0.02  # largest rms error of an arm that follows like this, relative to its way [-]
+MAX_DEVIATION = 0.3  # largest deviation of the logarithms of T and k with which a lag counts as known [-]
 
 
 @dataclass(frozen=True)
 class ServoResponse:
     """How a robot follows set-points."""
 
-    delay: float
-    """Time from a set-point until the measured angle responds [s]."""
-    lag: float
-    """T [s]."""
-    gain: float
-    """k [1/s²]."""
-    errors: tuple[float, float]
-    """Standard deviations of the logarithms of T and k [-]."""
+    delay: float  # time from a set-point until the measured angle responds [s]
+    lag: float  # t [s]
+    gain: float  # k [1/s²]
+    errors: tuple[float, float]  # standard deviations of the logarithms of T and k [-]
 
     @property
     def poles(self) -> tuple[complex, ...]:

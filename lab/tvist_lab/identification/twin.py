@@ -24,16 +24,11 @@ from tvist_plant.plant import PERIOD, Response
 from tvist_protocol.calibration import ModalParameter
 from tvist_protocol.values import Payload
 
-DIFFERENCE_STEP = 1e-3
-"""Step for finite differences, relative to a number's deviation before the fit [-]."""
-ROUNDS = 5
-"""Largest number of computations of derivatives."""
-DAMPERS = (0.0, 0.3, 3.0)
-"""Weights of the step's length, each used until it no longer helps [-]."""
-ENOUGH = 0.01
-"""Relative decrease of the cost below which a step does not help [-]."""
-FEWEST = 4
-"""Smallest number of motions; with fewer, the twin would be little more than the robot file."""
+DIFFERENCE_STEP = 1e-3  # step for finite differences, relative to a number's deviation before the fit [-]
+ROUNDS = 5  # largest number of computations of derivatives
+DAMPERS = (0.0, 0.3, 3.0)  # weights of the step's length, each used until it no longer helps [-]
+ENOUGH = 0.01  # relative decrease of the cost below which a step does not help [-]
+FEWEST = 4  # smallest number of motions; with fewer, the twin would be little more than the robot file
 AUDIBLE = 1.5
 """Smallest measured residual with which a prediction is compared, relative to the noise of three axes [-]."""
 
@@ -44,10 +39,8 @@ class Prediction:
 
     log: str
     motion: int
-    measured: float
-    """rms of the tool's acceleration from 10 ms to half a second after the stop [m/s²]."""
-    twin: float
-    """The same of the twin [m/s²]."""
+    measured: float  # rms of the tool's acceleration from 10 ms to half a second after the stop [m/s²]
+    twin: float  # the same of the twin [m/s²]
 
     @property
     def error_percent(self) -> float:
@@ -60,22 +53,14 @@ class Twin:
     """A fitted robot file, and how well it predicts."""
 
     parameters: TwinParameters
-    values: Floats
-    """The fitted numbers, shape (P,)."""
-    deviations: Floats
-    """Their standard deviations, shape (P,)."""
-    payload: int
-    """Index of the payload that was declared last."""
-    motions: int
-    """Number of motions that were repeated."""
-    others: tuple[RingDownStop, ...]
-    """Motions that were not repeated, with reasons."""
-    predictions: tuple[Prediction, ...]
-    """Predictions of motions that the fit has not seen."""
-    quiet: int
-    """Number of further unseen motions that vibrate too little to compare."""
-    checked: bool
-    """Whether these motions are from separate logs; else each is left out of the fit in turn."""
+    values: Floats  # the fitted numbers, shape (P,)
+    deviations: Floats  # their standard deviations, shape (P,)
+    payload: int  # index of the payload that was declared last
+    motions: int  # number of motions that were repeated
+    others: tuple[RingDownStop, ...]  # motions that were not repeated, with reasons
+    predictions: tuple[Prediction, ...]  # Predictions of motions that the fit has not seen
+    quiet: int  # number of further unseen motions that vibrate too little to compare
+    checked: bool  # whether these motions are from separate logs; else each is left out of the fit in turn
     late_ms: tuple[float, ...]
     """Time by which another controller's arm follows later than the twin, by motion [ms]."""
 

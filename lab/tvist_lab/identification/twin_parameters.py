@@ -25,26 +25,21 @@ TOGETHER = {"gear_damping": UNSURE, "position_gain": SET, "integral_gain": 0.5, 
 """Standard deviations before the fit of logarithms common to all drives [-]."""
 LINKS = {"stiffness": UNSURE, "damping_time": UNSURE}
 """Standard deviations before the fit of logarithms for bending links [-]."""
-MASS = 0.1
-"""Standard deviation of a carried mass from the declared one, relative to the rated payload [-]."""
-CENTRE = 0.03
-"""Standard deviation of each coordinate of its centre of mass [m]."""
+MASS = 0.1  # standard deviation of a carried mass from the declared one, relative to the rated payload [-]
+CENTRE = 0.03  # standard deviation of each coordinate of its centre of mass [m]
 DIGITS = 9
-FITTED_BELOW = 0.5
-"""A parameter counts as fitted if the logs reduce its deviation below this share [-]."""
+FITTED_BELOW = 0.5  # a parameter counts as fitted if the logs reduce its deviation below this share [-]
 
 
 @dataclass(frozen=True)
 class TwinParameter:
     """A fitted number: a factor on the robot file's value, or an addition to a payload's."""
 
-    table: str
-    """`drives`, `link_flexibility` or `payload`."""
+    table: str  # `drives`, `link_flexibility` or `payload`
     key: str
     places: tuple[int, ...]
     """Joints, or places in the list of links, that share it; for a payload, its index and the coordinate."""
-    deviation: float
-    """Standard deviation before the fit; of the logarithm for factors."""
+    deviation: float  # standard deviation before the fit; of the logarithm for factors
 
 
 class TwinParameters:

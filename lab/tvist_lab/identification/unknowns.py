@@ -17,18 +17,13 @@ from tvist_protocol.calibration import ModalParameter, Quantity, Status
 from tvist_protocol.values import Payload
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
-LARGE = 3
-"""Number of joints from the base, of up to six, with large drives; each has its own parameters."""
+LARGE = 3  # number of joints from the base, of up to six, with large drives; each has its own parameters
 TYPICAL_GAIN = (800.0, 300.0)
 """Velocity gain over torque of a large and of a wrist joint, for an arm of about 5 kg payload [s/rad]."""
-UNSURE = 0.7
-"""Standard deviation of a guess's logarithm [-]: within a factor of four with 95 % probability."""
-SET = 0.2
-"""The same of a robot file's position gain, which the maker sets and which does not scatter [-]."""
-ROTOR = 0.2
-"""The same of rotor inertia, which is nearly proportional to torque for a kind of drive [-]."""
-LINK_MASS = 0.03
-"""Relative standard deviation of each link's mass from the description [-]."""
+UNSURE = 0.7  # standard deviation of a guess's logarithm [-]: within a factor of four with 95 % probability
+SET = 0.2  # the same of a robot file's position gain, which the maker sets and which does not scatter [-]
+ROTOR = 0.2  # the same of rotor inertia, which is nearly proportional to torque for a kind of drive [-]
+LINK_MASS = 0.03  # relative standard deviation of each link's mass from the description [-]
 PAYLOAD_MASS = 0.04
 """Standard deviation of the payload's mass from the declared one, relative to the rated payload [-]."""
 SCATTER = 0.12
@@ -37,8 +32,7 @@ NARROWER = 0.5
 """A parameter is identified if measurements reduce its deviation below this share of the guess's [-]."""
 FURTHEST = 3.0
 """Deviations by which a parameter may differ from the robot file; beyond, it would absorb model errors [-]."""
-STEEL = 7850.0
-"""Density from which a payload's size is estimated [kg/m³]."""
+STEEL = 7850.0  # Density from which a payload's size is estimated [kg/m³]
 Z_95 = 1.959963984540054
 """Number of standard deviations that contain a normal variable with 95 % probability [-]."""
 
@@ -48,12 +42,9 @@ class Unknown:
     """A parameter before it is measured, with a guess."""
 
     quantity: Quantity
-    joints: tuple[int, ...]
-    """Joints that share the parameter; links for `bending_stiffness`."""
-    guess: float
-    """Guessed value [SI]."""
-    deviation: float = UNSURE
-    """Standard deviation of its logarithm [-]."""
+    joints: tuple[int, ...]  # joints that share the parameter; links for `bending_stiffness`
+    guess: float  # guessed value [SI]
+    deviation: float = UNSURE  # standard deviation of its logarithm [-]
 
 
 def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:

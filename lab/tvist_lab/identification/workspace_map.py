@@ -12,27 +12,20 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import Calibration
 
-QUANTITIES = {"f_d_hz": "f_d", "zeta": "zeta"}
-"""Keys of the maps, with the words in their file names."""
-POINTS = 41
-"""Number of angles of each joint."""
+QUANTITIES = {"f_d_hz": "f_d", "zeta": "zeta"}  # keys of the maps, with the words in their file names
+POINTS = 41  # number of angles of each joint
 
 
 @dataclass(frozen=True)
 class WorkspaceMap:
     """Values on a grid over two joints; NaN where the arm would touch itself or the floor."""
 
-    joints: tuple[int, int]
-    """Indices of the joints along the grid's rows and columns."""
+    joints: tuple[int, int]  # indices of the joints along the grid's rows and columns
     names: tuple[str, str]
-    angles: tuple[Floats, Floats]
-    """Angles of these joints [rad], shapes (R,) and (C,)."""
-    rest: tuple[float, ...]
-    """Configuration of the other joints [rad], with zero for those of the grid."""
-    identified: dict[str, Floats]
-    """Values of the calibration by key of `QUANTITIES`, shape (R, C)."""
-    true: dict[str, Floats]
-    """The same for the simulated arm."""
+    angles: tuple[Floats, Floats]  # angles of these joints [rad], shapes (R,) and (C,)
+    rest: tuple[float, ...]  # configuration of the other joints [rad], with zero for those of the grid
+    identified: dict[str, Floats]  # values of the calibration by key of `QUANTITIES`, shape (R, C)
+    true: dict[str, Floats]  # the same for the simulated arm
     poses: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Named poses on the map, by their angles along rows and columns [rad]."""
 

@@ -22,32 +22,21 @@ from tvist_lab.metrics.ring_down import (
 )
 from tvist_lab.recordings import Floats
 
-STARTS = 5
-"""Number of moments at which a fit starts."""
-MAX_SPACING = 0.04
-"""Longest time between these moments [s]; the vibration must be audible at all of them."""
-ORDERS = (1, 2, 3, 4)
-"""Numbers of modes to try."""
+STARTS = 5  # number of moments at which a fit starts
+MAX_SPACING = 0.04  # longest time between these moments [s]; the vibration must be audible at all of them
+ORDERS = (1, 2, 3, 4)  # numbers of modes to try
 LONGEST = 0.6
 """Duration of a fit [s]; over a longer one, f_d rises too much."""
-AUDIBLE = 2.5
-"""Smallest amplitude of a mode at the start of its fit, over the rms of the residual [-]."""
-SAME_MODE = 0.07
-"""Largest difference of f_d between fits of one mode, and smallest one between two modes [-]."""
-FOUND_IN = 0.7
-"""Smallest share of the fits that must have found a mode [-]."""
-MAX_MODES = 3
-"""Largest number of modes that are returned."""
-FAINT = 0.1
-"""Smallest amplitude of a mode relative to the strongest [-]."""
+AUDIBLE = 2.5  # smallest amplitude of a mode at the start of its fit, over the rms of the residual [-]
+SAME_MODE = 0.07  # largest difference of f_d between fits of one mode, and smallest one between two modes [-]
+FOUND_IN = 0.7  # smallest share of the fits that must have found a mode [-]
+MAX_MODES = 3  # largest number of modes that are returned
+FAINT = 0.1  # smallest amplitude of a mode relative to the strongest [-]
 HEAVY = 0.1
 """Damping ratio from which a mode beside a lighter one may be a driven motion, or two modes in one [-]."""
-BESIDE = 1.5
-"""Largest ratio of the frequencies of two such modes [-]."""
-RISE = 0.03
-"""Share by which f_d of a real arm rises while a mode decays [-]."""
-FALL = 0.7
-"""Share by which ζ falls meanwhile [-]."""
+BESIDE = 1.5  # largest ratio of the frequencies of two such modes [-]
+RISE = 0.03  # share by which f_d of a real arm rises while a mode decays [-]
+FALL = 0.7  # share by which ζ falls meanwhile [-]
 DRIFT_SHARE = 2.0 / 9.0
 """Share of such a change by which a fit with constant f_d and ζ errs [-].
 

@@ -9,20 +9,16 @@ from tvist_lab.recordings import Floats
 
 WINDOWS = (2, 3, 5, 8)
 """Numbers of latest measurements compared with earlier ones: one may be an outlier, small changes need more."""
-MIN_MEASUREMENTS = 3
-"""Number of earlier measurements that a comparison needs."""
+MIN_MEASUREMENTS = 3  # number of earlier measurements that a comparison needs
 KEPT = 40
 SURE_DEVIATIONS = 3.7
 """Standard deviations beyond which a change is reported if the scatter is known well: more than normal
 measurements need (1 in 5,000), since those of real motions have heavier tails."""
 SHOWN, CLEAR = 2.0, 2.5
 """Numbers of standard errors: for the interval in messages, and the least for a change."""
-FARTHEST = 3.5
-"""Largest distance from earlier measurements that counts, in a measurement's own deviations."""
-BELIEVED = 4.0
-"""Number of measurements that the expected scatter is worth."""
-OUTLYING = 2.5
-"""Number of deviations beyond which an earlier measurement loses weight."""
+FARTHEST = 3.5  # largest distance from earlier measurements that counts, in a measurement's own deviations
+BELIEVED = 4.0  # number of measurements that the expected scatter is worth
+OUTLYING = 2.5  # number of deviations beyond which an earlier measurement loses weight
 
 
 @dataclass(frozen=True)
@@ -31,10 +27,8 @@ class DetectedChange:
 
     before: float
     after: float
-    error: float
-    """Standard error of the difference."""
-    lasting: int
-    """Number of measurements since the change, including the newest."""
+    error: float  # standard error of the difference
+    lasting: int  # number of measurements since the change, including the newest
 
 
 class ChangeDetector:

@@ -19,28 +19,21 @@ from tvist_plant.plant import PERIOD
 
 NEEDED = ("target_q", "actual_q", "actual_moment", "target_moment", "actual_tool_accelerometer")
 """Columns needed to compare the arm of a recording with itself."""
-SAME = 0.1
-"""Largest difference of any joint between two poses that count as one [rad]."""
+SAME = 0.1  # largest difference of any joint between two poses that count as one [rad]
 SCATTER, LEAST = 0.015, 0.04
 """Expected deviation of the logarithm of f_d after stops in one pose, and its smallest reported change [-]."""
-LISTENED = 150
-"""Ticks after a stop in which the vibration is measured."""
-SHORTEST = 100
-"""Smallest number of these ticks, if the next motion starts sooner."""
-SETTLED = 50
-"""Number of the last of these ticks in which the gears' deflection is measured."""
+LISTENED = 150  # ticks after a stop in which the vibration is measured
+SHORTEST = 100  # smallest number of these ticks, if the next motion starts sooner
+SETTLED = 50  # number of the last of these ticks in which the gears' deflection is measured
 FRICTION = 0.2
 """Standard deviation of the friction in a torque at rest, relative to the joint's Coulomb friction [-]."""
 OFF = 1e-4
 """Standard deviation of the angle at rest, due to gear errors and integrators that still move [rad]."""
-VAGUE = 0.25
-"""Relative error from which a gear's compliance counts as unknown in a pose [-]."""
-HEAVY = 0.7
-"""Error from which a motion's mass is ignored [kg]."""
+VAGUE = 0.25  # relative error from which a gear's compliance counts as unknown in a pose [-]
+HEAVY = 0.7  # error from which a motion's mass is ignored [kg]
 MASS, GEAR, MODES = (1.0, 0.15, 0.7), (0.4, 0.05, 0.15), (0.1, 0.02, 0.03)
 """Arguments of the detectors: prior, expected scatter, smallest reported change; in kg, else of logarithms."""
-UNKNOWN = 0.4
-"""Share of Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
+UNKNOWN = 0.4  # share of Coulomb friction that may be unknown in each joint, with the worst sign [-]
 
 
 def changes(measured: MeasuredRecording) -> list[str]:

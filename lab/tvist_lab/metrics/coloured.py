@@ -4,8 +4,7 @@ import numpy as np
 
 from tvist_lab.recordings import Floats
 
-MAX_CORRELATION = 0.97
-"""Largest assumed correlation; beyond it, a residual is a drift [-]."""
+MAX_CORRELATION = 0.97  # largest assumed correlation; beyond it, a residual is a drift [-]
 
 
 def widening(residual: Floats, fitted: int = 0) -> float:

@@ -29,8 +29,7 @@ WORDS = {
     "f_d_interval_hz": "frequency", "zeta": "damping", "zeta_interval": "damping", "servo_lag_ms": "lag of the servo",
 }  # fmt: skip
 """Names of a motion's figures in notes."""
-NAMED = 3
-"""Largest number of motions that a line names; if there are more, it counts them."""
+NAMED = 3  # largest number of motions that a line names; if there are more, it counts them
 
 
 def motion_cells(results: Sequence[MotionResult], origin: float) -> list[tuple[str, ...]]:

@@ -17,12 +17,9 @@ STILL = 0.1
 AFTER_STOP = 0.010
 """Time after the stop from which `evaluate` searches for the peak, when the last ramp has passed [s]."""
 
-NOISE_PEAK = 5.0
-"""Largest |α| of noise within some seconds, relative to its rms in one axis [-]."""
-NOISE_TAIL = 0.2
-"""Time at the end of a rest in which the sensor shows its noise [s]."""
-RINGS = 0.5
-"""Share of a signal's energy explained by one mode from which it is vibration, not noise [-]."""
+NOISE_PEAK = 5.0  # largest |α| of noise within some seconds, relative to its rms in one axis [-]
+NOISE_TAIL = 0.2  # time at the end of a rest in which the sensor shows its noise [s]
+RINGS = 0.5  # share of a signal's energy explained by one mode from which it is vibration, not noise [-]
 
 Kinematics = Callable[[Floats], tuple[Floats, Floats]]
 """Converts joint angles, shape (n,) [rad], to the flange's position, shape (3,) [m], and rotation, shape (3, 3)."""

@@ -14,12 +14,10 @@ from tvist_lab.metrics.table import IMPACTS, MeasuredRecording, MotionResult, im
 from tvist_lab.metrics.vibration import TRUTH
 from tvist_lab.recordings import Floats, Recording
 
-SAME = 0.02
-"""Largest difference of a joint angle at start and end between motions that correspond [rad]."""
+SAME = 0.02  # largest difference of a joint angle at start and end between motions that correspond [rad]
 COMPARED = IMPACTS | {"still_after": "still_after_ms", "peak": "peak_m_s2", "envelope": "envelope_m_s2"}
 """Names of the impacts, and the figures of a motion that they compare."""
-TICK_MS = 2.0
-"""Shortest delay of a shaped reference [ms]: one tick."""
+TICK_MS = 2.0  # shortest delay of a shaped reference [ms]: one tick
 SAME_DURATION = (0.02, 0.01)
 """Largest difference in duration between motions of the same speed: relative [-], or in s."""
 REFERENCE = "reference_q"

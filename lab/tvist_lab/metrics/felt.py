@@ -8,8 +8,7 @@ from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.vibration import SENSOR, best_tool_acceleration, low_pass_at, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
 
-REST = (0.2, 1.0)
-"""Shortest and longest time at the end of a rest from which gravity is found [s]."""
+REST = (0.2, 1.0)  # shortest and longest time at the end of a rest from which gravity is found [s]
 
 
 def acceleration_of(

@@ -8,26 +8,16 @@ from scipy.ndimage import maximum_filter1d
 from tvist_lab.metrics.vibration import low_pass_at
 from tvist_lab.recordings import Floats, Recording
 
-SMOOTHED = 20.0
-"""Cut-off frequency of the angles before they are differentiated [Hz]."""
-REST_SPEED = 0.01
-"""Speed below which a joint may be at rest [rad/s]."""
-FAST = 2.0
-"""Smallest speed that a motion must reach, relative to the speed that ends it [-]."""
-SWING = 0.5
-"""Time around a fast motion in which the arm swings back from its overshoot [s]."""
-SWUNG = 0.02
-"""Largest speed of a joint that swings back, relative to the fastest within that time [-]."""
-DRIVEN = 0.15
-"""Longest time after a stop in which joints may still be driven [s]."""
-PAUSE = 0.1
-"""Rests shorter than this belong to a motion, as at a reversal or while the arm vibrates [s]."""
-SMALLEST = 0.005
-"""Smallest displacement of a motion [rad]; less is vibration."""
-FEWEST = 16
-"""Smallest number of rows in which motions are sought."""
-TAPER = 0.03
-"""Longest time for which a joint may have moved below `REST_SPEED` before and after [s]."""
+SMOOTHED = 20.0  # cut-off frequency of the angles before they are differentiated [Hz]
+REST_SPEED = 0.01  # speed below which a joint may be at rest [rad/s]
+FAST = 2.0  # smallest speed that a motion must reach, relative to the speed that ends it [-]
+SWING = 0.5  # time around a fast motion in which the arm swings back from its overshoot [s]
+SWUNG = 0.02  # largest speed of a joint that swings back, relative to the fastest within that time [-]
+DRIVEN = 0.15  # longest time after a stop in which joints may still be driven [s]
+PAUSE = 0.1  # rests shorter than this belong to a motion, as at a reversal or while the arm vibrates [s]
+SMALLEST = 0.005  # smallest displacement of a motion [rad]; less is vibration
+FEWEST = 16  # smallest number of rows in which motions are sought
+TAPER = 0.03  # longest time for which a joint may have moved below `REST_SPEED` before and after [s]
 
 
 def measured_spans(recording: Recording, name: str = "actual_q") -> list[tuple[int, int]]:

@@ -13,22 +13,15 @@ from tvist_lab.metrics.servo_lag import servo_lag
 from tvist_lab.metrics.vibration import parts
 from tvist_lab.recordings import Floats, Recording
 
-MOVING = 1e-7
-"""Change per tick above which a reference moves [rad]."""
+MOVING = 1e-7  # change per tick above which a reference moves [rad]
 JUMP = 0.05
 """Change per tick above which a reference was set elsewhere, for example by a reset [rad]; 25 rad/s."""
-TICK = 0.002
-"""Time in which that change counts as a jump [s]; longer if a log has longer ticks."""
-REST = 0.02
-"""Rests of a reference that are shorter, as at a reversal, belong to the motion [s]."""
-AT_REST = 1e-6
-"""Target speed below which another controller's arm is at rest [rad/s]."""
-MOSTLY = 0.98
-"""Share of moving rows from which a target's speed is never zero and so was measured [-]."""
-TINY = 5e-4
-"""Largest displacement of a joint that only trembles [rad]."""
-EARLY = 0.05
-"""Time before a motion found in measured angles that no longer counts as rest [s]."""
+TICK = 0.002  # time in which that change counts as a jump [s]; longer if a log has longer ticks
+REST = 0.02  # rests of a reference that are shorter, as at a reversal, belong to the motion [s]
+AT_REST = 1e-6  # target speed below which another controller's arm is at rest [rad/s]
+MOSTLY = 0.98  # share of moving rows from which a target's speed is never zero and so was measured [-]
+TINY = 5e-4  # largest displacement of a joint that only trembles [rad]
+EARLY = 0.05  # time before a motion found in measured angles that no longer counts as rest [s]
 DIFFERENTIATOR_TICKS = 1
 """The published target of tick i is the shaped reference of tick i-1, due to the central difference."""
 

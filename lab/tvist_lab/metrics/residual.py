@@ -12,10 +12,8 @@ from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.vibration import amplitude
 from tvist_lab.recordings import Floats, Recording
 
-WINDOW = 0.3
-"""Time after the stop in which peaks are sought [s]."""
-PROMINENCE = 0.1
-"""Smallest prominence of a peak [m/s²]: three times the sensor's noise."""
+WINDOW = 0.3  # time after the stop in which peaks are sought [s]
+PROMINENCE = 0.1  # smallest prominence of a peak [m/s²]: three times the sensor's noise
 
 
 @dataclass(frozen=True)

@@ -12,42 +12,32 @@ from tvist_lab.recordings import Floats
 
 FREQUENCIES = (3.0, 45.0)
 """Range of damped frequencies in the search [Hz]; for slow samples, up to 0.45 of their rate."""
-DAMPING = (0.002, 0.7)
-"""Range of damping ratios in the search [-]."""
+DAMPING = (0.002, 0.7)  # range of damping ratios in the search [-]
 SLOW_POLE = 17.5
 """Rate of the non-oscillatory tail that a position loop adds [1/s]."""
 SKIP = 0.006
 """Time after the stop that is ignored [s], since the end of the deceleration ramp is no ring-down."""
-WINDOW = 0.5
-"""Duration of the first fit [s]."""
+WINDOW = 0.5  # duration of the first fit [s]
 LEAST_R_SQUARED = 0.2
 """Smallest share of the signal's energy that a fit must explain [-]; a fit of pure noise explains a tenth."""
-WINDOWS = (0.2, 1.0)
-"""Shortest and longest duration of the final fit [s]."""
-CERTAIN = 1.96
-"""Half-width of a 95 % interval over its standard error [-]."""
+WINDOWS = (0.2, 1.0)  # shortest and longest duration of the final fit [s]
+CERTAIN = 1.96  # half-width of a 95 % interval over its standard error [-]
 SIGNIFICANT = 36.0
 """Gain of n ln SSE that noise exceeds in less than one fit of a hundred, at 100 to 500 Hz [-]."""
 CORRELATED = 0.02
 """Time over which the residual of a fit may be correlated, for example by an unmodelled mode [s]."""
-COLOURS = 4
-"""Order of the autoregression that describes the spectrum of a residual."""
+COLOURS = 4  # order of the autoregression that describes the spectrum of a residual
 
 
 @dataclass(frozen=True)
 class Mode:
     """A damped sine."""
 
-    f_d: float
-    """Damped frequency [Hz]."""
-    zeta: float
-    """Damping ratio [-]."""
-    amplitude: float
-    """Largest |α| of the mode at the stop [m/s²]."""
-    f_d_error: float
-    """Standard error of f_d [Hz]."""
-    zeta_error: float
-    """Standard error of ζ [-]."""
+    f_d: float  # damped frequency [Hz]
+    zeta: float  # damping ratio [-]
+    amplitude: float  # largest |α| of the mode at the stop [m/s²]
+    f_d_error: float  # standard error of f_d [Hz]
+    zeta_error: float  # standard error of ζ [-]
 
     @property
     def f_d_interval(self) -> tuple[float, float]:

@@ -15,28 +15,20 @@ from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 
-MODES = 4
-"""Number of modes that may ring, from the lowest."""
-HIGHEST = 100.0
-"""Largest frequency of a mode [Hz]."""
+MODES = 4  # number of modes that may ring, from the lowest
+HIGHEST = 100.0  # largest frequency of a mode [Hz]
 SLOW_POLE = 17.5
 """Rate of the non-oscillatory tail that a position loop adds [1/s]."""
-SKIP = 3
-"""Ticks after the stop that are ignored, since the end of the deceleration is no ring-down."""
-SCALES = np.linspace(-0.4, 0.3, 29)
-"""Logarithms of the common frequency factors to try."""
+SKIP = 3  # ticks after the stop that are ignored, since the end of the deceleration is no ring-down
+SCALES = np.linspace(-0.4, 0.3, 29)  # logarithms of the common frequency factors to try
 BASES = np.geomspace(1e6, 3e4, 20)
 """Stiffnesses to try for the arm's base [N m/rad]; with the first one it is practically rigid."""
-CORRELATED_SAMPLES = 3.0
-"""Number of samples that count as one, since the residual is correlated in time."""
-EXPECTED = 0.07
-"""Standard deviation of the factor's logarithm before any measurement."""
+CORRELATED_SAMPLES = 3.0  # number of samples that count as one, since the residual is correlated in time
+EXPECTED = 0.07  # standard deviation of the factor's logarithm before any measurement
 UNLIKE, ELSEWHERE = 0.05, 0.1
 """Standard deviation of the factor between poses, and share of stops that ring in something else."""
-VAGUE = 0.1
-"""Standard error from which a stop is ignored because it did not ring."""
-FIRST = 8
-"""Number of stops from which the stiffness of the base is found."""
+VAGUE = 0.1  # standard error from which a stop is ignored because it did not ring
+FIRST = 8  # number of stops from which the stiffness of the base is found
 
 
 def unexplained(alpha: Floats, f_d: Floats, zeta: Floats) -> Floats:

@@ -13,22 +13,16 @@ from tvist_lab.metrics.ring_down import FREQUENCIES, fit_ring_down
 from tvist_lab.metrics.vibration import SENSOR, parts
 from tvist_lab.recordings import Floats, Recording
 
-LEVEL = 0.05
-"""Time over which the level of a vibration is averaged [s]."""
-LOUD = 4.0
-"""Level relative to that of the quietest tenth of a log from which something vibrates [-]."""
-ONSET = 0.25
-"""Longest time from the start of a vibration to its peak in a ring-down [s]."""
-SWEEP, BLOCK = 3.0, 0.5
-"""Shortest sweep, and duration of its parts, each with one frequency [s]."""
-RISING = 0.8
-"""Smallest rank correlation of these frequencies with time [-]."""
+LEVEL = 0.05  # time over which the level of a vibration is averaged [s]
+LOUD = 4.0  # level relative to that of the quietest tenth of a log from which something vibrates [-]
+ONSET = 0.25  # longest time from the start of a vibration to its peak in a ring-down [s]
+SWEEP, BLOCK = 3.0, 0.5  # shortest sweep, and duration of its parts, each with one frequency [s]
+RISING = 0.8  # smallest rank correlation of these frequencies with time [-]
 EDGE = 1.1
 """Smallest ratio of a mode to the lowest frequency of a sweep, and of the highest frequency to the mode [-]."""
 EXPLAINED = 0.8
 """Smallest share of the energy that damped sines must explain [-]; they explain less of a robot's motion."""
-SCALED = 15.0
-"""Frequency in the middle of the fit's range to which the strongest one is scaled [Hz]."""
+SCALED = 15.0  # frequency in the middle of the fit's range to which the strongest one is scaled [Hz]
 
 
 @dataclass(frozen=True)
@@ -36,12 +30,9 @@ class FreeVibration:
     """The strongest mode of one ring-down or sweep."""
 
     kind: str
-    start_s: float
-    """Time at which it starts [s]."""
-    f_d_hz: float
-    """Damped frequency [Hz]."""
-    zeta: float
-    """Damping ratio [-]."""
+    start_s: float  # time at which it starts [s]
+    f_d_hz: float  # damped frequency [Hz]
+    zeta: float  # damping ratio [-]
     f_d_interval_hz: tuple[float, float] | None = None
     """95 % interval of the frequency [Hz]; None for a sweep."""
     zeta_interval: tuple[float, float] | None = None

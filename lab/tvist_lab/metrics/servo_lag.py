@@ -9,14 +9,10 @@ LONGEST = 0.2
 """Longest lag in the search [s]."""
 FOLLOWS = 0.05
 """Largest remaining variance of the distance, relative to the target's, if the arm follows it [-]."""
-LONGEST_FELT = 0.08
-"""Longest lag in the search with the accelerometer [s]."""
-FINE = 0.002
-"""Longest step of that search [s]."""
-SMOOTHED = 40.0
-"""Cut-off frequency of the target before it is differentiated twice [Hz]."""
-EXPLAINED = 0.5
-"""Largest share of the accelerometer signal that may remain unexplained [-]."""
+LONGEST_FELT = 0.08  # longest lag in the search with the accelerometer [s]
+FINE = 0.002  # longest step of that search [s]
+SMOOTHED = 40.0  # cut-off frequency of the target before it is differentiated twice [Hz]
+EXPLAINED = 0.5  # largest share of the accelerometer signal that may remain unexplained [-]
 FEWEST = 8
 
 

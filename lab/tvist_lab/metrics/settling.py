@@ -8,10 +8,8 @@ from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.recordings import Floats, Recording
 
-REPEATABILITY = 3.0e-5
-"""Repeatability of the UR5e: half-width of the band around the attained position [m]."""
-TAIL = 0.2
-"""Time at the end of the recorded rest whose mean is the attained position [s]."""
+REPEATABILITY = 3.0e-5  # repeatability of the UR5e: half-width of the band around the attained position [m]
+TAIL = 0.2  # time at the end of the recorded rest whose mean is the attained position [s]
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,13 @@ from tvist_lab.recordings import Floats, Recording
 from tvist_lab.recordings.checks import LONG_GAP
 from tvist_plant.tool_acceleration import tool_acceleration as without_gravity
 
-BAND = (3.0, 60.0)
-"""Frequency range of an arm's vibrations [Hz]."""
+BAND = (3.0, 60.0)  # frequency range of an arm's vibrations [Hz]
 SENSOR = "actual_tool_accelerometer"
 TRUTH = "truth_tool_acceleration"
 TRUE_POSE = "truth_flange_pose"
 
 
-FILLED = 10
-"""Largest factor by which filling gaps may extend a part of a log, to bound the memory."""
+FILLED = 10  # largest factor by which filling gaps may extend a part of a log, to bound the memory
 ALL = slice(None)
 
 

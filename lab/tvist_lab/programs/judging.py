@@ -104,8 +104,7 @@ def is_inside(area: Shape, at: Floats) -> bool:
 
 # ---------------------------------------------------------------------- an earlier run
 
-Run = Mapping[str, Any]
-"""What --json prints of a program."""
+Run = Mapping[str, Any]  # what --json prints of a program
 ROUNDING = {"_s": 0.5 * PERIOD, "seconds": 0.5 * PERIOD}
 """Differences of times that are ignored, by the end of the key [s]."""
 SHARES = {"_m_s2": 1e-3, "_rad_s": 1e-4, "_m_s": 1e-4}

@@ -17,10 +17,8 @@ class RunLimits:
     """Fail if the tool's acceleration without gravity exceeds this in m/s² from 10 ms until 0.3 s after a stop."""
     max_seconds: float | None = None
     """Fail if a program runs for longer than this in s on the robot's clock; --timeout would end it."""
-    max_joint_speed: float | None = None
-    """Fail if a joint turns faster than this in rad/s."""
-    max_tool_speed: float | None = None
-    """Fail if the tool centre point moves faster than this in m/s."""
+    max_joint_speed: float | None = None  # fail if a joint turns faster than this in rad/s
+    max_tool_speed: float | None = None  # fail if the tool centre point moves faster than this in m/s
     max_force: float | None = None
     """Fail if the world of --world touches the arm with a larger force than this in N."""
     expect: list[str] | None = None

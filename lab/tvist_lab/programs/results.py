@@ -18,11 +18,9 @@ MEASURES = ("seconds", "largest_peak_after_stop_m_s2")
 class Shortcoming:
     """A reason for which a run counts as failed."""
 
-    kind: str
-    """How the run ended, a limit such as `max_shake`, `expect`, `baseline`, or `recording`."""
+    kind: str  # how the run ended, a limit such as `max_shake`, `expect`, `baseline`, or `recording`
     text: str
-    line: int | None = None
-    """Line of the program to which it belongs, if any."""
+    line: int | None = None  # line of the program to which it belongs, if any
 
 
 def largest_peak(watch: ProgramWatch) -> float | None:

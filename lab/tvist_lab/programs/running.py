@@ -25,8 +25,7 @@ from tvist_server.server import Server
 from tvist_server.shutdown import Shutdown
 
 CLIENT: Final = "tvist run"
-LEASE: Final = 3600.0
-"""Time without renewal after which a run loses control [s]."""
+LEASE: Final = 3600.0  # time without renewal after which a run loses control [s]
 HERE: Final = "127.0.0.1"
 ATTEND_TICKS, ATTEND_S = 50, 0.05
 """Ticks in lockstep, or time in real time [s], between two calls of `attend`."""

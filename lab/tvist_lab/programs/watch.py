@@ -15,16 +15,12 @@ from tvist_plant.plant import PERIOD, Plant, Response
 from tvist_plant.tool_acceleration import tool_acceleration
 from tvist_protocol.stream import Event, State
 
-AFTER_STOP = 5
-"""Ticks after a stop (10 ms) from which the peak is sought, when the last ramp has passed."""
-SEEN = 50
-"""Ticks of rest (0.1 s) in which the vibration is measured; after a shorter rest, it is predicted."""
-WINDOW = 150
-"""Ticks after a stop (0.3 s) in which the peak is sought, as for the paper's residual vibration."""
+AFTER_STOP = 5  # ticks after a stop (10 ms) from which the peak is sought, when the last ramp has passed
+SEEN = 50  # ticks of rest (0.1 s) in which the vibration is measured; after a shorter rest, it is predicted
+WINDOW = 150  # ticks after a stop (0.3 s) in which the peak is sought, as for the paper's residual vibration
 KEPT = 5000
 """Most arm states (50 MB) that a real-time run keeps for `ProgramMove.peak`; later stops without rest have none."""
-LINGER = 2500
-"""Most ticks (5 s) for which a moving arm is observed after the end of its program."""
+LINGER = 2500  # most ticks (5 s) for which a moving arm is observed after the end of its program
 
 Reason = Literal[
     "finished",
@@ -46,8 +42,7 @@ class ProgramMessage:
     tick: int
     kind: Literal["text", "popup", "warning"]
     text: str
-    line: int = 0
-    """Line that was being executed; 0 if none."""
+    line: int = 0  # line that was being executed; 0 if none
     title: str | None = None
     level: Literal["message", "warning", "error"] | None = None
 
@@ -58,20 +53,14 @@ class ProgramMove:
 
     id: int
     started: int
-    line: int = 0
-    """Line of the program that started it; 0 if none."""
-    ended: int | None = None
-    """Tick of its end; None if the run ended first."""
-    stopped: str | None = None
-    """Why it was stopped before its target; None if it was not."""
+    line: int = 0  # line of the program that started it; 0 if none
+    ended: int | None = None  # tick of its end; None if the run ended first
+    stopped: str | None = None  # why it was stopped before its target; None if it was not
     rests: int | None = None
     """Tick at which the shaped reference came to rest; None if not before the next motion."""
-    followed: int | None = None
-    """Tick at which the next motion started; None if none did."""
-    rested: int = 0
-    """Ticks of rest after it, as far as the vibration is measured."""
-    peak_so_far: float | None = None
-    """Largest tool acceleration measured until now [m/s²]; None if none was."""
+    followed: int | None = None  # tick at which the next motion started; None if none did
+    rested: int = 0  # ticks of rest after it, as far as the vibration is measured
+    peak_so_far: float | None = None  # largest tool acceleration measured until now [m/s²]; None if none was
     held: Callable[[int], Response] | None = None
     """Predicts the arm at rest; None if the vibration was measured instead."""
 
@@ -97,13 +86,10 @@ class ProgramMove:
 class Fastest:
     """The largest speed or force of a run, with its time and place."""
 
-    speed: float = 0.0
-    """Measured speed [rad/s, or m/s], or the force [N]."""
+    speed: float = 0.0  # measured speed [rad/s, or m/s], or the force [N]
     tick: int = 0
-    line: int = 0
-    """Line that was being executed; 0 if none."""
-    joint: str | None = None
-    """Name of the joint; None for the tool."""
+    line: int = 0  # line that was being executed; 0 if none
+    joint: str | None = None  # name of the joint; None for the tool
 
 
 @dataclass(frozen=True)
@@ -141,30 +127,22 @@ class ProgramWatch(Sink):
         self._alone, self._timeout = alone, timeout
         self.tick = 0
         self.name = ""
-        self.reason: Reason | None = None
-        """How the run ended; None while it goes on."""
-        self.why: str | None = None
-        """Why the program did not end by itself, as a sentence."""
-        self.error: ProgramPlace | None = None
-        """Position of the error that ended the program."""
+        self.reason: Reason | None = None  # how the run ended; None while it goes on
+        self.why: str | None = None  # why the program did not end by itself, as a sentence
+        self.error: ProgramPlace | None = None  # position of the error that ended the program
         self.said: list[ProgramMessage] = []
-        self.news: deque[ProgramMessage] = deque()
-        """New messages, for another thread to take."""
+        self.news: deque[ProgramMessage] = deque()  # new messages, for another thread to take
         self.moves: list[ProgramMove] = []
         self.fastest_joint, self.fastest_tool = Fastest(), Fastest()
         """Largest speeds of a joint and of the tool centre point, as measured."""
-        self.hardest = Fastest()
-        """Largest force with which the world touched the arm; 0 without a world."""
-        self.over = False
-        """Whether there is nothing more to observe."""
+        self.hardest = Fastest()  # largest force with which the world touched the arm; 0 without a world
+        self.over = False  # whether there is nothing more to observe
         self._names = controller.cycle.description.robot.joints
         self._ended = 0
-        self._kept = 0
-        """Number of arm states that are kept."""
+        self._kept = 0  # number of arm states that are kept
         self._placeless: list[ProgramMove | ProgramMessage] = []
         """Messages and moves of this tick, whose line is not known yet."""
-        self._rest = 0
-        """Ticks for which the shaped reference has rested after the last move."""
+        self._rest = 0  # ticks for which the shaped reference has rested after the last move
         self.plant = plant = controller.cycle.plant
         self._in_world = plant.things() is not None
         self._truthful = plant.truth() is not None

@@ -10,16 +10,14 @@ from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_plant.user_file import is_name
 from tvist_protocol.errors import quoted
 
-TIME = "timestamp"
-"""Name of the column of times, as in RTDE [s]."""
+TIME = "timestamp"  # name of the column of times, as in RTDE [s]
 ACCELEROMETER, GYROSCOPE = "actual_tool_accelerometer", "actual_tool_gyroscope"
 """Names of the signals of a sensor at the tool; RTDE has only the first."""
 WIDTHS = {
     "actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, ACCELEROMETER: 3, GYROSCOPE: 3,
 }  # fmt: skip
 """Number of entries that a vector needs to be usable; joint angles have one per joint."""
-ANGLES = ("reference_q", "unshaped_q", "target_q", "actual_q")
-"""Vectors with one entry per joint."""
+ANGLES = ("reference_q", "unshaped_q", "target_q", "actual_q")  # vectors with one entry per joint
 SHAPES = {name: (width,) for name, width in WIDTHS.items()}
 LARGEST = {TIME: 1e10, "tick": 2.0**53}
 """Largest times [s] and ticks: three centuries after 1970, and the range of exact integers in a float."""
@@ -28,10 +26,8 @@ MEASURED = re.compile(
     r"|(estimated|flange|payload|shaper|speed_scaling|truth_\w*(deflection|poses))\w*"
 )
 """Names of columns in SI units."""
-MAX_VALUE = 1e6
-"""Largest number in such a column; more is damage."""
-LONG_GAP = 1.0
-"""Longest gap between rows that is filled with straight lines [s]; a longer one splits the log."""
+MAX_VALUE = 1e6  # largest number in such a column; more is damage
+LONG_GAP = 1.0  # longest gap between rows that is filled with straight lines [s]; a longer one splits the log
 Places = tuple[str, Floats]
 """Position of rows in a file: what is counted, such as "line", and the number of each row, shape (T,)."""
 PERIODS = (1e-4, 0.1)

@@ -19,16 +19,13 @@ SHORT = {
     "pose": "actual_TCP_pose",
 }
 """RTDE's names of the most important columns, by short name."""
-AXES = {"x": 0, "y": 1, "z": 2}
-"""Letters that may replace the number in the name of a vector's column."""
+AXES = {"x": 0, "y": 1, "z": 2}  # Letters that may replace the number in the name of a vector's column
 SI = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180.0, "m/s2": 1.0, "mm/s2": 1e-3,
     "g": 9.80665, "mg": 9.80665e-3, "rad/s": 1.0, "deg/s": np.pi / 180.0,
 }  # fmt: skip
-WIDEST = 7.0
-"""Largest angle that the middle one of an arm's joints reaches [rad]; more must be degrees."""
-GRAVITY_IN_G = (0.8, 1.2)
-"""Range of the median length of an accelerometer's vector in units of gravity."""
+WIDEST = 7.0  # largest angle that the middle one of an arm's joints reaches [rad]; more must be degrees
+GRAVITY_IN_G = (0.8, 1.2)  # range of the median length of an accelerometer's vector in units of gravity
 
 TIMES = (TIME, "time", "t")
 REALTIME = {

@@ -21,8 +21,7 @@ from tvist_protocol.schema import field_docs
 from tvist_protocol.stream import Event, State, Truth
 
 _UNIT = re.compile(r"\s*\[([^\]]*)\]")
-KEY = "tvist"
-"""Name of the description in a file with named parts."""
+KEY = "tvist"  # name of the description in a file with named parts
 FORMAT = 1
 
 
@@ -30,8 +29,7 @@ FORMAT = 1
 class ColumnMeaning:
     """What a column contains."""
 
-    meaning: str
-    """A phrase; empty for an unknown column."""
+    meaning: str  # a phrase; empty for an unknown column
     units: tuple[str, ...] = ()
     """Its SI unit, or one for each half of a vector of six; "-" for a ratio; empty without a unit."""
     whole: bool = False
@@ -95,13 +93,10 @@ class Description(msgspec.Struct, frozen=True):
 
     format: int
     columns: dict[str, ColumnDescription]
-    events: list[Event] = []
-    """Events in the order of their ticks."""
+    events: list[Event] = []  # events in the order of their ticks
     info: Info | None = None
-    notes: list[str] = []
-    """Notes on what was left out when the recording was read."""
-    foreign: bool = False
-    """Whether another controller was recorded."""
+    notes: list[str] = []  # notes on what was left out when the recording was read
+    foreign: bool = False  # whether another controller was recorded
 
     def recording(self, names: Sequence[str], values: Floats) -> Recording | None:
         """Return the recording of a table, shape (T, columns); None if it has other columns than described."""

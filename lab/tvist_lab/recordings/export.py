@@ -15,10 +15,8 @@ from tvist_lab.recordings.description import KEY, describe, meaning_of, ordered,
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.whole_file import whole_file
 
-FOXGLOVE = "foxglove"
-"""Format of `tvist_lab.foxglove`, only for recordings of a robot."""
-EXACT = 2.0**53
-"""Whole numbers below this are exact as integer and as float."""
+FOXGLOVE = "foxglove"  # format of `tvist_lab.foxglove`, only for recordings of a robot
+EXACT = 2.0**53  # whole numbers below this are exact as integer and as float
 
 _SYSTEM = re.compile(r"IO error: (.*) \(os error")
 

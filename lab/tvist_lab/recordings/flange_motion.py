@@ -9,16 +9,13 @@ from tvist_controller.api.planning import Arm
 from tvist_lab.recordings.recording import Floats, RecordingError
 from tvist_plant.description import RobotDescription
 
-RATE = 100.0
-"""Rate of the compared rows [Hz], some ten times the bandwidth after smoothing."""
+RATE = 100.0  # rate of the compared rows [Hz], some ten times the bandwidth after smoothing
 SMOOTHING = {False: 0.02, True: 0.06}
 """Standard deviation of the smoothing of rotation and force [s]: joint angles hardly show vibration, which
 dominates the force at 10 Hz, while a gyroscope's bias wanders slowly."""
 GRAVITY = np.array([0.0, 0.0, 9.80665])
-AT_REST = 0.2
-"""Share of a log in which the arm is assumed to rest [-]."""
-SPARSE = 10.0
-"""Duration of a log relative to that of its rows from which it is mostly gaps [-]."""
+AT_REST = 0.2  # share of a log in which the arm is assumed to rest [-]
+SPARSE = 10.0  # duration of a log relative to that of its rows from which it is mostly gaps [-]
 HELD = 0.05
 """Longest time for which a log repeats angles between two measurements [s]; if longer, the arm rests."""
 
@@ -27,14 +24,11 @@ HELD = 0.05
 class Felt:
     """A vector over time, in axes that move with it."""
 
-    time: Floats
-    """Times on its own clock, spaced by 1/`RATE`, shape (T,) [s]."""
-    vector: Floats
-    """Angular velocity [rad/s] or specific force [m/s²], smoothed, shape (T, 3)."""
+    time: Floats  # times on its own clock, spaced by 1/`RATE`, shape (T,) [s]
+    vector: Floats  # angular velocity [rad/s] or specific force [m/s²], smoothed, shape (T, 3)
     lever: Floats
     """Change per unit of distance along x, y, z from the flange, shape (T, 3, k); k is 0 for a rotation."""
-    known: Floats
-    """1 where there were rows, 0 in a gap, shape (T,)."""
+    known: Floats  # 1 where there were rows, 0 in a gap, shape (T,)
 
     @property
     def change(self) -> Floats:

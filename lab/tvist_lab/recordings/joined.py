@@ -14,23 +14,17 @@ from tvist_lab.words import counted
 from tvist_plant.description import DescriptionError, RobotDescription, load, robots
 from tvist_plant.user_file import UserFileError
 
-CORRELATED = 0.9
-"""Smallest correlation between both signals [-]."""
-AS_WELL = 0.3
-"""Share of the motion that a second fit must explain to make a join ambiguous [-]."""
-ALIKE = 3.0
-"""Largest unexplained share of a second fit, relative to the best, to make a join ambiguous [-]."""
-NOISE = 2e-3
-"""Share of any fit that noise leaves unexplained [-]."""
-OFFSET, DRIFT = 2.5e-3, 2e-4
-"""Largest half intervals of the offset [s] and of the drift [-]."""
+CORRELATED = 0.9  # smallest correlation between both signals [-]
+AS_WELL = 0.3  # share of the motion that a second fit must explain to make a join ambiguous [-]
+ALIKE = 3.0  # largest unexplained share of a second fit, relative to the best, to make a join ambiguous [-]
+NOISE = 2e-3  # share of any fit that noise leaves unexplained [-]
+OFFSET, DRIFT = 2.5e-3, 2e-4  # largest half intervals of the offset [s] and of the drift [-]
 MOVED = {
     False: (0.3, "the flange turns by {:.2g} rad in all"),
     True: (3.0, "its force changes by {:.2g} m/s² in all"),
 }
 """Smallest motion of a log and its description, for rotation (False) and force (True)."""
-SIZES = (0.8, 1.25)
-"""Range of the ratio of the joints' motion to the sensor's [-]."""
+SIZES = (0.8, 1.25)  # range of the ratio of the joints' motion to the sensor's [-]
 DEFAULT = "ur5e"
 REMEDY = (
     "record both at once for 20 s or more, the sensor fixed to the tool: fast motions of several joints, others at the "

@@ -23,15 +23,13 @@ from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import BEHAVIOUR, END_METADATA, FORMAT, FROM_TICK, METADATA, JsonReader
 from tvist_protocol.stream import Event, State, Truth
 
-BLOCK = 8192
-"""Number of messages decoded together; some 12 MB."""
+BLOCK = 8192  # number of messages decoded together; some 12 MB
 
 _TABLES: dict[str, type[State | Truth | Io]] = {tag(kind): kind for kind in (State, Truth, Io)}
 """Kinds of messages that become columns."""
 _OBJECTS: dict[str, type[Event | Entry]] = {tag(kind): kind for kind in (Event, Entry)}
 """Kinds of messages that are few and become objects."""
-Published = State | Truth | Event | Io
-"""A message that the robot published."""
+Published = State | Truth | Event | Io  # a message that the robot published
 _Kind = TypeVar("_Kind", State, Truth, Io)
 
 
@@ -43,31 +41,23 @@ class RecordingFileError(RecordingError):
 class RecordingFile:
     """Content of a recording."""
 
-    path: Path
-    """File, folder or pattern that names the recording."""
+    path: Path  # file, folder or pattern that names the recording
     files: tuple[Path, ...]
     robot: str
     info: Info | None
     """Description of the robot when the recording started; None in a file of another program."""
-    start: dict[str, Any] | None
-    """Start options of the robot's server; None in a file of another program."""
-    behaviour: int
-    """Number of the robot's behaviour, see `tvist_protocol.recorded.THIS_BEHAVIOUR`."""
-    counts: Mapping[str, int]
-    """Number of messages `state`, `truth` and `io`; at least one state."""
+    start: dict[str, Any] | None  # start options of the robot's server; None in a file of another program
+    behaviour: int  # number of the robot's behaviour, see `tvist_protocol.recorded.THIS_BEHAVIOUR`
+    counts: Mapping[str, int]  # number of messages `state`, `truth` and `io`; at least one state
     events: tuple[Event, ...]
-    journal: tuple[Entry, ...]
-    """Inputs of the controller."""
-    recording: Recording
-    """States, truth and events as columns, with inputs and outputs if they were recorded."""
+    journal: tuple[Entry, ...]  # inputs of the controller
+    recording: Recording  # states, truth and events as columns, with inputs and outputs if they were recorded
     from_tick: int | None
     """First tick of a recording without the earlier ones; None if it started with the robot's first tick."""
-    complete: bool
-    """Whether the file was closed properly and read to its end."""
+    complete: bool  # whether the file was closed properly and read to its end
     dropped: Mapping[str, int] | None
     """Number of messages that the recorder dropped, by kind; None if unknown."""
-    note: str | None
-    """Note if something is missing."""
+    note: str | None  # note if something is missing
 
     @cached_property
     def states(self) -> tuple[State, ...]:
@@ -159,8 +149,7 @@ class _Content:
     path: Path
     files: tuple[Path, ...]
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
-    ends: list[dict[str, str]] = field(default_factory=list)
-    """Metadata at the end of each closed file."""
+    ends: list[dict[str, str]] = field(default_factory=list)  # metadata at the end of each closed file
     tables: dict[str, JsonColumns] = field(
         default_factory=lambda: {name: JsonColumns(kind) for name, kind in _TABLES.items()}
     )

@@ -28,18 +28,14 @@ RECORD_LIMIT = 2**28
 DENSEST, LEAST = 500, 1 << 16
 """Largest ratio of a chunk's content to its size, and additional bytes; a robot at rest reaches 90. A chunk
 may hold about as many records as bytes: otherwise a small file could take minutes and all memory."""
-CUT = (EndOfFile, struct.error)
-"""Exceptions for a file that ends too early."""
+CUT = (EndOfFile, struct.error)  # exceptions for a file that ends too early
 DAMAGE = (*CUT, McapError, ZstdError, ValueError, OverflowError, MemoryError)
 """Exceptions for a damaged record: a wrong checksum is a ValueError, and a length may exceed the memory."""
 
-_RECORD = struct.Struct("<BQ")
-"""Start of a record: its kind and length."""
-_MESSAGE = struct.Struct("<HIQQ")
-"""Start of a message: its channel, number and two times."""
+_RECORD = struct.Struct("<BQ")  # start of a record: its kind and length
+_MESSAGE = struct.Struct("<HIQQ")  # start of a message: its channel, number and two times
 TOPIC = re.compile(r"tvist/(?P<robot>[^/]+)/(?P<kind>\w+)")
-WILD = "*?["
-"""Characters that make a name a pattern."""
+WILD = "*?["  # characters that make a name a pattern
 
 
 class _Records(StreamReader):

@@ -17,12 +17,10 @@ from tvist_protocol.recorded import JsonReader
 Block = Mapping[str, Floats]
 """Fields of consecutive messages by name, shape (T,) or (T, k); NaN where null or shorter than in others."""
 
-REGISTERS = "_register"
-"""Suffix of the names of register banks."""
+REGISTERS = "_register"  # suffix of the names of register banks
 OF_OUR_LINE = ("reference", "unshaped", "estimated", "shaper", "motor_", "setpoint")
 """Prefixes of columns that are meaningless for a robot that was only watched."""
-UNSHAPED = "unshaped_"
-"""Prefix of fields that take the target's values where they are null."""
+UNSHAPED = "unshaped_"  # prefix of fields that take the target's values where they are null
 SCALARS: dict[Any, type[pl.DataType]] = {int: pl.Int64, float: pl.Float64, bool: pl.Boolean}
 """Types of numbers in a table."""
 

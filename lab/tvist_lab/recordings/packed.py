@@ -6,10 +6,8 @@ from pathlib import Path
 from tvist_lab.recordings.checks import LogError
 
 GZIP = b"\x1f\x8b"
-DENSEST = 100
-"""Largest ratio of the content to the size of its file; logs reach 30, a malicious file 1000."""
-MIN_CONTENT = 1 << 20
-"""Size of the content that any file may have [bytes]."""
+DENSEST = 100  # largest ratio of the content to the size of its file; logs reach 30, a malicious file 1000
+MIN_CONTENT = 1 << 20  # size of the content that any file may have [bytes]
 
 
 def content(path: Path) -> bytes:

@@ -12,8 +12,7 @@ from tvist_lab.recordings.recording import Recording, RecordingError
 from tvist_lab.recordings.table import BINARY, READERS, ROBOT, TEXT, Needs, Reader, to_recording
 from tvist_plant.user_file import UserFileError, check_is_file
 
-SHOWN = 4096
-"""Number of first bytes that distinguish text from packets."""
+SHOWN = 4096  # number of first bytes that distinguish text from packets
 
 
 def read(path: str | os.PathLike[str], columns: str | None = None, needs: Needs = ROBOT) -> Recording:

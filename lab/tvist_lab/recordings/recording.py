@@ -16,10 +16,8 @@ Floats = NDArray[np.float64]
 
 STATE_COLUMNS = State.__struct_fields__
 """Fields of `state`, each of which becomes a column of the same name."""
-TRUTH_PREFIX = "truth_"
-"""Prefix for the column names of fields of `truth`."""
-EPOCH = 1e8
-"""Times beyond this are seconds since 1970, not a robot's uptime [s]."""
+TRUTH_PREFIX = "truth_"  # prefix for the column names of fields of `truth`
+EPOCH = 1e8  # times beyond this are seconds since 1970, not a robot's uptime [s]
 
 
 class RecordingError(ValueError):

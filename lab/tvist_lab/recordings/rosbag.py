@@ -29,8 +29,7 @@ READ = {f"{package}/msg/{name}": name for package, name in (
 ORDER = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 """Joints of a UR robot from base to tool; ROS lists them in any order."""
 
-MOST_JOINTS = 100
-"""Largest accepted number of joints in a message; a robot with a gripper has some ten."""
+MOST_JOINTS = 100  # largest accepted number of joints in a message; a robot with a gripper has some ten
 
 
 @dataclass

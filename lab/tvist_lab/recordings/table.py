@@ -20,14 +20,10 @@ from tvist_plant.user_file import is_name
 
 OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
 """Columns that together identify a recording of this controller."""
-STRANGE = "is no log that tvist reads"
-"""Start of the error message for a file of another format."""
-LONG_GAP = 0.02
-"""Shortest gap between rows that a note reports [s]."""
-SWAPPED = 3
-"""Largest number of rows by which a misplaced row may be moved to its place."""
-SHOWN = 6
-"""Largest number of a vector's missing entries that a note names."""
+STRANGE = "is no log that tvist reads"  # start of the error message for a file of another format
+LONG_GAP = 0.02  # shortest gap between rows that a note reports [s]
+SWAPPED = 3  # largest number of rows by which a misplaced row may be moved to its place
+SHOWN = 6  # largest number of a vector's missing entries that a note names
 
 _INDEXED = re.compile(r"(?P<name>.*\D)_(?P<index>\d{1,6})", re.ASCII)
 
@@ -36,12 +32,9 @@ _INDEXED = re.compile(r"(?P<name>.*\D)_(?P<index>\d{1,6})", re.ASCII)
 class Needs:
     """What a log must have besides its times."""
 
-    columns: tuple[str, ...]
-    """Vectors of which at least one must exist."""
-    option: str
-    """Option that gives the names of columns."""
-    positions: str
-    """Option that gives their positions in a file without a header."""
+    columns: tuple[str, ...]  # vectors of which at least one must exist
+    option: str  # option that gives the names of columns
+    positions: str  # option that gives their positions in a file without a header
 
 
 ROBOT = Needs(("target_q", "actual_q"), "--columns time=…,q=joint_{}", "--columns time=1,q=2-7")
@@ -58,22 +51,15 @@ class LogTable:
     path: Path
     names: Sequence[str]
     """Column names; those of a vector end in `_0`, `_1`, …; empty if the file has no header."""
-    values: Floats
-    """Shape (T, columns); NaN for an empty cell."""
-    lines: Floats
-    """Number of the line, row or packet of each row, shape (T,)."""
-    unit: str = "row"
-    """What `lines` counts, for messages."""
-    header: int = 0
-    """Number of the line with the names; 0 if there is none."""
-    notes: tuple[str, ...] = ()
-    """Notes on what the reader of the file left out."""
+    values: Floats  # shape (T, columns); NaN for an empty cell
+    lines: Floats  # number of the line, row or packet of each row, shape (T,)
+    unit: str = "row"  # what `lines` counts, for messages
+    header: int = 0  # number of the line with the names; 0 if there is none
+    notes: tuple[str, ...] = ()  # notes on what the reader of the file left out
     texts: Mapping[int, str] = field(default_factory=dict)
     """Columns with text, by index, and the problem if they are needed."""
-    rtde: bool = False
-    """Whether the format has RTDE's names and SI units by definition."""
-    there: str = ""
-    """What the file has instead of columns, for an error message."""
+    rtde: bool = False  # whether the format has RTDE's names and SI units by definition
+    there: str = ""  # what the file has instead of columns, for an error message
     description: Description | None = None
 
 

@@ -17,27 +17,18 @@ from tvist_lab.recordings import kabsch
 from tvist_lab.recordings.flange_motion import RATE, Felt
 from tvist_lab.recordings.recording import Floats
 
-DRIFT = 0.02
-"""Largest drift in the search [-]."""
-COARSE = 5
-"""Reduction of rows for the search: one of this number is used."""
-BLURRED = 0.2
-"""Time by which a drift may be wrong between the ends of a log in the search [s]."""
-TRIED = 24
-"""Number of candidates that are fitted."""
-APART = 0.25
-"""Difference from which offsets are distinct [s]; the step of a fit is at most half of it."""
-BLOCK = 0.5
-"""Time after which residuals of a fit count as independent [s]."""
-HUBER = 2.0
-"""Residuals beyond this multiple of the median have less weight (Huber 1964)."""
-RANK = 1e-9
-"""Share of the largest eigenvalue below which parameters cannot be separated [-]."""
+DRIFT = 0.02  # largest drift in the search [-]
+COARSE = 5  # reduction of rows for the search: one of this number is used
+BLURRED = 0.2  # time by which a drift may be wrong between the ends of a log in the search [s]
+TRIED = 24  # number of candidates that are fitted
+APART = 0.25  # difference from which offsets are distinct [s]; the step of a fit is at most half of it
+BLOCK = 0.5  # time after which residuals of a fit count as independent [s]
+HUBER = 2.0  # residuals beyond this multiple of the median have less weight (Huber 1964)
+RANK = 1e-9  # share of the largest eigenvalue below which parameters cannot be separated [-]
 MOVING = 1e-3
 """Smallest weight of a block, relative to the largest, to contain information about the clocks [-]."""
 ITERATIONS = 15
-CONVERGED = 1e-5
-"""Change of the offset anywhere in a log at which a fit ends [s]."""
+CONVERGED = 1e-5  # change of the offset anywhere in a log at which a fit ends [s]
 TURN, BIAS, LEVER = slice(2, 5), slice(5, 8), slice(8, None)
 """Positions among the parameters of a fit, after offset and drift."""
 
@@ -46,22 +37,16 @@ TURN, BIAS, LEVER = slice(2, 5), slice(5, 8), slice(8, None)
 class Clocks:
     """The other clock shows `other + (1 + drift) (t - middle)` when the first one shows t."""
 
-    middle: float
-    """Middle of the common time, on the first clock [s]."""
-    other: float
-    """Time of the other clock then [s]."""
-    drift: float
-    """Relative speed of the other clock, minus 1 [-]."""
+    middle: float  # middle of the common time, on the first clock [s]
+    other: float  # time of the other clock then [s]
+    drift: float  # relative speed of the other clock, minus 1 [-]
     half: tuple[float, float]
     """Half of the 95 % interval of the offset, at its wider end [s], and of the drift [-]."""
-    correlation: float
-    """Correlation of the vectors after rotation [-]."""
-    scale: float
-    """Size of the first vector relative to the other [-]."""
+    correlation: float  # correlation of the vectors after rotation [-]
+    scale: float  # size of the first vector relative to the other [-]
     explained: float
     """Energy of the first vector's changes that the other explains [its unit squared times s]."""
-    span: tuple[float, float]
-    """First and last common time, on the first clock [s]."""
+    span: tuple[float, float]  # first and last common time, on the first clock [s]
 
     def first(self, other: Floats) -> Floats:
         """Return times of the first clock for those of the other one."""

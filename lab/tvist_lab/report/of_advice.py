@@ -16,8 +16,7 @@ WORST = "The tool's acceleration after the stop that rings most: recorded, and p
 COSTS = (
     "Each shaper that keeps the arm's limits: what it leaves of the vibration, against the time that it adds."
 )
-SHOWN = 16
-"""Number of shapers in the table."""
+SHOWN = 16  # number of shapers in the table
 WORDS = {
     "left": "rms of the tool's acceleration for up to 0.5 s after the shaped stop, over that after the unshaped one, "
     "by the recorded acceleration convolved with the shaper. Medians over the motions that ring.",

@@ -43,8 +43,7 @@ OF_PAIRS = {
 }
 """Meaning of columns that the table of motions does not explain."""
 WITHOUT = "without a shaper"
-PICTURES = 6
-"""Largest number of motions in the figures."""
+PICTURES = 6  # largest number of motions in the figures
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from tvist_lab.study.columns import ResultTable, cells, meanings, titles
 from tvist_lab.study.study import Figures, Result
 from tvist_lab.words import QUANTILES_FROM, counted
 
-LISTED = 200
-"""Largest number of motions that are listed."""
+LISTED = 200  # largest number of motions that are listed
 
 
 def study_figures(result: Result) -> Figures:

@@ -11,8 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
-DPI = 138
-"""Resolution of pictures [dpi]; a figure's 183 mm are the 994 pixels to which the page grows."""
+DPI = 138  # resolution of pictures [dpi]; a figure's 183 mm are the 994 pixels to which the page grows
 
 
 @dataclass(frozen=True)

@@ -9,22 +9,17 @@ from tvist_lab.metrics import Comparison, MotionPair, MotionResult
 from tvist_lab.metrics.comparison import TICK_MS
 from tvist_lab.words import counted, either, sample, spread
 
-NOTICEABLE = 0.15
-"""Vibration that exceeds the sensor's noise [m/s²]."""
-CLEAR = 15.0
-"""Smallest change that counts as a difference [%]; equal runs differ by noise."""
-LISTED = 6
-"""Largest number of pairs that are listed."""
-LESS, EARLIER = ("less", "more"), ("earlier", "later")
-"""Words for positive and negative changes."""
+NOTICEABLE = 0.15  # vibration that exceeds the sensor's noise [m/s²]
+CLEAR = 15.0  # smallest change that counts as a difference [%]; equal runs differ by noise
+LISTED = 6  # largest number of pairs that are listed
+LESS, EARLIER = ("less", "more"), ("earlier", "later")  # words for positive and negative changes
 
 
 @dataclass(frozen=True)
 class Shaping:
     """Whether the reference of a recording was shaped, if known."""
 
-    shaped: bool | None
-    """None if the recording has no reference before shaping."""
+    shaped: bool | None  # none if the recording has no reference before shaping
     sentence: str
 
 

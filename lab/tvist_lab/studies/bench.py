@@ -34,12 +34,9 @@ STICKING = (
     Variant("stiction", "motors that stick near standstill, as the controller knows"),
     Variant("more_stiction", "motors that stick more than the controller knows", partial(rubbed, HEAVIER)),
 )
-PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
-"""Errors of the declared mass [-]."""
-CORNERS = 5
-"""Number of curved paths."""
-KEPT = 1.003
-"""Largest ratio of a peak to its limit that counts as within the limit [-]."""
+PAYLOAD_ERRORS = (0.0, 0.1, -0.1)  # errors of the declared mass [-]
+CORNERS = 5  # number of curved paths
+KEPT = 1.003  # largest ratio of a peak to its limit that counts as within the limit [-]
 ONCE = pl.col("arm") == pl.col("arm").first()
 """Selects the rows of the first arm, since the reference is the same for all."""
 

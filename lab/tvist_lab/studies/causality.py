@@ -13,10 +13,8 @@ from tvist_lab.study.shaping import ShaperFaultError
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 
-PLACES = (0.15, 0.5, 0.8)
-"""Positions from which the references differ, as shares of the motion [-]."""
-ELSEWHERE = 1.0
-"""Acceleration with which the other reference deviates [rad/s²]."""
+PLACES = (0.15, 0.5, 0.8)  # positions from which the references differ, as shares of the motion [-]
+ELSEWHERE = 1.0  # acceleration with which the other reference deviates [rad/s²]
 TWICE = "gives another output when the same reference is run again: it keeps something, or draws by chance"
 
 

@@ -15,8 +15,7 @@ from tvist_lab.study.study import Figures, Result, Study
 from tvist_lab.study.work import MEASURED, record
 from tvist_lab.words import QUANTILES_FROM, either, sample, spread
 
-COUNTED = pl.col("reduction_percent").is_not_null()
-"""Selects rows with enough vibration for a percentage."""
+COUNTED = pl.col("reduction_percent").is_not_null()  # selects rows with enough vibration for a percentage
 LESS = "Reduction of the largest acceleration of the tool, later than 10 ms after the reference stops."
 WAITED = "The same against an unshaped arm that waits as long as the shaper is late."
 STILL = "Last time |α| exceeds 0.1 m/s², from the stop of the unshaped reference."

@@ -20,8 +20,7 @@ ERRORS: dict[str, tuple[float, ...]] = {
 }
 """Relative errors [-]: how much stiffer all springs are than calibrated, and how much the declared mass
 exceeds the carried one."""
-PLANT = "plant"
-"""Kind of error of a named plant."""
+PLANT = "plant"  # kind of error of a named plant
 LESS = Column("median", median("reduction_percent"), 1)
 WORST = Column("p5", p5("reduction_percent", MIN_MOVES), 1)
 BOTH = Column("median / p5", lambda one: f"{LESS.text(one)} / {WORST.text(one)}")

@@ -31,10 +31,8 @@ from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, quoted
 from tvist_protocol.values import Mass
 
-MOST_ROWS = 1_000_000
-"""Largest number of rows of a sweep, which are held in memory at its end."""
-UNIFORM = "uniform"
-"""Payload that is drawn for each move, up to the arm's rating."""
+MOST_ROWS = 1_000_000  # largest number of rows of a sweep, which are held in memory at its end
+UNIFORM = "uniform"  # payload that is drawn for each move, up to the arm's rating
 
 Disturbance = Literal["friction", "gear", "noise"]
 Name = Annotated[str, Meta(min_length=1, max_length=4096)]
@@ -58,17 +56,14 @@ class Mistakes(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, om
 class NamedRobot(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """A robot with a calibration other than its own."""
 
-    robot: Name
-    """Name of a robot that comes with the package, or path of a robot file."""
-    calibration: Name
-    """Name of a calibration that comes with the package, or path of a calibration file."""
+    robot: Name  # name of a robot that comes with the package, or path of a robot file
+    calibration: Name  # name of a calibration that comes with the package, or path of a calibration file
 
 
 class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A sweep."""
 
-    shapers: Annotated[tuple[Name, ...], Meta(min_length=1)]
-    """Names of shapers, or FILE.py:NAME."""
+    shapers: Annotated[tuple[Name, ...], Meta(min_length=1)]  # names of shapers, or FILE.py:NAME
     moves: Annotated[int, Meta(ge=1, le=100_000)]
     payloads: Annotated[tuple[Mass | Name, ...], Meta(min_length=1)]
     """Masses of the disc on the flange [kg], or "uniform" for one drawn for each move up to the arm's rating."""
@@ -76,17 +71,14 @@ class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Errors of the controller's knowledge."""
     robots: Annotated[tuple[Name | NamedRobot, ...], Meta(min_length=1)] = ("ur5e",)
     """Names of robots, paths of robot files, or maps of robot and calibration."""
-    seed: Annotated[int, Meta(ge=0, lt=2**62)] = 0
-    """Seed of moves, payloads, gear errors and deviations."""
+    seed: Annotated[int, Meta(ge=0, lt=2**62)] = 0  # seed of moves, payloads, gear errors and deviations
     modes: Annotated[int, Meta(ge=1, le=6)] = 1
     """Number of modes that each shaper of the catalogue suppresses."""
     limits: Literal["gentle", "industrial"] = "gentle"
     stroke: tuple[Annotated[float, Meta(ge=0.001, le=1)], Annotated[float, Meta(ge=0.001, le=1)]] = (0.3, 1.0)
     """Smallest and largest length of a move, as a share of the way between two configurations [-]."""
-    wrists: bool = False
-    """Whether moves turn the two outer joints of the wrist."""
-    streams: bool = False
-    """Whether to follow streams of set-points that are stopped, instead of making moves."""
+    wrists: bool = False  # whether moves turn the two outer joints of the wrist
+    streams: bool = False  # whether to follow streams of set-points that are stopped, instead of making moves
     disturbances: tuple[Disturbance, ...] = ("friction", "gear", "noise")
 
     @property
@@ -148,14 +140,12 @@ class SweptRobot:
     name: str
     description: RobotDescription
     """The arm with the sweep's disturbances, which is also the controller's model of it."""
-    recipes: tuple[Recipe, ...]
-    """Recipe of each shaper of the sweep, without errors."""
+    recipes: tuple[Recipe, ...]  # recipe of each shaper of the sweep, without errors
 
 
 AXES = ("robot", "payload", "payload_error_percent", "stiffness_error_percent", "frequency_error_percent")
 """Columns that together identify a setting."""
-DRAWN = 100
-"""Largest number of settings in a figure."""
+DRAWN = 100  # largest number of settings in a figure
 
 
 class Axes(Sequence[Case]):

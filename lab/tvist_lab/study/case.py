@@ -29,21 +29,15 @@ def arm_seed(seed: int, place: int) -> int:
 class Case:
     """A move or a stream; it can be sent to another process."""
 
-    description: RobotDescription
-    """The controller's model of the arm."""
-    move: Move
-    """The move, with the carried mass."""
-    seed: int = 0
-    """Seed of gear errors, and of the arm's deviations."""
+    description: RobotDescription  # the controller's model of the arm
+    move: Move  # the move, with the carried mass
+    seed: int = 0  # seed of gear errors, and of the arm's deviations
     arms: tuple[Variant, ...] = (AS_DESCRIBED,)
-    limits: MotionLimits = PAPER
-    """Limits of every joint."""
-    payload_error: float = 0.0
-    """Error of the declared mass, relative to the carried one [-]."""
+    limits: MotionLimits = PAPER  # limits of every joint
+    payload_error: float = 0.0  # error of the declared mass, relative to the carried one [-]
     stream: bool = False
     """Whether to follow a stream from the move's start that is stopped somewhere, instead of making the move."""
-    methods: tuple[Method, ...] = ()
-    """Methods for this case; empty for those of its study."""
+    methods: tuple[Method, ...] = ()  # methods for this case; empty for those of its study
     axes: Mapping[str, Any] = field(default_factory=dict)
     """Cells of its rows by column name, which distinguish it from the other cases of its study."""
 

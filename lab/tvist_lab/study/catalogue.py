@@ -15,8 +15,7 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
 from tvist_shaping.errors import UnknownShaperError
 
-MOST_DECLARED = 1.1
-"""Largest declared mass of the bench, relative to the rating [-]."""
+MOST_DECLARED = 1.1  # largest declared mass of the bench, relative to the rating [-]
 
 
 def build_method(

@@ -8,25 +8,20 @@ import polars as pl
 
 from tvist_lab.recordings import Floats
 
-Entry = Mapping[str, Any]
-"""Values by name: a line of a table before formatting."""
+Entry = Mapping[str, Any]  # values by name: a line of a table before formatting
 
 
 @dataclass(frozen=True)
 class Column:
     """A column of a table."""
 
-    title: str
-    """Heading; a second line is small on a web page."""
+    title: str  # heading; a second line is small on a web page
     of: str | pl.Expr | Callable[[Entry], Any]
     """Where an entry holds the value, such as "delay_ms" or "less.p5"; a function of the entry; or an
     expression that computes it for a group of rows and is stored in the entry under its output name."""
-    digits: int | None = None
-    """Number of decimals; None for text."""
-    unit: str = ""
-    """Suffix of the number."""
-    meaning: str = ""
-    """Meaning of the heading's first line."""
+    digits: int | None = None  # number of decimals; None for text
+    unit: str = ""  # suffix of the number
+    meaning: str = ""  # meaning of the heading's first line
 
     def text(self, entry: Entry) -> str:
         """Return a cell; a dash means not measurable."""
@@ -52,8 +47,7 @@ class ResultTable:
     title: str
     entries: Sequence[Entry]
     columns: Sequence[Column]
-    listing: bool = False
-    """Whether it lists single motions, which may be too many to show."""
+    listing: bool = False  # whether it lists single motions, which may be too many to show
 
 
 def titles(columns: Iterable[Column]) -> tuple[str, ...]:

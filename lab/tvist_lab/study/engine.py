@@ -15,10 +15,8 @@ from tvist_lab.study.store import Store
 from tvist_lab.study.study import Study
 from tvist_lab.study.work import FAILED, Job, Row, failed, measure_each, why
 
-PART = 32
-"""Number of jobs in a part, and the most that are lost if the program is killed."""
-FEW_MOTIONS = 16
-"""Largest number of motions that do not justify another process."""
+PART = 32  # number of jobs in a part, and the most that are lost if the program is killed
+FEW_MOTIONS = 16  # largest number of motions that do not justify another process
 
 Progress = Callable[[int], AbstractContextManager[Callable[[int], None]]]
 """Takes the number of jobs to run; counts finished ones."""
@@ -29,10 +27,8 @@ class StudyRun:
     """A study that was run."""
 
     rows: pl.DataFrame
-    resumed: int
-    """Number of jobs that were done before."""
-    tasks: int
-    """Number of jobs that were run now."""
+    resumed: int  # number of jobs that were done before
+    tasks: int  # number of jobs that were run now
 
 
 def run(

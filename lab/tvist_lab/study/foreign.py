@@ -22,8 +22,7 @@ from tvist_plant.user_file import named
 from tvist_protocol.values import Payload
 from tvist_shaping.estimators.base import Estimator
 
-MODES = 4
-"""Number of modes that a shaper from a file receives."""
+MODES = 4  # number of modes that a shaper from a file receives
 
 
 class CandidateError(ValueError):
@@ -34,20 +33,15 @@ class CandidateError(ValueError):
 class TickInfo:
     """Information that a shaper gets at every tick."""
 
-    period: float
-    """Tick [s]."""
-    joints: int
-    """Number of joints of the arm; `q_ref` has as many entries."""
+    period: float  # tick [s]
+    joints: int  # number of joints of the arm; `q_ref` has as many entries
     limits: MotionLimits
     """Limits of the reference, for every joint: velocity [rad/s], acceleration [rad/s²], jerk [rad/s³]."""
-    payload: Payload
-    """Declared payload: mass [kg], com [m], inertia [kg m²]."""
-    robot: str
-    """Model of the arm."""
+    payload: Payload  # declared payload: mass [kg], com [m], inertia [kg m²]
+    robot: str  # model of the arm
     f_d: Floats
     """Damped frequencies of the lowest modes, estimated at the last shaped reference [Hz], shape (4,)."""
-    zeta: Floats
-    """Damping ratios of the same modes [-], shape (4,)."""
+    zeta: Floats  # damping ratios of the same modes [-], shape (4,)
 
 
 @dataclass(frozen=True)

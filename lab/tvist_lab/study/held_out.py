@@ -21,8 +21,7 @@ JUDGING = MappingProxyType(
     }
 )
 """Seeds of published tables: nothing is tuned on them."""
-MOVES = 60
-"""Number of moves for each cell of a published table, and the default."""
+MOVES = 60  # number of moves for each cell of a published table, and the default
 MIN_MOVES = 20
 """Smallest number of moves for a verdict and for a 5th percentile, which is otherwise little more than the
 worst move."""

@@ -27,11 +27,9 @@ from tvist_shaping.filter import TvistFilter
 
 PAPER = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 """The paper's limits, also the defaults of `move_j`."""
-REST = 0.7
-"""Time simulated after the end of the shaped reference [s]."""
+REST = 0.7  # time simulated after the end of the shaped reference [s]
 
-RESTING = 4
-"""Ticks at rest before the motion."""
+RESTING = 4  # ticks at rest before the motion
 
 
 class Unchanged(TvistFilter):

@@ -30,10 +30,8 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_plant.plant import PERIOD
 
-WORTH = 0.2
-"""Unshaped peak [m/s²] below which a move is listed, but not counted in percentages."""
-QUIET_LEVEL = 0.02
-"""A lower threshold for an arm at rest [m/s²]."""
+WORTH = 0.2  # unshaped peak [m/s²] below which a move is listed, but not counted in percentages
+QUIET_LEVEL = 0.02  # a lower threshold for an arm at rest [m/s²]
 
 
 class MadeMotion:
@@ -114,11 +112,9 @@ class Measure:
     """A column of figures."""
 
     name: str
-    unit: str
-    """Unit; "–" for a ratio."""
+    unit: str  # unit; "–" for a ratio
     meaning: str
-    of: Callable[[MadeMotion], float | None]
-    """Measures a motion; None if not measurable or irrelevant."""
+    of: Callable[[MadeMotion], float | None]  # measures a motion; None if not measurable or irrelevant
 
 
 def _late(at: float | None, motion: MadeMotion) -> float | None:

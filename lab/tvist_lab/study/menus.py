@@ -11,28 +11,22 @@ Kind = Literal[
     "filter", "for target", "for payload", "for workspace", "held", "longer", "as long as", "jerk of a period",
     "shaped alone",
 ]  # fmt: skip
-UNSHAPED = "none"
-"""Name of waiting on the bench, where it passes through the same line as the others."""
+UNSHAPED = "none"  # name of waiting on the bench, where it passes through the same line as the others
 
 
 @dataclass(frozen=True)
 class MenuMethod:
     """A method."""
 
-    name: str
-    """Name in JSON and on the command line."""
-    label: str
-    """Name for display."""
+    name: str  # name in JSON and on the command line
+    label: str  # name for display
     menus: tuple[Menu, ...] = ()
     kind: Kind = "filter"
-    of: str = ""
-    """Shaper from which it is made, or method whose duration it has; empty for its own name."""
-    modes: int = 1
-    """Number of modes; more than one needs a modal calibration."""
+    of: str = ""  # shaper from which it is made, or method whose duration it has; empty for its own name
+    modes: int = 1  # number of modes; more than one needs a modal calibration
 
 
-SHOWN: tuple[Menu, ...] = ("bench", "lesson")
-"""Menus of a shaper without a row."""
+SHOWN: tuple[Menu, ...] = ("bench", "lesson")  # menus of a shaper without a row
 ROWS = (
     MenuMethod("equal_duration_double_s", "longer double S", ("baselines",), "longer"),
     MenuMethod("double_s_of_one_period", "double S whose jerk lasts a period", ("baselines",), "jerk of a period"),

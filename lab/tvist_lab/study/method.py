@@ -25,28 +25,22 @@ from tvist_shaping.steady import ProductDesign, SteadyFilter
 class Task:
     """A reference to shape, with the controller's knowledge of it."""
 
-    description: RobotDescription
-    """The controller's model of the arm."""
-    move: Move
-    """The move, with the declared mass."""
-    reference: Floats
-    """Reference, shape (T, n) [rad]."""
+    description: RobotDescription  # the controller's model of the arm
+    move: Move  # the move, with the declared mass
+    reference: Floats  # reference, shape (T, n) [rad]
     limits: MotionLimits = PAPER
     as_served: bool = False
     """Whether to plan moves for the filter and accept the result, as a robot does; otherwise the filter gets
     the reference itself, and is checked for tails."""
-    stream: bool = False
-    """Whether the reference is a stream with unknown end."""
-    ticks: int | None = None
-    """Duration of the motion to compare with, if any."""
+    stream: bool = False  # whether the reference is a stream with unknown end
+    ticks: int | None = None  # duration of the motion to compare with, if any
 
 
 class Method(ABC):
     """A way to make a motion; it can be sent to another process."""
 
     name: str
-    label: str
-    """Name for display."""
+    label: str  # name for display
 
     @property
     def told_target(self) -> bool:
@@ -97,8 +91,7 @@ class Named(SampleMethod):
     recipe: Recipe
     name: str
     label: str = ""
-    alone: bool = False
-    """Whether to omit the elastic feed-forward for which the filter is made."""
+    alone: bool = False  # whether to omit the elastic feed-forward for which the filter is made
 
     @property
     def told_target(self) -> bool:
@@ -132,12 +125,9 @@ class ConstantModes(SampleMethod):
     name: str
     label: str
     shaper: str
-    modes: int = 1
-    """Number of lowest modes at the move's target, each with its own shaper."""
-    f_d: float | None = None
-    """Design frequency [Hz]; None for the estimate."""
-    zeta: float | None = None
-    """Design damping ratio [-]; None for the estimate."""
+    modes: int = 1  # number of lowest modes at the move's target, each with its own shaper
+    f_d: float | None = None  # design frequency [Hz]; None for the estimate
+    zeta: float | None = None  # design damping ratio [-]; None for the estimate
     for_payload: bool = False
     """Whether it is designed for the lowest mode over the workspace with the declared payload."""
 
@@ -169,8 +159,7 @@ class ConstantMeanDelay(SampleMethod):
     """The modes' ZV shapers in series, delayed to a constant mean delay."""
 
     recipe: Recipe
-    mean_delay: float
-    """The constant mean delay [s]."""
+    mean_delay: float  # the constant mean delay [s]
     modes: int
     name: str
     label: str

@@ -22,14 +22,10 @@ from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Angle, Mass
 
-MIN_TURN = 1e-4
-"""Rotation of the fastest joint below which a move counts as going nowhere [rad]."""
-STROKE = (0.3, 1.0)
-"""Length of a random move, as a share of the way to an independent configuration [-]."""
-TRIES = 1000
-"""Number of draws for one random move before giving up."""
-RETARGETED = (0.2, 0.8)
-"""Shortest and longest time after which a stream turns to another target [s]."""
+MIN_TURN = 1e-4  # rotation of the fastest joint below which a move counts as going nowhere [rad]
+STROKE = (0.3, 1.0)  # length of a random move, as a share of the way to an independent configuration [-]
+TRIES = 1000  # number of draws for one random move before giving up
+RETARGETED = (0.2, 0.8)  # shortest and longest time after which a stream turns to another target [s]
 TURNS = 4
 WITH_WRISTS = Region(low=(*WORKSPACE.low, -np.pi, -np.pi), high=(*WORKSPACE.high, np.pi, np.pi))
 """The workspace with any angles of the wrist's two outer joints."""
@@ -43,12 +39,9 @@ class MovesError(ValueError):
 class Move:
     """A move from rest to rest."""
 
-    start: tuple[float, ...]
-    """Joint angles at the start [rad]."""
-    target: tuple[float, ...]
-    """Joint angles at the end [rad]."""
-    mass: float
-    """Mass of the payload [kg]."""
+    start: tuple[float, ...]  # joint angles at the start [rad]
+    target: tuple[float, ...]  # joint angles at the end [rad]
+    mass: float  # mass of the payload [kg]
 
 
 class _Entry(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -56,8 +49,7 @@ class _Entry(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
 
     start: tuple[Angle, ...]
     target: tuple[Angle, ...]
-    payload: Mass | None = None
-    """Payload of this move [kg]; None for the one on the command line."""
+    payload: Mass | None = None  # payload of this move [kg]; None for the one on the command line
 
 
 Entries = Annotated[tuple[_Entry, ...], Meta(min_length=1)]

@@ -33,8 +33,7 @@ from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.named import Registry
 from tvist_shaping.taps import mean_delay
 
-CONFIGURATIONS = 150
-"""Number of configurations over which the range of the lowest mode is determined."""
+CONFIGURATIONS = 150  # number of configurations over which the range of the lowest mode is determined
 SEARCHED = 2000
 """Number of configurations searched for the longest mean delay; a longer one would exceed the motion's limits."""
 
@@ -76,16 +75,12 @@ class FrequencyError(Estimator):
 class Recipe:
     """Ingredients of a filter; unlike a filter, they can be sent to another process."""
 
-    shaper: str
-    """Name of a filter, as in `set_shaper`."""
-    calibration: Calibration | None
-    """Calibration of the arm; its modal model is preferred to its polynomials."""
-    frequency_error: float = 0.0
-    """Share by which every frequency is too high [-]."""
+    shaper: str  # name of a filter, as in `set_shaper`
+    calibration: Calibration | None  # calibration of the arm; its modal model is preferred to its polynomials
+    frequency_error: float = 0.0  # share by which every frequency is too high [-]
     modes: int = 1
     """Number of modes that a shaper of the catalogue suppresses; more than one requires a modal calibration."""
-    own: tuple[OwnShaper, ...] = ()
-    """Shapers from files, available by name besides those of the package."""
+    own: tuple[OwnShaper, ...] = ()  # shapers from files, available by name besides those of the package
 
     def make(self, description: RobotDescription, mass: float) -> Filter:
         """Create the filter for the paper's disc with this declared mass [kg]."""

@@ -19,28 +19,19 @@ from tvist_plant.variants import Variant
 class StudyRequest:
     """A robot, moves and shapers, all checked."""
 
-    description: RobotDescription
-    """The arm, which is also the controller's model of it."""
+    description: RobotDescription  # the arm, which is also the controller's model of it
     moves: Sequence[Move]
     methods: Sequence[Method]
     """The methods that the study always has, then the named shapers, then the baselines."""
-    named: int = 0
-    """Number of methods before the baselines."""
-    arms: Sequence[Variant] = ()
-    """The named plants."""
-    seed: int = 0
-    """Seed of gear errors and deviations."""
+    named: int = 0  # number of methods before the baselines
+    arms: Sequence[Variant] = ()  # the named plants
+    seed: int = 0  # seed of gear errors and deviations
     limits: MotionLimits = PAPER
-    payload_error: float = 0.0
-    """Error of the declared mass, relative to the carried one [-]."""
-    streams: bool = False
-    """Whether to follow streams from the start of each move."""
-    quick: bool = False
-    """Whether a few motions are enough."""
-    facts: Mapping[str, Any] = field(default_factory=dict)
-    """Description of all this for --json."""
-    notes: Sequence[str] = ()
-    """Notes on the moves for the reader."""
+    payload_error: float = 0.0  # error of the declared mass, relative to the carried one [-]
+    streams: bool = False  # whether to follow streams from the start of each move
+    quick: bool = False  # whether a few motions are enough
+    facts: Mapping[str, Any] = field(default_factory=dict)  # description of all this for --json
+    notes: Sequence[str] = ()  # notes on the moves for the reader
     on: "Callable[[str], StudyRequest | None]" = lambda _: None
     """Returns the same for another robot that comes with the package; None if the user chose a robot."""
 
@@ -71,12 +62,8 @@ class Preset:
 
     study: Callable[[StudyRequest], Study]
     always: tuple[str, ...] = ()
-    shapers: tuple[str, ...] = ()
-    """Default shapers."""
-    menu: Menu | None = None
-    """Menu of the baselines; None if there are none."""
-    options: frozenset[str] = frozenset()
-    """Options that it has besides those of all presets."""
-    modal: bool = True
-    """Whether each calibration needs a modal model."""
+    shapers: tuple[str, ...] = ()  # default shapers
+    menu: Menu | None = None  # menu of the baselines; None if there are none
+    options: frozenset[str] = frozenset()  # options that it has besides those of all presets
+    modal: bool = True  # whether each calibration needs a modal model
     least: int = 1

@@ -13,16 +13,12 @@ from tvist_shaping.base import Filter
 
 LONGEST = 3.0
 """Time after the reference's end within which a shaped reference must end [s]."""
-ENDED = 10
-"""Number of ticks at the target after which the output has ended."""
-WATCHED = 0.5
-"""Time for which the output is checked for a tail after it has ended [s]."""
-TAIL = 1e-6
-"""Largest motion in that time, and largest distance from the target [rad]."""
+ENDED = 10  # number of ticks at the target after which the output has ended
+WATCHED = 0.5  # time for which the output is checked for a tail after it has ended [s]
+TAIL = 1e-6  # largest motion in that time, and largest distance from the target [rad]
 SLACK = 3
 """Ticks by which a shaper may end later than declared, since interpolation uses samples on both sides."""
-WARM = 20
-"""Number of first ticks whose processing time is ignored, since they may compile code."""
+WARM = 20  # number of first ticks whose processing time is ignored, since they may compile code
 
 
 class ShaperFaultError(Exception):
@@ -33,18 +29,13 @@ class ShaperFaultError(Exception):
 class Shaped:
     """A shaped reference, and the feed-forward to follow it."""
 
-    q: Floats
-    """Samples up to the end and a few ticks more, shape (T', n) [rad]."""
-    delay: float = 0.0
-    """Time from the reference's end to the output's, at most the declared delay [s]."""
-    cost: float | None = None
-    """Measured processor time per tick [s]."""
+    q: Floats  # samples up to the end and a few ticks more, shape (T', n) [rad]
+    delay: float = 0.0  # time from the reference's end to the output's, at most the declared delay [s]
+    cost: float | None = None  # measured processor time per tick [s]
     elastic: ElasticFeedForward | None = None
     """Elastic feed-forward for the drives; None for that of the paper's controller."""
-    law: Floats | None = None
-    """Friction to feed forward; None for that of the unshaped motion."""
-    ended: bool = True
-    """Whether it came to rest at the target."""
+    law: Floats | None = None  # friction to feed forward; None for that of the unshaped motion
+    ended: bool = True  # whether it came to rest at the target
 
 
 class RunningShaper(Protocol):

@@ -14,10 +14,8 @@ import polars as pl
 from tvist_lab.study.work import FAILED
 from tvist_lab.whole_file import UNFINISHED, whole_file
 
-MANIFEST = "study.json"
-"""File with the study's identity, which determines the rows."""
-PARTS = "parts"
-"""Folder for the parts of an unfinished study."""
+MANIFEST = "study.json"  # file with the study's identity, which determines the rows
+PARTS = "parts"  # folder for the parts of an unfinished study
 ROWS = "rows.parquet"
 
 

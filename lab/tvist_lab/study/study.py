@@ -36,8 +36,7 @@ COUNTS = {
 """Counts in each group of rows."""
 DIGITS = 3
 
-Figures = Mapping[str, tuple[Figure, str]]
-"""Figures and captions, by file name without suffix."""
+Figures = Mapping[str, tuple[Figure, str]]  # figures and captions, by file name without suffix
 
 
 class StudyError(ValueError):
@@ -82,29 +81,23 @@ class Study:
     """A study in which every method makes every case."""
 
     title: str
-    cases: Sequence[Case]
-    """Cases, each with the same axes; a case may have its own methods."""
+    cases: Sequence[Case]  # cases, each with the same axes; a case may have its own methods
     methods: Sequence[Method] = ()
     by: tuple[str, ...] = ()
     """Axes that the tables distinguish besides arms and methods; the figure is drawn over the first one.
     Other axes, such as the number of the move, are summarized."""
-    pooled: tuple[str, ...] = ()
-    """What the tables do not distinguish although it differs: "arm" or "shaper"."""
+    pooled: tuple[str, ...] = ()  # what the tables do not distinguish although it differs: "arm" or "shaper"
     splits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Further axes for additional summaries, by their names in --json."""
     show: tuple[str, ...] = ("reduction_percent", "delay_ms")
     """Measures in the figure, and in the table if there are no columns."""
     columns: tuple[Column, ...] = ()
-    few: tuple[Column, ...] = ()
-    """Columns if too few rows count for a median."""
-    more: tuple[pl.Expr, ...] = ()
-    """Further values of each group of rows, for --json."""
-    measures: tuple[str, ...] = OF_PEAKS
-    """Measures kept in the rows besides those that the columns need."""
+    few: tuple[Column, ...] = ()  # columns if too few rows count for a median
+    more: tuple[pl.Expr, ...] = ()  # further values of each group of rows, for --json
+    measures: tuple[str, ...] = OF_PEAKS  # measures kept in the rows besides those that the columns need
     prepare: Callable[[pl.DataFrame], pl.DataFrame] = lambda rows: rows
     """Transforms all rows before they are grouped."""
-    finish: Callable[[Result], None] = lambda _: None
-    """Adds to a result what no column can compute."""
+    finish: Callable[[Result], None] = lambda _: None  # adds to a result what no column can compute
     tables: Callable[[Result], Sequence[ResultTable]] | None = None
     """Returns the tables; None for one with the summary."""
     draw: Callable[[Result], Figures] | None = None
@@ -112,8 +105,7 @@ class Study:
     as_served: bool = True
     """Whether moves are planned for the shaper as by a robot, instead of using the same reference."""
     notes: str = ""
-    facts: Mapping[str, Any] = field(default_factory=dict)
-    """Properties of the cases, for --json."""
+    facts: Mapping[str, Any] = field(default_factory=dict)  # properties of the cases, for --json
     identity: Mapping[str, Any] = field(default_factory=dict)
     """What determines the rows besides title, facts and version of tvist: rows of another identity are not
     continued."""

@@ -21,8 +21,7 @@ from tvist_plant.user_file import named
 
 MEASURED, TOO_WEAK, FAILED = "measured", "too weak", "failed"
 
-Row = Mapping[str, Any]
-"""A row: values by column name."""
+Row = Mapping[str, Any]  # a row: values by column name
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,7 @@ class Job:
     case: Case
     methods: tuple[Method, ...]
     measures: tuple[str, ...] = OF_PEAKS
-    as_served: bool = True
-    """See `Task.as_served`."""
+    as_served: bool = True  # see `Task.as_served`
 
     @property
     def motions(self) -> int:

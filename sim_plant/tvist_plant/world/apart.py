@@ -17,10 +17,8 @@ from tvist_plant.world.arm_form import settle
 from tvist_plant.world.scene import World, build
 from tvist_plant.world.scene_file import SceneError, SceneFile
 
-LONGEST, MOST_MEMORY = 30, 768 << 20
-"""Longest time [s] and largest memory [byte] for building a scene."""
-Asked = tuple[RobotDescription, Payload, SceneFile, float, Hand | None]
-"""Arguments of `build`."""
+LONGEST, MOST_MEMORY = 30, 768 << 20  # longest time [s] and largest memory [byte] for building a scene
+Asked = tuple[RobotDescription, Payload, SceneFile, float, Hand | None]  # arguments of `build`
 
 
 def build_apart(asked: Asked) -> World:

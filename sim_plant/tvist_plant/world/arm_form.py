@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from tvist_plant.description import Payload, RobotDescription, Tensor
 from tvist_plant.model import FLANGE, Floats, link_frame
 
-LOAD = "load"
-"""Name of the body beyond the flange: the payload, and the fingers of a gripper."""
+LOAD = "load"  # name of the body beyond the flange: the payload, and the fingers of a gripper
 
 
 class Hinges(NamedTuple):
@@ -24,8 +23,7 @@ class Hinges(NamedTuple):
 
     joints: NDArray[np.int64]
     motors: NDArray[np.int64]
-    flexes: NDArray[np.int64]
-    """Virtual joints about y and z of each bending link."""
+    flexes: NDArray[np.int64]  # virtual joints about y and z of each bending link
 
     @classmethod
     def of(cls, description: RobotDescription, model: "mujoco.MjModel") -> "Hinges":

@@ -21,24 +21,16 @@ import numpy as np
 
 from tvist_plant.world.scene_file import SceneError
 
-PREFIX = "world/"
-"""Prefix of the scene's names in the model, to keep them apart from the arm's."""
-STIFFNESS = 1e5
-"""Default stiffness of a contact [N/m]."""
-DAMPING_RATIO = 0.3
-"""Default damping ratio of a contact, for the mass that MuJoCo estimates [-]."""
-IMPEDANCE = 2e-3
-"""d: fraction by which a contact's stiffness depends on the bodies [-]."""
-IMPRATIO = 1e6
-"""Stiffness of friction relative to the contact [-]."""
+PREFIX = "world/"  # prefix of the scene's names in the model, to keep them apart from the arm's
+STIFFNESS = 1e5  # default stiffness of a contact [N/m]
+DAMPING_RATIO = 0.3  # default damping ratio of a contact, for the mass that MuJoCo estimates [-]
+IMPEDANCE = 2e-3  # d: fraction by which a contact's stiffness depends on the bodies [-]
+IMPRATIO = 1e6  # stiffness of friction relative to the contact [-]
 FACES = 4
 """Contact points of a box on a box or plane, which share the stiffness; other shapes touch at one point."""
-GRIP = 500.0
-"""Rate at which friction ends slip [1/s]."""
-MOST_PAIRS = 4000
-"""Largest number of shape pairs that can be checked in real time at steps of 0.25 ms."""
-FIRMEST = 0.5
-"""Largest A k h²; above, a contact would oscillate within few steps [-]."""
+GRIP = 500.0  # rate at which friction ends slip [1/s]
+MOST_PAIRS = 4000  # largest number of shape pairs that can be checked in real time at steps of 0.25 ms
+FIRMEST = 0.5  # largest A k h²; above, a contact would oscillate within few steps [-]
 
 TURNS = 50.0
 """Ratio of inverse mass at a body's reach to that at its centre of mass, above which it is treated as only
@@ -46,8 +38,7 @@ turning [-]."""
 
 _FLAT = {int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_PLANE)}
 
-ALL = 0x7FFFFFFF
-"""`contype` and `conaffinity` of arm and fingers, which touch every solid shape."""
+ALL = 0x7FFFFFFF  # `contype` and `conaffinity` of arm and fingers, which touch every solid shape
 
 Names = frozenset[str]
 Contacts = Sequence[tuple[float | None, float | None]]

@@ -7,20 +7,14 @@ import pinocchio as pin
 from tvist_plant.plant import Hand
 from tvist_plant.world.contacts import ALL
 
-PAD = (0.011, 0.004, 0.03)
-"""Half lengths of a finger along x y z of the tool centre point [m]."""
-BEYOND = 0.008
-"""Length of a finger beyond the tool centre point [m]."""
+PAD = (0.011, 0.004, 0.03)  # half lengths of a finger along x y z of the tool centre point [m]
+BEYOND = 0.008  # length of a finger beyond the tool centre point [m]
 MASS, DRIVE = 0.001, 0.5
 """A finger's own mass, the rest being part of the tool's, and its motor's inertia through the gear [kg]."""
-STIFFNESS, DAMPING = 2e4, 200.0
-"""Gains of the position controller of a finger [N/m, N s/m]."""
-TOGETHER = 2e5
-"""Stiffness of the linkage that centres the fingers [N/m]."""
-FRICTION = (1.0, 0.01, 1e-4)
-"""Friction of a finger: sliding [-], torsional and rolling [m]."""
-SIDES = {"finger left": 1.0, "finger right": -1.0}
-"""Bodies of the fingers and their sides."""
+STIFFNESS, DAMPING = 2e4, 200.0  # gains of the position controller of a finger [N/m, N s/m]
+TOGETHER = 2e5  # stiffness of the linkage that centres the fingers [N/m]
+FRICTION = (1.0, 0.01, 1e-4)  # friction of a finger: sliding [-], torsional and rolling [m]
+SIDES = {"finger left": 1.0, "finger right": -1.0}  # bodies of the fingers and their sides
 
 
 def add_fingers(spec: "mujoco.MjSpec", load: "mujoco.MjsBody", hand: Hand) -> None:

@@ -27,10 +27,8 @@ from tvist_plant.world.fingers import Fingers
 from tvist_plant.world.scene import World
 from tvist_plant.world.scene_file import SceneFile
 
-TIMESTEP = 0.00025
-"""Time step at which MuJoCo agrees with `FlexibleArm` [s]."""
-DEEPEST = 1e-4
-"""Largest penetration of an arm at the pose of a reset [m]."""
+TIMESTEP = 0.00025  # time step at which MuJoCo agrees with `FlexibleArm` [s]
+DEEPEST = 1e-4  # largest penetration of an arm at the pose of a reset [m]
 _OF_HANDS: Final = (Plant.mount, Plant.grip, Plant.opening)
 
 
@@ -105,8 +103,7 @@ class MujocoArm(SimulatedArm):
         self._flange, self._load = model.body(FLANGE).id, model.body(LOAD).id
         self._state = data.qpos, data.qvel, data.qfrc_applied
         self._place, self._turn = data.xpos[self._flange], data.xmat[self._flange]
-        self._evaluated = False
-        """Whether MuJoCo has already evaluated the present positions and velocities."""
+        self._evaluated = False  # whether MuJoCo has already evaluated the present positions and velocities
 
     def _seed(self, seed: int) -> None:
         sensors, alone = self._description.sensors, self._scene is None

@@ -15,10 +15,8 @@ from tvist_plant.world.contacts import ALL, IMPRATIO, PREFIX, Contacts, add_pair
 from tvist_plant.world.fingers import add_fingers
 from tvist_plant.world.scene_file import SceneError, SceneFile
 
-TOOL = "tool"
-"""The scene's body whose shapes are mounted on the flange."""
-MOST_BODIES = 50
-"""Largest number of moving bodies."""
+TOOL = "tool"  # the scene's body whose shapes are mounted on the flange
+MOST_BODIES = 50  # largest number of moving bodies
 _KINDS = {
     mujoco.mjtGeom.mjGEOM_PLANE: "plane",
     mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
@@ -33,16 +31,11 @@ _KINDS = {
 class World:
     """An arm, alone or in a scene."""
 
-    model: "mujoco.MjModel"
-    """Model of both, the arm first."""
-    contacts: Contacts = ()
-    """Result of `add_pairs`, for `set_contacts`."""
-    things: Things | None = None
-    """The objects besides the arm."""
-    bodies: tuple[int, ...] = ()
-    """Numbers of the bodies of `things`."""
-    arm: tuple[int, ...] = ()
-    """Numbers of the bodies of the arm and of what is mounted on it."""
+    model: "mujoco.MjModel"  # model of both, the arm first
+    contacts: Contacts = ()  # result of `add_pairs`, for `set_contacts`
+    things: Things | None = None  # the objects besides the arm
+    bodies: tuple[int, ...] = ()  # numbers of the bodies of `things`
+    arm: tuple[int, ...] = ()  # numbers of the bodies of the arm and of what is mounted on it
 
 
 def build(

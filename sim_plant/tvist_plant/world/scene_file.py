@@ -21,12 +21,9 @@ class SceneError(ValueError):
 class SceneFile:
     """A scene file that was found but not yet parsed."""
 
-    name: str
-    """Name of a scene of the package, or the given path."""
-    path: Path
-    """Path of the file."""
-    sha256: str
-    """SHA-256 of the file in hexadecimal; if it names other files, of all their hashes."""
+    name: str  # name of a scene of the package, or the given path
+    path: Path  # path of the file
+    sha256: str  # SHA-256 of the file in hexadecimal; if it names other files, of all their hashes
 
 
 def scenes() -> list[str]:

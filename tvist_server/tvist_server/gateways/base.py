@@ -12,8 +12,7 @@ from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 Message = State | Event | Truth | Telemetry | Io
-Answer = Callable[[Reply], None]
-"""Takes the reply to a command; called once, from any thread."""
+Answer = Callable[[Reply], None]  # takes the reply to a command; called once, from any thread
 
 
 def topic_of(message: Message) -> Topic:
@@ -76,8 +75,7 @@ class Gateway(ABC):
 
     setpoints_refused: int
     """Number of set-points rejected before the desk: on a key with a wildcard, or too large."""
-    dropped = 0
-    """Number of states dropped because too many were queued."""
+    dropped = 0  # number of states dropped because too many were queued
     wanted_topics: Collection[Topic] = frozenset(get_args(Topic))
     """Topics that currently have a reader; messages that no gateway takes are not made. Read from any thread."""
 

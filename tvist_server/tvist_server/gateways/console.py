@@ -13,12 +13,9 @@ from tvist_server.gateways.base import Gateway, Message
 
 log = logging.getLogger(__name__)
 
-WINDOW = 10.0
-"""Window in which lines are counted [s]."""
-STOPS, WARNINGS = 10, 5
-"""Largest number of lines of each kind per window; warnings never displace stops."""
-LEAVE = 0.2
-"""Longest wait at shutdown for a blocked console [s]."""
+WINDOW = 10.0  # window in which lines are counted [s]
+STOPS, WARNINGS = 10, 5  # largest number of lines of each kind per window; warnings never displace stops
+LEAVE = 0.2  # longest wait at shutdown for a blocked console [s]
 
 
 class Throttle:

@@ -4,8 +4,7 @@ import ipaddress
 import socket
 
 IP_PROTOCOLS = frozenset({"tcp", "udp", "ws", "tls", "quic"})
-LOCAL_PROTOCOLS = frozenset({"unixsock-stream"})
-"""Protocols that never leave the machine."""
+LOCAL_PROTOCOLS = frozenset({"unixsock-stream"})  # Protocols that never leave the machine
 
 
 def protocol(endpoint: str) -> str:

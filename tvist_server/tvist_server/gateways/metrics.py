@@ -34,10 +34,8 @@ class MetricsGateway(Gateway):
         self._newest = newest
         self.state: State | None = None
         self.telemetry: Telemetry | None = None
-        self.events: Counter[str] = Counter()
-        """Number of events by kind."""
-        self.warnings: Counter[str] = Counter()
-        """Number of warnings by code; empty: no code."""
+        self.events: Counter[str] = Counter()  # number of events by kind
+        self.warnings: Counter[str] = Counter()  # number of warnings by code; empty: no code
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
         if isinstance(message, Telemetry):

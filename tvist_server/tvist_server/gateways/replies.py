@@ -15,8 +15,7 @@ log = logging.getLogger(__name__)
 
 ENCODING = zenoh.Encoding("application/msgpack")
 
-CLOSE_WAIT = 0.2
-"""Longest time to send the last answers at close [s]."""
+CLOSE_WAIT = 0.2  # longest time to send the last answers at close [s]
 
 
 class Answers:

@@ -12,24 +12,18 @@ from tvist_server.gateways.exposure import check_endpoints, guarded_router
 from tvist_server.gateways.network import REALTIME, open_router
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-SESSIONS = 4096
-"""Largest number of robots, clients and routers connected at once."""
-MAX_COUNT = 10_000
-"""Largest COUNT in `NAME*COUNT`; each robot has its own rules."""
-FASTEST = 500.0
-"""Largest rate of states to pass on [1/s], which is the rate at which a robot publishes."""
-REDUCED = ("state", "truth")
-"""Keys whose rates can be reduced, because each message replaces the one before."""
+SESSIONS = 4096  # largest number of robots, clients and routers connected at once
+MAX_COUNT = 10_000  # largest COUNT in `NAME*COUNT`; each robot has its own rules
+FASTEST = 500.0  # largest rate of states to pass on [1/s], which is the rate at which a robot publishes
+REDUCED = ("state", "truth")  # keys whose rates can be reduced, because each message replaces the one before
 _RATE = re.compile(r"(\d+(?:\.\d+)?)(?:@([\w.:-]+))?")
 
 
 class Rate(NamedTuple):
     """A limit on the rate of each robot's states that the router passes on."""
 
-    hz: float
-    """States per second."""
-    interface: str | None
-    """Network interface that the states leave through; None: any."""
+    hz: float  # states per second
+    interface: str | None  # network interface that the states leave through; None: any
 
     @classmethod
     def read(cls, text: str) -> Self:

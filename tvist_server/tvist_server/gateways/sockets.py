@@ -26,16 +26,11 @@ from tvist_server.gateways.base import Gateway, Message
 
 log = logging.getLogger(__name__)
 
-CONNECT_WITHIN: Final = 2.0
-"""Longest time to connect, including name resolution [s]; as on UR's controllers."""
-PATIENCE: Final = 1.0
-"""Wall time for which a step waits for a socket that a program reads [s]."""
-MAX_UNREAD: Final = 65_536
-"""Number of unread bytes (plus one piece) above which the sender is paused."""
-FLUSH_WITHIN: Final = 5.0
-"""Longest time to flush a closed socket [s]."""
-MAX_UNSENT: Final = 262_144
-"""Number of unsent bytes above which the peer is disconnected."""
+CONNECT_WITHIN: Final = 2.0  # longest time to connect, including name resolution [s]; as on UR's controllers
+PATIENCE: Final = 1.0  # wall time for which a step waits for a socket that a program reads [s]
+MAX_UNREAD: Final = 65_536  # number of unread bytes (plus one piece) above which the sender is paused
+FLUSH_WITHIN: Final = 5.0  # longest time to flush a closed socket [s]
+MAX_UNSENT: Final = 262_144  # number of unsent bytes above which the peer is disconnected
 
 
 class _Link(asyncio.Protocol):
@@ -45,14 +40,10 @@ class _Link(asyncio.Protocol):
         self._number, self._tell = number, tell
         self._transport: asyncio.Transport | None = None
         self._received = 0
-        self.taken = 0
-        """Received bytes that the program has read; written in the controller's thread."""
-        self.paused = False
-        """Whether the sender is paused, because the program has much to read."""
-        self.ended = False
-        """Whether the socket has ended; later events are not reported."""
-        self.connecting: asyncio.Task[None] | None = None
-        """Task that connects it; None before it starts."""
+        self.taken = 0  # received bytes that the program has read; written in the controller's thread
+        self.paused = False  # whether the sender is paused, because the program has much to read
+        self.ended = False  # whether the socket has ended; later events are not reported
+        self.connecting: asyncio.Task[None] | None = None  # task that connects it; None before it starts
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -123,12 +114,9 @@ class ProgramSockets(Gateway, SocketPorts):
         """Actions that wait for the network's thread to start; None from then on."""
         # The controller's thread alone uses the following fields.
         self._links: dict[int, _Link] = {}
-        self._waits: dict[int, tuple[int, float]] = {}
-        """Socket and start time of each present wait."""
-        self._moved: set[int] = set()
-        """Sockets with news since the last tick."""
-        self._silent: set[int] = set()
-        """Sockets that a step has waited for in vain."""
+        self._waits: dict[int, tuple[int, float]] = {}  # socket and start time of each present wait
+        self._moved: set[int] = set()  # sockets with news since the last tick
+        self._silent: set[int] = set()  # sockets that a step has waited for in vain
 
     # The following methods run in the controller's thread.
 

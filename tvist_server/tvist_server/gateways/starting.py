@@ -7,10 +7,8 @@ from tvist_protocol.codec import encode
 from tvist_protocol.replies import Refused
 from tvist_server.gateways.base import Answer, QueryHandler
 
-Tell = Callable[[int, int], None]
-"""Takes the number of compiled kernels and of all kernels."""
-Prepare = Callable[[Tell], None]
-"""Does the slow work that precedes the creation of robots."""
+Tell = Callable[[int, int], None]  # takes the number of compiled kernels and of all kernels
+Prepare = Callable[[Tell], None]  # does the slow work that precedes the creation of robots
 
 
 class Starting(QueryHandler):

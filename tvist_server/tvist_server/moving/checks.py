@@ -18,18 +18,14 @@ MODEL, REMOTE = "get robot model", "is in remote control"
 QUESTIONS = MODEL, REMOTE
 LEAST_MINOR = {3: 14, 5: 9}
 """Oldest supported minor version of the robot's software by major version; later major versions are all supported."""
-MAX_JOINT_DIFFERENCE = 0.01
-"""Largest deviation of a joint from its expected angle [rad]."""
-SAME_MASS = 0.05
-"""Largest difference of two masses that count as equal [kg]."""
+MAX_JOINT_DIFFERENCE = 0.01  # largest deviation of a joint from its expected angle [rad]
+SAME_MASS = 0.05  # largest difference of two masses that count as equal [kg]
 SAME_PLACE, SAME_TURN = 1e-3, 0.01
 """Largest difference of two tool centre points that count as equal [m, rad]."""
 STILL = 1e-3
 """Speed below which a joint is at rest [rad/s]."""
-LEANING = 0.15
-"""Largest angle between the measured and the expected direction of gravity [rad]."""
-PLAUSIBLE = 2.0
-"""Largest error of the measured gravity for which the accelerometer is used [m/s²]."""
+LEANING = 0.15  # largest angle between the measured and the expected direction of gravity [rad]
+PLAUSIBLE = 2.0  # largest error of the measured gravity for which the accelerometer is used [m/s²]
 _AGAIN = "then power on here"
 _SAFETY = {
     SafetyMode.PROTECTIVE_STOP: "it has made a protective stop: remove the cause, unlock it at the robot, then here",
@@ -66,12 +62,9 @@ class Wanted(NamedTuple):
     """What tvist was told about the robot."""
 
     description: RobotDescription
-    payload: Payload
-    """Payload that the robot should have been told."""
-    tool: tuple[float, ...] | None = None
-    """Tool centre point that the robot should have been told; None: any."""
-    q: tuple[float, ...] | None = None
-    """Joint angles at which the robot should be [rad]; None: any."""
+    payload: Payload  # payload that the robot should have been told
+    tool: tuple[float, ...] | None = None  # tool centre point that the robot should have been told; None: any
+    q: tuple[float, ...] | None = None  # joint angles at which the robot should be [rad]; None: any
 
 
 def why_not_by_answers(wanted: Wanted, answers: Mapping[str, str], own: Configuration | None) -> str | None:

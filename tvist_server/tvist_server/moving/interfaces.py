@@ -13,20 +13,14 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.errors import short
 from tvist_server.watching.address import RobotAddress
 
-PATIENCE = 2.0
-"""Longest duration of a conversation [s]."""
-MAX_ANSWER = 1 << 20
-"""Largest answer [bytes]."""
-DASHBOARD = 29999
-"""Port of the dashboard server on a UR robot."""
+PATIENCE = 2.0  # longest duration of a conversation [s]
+MAX_ANSWER = 1 << 20  # largest answer [bytes]
+DASHBOARD = 29999  # port of the dashboard server on a UR robot
 _UNKNOWN = "could not understand"
 _PACKAGE, _PART, _DATA = Struct(">iB"), Struct(">IB"), Struct(">53d4i")
-PRIMARY = 30001
-"""Port of the primary interface on a UR robot."""
-STATE, CONFIGURATION = 16, 6
-"""Type of robot state packages, and number of their part with the configuration."""
-FAR, TURNED = 5e-3, 0.01
-"""Smallest differences from the robot file that indicate another model [m, rad]."""
+PRIMARY = 30001  # port of the primary interface on a UR robot
+STATE, CONFIGURATION = 16, 6  # type of robot state packages, and number of their part with the configuration
+FAR, TURNED = 5e-3, 0.01  # smallest differences from the robot file that indicate another model [m, rad]
 T = TypeVar("T")
 
 
@@ -75,16 +69,11 @@ def asked(place: RobotAddress, questions: Sequence[str]) -> dict[str, str]:
 class Configuration(NamedTuple):
     """Dimensions and limits that a robot reports; all arrays have shape (6,)."""
 
-    least: np.ndarray
-    """Smallest joint angles [rad]."""
-    most: np.ndarray
-    """Largest joint angles [rad]."""
-    velocity: np.ndarray
-    """Largest velocities [rad/s]."""
-    acceleration: np.ndarray
-    """Largest accelerations [rad/s²]."""
-    a: np.ndarray
-    """Denavit-Hartenberg link lengths [m]; `d` are offsets [m] and `alpha` twists [rad]."""
+    least: np.ndarray  # smallest joint angles [rad]
+    most: np.ndarray  # largest joint angles [rad]
+    velocity: np.ndarray  # largest velocities [rad/s]
+    acceleration: np.ndarray  # largest accelerations [rad/s²]
+    a: np.ndarray  # Denavit-Hartenberg link lengths [m]; `d` are offsets [m] and `alpha` twists [rad]
     d: np.ndarray
     alpha: np.ndarray
 

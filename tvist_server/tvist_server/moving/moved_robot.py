@@ -193,10 +193,8 @@ class ControlPeriods:
     """Counts the control periods of one robot: by its rows, or by this machine's clock while it is silent."""
 
     def __init__(self) -> None:
-        self.tick = 0
-        """Number of the present period, in the robot's time."""
-        self.owed = 0
-        """Number of periods that the last row has started and that are not computed yet."""
+        self.tick = 0  # number of the present period, in the robot's time
+        self.owed = 0  # number of periods that the last row has started and that are not computed yet
         self._heard, self._due = -math.inf, 0.0
 
     def silent(self, now: float) -> bool:

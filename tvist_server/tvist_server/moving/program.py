@@ -8,28 +8,19 @@ from string import Template
 
 from tvist_server.rtde.wire import Field, WireType
 
-NAME = "tvist_follow"
-"""Name of the program, which robots display."""
-SILENCE = 0.04
-"""Longest time from the last set-point until the arm starts to brake [s]."""
-FIRST = 10.0
-"""Longest wait for the first set-point [s]."""
-AWAY = 0.01
-"""Largest distance of a joint from the first set-point [rad]."""
-AGAIN = 0.016
-"""Longest time after a set-point in which the next one is expected to be on its way [s]."""
-CLOSE = 3e-4
-"""Distance from the set-points, and from their path, that is corrected within one period [rad]."""
+NAME = "tvist_follow"  # name of the program, which robots display
+SILENCE = 0.04  # longest time from the last set-point until the arm starts to brake [s]
+FIRST = 10.0  # longest wait for the first set-point [s]
+AWAY = 0.01  # largest distance of a joint from the first set-point [rad]
+AGAIN = 0.016  # longest time after a set-point in which the next one is expected to be on its way [s]
+CLOSE = 3e-4  # distance from the set-points, and from their path, that is corrected within one period [rad]
 AFTER_SHIFT = 1e-5
 """The same after the program has shifted the motion in time, an error that does not vanish by itself [rad]."""
-FADE = 0.05
-"""Time constant of the correction of larger distances [s]."""
-MARGIN = 1.05
-"""Largest ratio of the arm's speed to that of the fastest set-points [-]."""
+FADE = 0.05  # time constant of the correction of larger distances [s]
+MARGIN = 1.05  # largest ratio of the arm's speed to that of the fastest set-points [-]
 
 JOINTS = 6
-KEPT = 4
-"""Number of set-points in a package: the newest and its predecessors."""
+KEPT = 4  # number of set-points in a package: the newest and its predecessors
 MAX_NUMBER = 2**30
 """Largest number of a set-point or run, followed by 1. Differences fit into a 32-bit register."""
 
@@ -37,17 +28,13 @@ NUMBER = 24
 """Input integer: number n of the newest set-point, one more in each control period of the robot; 0: none yet."""
 ORDER = 25
 """Input integer: number of the run that may follow; any other value ends it, its negative also during the wait."""
-SETPOINTS = 24
-"""First of the input doubles: joint angles of set-point n, then of n-1, n-2 and n-3 [rad]."""
+SETPOINTS = 24  # first of the input doubles: joint angles of set-point n, then of n-1, n-2 and n-3 [rad]
 
-STATE = 24
-"""Output integer: a `ProgramState`."""
+STATE = 24  # output integer: a `ProgramState`
 PLAYED = 25
 """Output integer: number of the set-point being played; 0 and below stand for `MAX_NUMBER` and its predecessors."""
-ENDED = 26
-"""Output integer: a `ProgramEnded`."""
-ALONE = 27
-"""Output integer: number of periods without their set-point, in which the arm extrapolated."""
+ENDED = 26  # output integer: a `ProgramEnded`
+ALONE = 27  # output integer: number of periods without their set-point, in which the arm extrapolated
 LEFT_OUT = 28
 """Output integer: number of set-points never played, because they were late or the program fell behind."""
 RUN = 29
@@ -69,16 +56,11 @@ class ProgramEnded(IntEnum):
 
     NOT = 0
     ORDERED = 1
-    SILENCE = 2
-    """No set-point has come for almost 40 ms, or none at all within the wait for the first."""
-    AWAY = 3
-    """The first set-point is too far from the arm."""
-    TOO_FAST = 4
-    """A set-point is further from its predecessor than the speed cap permits, or is not a number."""
-    LOST = 5
-    """The program was paused or fell behind, or the numbers do not continue."""
-    STRAYED = 6
-    """The arm did not follow the program."""
+    SILENCE = 2  # no set-point has come for almost 40 ms, or none at all within the wait for the first
+    AWAY = 3  # the first set-point is too far from the arm
+    TOO_FAST = 4  # a set-point is further from its predecessor than the speed cap permits, or is not a number
+    LOST = 5  # the program was paused or fell behind, or the numbers do not continue
+    STRAYED = 6  # the arm did not follow the program
 
 
 INPUTS: dict[str, WireType] = {
@@ -130,8 +112,7 @@ class Window:
     """Numbers set-points from 1, one per control period of the robot, and keeps those of the next package."""
 
     def __init__(self) -> None:
-        self.number = 0
-        """Number of the newest set-point; 0 before the first."""
+        self.number = 0  # number of the newest set-point; 0 before the first
         self._kept = deque[Sequence[float]](maxlen=KEPT)
 
     @property

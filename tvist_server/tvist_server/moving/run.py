@@ -29,24 +29,17 @@ from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, ServoSetpoi
 from tvist_server.watching.address import RobotAddress
 from tvist_server.watching.watched_robot import WatchedRobot
 
-DECELERATION = 5.0
-"""Smallest deceleration of the fastest joint when the program brakes [rad/s²]."""
-BRAKES = 0.125
-"""Braking time at the speed cap, if that needs a larger deceleration [s]."""
+DECELERATION = 5.0  # smallest deceleration of the fastest joint when the program brakes [rad/s²]
+BRAKES = 0.125  # braking time at the speed cap, if that needs a larger deceleration [s]
 SETTLES = 25
 """Number of rows of the waiting program before the first set-point; rows delayed by its start have come by then."""
-GRACE = 5
-"""Number of rows after the program's end in which the modes may still explain it."""
-STANDS = 10
-"""Number of rows with the same set-point after which another program must have replaced this one."""
+GRACE = 5  # number of rows after the program's end in which the modes may still explain it
+STANDS = 10  # number of rows with the same set-point after which another program must have replaced this one
 HEEDS = 250
 """Number of ignored set-points after which a waiting program cannot be `follow.script`, which follows the first."""
-BEGINS = 5.0
-"""Longest time for the program to start [s]."""
-TELL_EVERY = 10.0
-"""Shortest time between two reports about late set-points [s]."""
-LOOK_EVERY = 0.2
-"""Longest time until the upload thread notices that it should end [s]."""
+BEGINS = 5.0  # longest time for the program to start [s]
+TELL_EVERY = 10.0  # shortest time between two reports about late set-points [s]
+LOOK_EVERY = 0.2  # longest time until the upload thread notices that it should end [s]
 
 
 class ProgramRun:
@@ -70,8 +63,7 @@ class ProgramRun:
         self._follows, self._played, self._still = False, 0, 0
         self.ready = False
         """Whether the program follows `add`. It changes only between two ticks, so that no command is lost."""
-        self.halt: Halt | None = None
-        """Why the program does not follow, and will not again."""
+        self.halt: Halt | None = None  # why the program does not follow, and will not again
         self._told, self._told_at = (0, 0, 0), 0.0
         robot.write(self._window.values(0))  # so that set-points of an earlier run are not played
         deceleration = min(max(DECELERATION, speed / BRAKES), *limits.acceleration)
@@ -153,8 +145,7 @@ class Upload:
 
     def __init__(self, place: RobotAddress, text: str, check: Callable[[], str | None]) -> None:
         self._place, self._text, self._check = place, text, check
-        self.trouble: str | None = None
-        """Why the program cannot run."""
+        self.trouble: str | None = None  # why the program cannot run
         self._closed = threading.Event()
         self.thread = threading.Thread(target=self._run, name="tvist-upload", daemon=True)
         self.thread.start()

@@ -12,21 +12,17 @@ from tvist_plant.plant import PERIOD, PlantError
 
 LOOKAHEAD = 0.03
 """`lookahead_time` of `servoj` [s]: the smallest, since a larger lag only increases the lead that is sent."""
-GAIN = 2000.0
-"""`gain` of `servoj` [1/s²]: the largest, for the same reason."""
+GAIN = 2000.0  # `gain` of `servoj` [1/s²]: the largest, for the same reason
 
-CUT = 1e-3
-"""Smallest cut of a set-point that is counted [rad]."""
+CUT = 1e-3  # smallest cut of a set-point that is counted [rad]
 
 
 @dataclass(frozen=True)
 class ServoLag:
     """How `servoj` follows the set-points p, each held for a period: q̈ = k (p - q - T q̇)."""
 
-    time: float
-    """T, the delay of a motion of constant velocity [s]."""
-    gain: float
-    """k [1/s²]."""
+    time: float  # t, the delay of a motion of constant velocity [s]
+    gain: float  # k [1/s²]
 
     @classmethod
     def simulated(cls, lookahead: float = LOOKAHEAD, gain: float = GAIN) -> Self:
@@ -46,8 +42,7 @@ class ServoSetpoints:
 
     def __init__(self, q: Floats, lag: ServoLag | None, *, fastest: float, reach: Floats) -> None:
         self._lag, self._most, self._reach = lag, fastest * PERIOD, np.array(reach)
-        self.limited = 0
-        """Number of set-points that were cut by more than `CUT`."""
+        self.limited = 0  # number of set-points that were cut by more than `CUT`
         self.begin(q)
 
     def begin(self, q: Floats) -> None:

@@ -19,8 +19,7 @@ from tvist_server.recording import Kept, RecorderError
 
 log = logging.getLogger(__name__)
 
-KEPT = 500
-"""Number of ticks kept before the failure: one second."""
+KEPT = 500  # number of ticks kept before the failure: one second
 MAX_FILES = 10
 """Largest number of files of one robot, and of logged exceptions, so that repeated failures do not fill the disk."""
 

@@ -31,8 +31,7 @@ QUEUE_SIZE = 8192
 """Number of messages that may wait: 30 MB, five seconds at 1500 messages/s, as a file system's commit may take."""
 PAUSE = 0.02
 """Time between two checks of the queue [s]; waking the writer would cost a system call and the interpreter's lock."""
-LOOK = 1.0
-"""Time between two checks whether the file was moved or deleted [s]."""
+LOOK = 1.0  # time between two checks whether the file was moved or deleted [s]
 
 
 class Recorder(Sink):
@@ -59,8 +58,7 @@ class Recorder(Sink):
         if queue_size < 1:
             raise RecorderError(f"queue_size is {queue_size}: must be at least 1")
         self.path = Path(path)
-        self.error: str | None = None
-        """Why the recording stopped by itself."""
+        self.error: str | None = None  # why the recording stopped by itself
         self._dropped: dict[type[msgspec.Struct], int] = dict.fromkeys((State, Event, Truth, Io, Entry), 0)
         self._queue: deque[Kept | State] = deque()
         self._queue_size = queue_size

@@ -22,10 +22,8 @@ from tvist_protocol.recorded import FROM_TICK, Recorded, segment_name, segment_o
 from tvist_protocol.stream import State
 from tvist_server.recording.writer import RecordingWriter
 
-PARTS = 4
-"""Number of segments for the ticks that must be kept."""
-KEPT_RUNS = 5
-"""Number of earlier runs whose recordings are kept."""
+PARTS = 4  # number of segments for the ticks that must be kept
+KEPT_RUNS = 5  # number of earlier runs whose recordings are kept
 
 
 class DeletedError(Exception):
@@ -49,8 +47,7 @@ class Segments:
         """The growing file, and the path of the recording for readers, a pattern if there are segments."""
         self._name, self._topic_of, self._heading, self._keep = path, topic_of, heading, keep
         self._dropped, self._counted = dropped, dict(dropped)
-        self._held: deque[tuple[int, Path]] = deque()
-        """First tick of each segment."""
+        self._held: deque[tuple[int, Path]] = deque()  # first tick of each segment
         self._first: int | None = None
         self._last = 0
         self._io: Io | None = None

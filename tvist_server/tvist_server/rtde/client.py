@@ -14,10 +14,8 @@ from tvist_server.rtde.wire import Field, WireType
 
 Row = Mapping[str, tuple[float, ...]]
 """Values of one cycle of the robot by name, each within its range; a number is a tuple of one."""
-PROTOCOL = 2
-"""Protocol version, in which the client chooses the frequency."""
-RATE = 500.0
-"""Requested frequency; a robot with a slower cycle sends at its own [Hz]."""
+PROTOCOL = 2  # protocol version, in which the client chooses the frequency
+RATE = 500.0  # requested frequency; a robot with a slower cycle sends at its own [Hz]
 _VERSION = Struct(">4I")
 
 
@@ -29,8 +27,7 @@ class Received(NamedTuple):
     """Result of bytes from the robot."""
 
     send: bytes
-    rows: Sequence[Row]
-    """Complete rows, in order."""
+    rows: Sequence[Row]  # complete rows, in order
     texts: Sequence[str]
 
 

@@ -5,10 +5,8 @@ from enum import IntEnum
 from struct import Struct
 
 HEADER = Struct(">HB")
-LARGEST = 0xFFFF
-"""Largest size of a package including the header [bytes]."""
-TEXT = 255
-"""Longest text in a message [bytes]."""
+LARGEST = 0xFFFF  # largest size of a package including the header [bytes]
+TEXT = 255  # longest text in a message [bytes]
 
 
 class PackageKind(IntEnum):

@@ -10,8 +10,7 @@ PORT = 30004
 class RobotAddress(NamedTuple):
     """Address of a robot's RTDE interface."""
 
-    host: str
-    """Name or IP address."""
+    host: str  # name or IP address
     port: int = PORT
 
     def beside(self, port: int) -> "RobotAddress":

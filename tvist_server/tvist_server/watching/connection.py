@@ -12,14 +12,11 @@ from tvist_plant.plant import PERIOD
 from tvist_server.rtde.client import Row, RtdeClient, RtdeError
 from tvist_server.watching.address import PORT, RobotAddress
 
-ANSWERS = 3.0
-"""Longest time for a robot to accept a connection and start sending [s]."""
-SILENT = 1.0
-"""Time without a new row after which a connection is lost [s], as in UR's own clients."""
+ANSWERS = 3.0  # longest time for a robot to accept a connection and start sending [s]
+SILENT = 1.0  # time without a new row after which a connection is lost [s], as in UR's own clients
 Address = tuple[socket.AddressFamily, tuple[Any, ...]]
 """Family of an address, and the address as `socket` has it."""
-AT_ONCE = 1 << 16
-"""Largest number of bytes read at once: two seconds of rows."""
+AT_ONCE = 1 << 16  # largest number of bytes read at once: two seconds of rows
 
 
 class LostError(Exception):
@@ -35,8 +32,7 @@ class RtdeConnection:
 
     def __init__(self, place: RobotAddress, address: Address, client: RtdeClient) -> None:
         self._place, self.client = place, client
-        self.texts: list[str] = []
-        """Messages of the controller, until the caller clears the list."""
+        self.texts: list[str] = []  # messages of the controller, until the caller clears the list
         self._begun = self._heard = time.monotonic()
         self._connected, self._newest, self._rest = False, -1, b""
         self._socket = socket.socket(address[0], socket.SOCK_STREAM)

@@ -39,8 +39,7 @@ OPTIONAL: dict[str, Field] = {
     "actual_digital_output_bits": Field(WireType.UINT64, 0, 2**32 - 1),
 }
 """Variables that older software lacks."""
-JOINTS = 6
-"""Number of joints of every robot with RTDE."""
+JOINTS = 6  # number of joints of every robot with RTDE
 SAME_CLOCK = 1.0
 """Largest lead of a row over earlier ones, and largest difference of the clocks after a lost connection [s]."""
 
@@ -92,12 +91,9 @@ def _inertia(row: Row) -> tuple[float, float, float, float, float, float]:
 class Counted(NamedTuple):
     """A new row."""
 
-    tick: int
-    """Number of its control period; it increases from row to row."""
-    missing: int
-    """Number of rows missing before it."""
-    anew: bool
-    """Whether the robot's clock was reset, so that `missing` is estimated from the local clock."""
+    tick: int  # number of its control period; it increases from row to row
+    missing: int  # number of rows missing before it
+    anew: bool  # whether the robot's clock was reset, so that `missing` is estimated from the local clock
 
 
 class RowCount:
@@ -110,8 +106,7 @@ class RowCount:
         self._interval = interval
         self._own: int | None = None
         self._offset, self._heard, self._ahead = 0, 0.0, 0.0
-        self.tick = 0
-        """Number of the last row; 0 before the first."""
+        self.tick = 0  # number of the last row; 0 before the first
         self.rows = self.missing = self.doubled = 0
         """Numbers of rows taken, missing, and ignored as duplicates since the first one."""
 

@@ -21,16 +21,11 @@ from tvist_server.watching.address import RobotAddress
 from tvist_server.watching.connection import ANSWERS, LostError, RtdeConnection, UnreachableError, resolved
 from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, RowCount, has_real_payload, sight_of
 
-LOOKED_AT = 25
-"""Number of rows that determine the row rate."""
-INTERVALS = {1: "500", 4: "125"}
-"""Control periods between two rows, and the row rate of such a robot [Hz]."""
-TEXTS = 10
-"""Largest number of the robot's texts passed on in a second, and queued for its next row."""
-RETRY = 1.0
-"""Time between two attempts to connect [s]."""
-TELL_EVERY = 1.0
-"""Shortest time between two reports about missing rows [s]."""
+LOOKED_AT = 25  # number of rows that determine the row rate
+INTERVALS = {1: "500", 4: "125"}  # control periods between two rows, and the row rate of such a robot [Hz]
+TEXTS = 10  # largest number of the robot's texts passed on in a second, and queued for its next row
+RETRY = 1.0  # time between two attempts to connect [s]
+TELL_EVERY = 1.0  # shortest time between two reports about missing rows [s]
 OTHER = 0.03
 """Smallest distance of the tool that indicates another model [m]; a calibration shifts it by some millimetres."""
 
@@ -58,12 +53,9 @@ class WatchedRobot(RealArm):
         self._constants = [rating.torque_constant for rating in joint_ratings(description)]
         self._sights: deque[tuple[Sight, Row]] = deque()
         self._connection: RtdeConnection | None = None
-        self.looked_at: list[Row] = []
-        """Rows read before the first tick."""
-        self._checked = False
-        """Whether the present connection has sent a row of the right robot."""
-        self._lost = 0.0, ""
-        """Time [s] and reason of the loss of the connection; empty while connected."""
+        self.looked_at: list[Row] = []  # rows read before the first tick
+        self._checked = False  # whether the present connection has sent a row of the right robot
+        self._lost = 0.0, ""  # time [s] and reason of the loss of the connection; empty while connected
         self._retry_at = self._told_at = self._texts_at = 0.0
         self._untold = self._room = self._left_out = 0
         self._notes: list[str] = []
@@ -141,8 +133,7 @@ class WatchedRobot(RealArm):
                 if time.monotonic() > ends:
                     raise LostError(f"{self._place} sends only {len(rows)} rows in {ANSWERS:g} s")
             self._check(rows[-1])
-            self.version = self._client.version
-            """Software version: major, minor, bugfix, build."""
+            self.version = self._client.version  # software version: major, minor, bugfix, build
             lacking = self._client.lacking
         finally:
             self.close()

@@ -10,8 +10,7 @@ from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import out, print_json, say
 from tvist_cli.shapers_of import load_given
 
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-"""Endpoint on which a recording is published."""
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"  # endpoint on which a recording is published
 
 
 def replay(

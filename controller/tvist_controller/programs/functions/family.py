@@ -34,8 +34,7 @@ class Family:
     after a blended move takes effect where the blend begins, see `ProgramArm.then`.
     """
 
-    title: ClassVar[str]
-    """Heading in the reference page."""
+    title: ClassVar[str]  # heading in the reference page
 
     def __init__(self, on: Parts) -> None:
         self._access, self._arm, self._kinematics, self._parts = on.access, on.arm, on.kinematics, on

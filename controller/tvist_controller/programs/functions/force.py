@@ -27,8 +27,7 @@ from tvist_protocol.io import Length
 from tvist_protocol.values import Mass
 from tvist_urscript import Array, Fault, costs
 
-MAX_LIMIT = 1e3
-"""Largest limit of an axis; larger values have no effect [m/s, m, rad]."""
+MAX_LIMIT = 1e3  # largest limit of an axis; larger values have no effect [m/s, m, rad]
 ALL: Any = Array((1,) * 6)
 NOWHERE: Any = Array((0,) * 3)
 

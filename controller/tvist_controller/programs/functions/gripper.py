@@ -9,8 +9,7 @@ from tvist_controller.programs.functions.family import Family
 from tvist_controller.programs.journey import Turns
 from tvist_urscript import Fault
 
-_ONE = "1"
-"""Gripper of a call without one; ignored, because the cell has one gripper."""
+_ONE = "1"  # gripper of a call without one; ignored, because the cell has one gripper
 
 
 Counts = Annotated[int, whole(0, 255)]

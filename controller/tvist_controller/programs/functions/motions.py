@@ -30,8 +30,7 @@ from tvist_urscript import Array, Fault, Pose, costs
 
 LONGEST: Final = 3600.0
 """Longest duration of a move [s]."""
-CLOSE: Final = 1e-3
-"""Distance at which `servoc` has arrived [m, and rad times `TURN`]."""
+CLOSE: Final = 1e-3  # distance at which `servoc` has arrived [m, and rad times `TURN`]
 
 
 MAX_TOOL: Final = 3.0, 15.0

@@ -11,10 +11,8 @@ from tvist_protocol.commands import PowerOff
 from tvist_protocol.stream import PopupKind
 from tvist_urscript import Array, Fault, Struct, Value, costs, to_str
 
-LONGEST_TEXT = 350
-"""Number of list elements that fit into a text."""
-LONGEST_SLEEP = 1e6
-"""Longest time of `sleep` [s]."""
+LONGEST_TEXT = 350  # number of list elements that fit into a text
+LONGEST_SLEEP = 1e6  # longest time of `sleep` [s]
 
 
 class MessageFunctions(Family):

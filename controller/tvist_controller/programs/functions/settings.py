@@ -17,15 +17,12 @@ from tvist_protocol.io import Length, SetTcp
 from tvist_protocol.values import Mass, Moment, Offset
 from tvist_urscript import Array, Fault, costs
 
-GRAVITY = 9.82
-"""Gravity that programs may declare, within `TOLERANCE`, for an upright arm [m/s^2]."""
+GRAVITY = 9.82  # gravity that programs may declare, within `TOLERANCE`, for an upright arm [m/s^2]
 TOLERANCE = 0.05
-ROUNDED = 0.05
-"""Fraction of the largest moment by which others may be too small due to rounding in CAD."""
+ROUNDED = 0.05  # fraction of the largest moment by which others may be too small due to rounding in CAD
 ORDER = (0, 3, 5, 1, 2, 4)
 """Places of Ixx Iyy Izz Ixy Ixz Iyz, the order in programs, in the order of robot files."""
-NONE: Tensor = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-"""Inertia of a payload declared without it."""
+NONE: Tensor = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # inertia of a payload declared without it
 
 
 Centre = Annotated[tuple[float, float, float], several(3, Offset)]

@@ -20,8 +20,7 @@ from tvist_controller.programs.functions.terminals import BitPlace, Configurable
 from tvist_controller.programs.indicators import SHOWS_UNTIL_FAILURE, Group
 from tvist_urscript import Array, Fault
 
-RATES = (9600, 19200, 38400, 57600, 115200, 1000000, 2000000, 5000000)
-"""Baud rates of the tool's serial line."""
+RATES = (9600, 19200, 38400, 57600, 115200, 1000000, 2000000, 5000000)  # Baud rates of the tool's serial line
 _NO_TURNS: Any = Array((0.0,) * 6)
 
 

@@ -13,19 +13,13 @@ from tvist_urscript import Value, costs, to_str
 from tvist_urscript.texts import DECIMAL
 from tvist_urscript.values import Array, to_bytes, to_text
 
-MAX_VALUES = 30
-"""Largest number of values per call."""
-ANSWER = 2.0
-"""Timeout for the value of a variable [s]."""
-MORE = 25
-"""Ticks of waiting for data after which moves that wait to be blended start."""
-_ONE = "socket_0"
-"""Default name of a socket."""
+MAX_VALUES = 30  # largest number of values per call
+ANSWER = 2.0  # timeout for the value of a variable [s]
+MORE = 25  # ticks of waiting for data after which moves that wait to be blended start
+_ONE = "socket_0"  # default name of a socket
 _VARIABLE = re.compile(r"\s*(\S+)\s+([+-]?\d+)\s*", re.ASCII)
-LONGEST_NUMBER = 64
-"""Longest number [bytes]."""
-LONGEST_LINE = 1023
-"""Longest line or string, the same as for texts in programs [bytes]."""
+LONGEST_NUMBER = 64  # longest number [bytes]
+LONGEST_LINE = 1023  # longest line or string, the same as for texts in programs [bytes]
 T = TypeVar("T")
 
 

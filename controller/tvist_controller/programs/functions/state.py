@@ -77,8 +77,7 @@ class StateFunctions(Family):
 
     def __init__(self, on: Parts) -> None:
         super().__init__(on)
-        self._instruments: Instruments | None = None
-        """Computes RTDE variables; created when first needed."""
+        self._instruments: Instruments | None = None  # computes RTDE variables; created when first needed
 
     get_steptime = reads("Return the control period [s].", lambda _: PERIOD)
     get_actual_joint_positions = reads("Return the measured joint positions [rad].", _positions)

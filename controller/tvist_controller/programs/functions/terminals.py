@@ -10,10 +10,8 @@ from tvist_controller.programs.functions.family import Family, Parts, described
 from tvist_protocol.io import BITS, NUMBERS, Bank
 from tvist_urscript import Array, Fault, costs
 
-STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
-"""Bits of the digital terminals."""
-FLAGS = 32
-"""Number of flags; only programs have them."""
+STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)  # bits of the digital terminals
+FLAGS = 32  # number of flags; only programs have them
 
 
 def _old(name: str, value: object) -> int:

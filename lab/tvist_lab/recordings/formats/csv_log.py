@@ -14,10 +14,8 @@ from tvist_lab.recordings.recording import Floats
 from tvist_lab.recordings.table import STRANGE, TEXT, LogTable, reader
 from tvist_lab.words import counted
 
-SEPARATORS = (";", "\t", ",", " ")
-"""Separators of cells, in the order in which they are sought in the header."""
-EMPTY = ("", "nan", "NaN", "NAN", "None", "null", "NULL", "NA", "-")
-"""Cells without a number."""
+SEPARATORS = (";", "\t", ",", " ")  # Separators of cells, in the order in which they are sought in the header
+EMPTY = ("", "nan", "NaN", "NAN", "None", "null", "NULL", "NA", "-")  # cells without a number
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 
 

@@ -18,10 +18,8 @@ from tvist_lab.recordings.checks import LogError
 from tvist_lab.recordings.description import KEY, described
 from tvist_lab.recordings.table import LogTable, reader
 
-DENSEST = 2000
-"""Largest ratio of the content to the size of its file; recordings reach a tenth of it."""
-LEAST_CONTENT = 1 << 20
-"""Size of the content that any file may have [bytes]."""
+DENSEST = 2000  # largest ratio of the content to the size of its file; recordings reach a tenth of it
+LEAST_CONTENT = 1 << 20  # size of the content that any file may have [bytes]
 
 
 @reader(".parquet")

@@ -11,8 +11,7 @@ from tvist_lab.recordings.table import BINARY, STRANGE, LogTable, reader
 
 SIZES = (1044, 1060, 1108, 1116, 1140, 1220)
 """Lengths of a packet [bytes], from software 3.0 on; each later one starts like the earlier ones."""
-OLD = 812
-"""Length of a packet of software 1.8, which has another order."""
+OLD = 812  # length of a packet of software 1.8, which has another order
 
 
 @reader(BINARY)

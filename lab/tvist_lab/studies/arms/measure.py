@@ -25,12 +25,9 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import rigid_model
 from tvist_protocol.calibration import Calibration
 
-PLACES = 40
-"""Number of random configurations at which the sag is compared."""
-ALONE = 4
-"""Smallest number of joints of an arm that auto can shape, since it suppresses four modes."""
-TWIST = 1e-7
-"""Twist below which gravity loads no gear [rad]."""
+PLACES = 40  # number of random configurations at which the sag is compared
+ALONE = 4  # smallest number of joints of an arm that auto can shape, since it suppresses four modes
+TWIST = 1e-7  # twist below which gravity loads no gear [rad]
 
 
 def measure(

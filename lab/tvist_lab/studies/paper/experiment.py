@@ -17,13 +17,11 @@ from tvist_lab.recordings import Recording
 from tvist_lab.studies.paper.published import MOTIONS, pose
 from tvist_protocol.info import Info
 
-BEFORE = 0.1
-"""Time recorded before a motion [s]."""
+BEFORE = 0.1  # time recorded before a motion [s]
 AFTER = 1.9
 """Time recorded after the motion's end [s]: the drives' slow loops need it to settle within 0.03 mm."""
 
-ACCELERATION, JERK = 2.0, 100.0
-"""The paper's limits [rad/s², rad/s³]."""
+ACCELERATION, JERK = 2.0, 100.0  # the paper's limits [rad/s², rad/s³]
 Progress = Callable[[str], None]
 
 
@@ -32,15 +30,13 @@ class PaperMethod:
     """A method for making a motion: a shaper, and the modes that it is designed for."""
 
     name: str
-    label: str
-    """Name for display."""
+    label: str  # name for display
     shaper: str = "none"
     modes: tuple[float, float] | None = None
     """Constant design frequency [Hz] and damping ratio [-]; None for the polynomials of the robot's calibration."""
     frozen: bool = False
     """Whether it uses the modes of the end pose throughout, which requires the target in advance."""
-    jerk: float = JERK
-    """Jerk limit of the motion [rad/s³]."""
+    jerk: float = JERK  # jerk limit of the motion [rad/s³]
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> None:
         """Set up a robot at rest for a motion that ends at a pose; without a shaper, the estimate is still recorded."""
@@ -59,8 +55,7 @@ class PaperMethod:
 
 
 UNSHAPED = PaperMethod("unshaped", "unshaped")
-SHAPED = PaperMethod("shaped", "TVIST-ZV", "zv")
-"""TVIST with the calibration's polynomials."""
+SHAPED = PaperMethod("shaped", "TVIST-ZV", "zv")  # TVIST with the calibration's polynomials
 FROZEN_AT_END = PaperMethod("zv_frozen_at_end", "ZV for the end pose", "zv", frozen=True)
 
 

@@ -21,10 +21,8 @@ class ServedExperiment:
     """One run of the experiment on a served robot."""
 
     done: Experiment
-    report: dict[str, Any]
-    """Results as plain values, with those of the checks."""
-    difference: str | None
-    """First difference between replay and recording; None if there is none."""
+    report: dict[str, Any]  # results as plain values, with those of the checks
+    difference: str | None  # first difference between replay and recording; None if there is none
 
     @property
     def equal(self) -> bool:

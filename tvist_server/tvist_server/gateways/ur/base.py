@@ -11,16 +11,14 @@ from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
 
-Send = Callable[[bytes], None]
-"""Sends an answer, which is never dropped."""
+Send = Callable[[bytes], None]  # sends an answer, which is never dropped
 Item = TypeVar("Item")
 
 
 class PortSession(ABC):
     """One connection. Methods do not block and, whatever bytes arrive, do not raise: errors are answered."""
 
-    over = False
-    """Whether the connection is closed, or the client has asked to close it."""
+    over = False  # whether the connection is closed, or the client has asked to close it
     client_begins = False
     """Whether the client gets nothing that it has not requested, so that it may be disconnected to make room."""
     served = False

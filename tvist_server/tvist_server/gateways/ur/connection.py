@@ -16,31 +16,23 @@ from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 
 log = logging.getLogger(__name__)
 
-PIECE = 256
-"""Bytes read from a client at a time, so that a flood does not delay the others."""
+PIECE = 256  # bytes read from a client at a time, so that a flood does not delay the others
 MAX_COMMANDS = 32
 """Largest number of a client's unanswered commands; more pause reading, because one tick carries all of them out."""
-MAX_UNREAD = 1_000_000
-"""Unread bytes at which a client is disconnected."""
-HEARS = MAX_UNREAD // 4
-"""In real time, unread bytes above which a client misses messages to all clients."""
-ANSWERS = MAX_UNREAD // 2
-"""In real time, unread bytes above which reading from a client pauses."""
-MAX_UNREAD_LOCKSTEP = 64_000_000
-"""`MAX_UNREAD` in lockstep, where samples wait as well: one minute of them."""
+MAX_UNREAD = 1_000_000  # unread bytes at which a client is disconnected
+HEARS = MAX_UNREAD // 4  # in real time, unread bytes above which a client misses messages to all clients
+ANSWERS = MAX_UNREAD // 2  # in real time, unread bytes above which reading from a client pauses
+MAX_UNREAD_LOCKSTEP = 64_000_000  # `MAX_UNREAD` in lockstep, where samples wait as well: one minute of them
 
 LAST_WORDS = 65_536
 """Largest amount still read from a client that has reset its connection [bytes]; longer than any known program."""
 
-UNREAD_FOR = 10.0
-"""In real time, time without a successful sample after which a client is disconnected [s]."""
+UNREAD_FOR = 10.0  # in real time, time without a successful sample after which a client is disconnected [s]
 
-MAX_CONNECTIONS: Final = 256
-"""Largest number of connections to all interfaces of a robot."""
+MAX_CONNECTIONS: Final = 256  # largest number of connections to all interfaces of a robot
 LOCAL_PLACES: Final = 8
 """Number of places reserved for clients on this machine, so that a local user can always connect."""
-SCARCE: Final = 0.9
-"""Share of places in use above which each new client displaces another [-]."""
+SCARCE: Final = 0.9  # share of places in use above which each new client displaces another [-]
 
 MakeSession = Callable[[ConnectionControl, Send], PortSession]
 """Creates an interface's session from its access to the controller and its send function."""
@@ -64,17 +56,12 @@ class ClientConnection(asyncio.BufferedProtocol):
         self._most_unread = MAX_UNREAD_LOCKSTEP if lossless else MAX_UNREAD
         self._transport: asyncio.Transport | None = None
         self._piece = bytearray(PIECE)
-        self._behind = False
-        """Whether the client has left many answers unread."""
-        self._took = 0.0
-        """When the socket last accepted a sample [s of the loop's clock]."""
+        self._behind = False  # whether the client has left many answers unread
+        self._took = 0.0  # when the socket last accepted a sample [s of the loop's clock]
         self.session: PortSession | None = None
-        self.peer = "a client"
-        """Description of the client and its interface, for messages."""
-        self.heard = 0.0
-        """When the client last sent something, or connected [s of the loop's clock]."""
-        self.dropped = 0
-        """Number of samples dropped because the client is slow."""
+        self.peer = "a client"  # description of the client and its interface, for messages
+        self.heard = 0.0  # when the client last sent something, or connected [s of the loop's clock]
+        self.dropped = 0  # number of samples dropped because the client is slow
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start a session, unless all places are taken."""
@@ -228,8 +215,7 @@ class ConnectionLimit:
     def __init__(
         self, now: Callable[[], float], note: Callable[[str], None], most: int = MAX_CONNECTIONS
     ) -> None:
-        self.taken: set[ClientConnection] = set()
-        """Clients that have a place; each adds and removes itself."""
+        self.taken: set[ClientConnection] = set()  # clients that have a place; each adds and removes itself
         self._now = now
         self._note = note
         self._most = most

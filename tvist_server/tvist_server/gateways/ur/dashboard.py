@@ -17,12 +17,9 @@ from tvist_server.ur_model import series
 GREETING: Final = "Connected: Universal Robots Dashboard Server"
 LONGEST: Final = 4096
 """Longest line [bytes]; the rest of a longer one is ignored."""
-PATIENCE: Final = 2500
-"""Ticks within which a stopped arm must come to rest."""
-ECHO: Final = 200
-"""Characters of an unknown line that the answer repeats."""
-UNNAMED: Final = "<unnamed>"
-"""Reported name of the program while none is loaded."""
+PATIENCE: Final = 2500  # ticks within which a stopped arm must come to rest
+ECHO: Final = 200  # characters of an unknown line that the answer repeats
+UNNAMED: Final = "<unnamed>"  # reported name of the program while none is loaded
 INSTALLATION: Final = "default.installation"
 MODES: Final = ("MANUAL", "AUTOMATIC")
 TOO_SOON: Final = (
@@ -39,8 +36,7 @@ class Request:
     robot: UrRobot
     control: ConnectionControl
     argument: str
-    at_rest: Callable[[], Awaitable[bool]]
-    """Waits until the arm rests; returns whether it does in time."""
+    at_rest: Callable[[], Awaitable[bool]]  # waits until the arm rests; returns whether it does in time
 
 
 @dataclass(frozen=True)
@@ -253,10 +249,8 @@ class DashboardSession(InTurnSession[str]):
     def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
         super().__init__(robot, control, send)
         self._lines = LineSplitter(LONGEST)
-        self._rests: Deferred[bool] | None = None
-        """Waits for the arm to rest."""
-        self._last = 0
-        """Tick at which this wait ends."""
+        self._rests: Deferred[bool] | None = None  # waits for the arm to rest
+        self._last = 0  # tick at which this wait ends
 
     def opened(self) -> None:
         self._say(GREETING)

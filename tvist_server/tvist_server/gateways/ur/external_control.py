@@ -11,8 +11,7 @@ from tvist_server.polyscope import program, with_external_control
 from tvist_server.polyscope_nodes import EXTERNAL_CONTROL
 from tvist_server.program_folder import ProgramFolder
 
-FILE: Final = "external_control.urp"
-"""Built-in program that consists of the node alone."""
+FILE: Final = "external_control.urp"  # built-in program that consists of the node alone
 ALONE: Final = program("external_control", EXTERNAL_CONTROL)
 
 Fetch = Callable[[str], Awaitable[str | None]]

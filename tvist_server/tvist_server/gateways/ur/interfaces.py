@@ -38,14 +38,11 @@ from tvist_server.ur_ports import InterfaceName
 
 log = logging.getLogger(__name__)
 
-FIRST = 1000
-"""Longest wait for the first tick [ticks]."""
-MAX_PENDING = 250
-"""Largest number of states queued for the interfaces' thread: half a second."""
+FIRST = 1000  # longest wait for the first tick [ticks]
+MAX_PENDING = 250  # largest number of states queued for the interfaces' thread: half a second
 LEAD = 20
 """Largest queue in lockstep: the further a step runs ahead of published states, the later clients get answers."""
-PAUSE = 0.02
-"""Time between two checks for room in lockstep [s]."""
+PAUSE = 0.02  # time between two checks for room in lockstep [s]
 UNREAD = 10
 """States handed over together while there is no client; only temperatures and energies need them then."""
 
@@ -88,15 +85,11 @@ class UrInterfaces(Gateway):
         """Connections that have a place while the interfaces are open."""
         self._leases = WeakValueDictionary[str, HostLease]()
         """Lease of each host; it lives as long as one of the host's connections."""
-        self._adopted: HostLease | None = None
-        """Lease that this process holds in the name of a host."""
+        self._adopted: HostLease | None = None  # lease that this process holds in the name of a host
         self._lockstep = lockstep
-        self._news = deque[Report | Message]()
-        """Messages for the interfaces' thread."""
-        self._woken = False
-        """Whether that thread has been woken and has not run yet."""
-        self._unread: Report | None = None
-        """Last tick of which only temperatures and energies were computed."""
+        self._news = deque[Report | Message]()  # messages for the interfaces' thread
+        self._woken = False  # whether that thread has been woken and has not run yet
+        self._unread: Report | None = None  # last tick of which only temperatures and energies were computed
         self._room = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._servers: list[asyncio.Server] = []

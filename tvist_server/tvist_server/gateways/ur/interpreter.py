@@ -21,8 +21,7 @@ SKIPS: Final[dict[str, Literal["statements", "move"]]] = {"skipbuffer": "stateme
 """Commands that are carried out at once, and what each skips."""
 LONGEST: Final = MAX_SCRIPT
 """Longest line [bytes]."""
-ECHO: Final = 4096
-"""Characters of a line that its answer repeats."""
+ECHO: Final = 4096  # characters of a line that its answer repeats
 NO_PROGRAM, TOO_MANY, SYNTAX, COMPILATION, TOO_LONG = (
     "Program is in an invalid state",
     "Too many interpreted messages",

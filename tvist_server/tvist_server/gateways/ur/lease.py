@@ -9,28 +9,23 @@ from tvist_server.gateways.ur.deferred import Deferred, begin
 
 # The longest lease that the protocol allows: a host's control ends with its connections, not with time. ALIVE
 # is wall time but the lease is robot time, which can pass many times faster in lockstep.
-LEASE = 3600.0
-"""Duration of the lease without renewal [s]; it is renewed every `ALIVE`."""
-ALIVE = 10.0
-"""Time between two renewals of the lease [s]."""
+LEASE = 3600.0  # duration of the lease without renewal [s]; it is renewed every `ALIVE`
+ALIVE = 10.0  # time between two renewals of the lease [s]
 _LOST = {"no_control", "stale_token"}
 _NO_TOKEN = ""
 
-MakeCommand = Callable[[str], Command]
-"""Creates a command from the token of the lease."""
+MakeCommand = Callable[[str], Command]  # creates a command from the token of the lease
 
 
 class HostLease:
     """Control for the clients of one host; `soon` runs a function in the interfaces' thread."""
 
     def __init__(self, desk: CommandIntake, host: str, soon: Callable[[Callable[[], None]], None]) -> None:
-        self.client = f"ur-{host}"
-        """Name under which the lease is held."""
+        self.client = f"ur-{host}"  # name under which the lease is held
         self._desk, self.host = desk, host
         self._soon = soon
         self._token = _NO_TOKEN
-        self._taking: Deferred[Reply] | None = None
-        """Reply to a pending request for control."""
+        self._taking: Deferred[Reply] | None = None  # reply to a pending request for control
         self._users: set[object] = set()
 
     async def change(self, connection: object, command: MakeCommand) -> Reply:
@@ -111,10 +106,8 @@ class ConnectionControl:
     ) -> None:
         self.peer, self.host = peer or lease.client, lease.host
         self._lease = lease
-        self.hear = hear
-        """Handles an answer, which is a function to call."""
-        self.unanswered = 0
-        """Number of commands without an answer."""
+        self.hear = hear  # handles an answer, which is a function to call
+        self.unanswered = 0  # number of commands without an answer
 
     def change(self, command: MakeCommand) -> Deferred[Reply]:
         """Send a command that needs control; it is refused if another client has it."""

@@ -7,8 +7,7 @@ import sys
 from tvist_server.gateways.base import GatewayError
 from tvist_server.ur_ports import InterfaceName
 
-SEND_BUFFER = 32_768
-"""System's send buffer for a client [bytes]: 0.1 s of samples; more would only add delay."""
+SEND_BUFFER = 32_768  # system's send buffer for a client [bytes]: 0.1 s of samples; more would only add delay
 PROBES = (10, 5, 3)
 """TCP keepalive: idle time before the first probe [s], time between probes [s], and number of unanswered
 probes after which a client counts as disconnected and loses control, as when its machine has lost power."""

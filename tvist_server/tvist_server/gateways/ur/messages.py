@@ -7,8 +7,7 @@ from typing import Final
 from tvist_controller.instruments.snapshot import Snapshot
 
 ROBOT_MESSAGE: Final = 20
-SOURCE: Final = 254
-"""Source -2: neither a joint nor a board."""
+SOURCE: Final = 254  # source -2: neither a joint nor a board
 LONGEST: Final = 1000
 """Longest text [bytes]: some clients reject packages of more than 2000 bytes."""
 

@@ -9,13 +9,11 @@ from tvist_protocol.programs import MAX_SCRIPT
 
 log = logging.getLogger(__name__)
 
-PORT: Final = 50002
-"""Port on which UR's client library answers."""
+PORT: Final = 50002  # port on which UR's client library answers
 REQUEST: Final = b"request_program\n"
 ENDS: Final = b"# NODE_CONTROL_LOOP_ENDS"
 """Line near the end of the library's program."""
-WITHIN: Final = 2.0
-"""Longest wait for a connection, and for more of a program [s]."""
+WITHIN: Final = 2.0  # longest wait for a connection, and for more of a program [s]
 SILENCE: Final = 0.1
 """Silence after which a program with the line `ENDS` is complete [s]; the library does not mark its end."""
 

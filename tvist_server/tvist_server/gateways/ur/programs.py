@@ -25,8 +25,7 @@ from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.lease import ConnectionControl
 
-FOLDER: Final = "/programs"
-"""Folder in which a controller keeps programs; every other folder is accepted too."""
+FOLDER: Final = "/programs"  # folder in which a controller keeps programs; every other folder is accepted too
 _SAVED: Final = (".urp", ".script")
 """Endings of file names. A script that a client has sent has a name without ending."""
 _PLACE: Final = re.compile(r"text:(\d+):(\d+)")

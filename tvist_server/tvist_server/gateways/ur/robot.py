@@ -8,8 +8,7 @@ from tvist_plant.description import RobotDescription
 from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.programs import Programs
 
-NO_MODE = "NONE"
-"""Operational mode until a client sets one."""
+NO_MODE = "NONE"  # operational mode until a client sets one
 
 
 class UrRobot:
@@ -28,10 +27,8 @@ class UrRobot:
         self.tell, self.report, self.report_refusal = tell, report, report_refusal
         self.serial = f"2024550{crc32(name.encode()) % 10_000:04d}"
         """Serial number: the year, as UR's have, and digits derived from the name."""
-        self.latest: Snapshot | None = None
-        """Snapshot of the last tick; None before the first."""
-        self.operational_mode = NO_MODE
-        """Operational mode set on the dashboard."""
+        self.latest: Snapshot | None = None  # snapshot of the last tick; None before the first
+        self.operational_mode = NO_MODE  # operational mode set on the dashboard
         self.inputs = InputOwners()
         self.programs = Programs(self, external)
 
@@ -41,8 +38,7 @@ class InputOwners:
 
     def __init__(self) -> None:
         self._owners: dict[str, object] = {}
-        self.pending = PendingWrites()
-        """Values written by any connection."""
+        self.pending = PendingWrites()  # values written by any connection
 
     def is_free(self, name: str, connection: object) -> bool:
         return self._owners.get(name, connection) is connection

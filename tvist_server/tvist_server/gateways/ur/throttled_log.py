@@ -4,8 +4,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-LINE_INTERVAL: Final = 1.0
-"""Time between two lines [s]."""
+LINE_INTERVAL: Final = 1.0  # time between two lines [s]
 
 
 class ThrottledLog:

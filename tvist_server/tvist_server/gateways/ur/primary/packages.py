@@ -15,10 +15,8 @@ from tvist_server.ur_ports import MOST_JOINTS
 
 ROBOT_STATE: Final = 16
 NOMINAL: Final = 0xFFFFFFFF
-SUBTYPE: Final = 3
-"""Robot subtype of an e-Series arm."""
-BOARD_TEMPERATURE: Final = 25.0
-"""Temperature of the boards [°C]."""
+SUBTYPE: Final = 3  # robot subtype of an e-Series arm
+BOARD_TEMPERATURE: Final = 25.0  # temperature of the boards [°C]
 FULL_SPEED: Final = 1.0
 MOTION_DEFAULTS: Final = (1.0471975511965976, 1.3962634015954636, 0.25, 1.2, 0.25)
 """Defaults of a new program: joint velocity [rad/s] and acceleration [rad/s²], tool velocity [m/s] and

@@ -9,10 +9,8 @@ from tvist_server.gateways.ur.base import LineSplitter
 
 LONGEST: Final = MAX_SCRIPT
 """Longest unit with its line feeds [bytes]: twenty times the longest program of a known client."""
-GLIMPSE: Final = 200
-"""Bytes kept of a unit that is too long."""
-TITLE: Final = 60
-"""Longest title [characters]."""
+GLIMPSE: Final = 200  # bytes kept of a unit that is too long
+TITLE: Final = 60  # longest title [characters]
 
 _OPENS = re.compile(r"\b(?:def|sec|thread|if|while|for|switch)\b")
 _CLOSES = re.compile(r"\bend\b")
@@ -24,14 +22,10 @@ _STRING = re.compile(r"\"[^\"]*\"?|'[^']*'?")
 class Unit:
     """A complete line or block."""
 
-    text: str
-    """Text with lines ended by line feeds; only its beginning if it is too long."""
-    line: int
-    """Line at which its code starts, counted from 1; comments may precede it."""
-    column: int
-    """Column in that line, counted from 1."""
-    too_long: bool = False
-    """Whether it is longer than `LONGEST` bytes and was therefore dropped."""
+    text: str  # text with lines ended by line feeds; only its beginning if it is too long
+    line: int  # line at which its code starts, counted from 1; comments may precede it
+    column: int  # column in that line, counted from 1
+    too_long: bool = False  # whether it is longer than `LONGEST` bytes and was therefore dropped
 
     @property
     def words(self) -> str:
@@ -73,10 +67,8 @@ class Intake:
         self._unit = bytearray()
         """Lines of an incomplete unit, as bytes: one string per line would take twenty times the memory."""
         self._depth = 0
-        self._start: tuple[int, int] | None = None
-        """Line and column of the unit's first code."""
-        self._skipping = False
-        """Whether the rest of a unit that is too long is being skipped."""
+        self._start: tuple[int, int] | None = None  # line and column of the unit's first code
+        self._skipping = False  # whether the rest of a unit that is too long is being skipped
 
     @property
     def held(self) -> int:

@@ -14,11 +14,9 @@ from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake, Unit
 from tvist_server.gateways.ur.robot import UrRobot
 
-STATE_TICKS: Final = 50
-"""Ticks between two robot states: 10 Hz."""
+STATE_TICKS: Final = 50  # ticks between two robot states: 10 Hz
 TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was thrown away"
-SHORT: Final = 1000
-"""Minimum length of text that is not one of the interface's own commands."""
+SHORT: Final = 1000  # minimum length of text that is not one of the interface's own commands
 READ_ONLY: Final = (
     "this interface is read-only: somebody else controls the robot, or the port takes no commands"
 )
@@ -39,8 +37,7 @@ class ScriptSession(InTurnSession[Unit]):
         self, robot: UrRobot, control: ConnectionControl, send: Send, *, read_only: bool = False
     ) -> None:
         super().__init__(robot, control, send)
-        self._read_only = read_only
-        """Whether the client's commands are refused."""
+        self._read_only = read_only  # whether the client's commands are refused
         self._intake = Intake()
 
     def receive(self, data: bytes) -> None:
@@ -119,12 +116,9 @@ class PrimarySession(ScriptSession):
     ) -> None:
         super().__init__(robot, control, send, read_only=read_only)
         self.informed = informed
-        self._errors: list[bytes] = []
-        """Error codes of this tick, which are sent after its state."""
-        self._due = 0
-        """Tick of the next robot state."""
-        self._safety_mode: int | None = None
-        """Safety mode last sent to the client, which only gets changes."""
+        self._errors: list[bytes] = []  # error codes of this tick, which are sent after its state
+        self._due = 0  # tick of the next robot state
+        self._safety_mode: int | None = None  # safety mode last sent to the client, which only gets changes
 
     def opened(self) -> None:
         """Send the version; the first robot state follows with the next tick."""

@@ -8,12 +8,9 @@ from tvist_protocol.io import Bank
 from tvist_server.option_values import StartError
 from tvist_server.rtde.wire import WireType
 
-NUMBERS = range(48)
-"""Numbers of the integer registers and of the double registers."""
-SINGLE_BITS = range(64, 128)
-"""Bits that are separate variables; bits 0 to 63 are sent in two words of 32."""
-WORDS = ("0_to_31", "32_to_63")
-"""Suffixes of the names of the two words."""
+NUMBERS = range(48)  # numbers of the integer registers and of the double registers
+SINGLE_BITS = range(64, 128)  # bits that are separate variables; bits 0 to 63 are sent in two words of 32
+WORDS = ("0_to_31", "32_to_63")  # Suffixes of the names of the two words
 
 
 def registers(kind: str) -> tuple[tuple[str, WireType], ...]:

@@ -21,12 +21,9 @@ class OutputSource(NamedTuple):
 
     read: Callable[[Snapshot], Any]
     """Returns a number, a list of numbers, or doubles as bytes in the machine's order."""
-    letter: str
-    """Format of an entry in `struct`."""
-    variables: int = 1
-    """Number of variables."""
-    of_io: bool = False
-    """Whether its values depend only on terminals and registers, which rarely change."""
+    letter: str  # format of an entry in `struct`
+    variables: int = 1  # number of variables
+    of_io: bool = False  # whether its values depend only on terminals and registers, which rarely change
 
 
 def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:

@@ -23,8 +23,7 @@ class PackageEncoder:
         self._bytes: _EncodedTick | None = None
         """Bytes of the last tick; None if the recipes have changed since."""
         self._snapshot: Snapshot | None = None
-        self._packages: dict[tuple[bytes, str], bytes] = {}
-        """Packages of the last tick, by head and names."""
+        self._packages: dict[tuple[bytes, str], bytes] = {}  # packages of the last tick, by head and names
 
     def begin(self, client: object, recipe: OutputRecipe) -> None:
         """Note that a client reads a valid recipe, instead of its previous one."""
@@ -117,8 +116,7 @@ class _EncodedTick:
 class _Place(NamedTuple):
     first: int
     entries: int
-    of_machine: bool
-    """Whether its bytes are in the machine's order."""
+    of_machine: bool  # whether its bytes are in the machine's order
 
 
 class _Packing:

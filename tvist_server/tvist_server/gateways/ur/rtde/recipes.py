@@ -22,11 +22,9 @@ class OutputRecipe:
     def __init__(self, names: tuple[str, ...]) -> None:
         self.words = [OUTPUTS[name].name if name in OUTPUTS else "NOT_FOUND" for name in names]
         """Type of each variable, or `NOT_FOUND`."""
-        self.names = names
-        """The variables' names as the client wrote them."""
+        self.names = names  # the variables' names as the client wrote them
         self.text = ",".join(names)
-        self.size = 0
-        """Size of all of them [bytes]."""
+        self.size = 0  # size of all of them [bytes]
         self.valid = bool(names) and "NOT_FOUND" not in self.words
         """Whether every variable exists and all of them fit into one package."""
         if self.valid:

@@ -26,14 +26,11 @@ from tvist_server.rtde.codec import (
     words,
 )
 
-RATE = 500.0
-"""Frequency of the control loop and highest frequency of data packages [Hz]."""
-RECIPES = 255
-"""Largest number of input recipes of a connection: their ids are 1 to 255."""
+RATE = 500.0  # frequency of the control loop and highest frequency of data packages [Hz]
+RECIPES = 255  # largest number of input recipes of a connection: their ids are 1 to 255
 SENTENCES = 64
 """Largest number of text messages between two starts, because a client may send wrong packages for days."""
-OUTPUT_ID = b"\x01"
-"""Id of the output recipe: a connection has only one."""
+OUTPUT_ID = b"\x01"  # id of the output recipe: a connection has only one
 
 _UINT16 = Struct(">H")
 _DOUBLE = Struct(">d")

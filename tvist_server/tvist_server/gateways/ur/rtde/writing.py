@@ -16,8 +16,7 @@ from tvist_server.gateways.ur.rtde.recipes import Value
 from tvist_server.rtde.wire import WireType
 
 Number = bool | int | float
-LARGEST = 1e308
-"""Largest absolute value of an input; infinity and NaN are refused."""
+LARGEST = 1e308  # largest absolute value of an input; infinity and NaN are refused
 
 
 class InputWriter:
