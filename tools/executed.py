@@ -62,7 +62,7 @@ def executed(folder: Path, file: str) -> dict[int, set[str]]:
 
 def shortest(tests: set[str], together: float) -> list[str]:
     """Return the shortest tests that together take at most a time [s] according to `durations.json`."""
-    kept = json.loads((ROOT / "tests" / "durations.json").read_text(encoding="utf-8"))
+    kept = json.loads((ROOT / "tests" / "durations.json").read_text(encoding="utf-8"))["seconds"]
     cases = Counter(one.partition("[")[0] for one in tests)
 
     def seconds(test: str) -> float:
