@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from tvist_controller.instruments.report import Report, Sink
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
-from tvist_protocol.stream import Event, Telemetry, Truth
+from tvist_protocol.stream import Telemetry
 from tvist_server.gateways.base import Gateway, Message, topic_of
 
 log = logging.getLogger(__name__)
@@ -38,15 +38,6 @@ class Publisher(Sink):
                 except Exception:
                     log.exception("a state is not published")
 
-    def event(self, event: Event) -> None:
-        self._publish(event)
-
-    def truth(self, truth: Truth) -> None:
-        self._publish(truth)
-
-    def io(self, io: Io) -> None:
-        self._publish(io)
-
     def telemetry(self, telemetry: Telemetry, io: Io) -> None:
         """Publish the server's own figures, and the present inputs, outputs and registers again."""
         self._publish(io)
@@ -72,3 +63,5 @@ class Publisher(Sink):
                 gateway.publish(topic, message, data)
             except Exception:
                 log.exception("a message of the topic %s is not published", topic)
+
+    event = truth = io = _publish
