@@ -21,9 +21,6 @@ class NotingGateway(Gateway):
             raise ZeroDivisionError
         self.published.append((topic, data))
 
-    def close(self):
-        """Nothing is open."""
-
 
 def test_a_gateway_that_fails_is_logged_and_the_others_get_each_message_in_order(caplog):
     robot, gateways, publisher = (

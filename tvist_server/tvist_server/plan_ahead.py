@@ -82,11 +82,6 @@ class PlanAhead:
         if self._thread.is_alive():
             self._thread.join(CLOSE_WAIT)
 
-    @property
-    def waiting(self) -> int:
-        """Number of commands whose preparation has not finished."""
-        return self._count
-
     def submit(self, admitted: Admitted, answer: Answer) -> None:
         """Queue a command, from any thread, without blocking; `answer` takes the reply in the controller's thread."""
         row = COMMANDS[type(admitted.command)]
