@@ -30,7 +30,7 @@ from tvist_server.option_values import (
     ticks_of,
 )
 from tvist_server.options import DEFAULT_NAME, ProfileName, ServeOptions
-from tvist_server.profiles import PLAIN, PROFILES, Profile
+from tvist_server.profiles import PROFILES, Profile
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.start_files import InitialState, calibration_for, read_cell, shaped_by
 from tvist_server.ur_ports import InterfaceName
@@ -150,7 +150,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
             chosen, description = self.profile_in_force, load(self.robot)
             if self.ur:
                 self.ur_ports.check_joints(description.robot.name, description.joints)
-            profile = PLAIN if chosen is None else PROFILES[chosen]
+            profile = PROFILES[chosen]
             real = self.plant is not None and is_place(self.plant)
             watched = real and not self.enable_motion
             self._check_real(real=real)

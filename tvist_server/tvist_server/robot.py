@@ -138,7 +138,7 @@ class ServedRobot:
     def open(self, gateways: Sequence[Gateway]) -> None:
         """Set this robot's own gateways, which get its messages and are closed with it."""
         self.gateways = gateways
-        self.publisher.open(gateways)
+        self.publisher.gateways = gateways
 
     def request(self, command: Command) -> Reply:
         """Carry out a command of this process, in the controller's thread or, reproducibly, before the first tick."""
@@ -149,7 +149,8 @@ class ServedRobot:
         report = self.controller.report
         # A robot that is stepped publishes newer states; its clients would mistake an old one for a tick.
         if report.tick == self._looked_at:
-            self.publisher.repeat(report, self.controller.io())
+            self.publisher.io(self.controller.io())
+            self.publisher.report(report)
         self._looked_at = report.tick
 
     def _carry_out(self, admitted: Admitted, answer: Answer) -> None:
@@ -186,7 +187,8 @@ class ServedRobot:
             if self.driven.pace is not None:  # new clients of a silent arm still get a state
                 self.repeat()
             io = self.controller.io()
-            self.publisher.telemetry(self._telemetry(punctuality), io)
+            self.publisher.io(io)
+            self.publisher.publish(self._telemetry(punctuality))
             if (
                 self.recorder is not None and self._realtime
             ):  # recordings of equal runs in lockstep must be equal

@@ -164,13 +164,11 @@ def meet_clients(
 def work(config: ServeConfig, share: Share, parent: ParentPipe) -> None:
     """Serve robots until the first process ends it or dies.
 
-    On the first word it makes its robots and reports `Made`; on the next it starts them and reports `WorkerReady`; on
-    the last it reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
+    It makes its robots and reports `Made`; on the first word it starts them and reports `WorkerReady`; on the last it
+    reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
     """
     ending = Shutdown()
     ending.close()  # ignores signals
-    if not parent.receive():
-        return
     try:
         server = Server(config, share=share)
     except (StartError, UserFileError, GatewayError, RecorderError) as error:

@@ -87,8 +87,6 @@ class Workers:
                 _rehearse(setup)
             self._fork()
             for worker in self._workers:
-                worker.pipe.send(True)
-            for worker in self._workers:
                 self.ur += self._made(worker).ur
         except BaseException:  # including a signal
             self.close()
