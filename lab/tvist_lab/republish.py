@@ -11,7 +11,6 @@ from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings.mcap_file import Published, RecordingFile
 from tvist_protocol import keys
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import Command
 from tvist_protocol.info import Info
 from tvist_protocol.recorded import TICK_NS
 from tvist_protocol.replies import Refused
@@ -37,33 +36,13 @@ class PlaybackDesk(CommandIntake):
         self._info = msgspec.structs.replace(info, name=name, clock="realtime", control=None, stepper=None)
         self.tick = info.tick  # tick of the last state published
 
-    def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  no command is carried out
+    def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  whatever it is
         """Refuse a command."""
         answer(REFUSAL)
-
-    def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:  # noqa: ARG002  likewise
-        """Refuse a command."""
-        answer(REFUSAL)
-
-    def setpoint(self, data: bytes) -> None:
-        """Ignore a set-point: nobody has control."""
 
     def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
         """Answer with the description of the robot and the present tick."""
         answer(lambda: encode(msgspec.structs.replace(self._info, tick=self.tick)))
-
-    def client_seen(self, client: str, session: str = "") -> None:
-        """Ignore a client: none gets control."""
-
-    def client_gone(self, client: str, session: str = "") -> None:
-        """Ignore the end of a client."""
-
-    def session_gone(self, session: str) -> None:
-        """Ignore the end of a session."""
-
-    def holder(self) -> str | None:
-        """Return None: nobody has control."""
-        return None
 
 
 class Playback:

@@ -222,7 +222,8 @@ def _complete_recording(robot: ServedRobot) -> None:
     done = threading.Event()
 
     def complete() -> None:
-        robot.close_recording()
+        if robot.recorder is not None:
+            robot.recorder.close()
         done.set()
 
     robot.driven.post(complete)

@@ -132,26 +132,26 @@ class Sink:
     wants_truth = False
     """Whether this sink wants the truth now, even if the robot does not publish it."""
 
-    def report(self, report: Report) -> None:
+    def report(self, report: Report, /) -> None:
         """Take a tick's report; by default as its state, which takes a while to build."""
         self.state(report.state)
 
-    def state(self, state: State) -> None:
+    def state(self, state: State, /) -> None:
         """Take a tick's state."""
 
-    def event(self, event: Event) -> None:
+    def event(self, event: Event, /) -> None:
         """Take an event; it precedes the state of its tick."""
 
-    def truth(self, truth: Truth) -> None:
+    def truth(self, truth: Truth, /) -> None:
         """Take what a real robot cannot measure, if published or wanted by this sink."""
 
-    def io(self, io: Io) -> None:
+    def io(self, io: Io, /) -> None:
         """Take changed inputs, outputs and registers; they precede the state of their tick."""
 
     def raised(self, error: Exception) -> None:
         """Take an exception of a plant, program function or tick for a log; the robot has handled it."""
 
-    def journal(self, entry: Entry) -> None:
+    def journal(self, entry: Entry, /) -> None:
         """Take an input of the controller, which precedes the tick of its number."""
 
 
