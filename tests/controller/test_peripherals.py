@@ -77,7 +77,8 @@ def test_bits_stand_in_words_of_32(bank, writes):
     peripherals, bits = bare(), [False] * BITS
     for first, values in writes:
         fitting = values[: BITS - first]
-        peripherals.set_registers(SetRegisters(bank=bank, first=first, values=tuple(fitting)))
+        command = SetRegisters(token="", bank=bank, first=first, values=tuple(fitting))
+        peripherals.write_registers(command, 1)
         bits[first : first + len(fitting)] = fitting
     words = [sum(bits[32 * w + k] << k for k in range(32)) for w in range(4)]
     assert getattr(told(peripherals), f"{bank}_register") == words

@@ -93,11 +93,6 @@ class Reading:
         """Tool motion of the unshaped reference, see `RigidBody.tool`, shape (18,)."""
         return self.rigid.tool(self.motion[UNSHAPED], self.io.tcp_offset)
 
-    @property
-    def target_tool(self) -> bytes:
-        """`target` as doubles in native byte order."""
-        return self.target.tobytes()
-
     @computed_once
     def shaped(self) -> Floats:
         """Tool motion of the shaped reference, shape (18,)."""

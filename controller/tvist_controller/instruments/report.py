@@ -15,8 +15,7 @@ from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth
 
-Topic = Literal["state", "event", "truth", "telemetry", "io"]
-"""Topics published without a request."""
+Topic = Literal["state", "event", "truth", "telemetry", "io"]  # topics published without a request
 MODES = ("f_d", "zeta", "participation")
 TRUE_MODES_EVERY = 50  # ticks between computations of the arm's true modes, which take a good part of a tick
 

@@ -96,8 +96,7 @@ class Kept(NamedTuple):
     """A program and its sender."""
 
     script: Script
-    origin: str | None
-    """Address of the machine that sent it; None if unknown."""
+    origin: str | None  # address of the machine that sent it; None if unknown
 
 
 class KeptPrograms:

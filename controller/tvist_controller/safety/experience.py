@@ -14,8 +14,7 @@ from tvist_controller.planning.snapshot import FilterState
 from tvist_plant.user_file import named
 from tvist_protocol.lessons import PayloadLesson
 
-LONGEST = 10_000
-"""Longest recorded motion; longer ones are dropped [ticks]."""
+LONGEST = 10_000  # longest recorded motion; longer ones are dropped [ticks]
 AFTER = 150  # recording time after the end of a motion, for the ring-down [ticks]
 
 

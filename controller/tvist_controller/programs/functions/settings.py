@@ -2,6 +2,7 @@
 
 from typing import Annotated
 
+from tvist_controller.instruments.variables import ORDER
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import OWN_TOKEN, refusals_as_faults
 from tvist_controller.programs.arguments import Vector3, pose, several, within
@@ -20,8 +21,6 @@ from tvist_urscript import Array, Fault, costs
 GRAVITY = 9.82  # gravity that programs may declare, within `TOLERANCE`, for an upright arm [m/s^2]
 TOLERANCE = 0.05
 ROUNDED = 0.05  # fraction of the largest moment by which others may be too small due to rounding in CAD
-ORDER = (0, 3, 5, 1, 2, 4)
-"""Places of Ixx Iyy Izz Ixy Ixz Iyz, the order in programs, in the order of robot files."""
 NONE: Tensor = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # inertia of a payload declared without it
 
 
@@ -92,10 +91,7 @@ class SettingFunctions(Family):
             raise Fault(f"set_gravity: d is [{x:g}, {y:g}, {z:g}]; the simulated arm stands upright, so it must be "
                         f"[0, 0, {GRAVITY}]")  # fmt: skip
 
-    get_gravity = reads(
-        "Return gravity for an upright arm [m/s^2].",
-        lambda _: Array((0.0, 0.0, GRAVITY)),
-    )
+    get_gravity = reads("Return gravity for an upright arm [m/s^2].", lambda _: Array((0.0, 0.0, GRAVITY)))
 
     @costs(80)
     def zero_ftsensor(self) -> None:

@@ -1,5 +1,6 @@
 """Set-up of terminals, tool and safety by programs from PolyScope; settings without effect are only checked."""
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 from tvist_controller.programs.arguments import (
@@ -15,7 +16,7 @@ from tvist_controller.programs.arguments import (
     within,
     word,
 )
-from tvist_controller.programs.functions.family import Family, Parts, reads
+from tvist_controller.programs.functions.family import Family, Parts, described, reads
 from tvist_controller.programs.functions.terminals import BitPlace, Configurable, Standard, Tool
 from tvist_controller.programs.indicators import SHOWS_UNTIL_FAILURE, Group
 from tvist_urscript import Array, Fault
@@ -47,6 +48,26 @@ def _at_rest(name: str, value: object) -> None:
 RunState = Annotated[int, _run_state]
 Action = Annotated[str, word("default", "freedrive")]
 Octet = Annotated[int, whole(0, 7)]
+
+
+_AS_INPUT = "Check an input's action, as `set_standard_digital_input_action`."
+_AS_OUTPUT = "Choose what an output does, as `set_runstate_standard_digital_output_to_value`."
+
+
+def _input_action(what: str, where: str, place: object) -> Callable[[Family, int, str], None]:
+    def check(self: Family, port: int, action: Action) -> None:
+        if action == "freedrive":
+            why = "here freedrive_mode lets the arm be moved by hand, and no input"
+            self._warn(f"{where} {port} has the action freedrive: {why}")
+
+    return described(check, what, port=place)
+
+
+def _runstate_output(what: str, group: Group, place: object) -> Callable[[Family, int, int], None]:
+    def choose(self: Family, outputId: int, state: RunState) -> None:
+        self._arm.then(lambda: self._parts.runstate.choose(group, outputId, state))
+
+    return described(choose, what, outputId=place)
 
 
 class SetupFunctions(Family):
@@ -90,54 +111,42 @@ class SetupFunctions(Family):
     def set_input_actions_to_default(self) -> None:
         """Do nothing: no input starts freedrive."""
 
-    def set_standard_digital_input_action(self, port: Octet, action: Action) -> None:
-        """Check an input's action, "default" or "freedrive"; the latter warns that it has no effect."""
-        self._act(f"standard digital input {port}", action)
-
-    def set_configurable_digital_input_action(self, port: Octet, action: Action) -> None:
-        """Check an input's action, as `set_standard_digital_input_action`."""
-        self._act(f"configurable digital input {port}", action)
-
-    def set_tool_digital_input_action(self, port: Bit, action: Action) -> None:
-        """Check an input's action, as `set_standard_digital_input_action`."""
-        self._act(f"tool digital input {port}", action)
-
-    def set_gp_boolean_input_action(self, port: BitPlace, action: Action) -> None:
-        """Check an input bit's action, as `set_standard_digital_input_action`."""
-        self._act(f"input bit {port}", action)
+    set_standard_digital_input_action = _input_action(
+        'Check an input\'s action, "default" or "freedrive"; the latter warns that it has no effect.',
+        "standard digital input",
+        Octet,
+    )
+    set_configurable_digital_input_action = _input_action(_AS_INPUT, "configurable digital input", Octet)
+    set_tool_digital_input_action = _input_action(_AS_INPUT, "tool digital input", Bit)
+    set_gp_boolean_input_action = _input_action(
+        "Check an input bit's action, as `set_standard_digital_input_action`.", "input bit", BitPlace
+    )
 
     # ------------------------------------------------------------------ outputs
 
-    def set_runstate_standard_digital_output_to_value(self, outputId: Standard, state: RunState) -> None:
+    set_runstate_standard_digital_output_to_value = _runstate_output(
         """Choose what an output does while no program runs.
 
         0: nothing; 1: low; 2: high; 3: low, but high while one runs; 4: low when one ends by an error or a
         stop; 5: as 4, and high when one starts. A paused program does not run.
-        """
-        self._choose("digital", outputId, state)
+        """,
+        "digital",
+        Standard,
+    )
 
     def set_runstate_standard_digital_outputs(self, outputs: object) -> None:
         """Check output numbers; the calls that PolyScope exports after this one define their actions."""
         for output in outputs.items if isinstance(outputs, Array) else (outputs,):
             integer("outputs", output, 0, 7)
 
-    def set_runstate_configurable_digital_output_to_value(
-        self, outputId: Configurable, state: RunState
-    ) -> None:
-        """Choose what an output does, as `set_runstate_standard_digital_output_to_value`."""
-        self._choose("digital", outputId, state)
-
-    def set_runstate_tool_digital_output_to_value(self, outputId: Tool, state: RunState) -> None:
-        """Choose what an output does, as `set_runstate_standard_digital_output_to_value`."""
-        self._choose("digital", outputId, state)
-
-    def set_runstate_standard_analog_output_to_value(self, outputId: Bit, state: RunState) -> None:
-        """Choose what an output does, as `set_runstate_standard_digital_output_to_value`; low is 0 V or 4 mA."""
-        self._choose("analog", outputId, state)
-
-    def set_runstate_gp_boolean_output_to_value(self, outputId: BitPlace, state: RunState) -> None:
-        """Choose what an output bit does, as `set_runstate_standard_digital_output_to_value`."""
-        self._choose("bit", outputId, state)
+    set_runstate_configurable_digital_output_to_value = _runstate_output(_AS_OUTPUT, "digital", Configurable)
+    set_runstate_tool_digital_output_to_value = _runstate_output(_AS_OUTPUT, "digital", Tool)
+    set_runstate_standard_analog_output_to_value = _runstate_output(
+        f"{_AS_OUTPUT[:-1]}; low is 0 V or 4 mA.", "analog", Bit
+    )
+    set_runstate_gp_boolean_output_to_value = _runstate_output(
+        "Choose what an output bit does, as `set_runstate_standard_digital_output_to_value`.", "bit", BitPlace
+    )
 
     # ------------------------------------------------------------------ arm and safety
 
@@ -174,12 +183,3 @@ class SetupFunctions(Family):
         """Do nothing: the simulated drives always hold with the same torque."""
 
     high_holding_torque_disable = high_holding_torque_enable
-
-    def _act(self, what: str, action: str) -> None:
-        if action == "freedrive":
-            self._warn(
-                f"{what} has the action freedrive: here freedrive_mode lets the arm be moved by hand, and no input"
-            )
-
-    def _choose(self, group: Group, place: int, state: int) -> None:
-        self._arm.then(lambda: self._parts.runstate.choose(group, place, state))
