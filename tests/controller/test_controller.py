@@ -194,12 +194,8 @@ def test_a_robot_of_any_number_of_joints_works_throughout(joints):
     robot.until_rest()
     assert robot.send(SimulationReset, q=target) == Done(tick=robot.states[-1].tick)
     state = robot.tick()
-    assert (
-        len(state.actual_q)
-        == len(state.target_moment)
-        == len(check(robot.controller.truth()).motor_q)
-        == joints
-    )
+    truth = check(robot.controller.truth())
+    assert {len(state.actual_q), len(state.target_moment), len(truth.motor_q)} == {joints}
     assert len(state.actual_TCP_pose) == 6
     assert robot.send(c.MoveJ, q=Q1_).code == "out_of_range"
 
@@ -215,9 +211,6 @@ def test_a_setup_that_cannot_be_is_a_value_error():
             Controller(setup(**wrong))
 
 
-Q2 = UR5E.poses["Q2"]
-
-
 def test_before_the_first_tick_the_state_is_that_of_the_arm_at_rest_where_it_starts():
     robot = Robot()
     first = robot.controller.latest
@@ -228,15 +221,11 @@ def test_before_the_first_tick_the_state_is_that_of_the_arm_at_rest_where_it_sta
     assert first.actual_q == pytest.approx(after.actual_q, abs=1e-9)
     assert first.actual_moment == pytest.approx(after.actual_moment, abs=1e-6)
     assert first.estimated_f_d == after.estimated_f_d
-    assert (first.robot_mode, first.safety_mode, first.runtime_state) == (
-        after.robot_mode,
-        after.safety_mode,
-        after.runtime_state,
-    )
+    for mode in ("robot_mode", "safety_mode", "runtime_state"):
+        assert getattr(first, mode) == getattr(after, mode)
 
 
 def test_who_subscribes_in_process_is_told_at_once_and_the_run_stays_the_same():
-
     told = []
     asked, unasked = LoopbackHost(free_setup()), LoopbackHost(free_setup())
     for _ in range(3):  # to ask often changes as little as to ask once

@@ -24,12 +24,6 @@ _EMPTY: dict[str, list[Any]] = {"bit": [0] * (BITS // 32), "int": [0] * NUMBERS,
 """Initial registers of each kind."""
 
 
-def analog_value(share: float, *, voltage: bool) -> float:
-    """Return an analogue terminal's value at a fraction of its range [A or V]."""
-    low, high = VOLTAGE if voltage else CURRENT
-    return low + share * (high - low)
-
-
 def analog_share(value: float, *, voltage: bool) -> float:
     """Return the fraction of its range for an analogue terminal's value [-]."""
     low, high = VOLTAGE if voltage else CURRENT
@@ -209,7 +203,8 @@ class Peripherals:
         return Payload(mass=mass, com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))
 
     def _analog_output(self, number: int) -> float:
-        return analog_value(self.analog_shares[number], voltage=bool(self._analog_types >> (2 + number) & 1))
+        low, high = VOLTAGE if self._analog_types >> (2 + number) & 1 else CURRENT
+        return low + self.analog_shares[number] * (high - low)
 
 
 def _check(where: str, value: Register, bank: Bank) -> None:

@@ -11,10 +11,10 @@ from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.wrench import (
     ACTUAL_Q,
     ACTUAL_QD,
+    ROWS,
     RUNNING,
     SHAPED,
     UNSHAPED,
-    as_rows,
     joint_lists,
 )
 from tvist_plant.model import Floats
@@ -86,7 +86,7 @@ class Reading:
     @computed_once
     def motion(self) -> Floats:
         """`joint_lists` as an array, shape (10, n)."""
-        return as_rows(self.joint_lists)
+        return np.ndarray((ROWS, len(self.ratings)), buffer=self.joint_lists)
 
     @computed_once
     def target(self) -> Floats:

@@ -40,11 +40,6 @@ def joint_lists(state: State) -> bytearray:
     return bytearray(pack(f"{ROWS * len(state.target_q)}d", *[value for row in rows for value in row]))
 
 
-def as_rows(lists: bytearray) -> Floats:
-    """Return the result of `joint_lists` as an array, shape (10, n)."""
-    return np.ndarray((ROWS, len(lists) // (8 * ROWS)), buffer=lists)
-
-
 NEAR_SINGULAR = 0.01
 """Manipulability √det(J Jᵀ) below which estimates are damped; at most 0.11 on a UR5e [m³ with six joints]."""
 DAMPING = 0.08  # λ₀, the damping factor at a singularity [m, or -]
