@@ -148,22 +148,6 @@ def test_a_lease_that_runs_out_in_mid_motion_stops_the_arm():
     assert robot.send(c.TakeControl, client="b").token
 
 
-def story(robot: Robot):
-    robot.send(c.MoveJ, q=tuple(Q1 + 0.2))
-    robot.until_rest()
-    robot.stream(100)
-    robot.send(c.Stop)
-    robot.until_rest()
-    robot.send(c.SetShaper, name="ei2")
-    robot.send(c.MoveJ, q=Q3_)
-    robot.tick(300)
-    return bits(robot.states), robot.events
-
-
-def test_equal_commands_and_seed_give_equal_bits():
-    assert story(Robot(seed=4)) == story(Robot(seed=4))
-
-
 def test_missed_ticks_are_published():
     robot = Robot()
     robot.controller.counters.missed_ticks += 3

@@ -12,7 +12,10 @@ from tests.plant.arms import chain, changed, forward_kinematics
 
 from tvist_controller.instruments import wrench as module
 from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.wrench import DAMPING, NEAR_SINGULAR
+from tvist_controller.instruments.wrench import (
+    DAMPING,
+    NEAR_SINGULAR,
+)
 from tvist_controller.kinematics import choice
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError

@@ -1,5 +1,6 @@
 """Reports of a tick: state, built or encoded on demand, and truth; and their receivers."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 from msgspec import Struct
@@ -54,11 +55,10 @@ class Report(Struct, gc=False):
     def _make(self) -> State:
         sample, measured = self.sample, self.sample.measured
         reference, target, target_qd, target_qdd, moment = sample.signals[: TORQUE + 1].tolist()
-        unshaped = motors = None, None, None
+        unshaped: Sequence[list[float] | None] = (None, None, None)
         if sample.unshaped is not None:
             unshaped = [row.tolist() for row in middle_of(sample.unshaped, PERIOD)]
-        if sample.motors is not None:
-            motors = sample.motors.rows.tolist()
+        motors = (None, None, None) if sample.motors is None else sample.motors.rows.tolist()
         motion = self.arm.motion(measured.q, measured.qd).tolist()
         robot_mode, safety_mode, runtime = self.modes
         return State(

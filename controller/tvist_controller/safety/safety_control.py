@@ -23,7 +23,7 @@ from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
 
 HOLD = 1.25  # least ratio of a brake's torque to the load by gravity and other joints [-]
-LONGEST = 5.0  # time after which the arm counts as stopped [s]
+LONGEST_BRAKING = 5.0  # time after which the arm counts as stopped [s]
 
 
 class SafetyControl:
@@ -264,7 +264,7 @@ def brake(description: RobotDescription, carried: Payload, state: Target, period
     q, qd = state.q.copy(), state.qd.copy()
     positions = [q]
     turning = np.abs(qd) > 0.0
-    for _ in range(round(LONGEST / period)):
+    for _ in range(round(LONGEST_BRAKING / period)):
         if not turning.any():
             break
         mass = np.array(pin.crba(model, data, q, pin.Convention.WORLD)) + np.diag(rotor)
