@@ -47,11 +47,10 @@ class Wires:
         self._outputs: int | None = None  # outputs of the last tick; None before the first
         # Entries of one wire are in order of time, since its delay is constant.
         self._under_way: list[deque[tuple[int, bool]]] = [deque() for _ in wires]
-        self._left = 0
 
     def tick(self, tick: int, outputs: int) -> tuple[int, int]:
         """Return the inputs that change for the next tick as a mask and values; others keep their signal."""
-        if outputs == self._outputs and not self._left:
+        if outputs == self._outputs and not any(self._under_way):
             return 0, 0
         before, self._outputs = self._outputs, outputs
         mask = values = 0
@@ -61,10 +60,8 @@ class Wires:
                 mask, values = mask | input_, values | (input_ if on else 0)
             elif (before ^ outputs) & output:
                 waiting.append((tick + ticks, on))
-                self._left += 1
             while waiting and waiting[0][0] <= tick + 1:
                 _, on = waiting.popleft()
-                self._left -= 1
                 mask, values = mask | input_, values & ~input_ | (input_ if on else 0)
         return mask, values
 

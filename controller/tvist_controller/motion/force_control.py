@@ -300,7 +300,7 @@ def frame_of(feature: Feature, kind: int) -> Callable[[tuple[Floats, Floats], Fl
     if not isinstance(feature, str):
         axes, origin = np.asarray(pin.exp3(np.array(feature[3:]))), np.array(feature[:3])
     if kind == 1:
-        return lambda pose, _: _turned_to(axes, 1, origin - pose[1])
+        return lambda pose, _: _turned_to(axes, origin - pose[1])
     if kind == 3:
         latest = [axes]
 
@@ -315,12 +315,10 @@ def frame_of(feature: Feature, kind: int) -> Callable[[tuple[Floats, Floats], Fl
     return lambda _pose, _velocity: axes
 
 
-def _turned_to(axes: Floats, axis: int, direction: Floats) -> Floats:
-    """Turn one axis of a frame into a direction by the shortest rotation."""
+def _turned_to(axes: Floats, direction: Floats) -> Floats:
+    """Turn the y axis of a frame into a direction by the shortest rotation."""
     length = np.linalg.norm(direction)
     if length < FRAME_DEADBAND:
         return axes
-    turned: Floats = (
-        np.asarray(pin.Quaternion.FromTwoVectors(axes[:, axis], direction / length).matrix()) @ axes
-    )
+    turned: Floats = np.asarray(pin.Quaternion.FromTwoVectors(axes[:, 1], direction / length).matrix()) @ axes
     return turned

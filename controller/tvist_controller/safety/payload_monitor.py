@@ -88,10 +88,8 @@ class PayloadMonitor(Monitor):
         self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
         self._fade = np.exp(-TICKS_AVERAGED * PERIOD / np.array([MEMORY, RECENT]))
         self.declare(declared, SLEW)
-        nothing = np.zeros_like(self._sums)
-        self._correlate(
-            np.zeros((QDD + 1, len(self._sum))), nothing
-        )  # loads compiled code, which takes many ticks
+        signals = np.zeros((QDD + 1, len(self._sum)))
+        self._correlate(signals, np.zeros_like(self._sums))  # loads compiled code, which takes many ticks
 
     def declare(self, payload: Payload, ticks: int, *, found: bool = False, told: bool = False) -> None:
         """Set another payload and discard measurements; `found` by the robot itself, `told` in a warning."""
