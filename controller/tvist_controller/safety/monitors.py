@@ -22,7 +22,7 @@ class TorqueOverload(Monitor):
 
     def __init__(self, joints: Sequence[str], limits: Sequence[float]) -> None:
         self._joints, self._limits = joints, np.array(limits, dtype=float)
-        self.restart()
+        self._beyond = np.zeros(len(limits), dtype=int)
 
     def look(self, sample: Sample) -> MonitorFinding | None:
         """Return the longest overload if too long, and restart the count."""
@@ -40,7 +40,7 @@ class TorqueOverload(Monitor):
 
     def restart(self) -> None:
         """Restart the count."""
-        self._beyond = np.zeros(len(self._limits), dtype=int)
+        self._beyond[:] = 0
 
 
 class ShaperMonitor(Monitor):
