@@ -198,8 +198,7 @@ def hidden_payload(declared: Payload, seed: int) -> Payload:
     return _other_payload(declared, factor, random.uniform(-CENTRE, CENTRE, 3))
 
 
-AS_DESCRIBED: Final = Variant("calibrated", "as described")
-"""The arm exactly as described."""
+AS_DESCRIBED: Final = Variant("calibrated", "as described")  # the arm exactly as described
 _ALL = (
     AS_DESCRIBED,
     Variant(
