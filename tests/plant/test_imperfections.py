@@ -16,7 +16,7 @@ from tvist_plant.model import flexible_model, rigid_model
 from tvist_plant.robot_tables import Payload
 from tvist_plant.stiction import relaxed, stiction_after
 
-from .arms import changed, conservative, hold, quiet
+from .arms import changed, conservative, hold, quiet, rested, standing
 from .reference import commands
 
 IMPERFECT = {
@@ -29,8 +29,8 @@ IMPERFECT = {
 }
 
 
-def felt(description, drive, imperfections):
-    arm = FlexibleArm(description, description.payload, imperfections=imperfections)
+def felt(description, drive, imperfections, substeps=None):
+    arm = FlexibleArm(description, description.payload, imperfections=imperfections, substeps=substeps)
     arm.reset(drive[0], seed=3)
     return np.array([arm.step(command).accelerometer for command in drive[1:]])
 
@@ -177,50 +177,28 @@ def test_a_motor_is_held_for_a_minute_by_half_its_stiction_and_springs_back():
 def test_four_substeps_are_enough():
     drive = commands(STICKS, STICKS.poses["Q1"], STICKS.poses["Q3"], 700)
 
-    def felt(substeps):
-        arm = FlexibleArm(
-            changed(STICKS, "sensors", accelerometer_noise=0.0), STICKS.payload, substeps=substeps
-        )
-        arm.reset(drive[0], seed=3)
-        return np.array([arm.step(command).accelerometer for command in drive[1:]])
-
-    usual, fine = felt(None), felt(64)
+    silent = changed(STICKS, "sensors", accelerometer_noise=0.0)
+    usual, fine, finer = (felt(silent, drive, None, substeps) for substeps in (None, 16, 64))
     assert FlexibleArm(STICKS, STICKS.payload)._substeps == 4
-    assert np.abs(usual - fine).max() < 0.03
-    assert np.abs(felt(16) - fine).max() < 0.25 * np.abs(usual - fine).max()
+    assert np.abs(usual - finer).max() < 0.03
+    assert np.abs(fine - finer).max() < 0.25 * np.abs(usual - finer).max()
 
 
 TORSION, PLAY, TILT = 2.0e4, 1.0e-4, 0.05
 
 
-def imperfect(arm, **numbers):
-    return FlexibleArm(arm, arm.payload, imperfections=Imperfections(**numbers), substeps=8)
+def test_a_moment_twists_both_links_by_as_much_as_their_springs_say(ur5e):
+    """Against the arm whose links do not twist, the flange turns about the links by 2 M/k more.
 
-
-def rested(arm, command, ticks=600):
-    for _ in range(ticks):
-        measured = arm.step(command)
-    return measured
-
-
-@pytest.fixture
-def stretched(ur5e):
-    """The arm stretched out along the upper arm's x axis: a moment about it twists upper arm and forearm alike."""
-    arm = quiet(ur5e)
-    return arm, hold(arm, [0.3, -0.4, 0.0, 0.2, 0.3, 0.0])
-
-
-def test_a_moment_twists_both_links_by_as_much_as_their_springs_say(stretched):
-    """Against the arm whose links do not twist, the flange turns about the links by 2 M/k more."""
-    arm, command = stretched
-    turned = []
-    for numbers in ({}, {"torsion": TORSION}):
-        one = imperfect(arm, **numbers)
-        one.reset(command)
+    The arm is stretched out along the upper arm's x axis, so that the moment twists both links alike.
+    """
+    arm, turned = quiet(ur5e), []
+    for numbers in ({"rotor": 1.0}, {"torsion": TORSION}):
+        one, command, _ = standing(arm, [0.3, -0.4, 0.0, 0.2, 0.3, 0.0], **numbers)
         before = one.truth().flange_rotation
         axis = rigid_frames(arm, command.q)[2][:, 0]  # the forearm's x axis, and the upper arm's
         one.push_body("flange", moment=tuple(20.0 * axis))
-        rested(one, command)
+        rested(one, command, 600)
         turned.append(pin.log3(one.truth().flange_rotation @ before.T) @ axis)
     assert turned[1] - turned[0] == pytest.approx(2.0 * 20.0 / TORSION, rel=0.02)
 
@@ -240,7 +218,7 @@ def test_a_twisting_link_rings_at_the_frequency_of_its_spring_and_what_hangs_on_
         "link_flexibility", links=(2,), stiffness=(1e7,), damping_time=0.0,
     )  # fmt: skip
     q = np.array([0.0, -1.2, 0.8, 0.0, 0.4, 0.0])
-    one = imperfect(arm, torsion=TORSION)
+    one, *_ = standing(arm, q, torsion=TORSION)
     model = flexible_model(arm, arm.payload, TORSION).model
     names = list(model.names)
     at = names.index("elbow_torsion") - 1
@@ -270,9 +248,7 @@ def beyond_the_elbow(arm, q):
 def test_a_gear_with_backlash_turns_freely_by_its_width_and_then_as_its_spring_says(ur5e):
     """A slow reversal of the torque at the base, which gravity does not load, moves the link by 2 (b + τ/K)."""
     arm = changed(quiet(ur5e), "drives", windup_feedforward=(0.0,) * 6)
-    one = imperfect(arm, backlash=(PLAY,) * 6)
-    command = hold(arm, arm.poses["Q3"])
-    one.reset(command)
+    one, command, _ = standing(arm, arm.poses["Q3"], backlash=(PLAY,) * 6)
     torque, K = 5.0, arm.drives.gear_stiffness[0]
     found = []
     for share in (1.0, 0.5, 0.0, -0.5, -1.0):
@@ -290,9 +266,7 @@ def test_backlash_and_a_soft_gear_obey_their_law_at_rest_and_in_the_kernel_alike
     """The twist under gravity that a reset computes is where the integrator stays, and it is the law's."""
     numbers = {"backlash": (PLAY,) * 6, "soft": 0.75}
     joints = joint_parameters(ur5e, Imperfections(**numbers))
-    one = imperfect(quiet(ur5e), **numbers)
-    command = hold(ur5e, ur5e.poses["Q1"])
-    one.reset(command)
+    one, command, _ = standing(quiet(ur5e), ur5e.poses["Q1"], **numbers)
     start = one.truth().gear_deflection
     rested(one, command, 500)
     np.testing.assert_allclose(one.truth().gear_deflection, start, atol=1e-8)
@@ -331,7 +305,7 @@ def test_backlash_gives_no_energy_and_takes_less_the_shorter_the_period(ur5e):
 def test_a_leaning_arm_carries_a_leaning_weight(ur5e):
     """Its drives hold the torques of gravity turned the other way, and its accelerometer sees that direction."""
     arm = quiet(ur5e)
-    one = imperfect(arm, tilt=TILT)
+    one = FlexibleArm(arm, arm.payload, imperfections=Imperfections(tilt=TILT))
     q = np.array([0.4, -1.0, 1.2, -0.5, 0.3, 0.2])
     measured = one.reset(DriveCommand(q, np.zeros(6), np.zeros(6)))
     model = rigid_model(arm, arm.payload)

@@ -10,7 +10,7 @@ from tvist_plant.plant import Plant, PlantError
 from tvist_plant.sensors import Accelerometer, gear_phases
 from tvist_plant.world.mujoco_arm import MujocoArm
 
-from .arms import changed, forward_kinematics, hold, quiet
+from .arms import changed, forward_kinematics, hold, quiet, rested, standing
 from .reference import commands
 
 
@@ -32,11 +32,8 @@ def drive(ur5e):
 
 def test_ten_seconds_of_holding_still_move_nothing(ur5e):
     arm = changed(ur5e, "sensors", accelerometer_noise=0.0)
-    plant = FlexibleArm(arm, arm.payload)
-    command = hold(arm, arm.poses["Q1"])
-    first = plant.reset(command, seed=1)
-    for _ in range(5_000):
-        last = plant.step(command)
+    plant, command, first = standing(arm, arm.poses["Q1"])
+    last = rested(plant, command, 5000)
     np.testing.assert_allclose(last.q, first.q, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(last.moment, first.moment, rtol=0.0, atol=1e-7)
     np.testing.assert_allclose(last.accelerometer, first.accelerometer, rtol=0.0, atol=1e-6)
@@ -44,9 +41,7 @@ def test_ten_seconds_of_holding_still_move_nothing(ur5e):
 
 def test_at_rest_the_motors_carry_the_arm(ur5e):
     arm = quiet(ur5e)
-    plant = FlexibleArm(arm, arm.payload)
-    command = hold(arm, arm.poses["Q1"])
-    measured = plant.reset(command)
+    plant, command, measured = standing(arm, arm.poses["Q1"])
     assert measured.moment[1] == pytest.approx(command.torque[1], abs=0.2)
     twist = -measured.moment / arm.drives.gear_stiffness
     np.testing.assert_allclose(plant.truth().gear_deflection, twist, atol=1e-8)
@@ -54,11 +49,8 @@ def test_at_rest_the_motors_carry_the_arm(ur5e):
 
 def test_a_wrong_declared_payload_is_carried_by_the_integrators(ur5e):
     """The command feeds forward gravity of 5 kg, the arm carries none: it still starts at rest."""
-    plant = FlexibleArm(ur5e, ur5e.payload)
-    command = hold(ur5e, ur5e.poses["Q1"])
-    first = plant.reset(command, payload=Payload())
-    for _ in range(500):
-        last = plant.step(command)
+    plant, command, first = standing(ur5e, ur5e.poses["Q1"], carries=Payload())
+    last = rested(plant, command, 500)
     np.testing.assert_allclose(last.q, first.q, rtol=0.0, atol=1e-9)
     assert abs(last.moment[1]) < abs(command.torque[1]) - 40.0
 
@@ -85,9 +77,7 @@ def test_seeds_differ_in_noise_and_gear_error(ur5e, drive):
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 @pytest.mark.parametrize("field", ["q", "qd", "torque"])
 def test_a_command_without_sense_raises_and_a_reset_heals(ur5e, field, bad):
-    plant = FlexibleArm(ur5e, ur5e.payload)
-    command = hold(ur5e, ur5e.poses["Q1"])
-    first = plant.reset(command)
+    plant, command, first = standing(ur5e, ur5e.poses["Q1"])
     values = {name: getattr(command, name).copy() for name in ("q", "qd", "torque")}
     values[field][1] = bad
     with pytest.raises(PlantError, match="finite"):  # noqa: PT012 - some ticks pass
@@ -149,8 +139,8 @@ def test_gear_phases_are_drawn_by_the_seed_and_not_by_the_noise():
 def test_at_rest_it_points_up_with_9_81_in_the_flange_frame(ur5e, case):
     arm = quiet(ur5e)
     q = np.random.default_rng(case).uniform(-np.pi, np.pi, 6)
-    plant = FlexibleArm(arm, arm.payload)
-    felt = plant.reset(hold(arm, q)).accelerometer
+    plant, _, measured = standing(arm, q)
+    felt = measured.accelerometer
     assert np.linalg.norm(felt) == pytest.approx(9.81, abs=1e-6)
     up = plant.truth().flange_rotation @ felt
     np.testing.assert_allclose(up, [0.0, 0.0, 9.81], atol=1e-6)
@@ -163,11 +153,6 @@ LIGHT, HEAVY = (
 )
 
 
-def held(arm, command, ticks):
-    """The measurements of an arm that is held, one a tick."""
-    return [arm.step(command) for _ in range(ticks)]
-
-
 def test_an_arm_settles_as_if_it_had_carried_the_payload_from_the_start(ur5e):
     arm, other = FlexibleArm(ur5e, LIGHT), FlexibleArm(ur5e, HEAVY)
     command = DriveCommand(np.array(ur5e.poses["Q1"]), np.zeros(6), np.zeros(6))
@@ -178,6 +163,6 @@ def test_an_arm_settles_as_if_it_had_carried_the_payload_from_the_start(ur5e):
     arm.load(HEAVY)
     for name in ("motor_q", "motor_qd", "gear_deflection", "flange_position"):
         np.testing.assert_array_equal(getattr(arm.truth(), name), getattr(before, name))
-    np.testing.assert_allclose(held(arm, command, 3000)[-1].q, other.step(command).q, atol=1e-6)
+    np.testing.assert_allclose(rested(arm, command, 3000).q, other.step(command).q, atol=1e-6)
     np.testing.assert_allclose(arm.modes().f_d, other.modes().f_d, rtol=1e-6)
     assert arm.payload == HEAVY
