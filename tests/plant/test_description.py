@@ -25,7 +25,7 @@ from tvist_plant.robot_tables import Payload
 from tvist_plant.similar import RULE, Scale
 from tvist_plant.user_file import UserFileError
 
-from .arms import chain, changed
+from .arms import changed
 
 TEXT = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
 MASS = "mass = [3.761, 8.058, 2.846, 1.37, 1.3, 0.365]"
@@ -137,15 +137,6 @@ def test_disturbances_can_be_kept_one_by_one(ur5e):
         assert (alone.sensors.accelerometer_noise > 0.0) == (name == "noise")
     with pytest.raises(DescriptionError, match=r"'wind'.*friction, gear, noise"):
         ur5e.disturbed_by(["gear", "wind"])
-
-
-def test_modes_are_found_for_any_number_of_joints():
-    for joints in (1, 2, 3, 7):
-        arm = chain(joints)
-        found = FlexibleArm(arm, arm.payload).modes(np.zeros(joints))
-        assert len(found.f_d) >= 1
-        assert np.all(np.diff(found.f_d) >= 0.0)
-        assert np.all((found.zeta > 0.0) & (found.zeta < 1.0))
 
 
 UR5E = load("ur5e")

