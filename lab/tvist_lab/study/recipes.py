@@ -54,9 +54,6 @@ class FrequencyError(Estimator):
     def __repr__(self) -> str:
         return f"{self._right!r} with frequencies times {self._factor:g}"
 
-    def _unshare(self) -> None:
-        self._right = self._right.fork()
-
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Return the modes at a configuration; see `Estimator.estimate`."""
         return self._wrong(self._right.estimate(q))
