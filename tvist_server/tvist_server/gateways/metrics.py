@@ -7,7 +7,7 @@ import contextlib
 import socket
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tvist_controller.instruments.report import Topic
 from tvist_protocol.stream import Event, State, Telemetry
@@ -97,47 +97,32 @@ class Metrics(Collector):
 
         for robot in self._robots:
             robot.look()
-        states = [(robot.labels, robot.state) for robot in self._robots if robot.state is not None]
-        told = [(robot.labels, robot.telemetry) for robot in self._robots if robot.telemetry is not None]
-        ticks = CounterMetricFamily(
-            "tvist_ticks", "Control periods begun. If it stands still, the robot does.", labels=LABELS
-        )
-        robot_mode = GaugeMetricFamily(
-            "tvist_robot_mode", "Robot mode as in RTDE: 7 is RUNNING.", labels=LABELS
-        )
-        safety = GaugeMetricFamily(
-            "tvist_safety_mode", "Safety mode as in RTDE: 1 is NORMAL, 3 is PROTECTIVE_STOP.", labels=LABELS
-        )
-        for labels, state in states:
-            ticks.add_metric(labels, state.tick)
-            robot_mode.add_metric(labels, state.robot_mode)
-            safety.add_metric(labels, state.safety_mode)
-        yield from (ticks, robot_mode, safety)
+        for of, make, figures in (("state", CounterMetricFamily, TICKS), ("state", GaugeMetricFamily, MODES)):
+            yield from (self._family(make, of, *figure) for figure in figures)
         late = GaugeMetricFamily(
             "tvist_tick_lateness_seconds",
             "Lateness of the ticks of the last second, by `quantile`: 0.5, 0.99, and 1 for the largest.",
             labels=(*LABELS, "quantile"),
         )
-        for labels, telemetry in told:
-            lateness = {
-                "0.5": telemetry.late_p50_us,
-                "0.99": telemetry.late_p99_us,
-                "1": telemetry.late_max_us,
-            }
-            for quantile, value in lateness.items():
-                late.add_metric((*labels, quantile), value * MICRO)
+        for robot in self._robots:
+            for quantile, field in QUANTILES.items() if robot.telemetry is not None else ():
+                late.add_metric((*robot.labels, quantile), getattr(robot.telemetry, field) * MICRO)
         yield late
         for make, figures in ((GaugeMetricFamily, GAUGES), (CounterMetricFamily, COUNTERS)):
-            for name, what, field in figures:
-                family = make(name, what, labels=LABELS)
-                values = [(labels, getattr(telemetry, field)) for labels, telemetry in told]
-                for labels, value in [one for one in values if one[1] is not None]:
-                    family.add_metric(labels, value)
-                yield family
+            yield from (self._family(make, "telemetry", *figure) for figure in figures)
         yield self._counted("tvist_events", "Events, by `kind`.", "kind")
         yield self._counted(
             "tvist_warnings", "Warnings, by `code`, which is empty for those without one.", "code"
         )
+
+    def _family(self, make: "Callable[..., Metric]", of: str, name: str, what: str, field: str) -> "Metric":
+        """Return a figure of the robots' states or telemetry; a robot that lacks it is left out."""
+        family: Any = make(name, what, labels=LABELS)
+        for robot in self._robots:
+            value = getattr(getattr(robot, of), field, None)
+            if value is not None:
+                family.add_metric(robot.labels, value)
+        return family  # type: ignore[no-any-return]
 
     def _counted(self, name: str, what: str, label: str) -> "Metric":
         """Return the number of events or warnings for each kind or code."""
@@ -151,7 +136,14 @@ class Metrics(Collector):
         return family
 
 
-GAUGES = (
+Figures = tuple[tuple[str, str, str], ...]  # name, meaning, field
+TICKS: Figures = (("tvist_ticks", "Control periods begun. If it stands still, the robot does.", "tick"),)
+MODES: Figures = (
+    ("tvist_robot_mode", "Robot mode as in RTDE: 7 is RUNNING.", "robot_mode"),
+    ("tvist_safety_mode", "Safety mode as in RTDE: 1 is NORMAL, 3 is PROTECTIVE_STOP.", "safety_mode"),
+)
+QUANTILES = {"0.5": "late_p50_us", "0.99": "late_p99_us", "1": "late_max_us"}
+GAUGES: Figures = (
     (
         "tvist_ticks_per_second",
         "Control periods begun in the last second: 500 at full rate.",
@@ -164,8 +156,7 @@ GAUGES = (
     ),
     ("tvist_overloaded", "1 while the robot is overloaded, otherwise 0.", "overloaded"),
 )
-"""Gauges of the telemetry: name, meaning, field."""
-COUNTERS = (
+COUNTERS: Figures = (
     (
         "tvist_due_ticks",
         "Control periods that were due: those begun and those left out; missing in lockstep.",
@@ -194,7 +185,6 @@ COUNTERS = (
     ),
     ("tvist_recorder_dropped", "Messages dropped because the recorder's queue was full.", "recorder_dropped"),
 )
-"""Counters of the telemetry: name, meaning, field."""
 
 
 def place(address: str) -> tuple[str, int]:
