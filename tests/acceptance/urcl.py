@@ -34,10 +34,8 @@ from typing import NamedTuple
 from report import note
 
 ROBOT, CLIENT = "192.168.56.101", "192.168.56.1"
-READY_WITHIN = 300.0
-"""Longest time for the server to start [s]."""
-LIMIT = 120.0
-"""Longest time of a test or an example [s]."""
+READY_WITHIN = 300.0  # longest time for the server to start [s]
+LIMIT = 120.0  # longest time of a test or an example [s]
 LOGS = Path("urcl-logs")
 
 HEADLESS = (

@@ -3,8 +3,7 @@
 from tvist_urscript import Fault, Signature, parameters, signature, to_str
 from tvist_urscript.values import short
 
-STEP = 0.002
-"""Duration of a tick [s]."""
+STEP = 0.002  # duration of a tick [s]
 
 
 class DryFunctions:

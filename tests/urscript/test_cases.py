@@ -22,10 +22,8 @@ CASES = [
     for name, case in cases.items()
 ]
 KNOWN = {"prog", "script", "says", "error", "ticks"}
-BUDGET = 20_000
-"""Evaluations of a tick: many more than beside a robot, as nothing else has to run in it."""
-LONGEST_RUN = 2_000
-"""Ticks after which a run is given up."""
+BUDGET = 20_000  # evaluations of a tick: many more than beside a robot, as nothing else has to run in it
+LONGEST_RUN = 2_000  # ticks after which a run is given up
 
 
 def dry_run(text, dry):

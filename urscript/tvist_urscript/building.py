@@ -10,8 +10,7 @@ from tvist_urscript import tree
 from tvist_urscript.errors import no_program
 from tvist_urscript.values import HIGHEST, LONGEST_TEXT, to_bytes, whole
 
-DEEPEST = 100
-"""Most levels of nested expressions; a block counts as BLOCK levels."""
+DEEPEST = 100  # most levels of nested expressions; a block counts as BLOCK levels
 BLOCK = 4
 
 _LABEL = re.compile(r'\$[ \t]*(\d+)[ \t]*"(.*?)"(?:[ \t]+"\w+")*[ \t\r]*(?:#.*)?', re.ASCII)

@@ -13,10 +13,8 @@ from tvist_urscript.pieces import DEPTH, LOAD, MISSING, call, compare, invert, l
 from tvist_urscript.signatures import REQUIRED, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
 
-MOST_OPERATIONS = 1000
-"""Most evaluations of one statement, since nothing can interrupt it."""
-START = 20
-"""Cost of starting a thread, which limits how many threads start in a tick."""
+MOST_OPERATIONS = 1000  # most evaluations of one statement, since nothing can interrupt it
+START = 20  # cost of starting a thread, which limits how many threads start in a tick
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
 COMPARISONS: dict[str, type[ast.cmpop]] = {

@@ -7,16 +7,12 @@ from tvist_urscript.names import Scope
 from tvist_urscript.pieces import DEPTH, MISSING, assign, branch, call, charge, compare, located, name
 from tvist_urscript.statements import Statements
 
-DEEPEST_CALLS = 200
-"""Most nested calls of functions."""
-MOST_PARAMETERS = 255
-"""Most parameters of one function."""
-MOST_FUNCTIONS = 2000
-"""Most functions and threads of a program."""
+DEEPEST_CALLS = 200  # most nested calls of functions
+MOST_PARAMETERS = 255  # most parameters of one function
+MOST_FUNCTIONS = 2000  # most functions and threads of a program
 MOST_STATEMENTS = 4000
 """Most statements of one function; while Python compiles it, no other thread of the process runs."""
-MOST_NODES = 10_000
-"""Most operations, names, calls and statements of one function, for the same reason."""
+MOST_NODES = 10_000  # most operations, names, calls and statements of one function, for the same reason
 PART, PART_NODES = 200, 1000
 """Largest part of a long main function, in statements and in the nodes that MOST_NODES counts."""
 

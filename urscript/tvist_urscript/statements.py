@@ -10,10 +10,8 @@ from tvist_urscript.names import BUILT_IN_ARRAYS
 from tvist_urscript.pieces import LOAD, assign, branch, call, charge, located, name
 from tvist_urscript.signatures import Signatures
 
-PIECE = 40
-"""Evaluations after which code without loops checks whether the budget is spent."""
-MOST_LOOPS = 15
-"""Most nested loops: CPython allows 20 nested blocks."""
+PIECE = 40  # evaluations after which code without loops checks whether the budget is spent
+MOST_LOOPS = 15  # most nested loops: CPython allows 20 nested blocks
 LINK = 15
 """Most branches of one Python `if`; a longer `elif` chain is split, since Python nests each in the one before."""
 
