@@ -57,7 +57,8 @@ class Report(Struct, gc=False):
         reference, target, target_qd, target_qdd, moment = sample.signals[: TORQUE + 1].tolist()
         unshaped: Sequence[list[float] | None] = (None, None, None)
         if sample.unshaped is not None:
-            unshaped = [row.tolist() for row in middle_of(sample.unshaped, PERIOD)]
+            before = middle_of(sample.unshaped, PERIOD)
+            unshaped = [row.tolist() for row in (before.q, before.qd, before.qdd)]
         motors = (None, None, None) if sample.motors is None else sample.motors.rows.tolist()
         motion = self.arm.motion(measured.q, measured.qd).tolist()
         robot_mode, safety_mode, runtime = self.modes

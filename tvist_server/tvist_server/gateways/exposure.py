@@ -77,8 +77,25 @@ def _protected(
     if security is not None:
         if insecure:
             raise StartError("security and insecure exclude each other: leave one out")
-        secured, roles = [_secured(endpoint) for endpoint in listen], _roles(security)
-        return secured, {**LIMITS, **_settings(security)}, roles
+        secured, folder = [_secured(endpoint) for endpoint in listen], Path(security).absolute()
+        roles = roles_in(folder)
+        if not roles:
+            raise StartError(
+                f"{folder / CLIENTS} lists no clients: add one with `tvist keys {security} --operator NAME`"
+            )
+        _check_pair(folder)
+        settings = {
+            "enable_mtls": True,
+            "root_ca_certificate": str(folder / AUTHORITY),
+            "listen_certificate": str(folder / CERTIFICATE),
+            "listen_private_key": str(folder / KEY),
+            "close_link_on_expiration": True,
+        }
+        return (
+            secured,
+            {**LIMITS, **{f"transport/link/tls/{key}": value for key, value in settings.items()}},
+            roles,
+        )
     for endpoint in listen:
         if protocol(endpoint) in {"tls", "quic"} and not options(endpoint):
             raise StartError(
@@ -124,28 +141,6 @@ def _secured(endpoint: str) -> str:
             f"listen is {endpoint}: with --security no options may follow #, since they would override it"
         )
     return f"{endpoint}#tls_handshake_timeout_ms={HANDSHAKE_MS}"
-
-
-def _roles(security: str) -> dict[str, Role]:
-    folder = Path(security).absolute()
-    roles = roles_in(folder)
-    if not roles:
-        raise StartError(
-            f"{folder / CLIENTS} lists no clients: add one with `tvist keys {security} --operator NAME`"
-        )
-    return roles
-
-
-def _settings(security: str) -> dict[str, Any]:
-    folder = Path(security).absolute()
-    _check_pair(folder)
-    return {
-        "transport/link/tls/enable_mtls": True,
-        "transport/link/tls/root_ca_certificate": str(folder / AUTHORITY),
-        "transport/link/tls/listen_certificate": str(folder / CERTIFICATE),
-        "transport/link/tls/listen_private_key": str(folder / KEY),
-        "transport/link/tls/close_link_on_expiration": True,
-    }
 
 
 def _check_pair(folder: Path) -> None:

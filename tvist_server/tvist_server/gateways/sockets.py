@@ -5,6 +5,7 @@ import contextlib
 import logging
 import time
 from collections.abc import Callable, Collection, Sequence
+from functools import partial
 from typing import Final
 
 from tvist_controller.instruments.report import Topic
@@ -126,9 +127,9 @@ class ProgramSockets(Gateway, SocketPorts):
             match order:
                 case Open():
                     link = self._links[order.socket] = _Link(order.socket, self._tell_controller)
-                    self._soon(lambda order=order, link=link: self._begin(order, link))  # type: ignore[misc]
+                    self._soon(partial(self._begin, order, link))
                 case Send():
-                    self._soon(lambda link=self._links[order.socket], data=order.data: link.send(data))  # type: ignore[misc]
+                    self._soon(partial(self._links[order.socket].send, order.data))
                 case Close():
                     self._silent.discard(order.socket)
                     self._soon(self._links.pop(order.socket).end)
@@ -143,7 +144,8 @@ class ProgramSockets(Gateway, SocketPorts):
                     del self._waits[order.wait]
                 case Expire():
                     left = self._waits[order.wait][1] + order.seconds - now
-                    self._after(left, SocketNews(order.wait, "expired"))
+                    # Through the network's thread, so that data that came earlier is reported first.
+                    self._soon(partial(self._later, left, SocketNews(order.wait, "expired")))
         return ()
 
     def note(self, news: SocketNews) -> None:
@@ -164,12 +166,6 @@ class ProgramSockets(Gateway, SocketPorts):
         now = time.monotonic()
         self._silent.update(socket for socket, begun in waits if begun + PATIENCE <= now)
         return max(0.0, max(begun for _, begun in waits) + PATIENCE - now)
-
-    def _after(self, seconds: float, news: SocketNews) -> None:
-        """Report news after a delay from the network thread, so that data that came earlier is reported first."""
-        self._soon(
-            lambda: asyncio.get_running_loop().call_later(max(0.0, seconds), self._tell_controller, news)
-        )
 
     def _soon(self, action: Callable[[], object]) -> None:
         if self._loop is not None:
@@ -194,6 +190,9 @@ class ProgramSockets(Gateway, SocketPorts):
 
     def close(self) -> None:
         self._loop = self._early = None
+
+    def _later(self, seconds: float, news: SocketNews) -> None:
+        asyncio.get_running_loop().call_later(max(0.0, seconds), self._tell_controller, news)
 
     def _begin(self, order: Open, link: _Link) -> None:
         link.connecting = asyncio.ensure_future(self._connect(order, link))
