@@ -155,14 +155,13 @@ class ZenohGateway(Gateway):
             self._desk.setpoint(sample.payload.to_bytes())
 
     def _on_client(self, sample: zenoh.Sample) -> None:
-        key = str(sample.key_expr)
-        name, session = keys.client_name(self._robot, key), keys.client_session(self._robot, key)
-        if self._closed or name is None:
+        client = keys.client_of(self._robot, str(sample.key_expr))
+        if self._closed or client is None:
             return
         if sample.kind == zenoh.SampleKind.PUT:
-            self._desk.client_seen(name, session)
+            self._desk.client_seen(*client)
         else:
-            self._desk.client_gone(name, session)
+            self._desk.client_gone(*client)
 
     def session_gone(self, session: str) -> None:
         """Note that a session has ended. Its liveliness tokens may outlast it while another session holds a copy."""
