@@ -10,10 +10,9 @@ from tvist_cli.failure import Failure, failing_on
 from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, write
 from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, print_json, program, progress, words
-from tvist_cli.pages import PageAddress
+from tvist_cli.pages import MAGNIFY, PageAddress
 from tvist_cli.paper_tables import print_paper
 from tvist_cli.studying import give
-from tvist_cli.tracks import MAGNIFY, recorded
 
 if TYPE_CHECKING:
     from tvist_lab.studies.paper.served import ServedExperiment
@@ -104,6 +103,8 @@ def _in_real_time(
     from tvist_lab.metrics import NotMeasurableError
     from tvist_lab.recordings import RecordingError
     from tvist_lab.studies.paper.experiment import count
+    from tvist_lab.studies.paper.figures import draw
+    from tvist_lab.studies.paper.figures import overview as overview_figure
     from tvist_lab.studies.paper.served import serve
 
     compile_if_new()
@@ -114,7 +115,10 @@ def _in_real_time(
         failing_on(*errors),
     ):
         result = serve(recording, seed, lambda what: bar(1, what))
-        overview = _figures(result, folder, look)
+        with look.into(folder) as save:
+            for name, figure in draw(result.done, all_figures=False).items():
+                save(figure, name)
+            overview = save(overview_figure(result.done, ANSWERED), "vibration-with-and-without-shaping")
     if json:
         print_json(result.report)
     else:
@@ -124,17 +128,9 @@ def _in_real_time(
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
     if view:
+        from tvist_cli.tracks import recorded
+
         recorded(recording).serve(MAGNIFY, PageAddress("127.0.0.1", PORT, insecure=False))
-
-
-def _figures(result: "ServedExperiment", folder: Path, look: FigureOptions) -> Path:
-    """Draw the paper's figures and the overview; return the path of the overview."""
-    from tvist_lab.studies.paper.figures import draw, overview
-
-    with look.into(folder) as save:
-        for name, figure in draw(result.done, all_figures=False).items():
-            save(figure, name)
-        return save(overview(result.done, ANSWERED), "vibration-with-and-without-shaping")
 
 
 def _say(result: "ServedExperiment", overview: Path, recording: Path) -> None:
