@@ -103,8 +103,6 @@ def _in_real_time(
     from tvist_lab.metrics import NotMeasurableError
     from tvist_lab.recordings import RecordingError
     from tvist_lab.studies.paper.experiment import count
-    from tvist_lab.studies.paper.figures import draw
-    from tvist_lab.studies.paper.figures import overview as overview_figure
     from tvist_lab.studies.paper.served import serve
 
     compile_if_new()
@@ -115,10 +113,7 @@ def _in_real_time(
         failing_on(*errors),
     ):
         result = serve(recording, seed, lambda what: bar(1, what))
-        with look.into(folder) as save:
-            for name, figure in draw(result.done, all_figures=False).items():
-                save(figure, name)
-            overview = save(overview_figure(result.done, ANSWERED), "vibration-with-and-without-shaping")
+        overview = _figures(result, folder, look)
     if json:
         print_json(result.report)
     else:
@@ -131,6 +126,16 @@ def _in_real_time(
         from tvist_cli.tracks import recorded
 
         recorded(recording).serve(MAGNIFY, PageAddress("127.0.0.1", PORT, insecure=False))
+
+
+def _figures(result: "ServedExperiment", folder: Path, look: FigureOptions) -> Path:
+    """Draw the paper's figures and the overview; return the path of the overview."""
+    from tvist_lab.studies.paper.figures import draw, overview
+
+    with look.into(folder) as save:
+        for name, figure in draw(result.done, all_figures=False).items():
+            save(figure, name)
+        return save(overview(result.done, ANSWERED), "vibration-with-and-without-shaping")
 
 
 def _say(result: "ServedExperiment", overview: Path, recording: Path) -> None:
