@@ -235,16 +235,11 @@ def test_the_page_loads_nothing_and_every_option_is_plain_values(rings, advice, 
     assert plain["recommended"]["left_percent"] == min(same)
 
 
-WAYS, REPETITIONS = 3, 2
-"""Number of random moves of each robot, each made to and fro, and how often."""
-REST, BEFORE = 1.2, 0.4
-"""Time at rest after a motion, and after the arm was put at the start of a move [s]."""
-SPEEDS = ((1.5, 2.0), (2.0, 3.0))
-"""Velocity and acceleration limits [rad/s, rad/s²], in turn."""
-SEEDS = (201, 202)
-"""Seeds of hidden robots and their moves."""
-POINTS = 5.0
-"""Largest difference of a reduction that comes true [percentage points]."""
+WAYS, REPETITIONS = 3, 2  # number of random moves of each robot, each made to and fro, and how often
+REST, BEFORE = 1.2, 0.4  # time at rest after a motion, and after the arm was put at the start of a move [s]
+SPEEDS = ((1.5, 2.0), (2.0, 3.0))  # velocity and acceleration limits [rad/s, rad/s²], in turn
+SEEDS = (201, 202)  # seeds of hidden robots and their moves
+POINTS = 5.0  # largest difference of a reduction that comes true [percentage points]
 
 
 async def predicted_and_real(name, seed):

@@ -24,8 +24,7 @@ UNIT = re.compile(
 )
 NARROW = "figure.figsize: 3.503937, 3"
 """Line of a style file with the width of one column of a journal, 89 mm."""
-LEAST_POINTS = 5.5
-"""Smallest size of text in one column [pt]."""
+LEAST_POINTS = 5.5  # smallest size of text in one column [pt]
 
 
 @pytest.fixture(autouse=True)

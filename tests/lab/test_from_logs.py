@@ -41,8 +41,7 @@ from tvist_protocol.errors import RefusedError
 
 SHARES = ((0.0, 6), (0.5, 7), (0.9, 7))
 """Carried masses over the rated payload, and the number of motions with each."""
-LINE = 0.25
-"""Largest way of a straight line along each axis [m]."""
+LINE = 0.25  # largest way of a straight line along each axis [m]
 
 
 def anywhere(random):

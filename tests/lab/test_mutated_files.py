@@ -22,10 +22,8 @@ import numpy as np
 import pytest
 from tests import forked
 
-SECONDS = 5
-"""Longest processor time for one file, some hundred times what a good one takes [s]."""
-MEMORY = 1 << 30
-"""Largest memory that reading may add to what the good files took [bytes]."""
+SECONDS = 5  # longest processor time for one file, some hundred times what a good one takes [s]
+MEMORY = 1 << 30  # largest memory that reading may add to what the good files took [bytes]
 TREE = Path(__file__).parents[2]
 
 NUMBERS = (
