@@ -12,9 +12,10 @@ from tvist_lab.recordings.mcap_file import Published, RecordingFile
 from tvist_protocol import keys
 from tvist_protocol.codec import encode
 from tvist_protocol.info import Info
+from tvist_protocol.io import Io
 from tvist_protocol.recorded import TICK_NS
 from tvist_protocol.replies import Refused
-from tvist_protocol.stream import State, Truth
+from tvist_protocol.stream import Event, State, Truth
 from tvist_server.gateways.base import Answer, CommandIntake, Gateway, topic_of
 from tvist_server.gateways.exposure import guarded
 from tvist_server.gateways.network import Network
@@ -117,7 +118,7 @@ def played(content: RecordingFile, *, loop: bool = False) -> Iterator[Published]
     length = int(tick[-1] - tick[0]) + 1
     shift = 0
     while True:
-        for message in content.published():
+        for message in content.again(State, Truth, Event, Io):
             yield _shifted(message, shift) if shift else message
         if not loop:
             return

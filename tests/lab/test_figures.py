@@ -10,7 +10,7 @@ import pytest
 
 from tvist_lab.identification.workspace_map import WorkspaceMap
 from tvist_lab.metrics import motions
-from tvist_lab.metrics.residual import residual as measured
+from tvist_lab.metrics.paper import residual as measured
 from tvist_lab.studies.moves import example
 from tvist_lab.studies.robustness import ERRORS, cells
 from tvist_shaping import SHAPERS, custom, residual

@@ -45,7 +45,7 @@ def test_the_recording_has_inputs_and_outputs_from_the_first_tick_on(tmp_path):
     robot.request(SimulationStep(token=token, ticks=2))
     robot.recorder.close()
     content = read(tmp_path / "run.mcap")
-    assert [(io.tick, io.actual_digital_output_bits) for io in content.io] == [(1, 0), (4, 2)]
+    assert [(io.tick, io.actual_digital_output_bits) for io in content.again(Io)] == [(1, 0), (4, 2)]
     assert content.recording["actual_digital_output_bits"].tolist() == [0, 0, 0, 2, 2]
 
 
