@@ -68,16 +68,11 @@ def test_a_link_to_a_source_file_leads_to_the_repository(repository, shown, monk
     assert sources.to_repository(text, link.start(), link.end(), ROOT / ".ci" / "run") == shown
 
 
-@pytest.mark.parametrize(
-    ("text", "targets"),
-    [
-        ("see [a](b.md) and ![c](d.png)", ["b.md", "d.png"]),
-        ('<source srcset="a.webp"> <img src="b.gif">', ["a.webp", "b.gif"]),
-        ("`[a](b.md)` is code", []),
-        ("```md\n[a](b.md)\n```\n[`x`](y.md#z)", ["y.md#z"]),
-        ("[out](https://example.org)", []),
-    ],
-)
+@pytest.mark.parametrize(("text", "targets"), [
+    ("see [a](b.md) and ![c](d.png)", ["b.md", "d.png"]),
+    ('<source srcset="a.webp"> <img src="b.gif">', ["a.webp", "b.gif"]), ("`[a](b.md)` is code", []),
+    ("```md\n[a](b.md)\n```\n[`x`](y.md#z)", ["y.md#z"]), ("[out](https://example.org)", []),
+])  # fmt: skip
 def test_links_are_found_outside_code(text, targets):
     assert [match["target"] for match in tree.links(text)] == targets
 
