@@ -41,24 +41,13 @@ class CommandIntake(QueryHandler, Protocol):
     """Receives all messages that arrive at a gateway; threads as for `QueryHandler`."""
 
     def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
-        """Take a command that the gateway itself has made.
-
-        Args:
-            command: The command.
-            answer: As for `request`.
-            origin: IP address of the machine that caused it, if known.
-        """
+        """Take a command that the gateway itself has made; `origin` is the IP address of the machine that caused it."""
 
     def setpoint(self, data: bytes) -> None:
         """Take an encoded set-point."""
 
     def client_seen(self, client: str, session: str = "") -> None:
-        """Note that a client's liveliness token has appeared.
-
-        Args:
-            client: Name of the client.
-            session: Session that declared the token; empty if the token does not name it.
-        """
+        """Note that a client's liveliness token has appeared; `session` declared it, empty if it is not named."""
 
     def client_gone(self, client: str, session: str = "") -> None:
         """Note that a client's liveliness token, or the session that declared it, has disappeared."""
