@@ -1,6 +1,5 @@
 """Gateways, through which clients reach a robot, and their interface to the robot."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from typing import Protocol, cast, get_args
 
@@ -59,11 +58,12 @@ class CommandIntake(QueryHandler, Protocol):
         """Return the client that has control; None: no client."""
 
 
-class Gateway(ABC):
+class Gateway:
     """A way for clients to reach a robot and for the robot's messages to reach them."""
 
-    setpoints_refused: int
-    """Number of set-points rejected before the desk: on a key with a wildcard, or too large."""
+    setpoints_refused = (
+        0  # number of set-points rejected before the desk: on a key with a wildcard, or too large
+    )
     dropped = 0  # number of states dropped because too many were queued
     wanted_topics: Collection[Topic] = frozenset(get_args(Topic))
     """Topics that currently have a reader; messages that no gateway takes are not made. Read from any thread."""
@@ -71,16 +71,14 @@ class Gateway(ABC):
     def report(self, report: Report) -> None:
         self.publish("state", report.state, report.encoded)
 
-    @abstractmethod
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
         """Publish a message, given both decoded and encoded. Called from one thread; network errors raise nothing."""
 
-    async def open(self) -> None:  # noqa: B027  not every gateway has to wait for something
+    async def open(self) -> None:
         """Admit clients. Called when the robot ticks."""
 
-    async def shut(self) -> None:  # noqa: B027  likewise
+    async def shut(self) -> None:
         """Admit no more clients, and disconnect the present ones."""
 
-    @abstractmethod
     def close(self) -> None:
         """Stop listening. Messages that arrive from now on are not answered; a second call does nothing."""

@@ -26,7 +26,6 @@ MICRO = 1e-6
 class MetricsGateway(Gateway):
     """Keeps a robot's newest messages for Prometheus; `newest` returns the newest state, from any thread."""
 
-    setpoints_refused = 0
     wanted_topics: Collection[Topic] = frozenset[Topic]({"event", "telemetry"})
 
     def __init__(self, namespace: str, robot: str, newest: Callable[[], State | None]) -> None:
@@ -51,9 +50,6 @@ class MetricsGateway(Gateway):
     def look(self) -> None:
         """Fetch the newest state, before the figures are read."""
         self.state = self._newest() or self.state
-
-    def close(self) -> None:
-        """Do nothing, since the figures of the last second may still be read."""
 
 
 class Metrics(Collector):

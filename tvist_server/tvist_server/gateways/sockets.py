@@ -23,7 +23,7 @@ from tvist_controller.programs.sockets import (
 )
 from tvist_protocol.journal import SocketChange
 from tvist_server.allowed_hosts import AllowedHosts
-from tvist_server.gateways.base import Gateway, Message
+from tvist_server.gateways.base import Gateway
 
 log = logging.getLogger(__name__)
 
@@ -108,7 +108,6 @@ class ProgramSockets(Gateway, SocketPorts):
     def __init__(
         self, tell: Callable[[SocketNews], None], warn: Callable[[str], None], allowed: AllowedHosts
     ) -> None:
-        self.setpoints_refused = 0
         self._tell_controller, self._warn, self._allowed = tell, warn, allowed
         self._loop: asyncio.AbstractEventLoop | None = None
         self._early: list[Callable[[], object]] | None = []
@@ -176,9 +175,6 @@ class ProgramSockets(Gateway, SocketPorts):
             self._early.append(action)
 
     # The following methods run in the network's thread.
-
-    def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
-        """Ignore the messages of the robot."""
 
     async def open(self) -> None:
         self._loop = asyncio.get_running_loop()

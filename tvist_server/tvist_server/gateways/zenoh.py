@@ -71,7 +71,6 @@ class ZenohGateway(Gateway):
     def __init__(
         self, session: zenoh.Session, robot: str, starting: QueryHandler, *, complete: bool = True
     ) -> None:
-        self.setpoints_refused = 0
         self._session = session
         self._robot = robot
         self._desk: CommandIntake | None = None

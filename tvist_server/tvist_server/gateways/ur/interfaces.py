@@ -66,7 +66,6 @@ class UrInterfaces(Gateway):
         programs: ProgramFolder | None = None,  # programs that clients load by name
         reserved: Sequence[str] = (),  # RTDE inputs that no client may own, as if a fieldbus owned them
     ) -> None:
-        self.setpoints_refused = 0
         self.address = address
         self._desk, self._gripper = desk, gripper
         self._throttles = [
