@@ -107,8 +107,7 @@ class Nodes:
                     self._number_in(one, point) for one in (joints.get("angles") or "").split(",")
                 )
                 yield from self._labelled(
-                    point.get("name") or "Waypoint",
-                    f"{function}([{angles}], a={acceleration}, v={speed})",
+                    point.get("name") or "Waypoint", f"{function}([{angles}], a={acceleration}, v={speed})"
                 )
             elif point.get("type") == "Variable":
                 name = self._variable(point.find("variable"))
