@@ -1,4 +1,4 @@
-"""Find motions in measured joint angles, if a log lacks the target, and how late an arm follows its target."""
+"""Find motions in measured joint angles, and how late an arm follows its target."""
 
 import math
 
