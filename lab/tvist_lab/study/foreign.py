@@ -54,7 +54,7 @@ class FromFile(SampleMethod):
     name: str
     label: str
 
-    def stepper(self, task: Task) -> "Foreign":
+    def stepper(self, task: Task) -> "UserShaper":
         """Return a new shaper, reset."""
         description, move = task.description, task.move
         estimator = self.recipe.estimator(description, move.mass, MODES)
@@ -73,10 +73,10 @@ class FromFile(SampleMethod):
             raise
         except Exception as error:
             raise ShaperFaultError(f"raises {named(error)} when it is made") from error
-        return Foreign(made, info, estimator, np.array(move.start), np.array(description.limits.position))
+        return UserShaper(made, info, estimator, np.array(move.start), np.array(description.limits.position))
 
 
-class Foreign:
+class UserShaper:
     """A user's shaper in operation."""
 
     def __init__(self, made: Any, info: TickInfo, estimator: Estimator, start: Floats, reach: Floats) -> None:
