@@ -59,6 +59,8 @@ class MotionRecorder:
             motion.samples.append(sample)
         if resting and not motion.stop:
             motion.stop = len(motion.samples)
+            if motion.stop > LONGEST:  # too long to teach anything: its samples take 20 MB
+                self.forget()
         if motion.stop and len(motion.samples) == motion.stop + AFTER:
             done = _recorded(motion)
             self.forget()

@@ -5,7 +5,6 @@ import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -125,13 +124,22 @@ class UserShaper:
         return q_star.copy()
 
 
-@cache
+_loaded: dict[Path, Callable[[], Any]] = {}
+
+
 def load_shaper(path: Path) -> Callable[[], Any]:
     """Return a function that creates the file's shaper: its class with `step`, or one that returns its module.
 
     The file is run once in each process, so its module's state persists from motion to motion. Raises
     CandidateError if the file cannot be run, or does not contain exactly one shaper.
     """
+    file = path.resolve()
+    if file not in _loaded:
+        _loaded[file] = _load(path)
+    return _loaded[file]
+
+
+def _load(path: Path) -> Callable[[], Any]:
     if not path.is_file():
         raise CandidateError(f"shaper {path}: there is no such file")
     module = run_file(path, "shaper", CandidateError)
