@@ -56,6 +56,9 @@ def complaint(run, age):
 
 
 def main():
+    if _git("rev-parse", "--is-shallow-repository") == "true":
+        sys.stderr.write("tests/nightly.json: not checked, since this clone has not all commits\n")
+        return
     run = json.loads(RECORD.read_text())
     known = subprocess.run(
         ["git", "merge-base", "--is-ancestor", run["commit"], "HEAD"], check=False, capture_output=True
