@@ -19,11 +19,12 @@ from tvist_lab.programs.results import Shortcoming, as_dict, summary
 from tvist_lab.programs.running import InputError, ProgramServer, run_in_lockstep
 from tvist_lab.programs.watch import ProgramMessage, ProgramWatch
 from tvist_lab.words import counted
-from tvist_plant.user_file import LARGEST, UserFileError, read_text
+from tvist_plant.user_file import LARGEST, UserFileError
 from tvist_protocol.errors import harmless
 from tvist_server.config import ServeConfig
 from tvist_server.gateways.base import GatewayError
 from tvist_server.option_values import StartError
+from tvist_server.polyscope.files import read_program
 from tvist_server.recording import RecorderError
 from tvist_server.server import Server
 from tvist_server.shutdown import Shutdown
@@ -38,8 +39,8 @@ def named(file: Path) -> str:
     return "<stdin>" if _is_stdin(file) else str(file)
 
 
-def read_script(file: Path) -> str:
-    """Read a program; `-` reads the standard input."""
+def read_script(file: Path, skip: Sequence[str] = ()) -> str:
+    """Read a program, without the nodes of some URCaps; `-` reads the standard input."""
     if _is_stdin(file):
         content = sys.stdin.buffer.read(LARGEST + 1)
         if len(content) > LARGEST:
@@ -53,7 +54,7 @@ def read_script(file: Path) -> str:
             raise Failure(why, code=2) from error
     with failing_on(OSError, exit_code=2):
         try:
-            return read_text(file, "program")
+            return read_program(file, frozenset(skip))
         except UserFileError as error:
             raise Failure(str(error), code=2) from error
 

@@ -5,6 +5,7 @@ import gzip
 import msgspec
 import pytest
 from tests.controller.robots import Robot
+from tvist_server.polyscope_nodes import EXTERNAL_CONTROL, Nodes
 
 from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.host import Host
@@ -17,7 +18,6 @@ from tvist_protocol.replies import Refused
 from tvist_server.config import from_mapping
 from tvist_server.option_values import StartError
 from tvist_server.polyscope import program, with_external_control
-from tvist_server.polyscope_nodes import EXTERNAL_CONTROL, Nodes
 from tvist_server.program_folder import ProgramFolder
 
 TEXT = "def pick():\n  sync()\nend\n"
