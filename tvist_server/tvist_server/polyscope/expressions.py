@@ -12,13 +12,14 @@ _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _PIN = re.compile(r"(\w+)\[(\d{1,3})\]")
 _NAMES = ("name", "featureName", "referencedName")  # attributes that name a variable or feature
 _READ = {
-    "digital_in": "get_standard_digital_in", "config_in": "get_configurable_digital_in",
-    "tool_in": "get_tool_digital_in", "digital_out": "get_standard_digital_out", "config_out": "get_configurable_digital_out",
-    "tool_out": "get_tool_digital_out", "analog_in": "get_standard_analog_in", "tool_analog_in": "get_tool_analog_in",
-    "analog_out": "get_standard_analog_out", "gp_bool_in": "read_input_boolean_register",
-    "gp_int_in": "read_input_integer_register", "gp_float_in": "read_input_float_register",
-    "gp_bool_out": "read_output_boolean_register", "gp_int_out": "read_output_integer_register",
-    "gp_float_out": "read_output_float_register",
+    "digital_in": "get_standard_digital_in", "digital_out": "get_standard_digital_out",
+    "config_in": "get_configurable_digital_in", "config_out": "get_configurable_digital_out",
+    "tool_in": "get_tool_digital_in", "tool_out": "get_tool_digital_out",
+    "analog_in": "get_standard_analog_in", "analog_out": "get_standard_analog_out",
+    "tool_analog_in": "get_tool_analog_in",
+    "gp_bool_in": "read_input_boolean_register", "gp_bool_out": "read_output_boolean_register",
+    "gp_int_in": "read_input_integer_register", "gp_int_out": "read_output_integer_register",
+    "gp_float_in": "read_input_float_register", "gp_float_out": "read_output_float_register",
 }  # fmt: skip
 _WRITE = {
     "digital_out": "set_standard_digital_out", "config_out": "set_configurable_digital_out",

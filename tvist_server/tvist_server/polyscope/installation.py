@@ -58,7 +58,8 @@ class Installation:
         features = {
             one.get("name") or "": numbers(place.get("value"), 3) + numbers(turn.get("value"), 3)
             for one in tree.iter("GeomPoseNode")
-            if (place := one.find("toolPosition")) is not None
+            if one.get("isVariable") == "true"
+            and (place := one.find("toolPosition")) is not None
             and (turn := one.find("toolAxisAngle")) is not None
         }
         lines = (line.partition("=") for line in variables.splitlines() if not line.startswith("#"))
