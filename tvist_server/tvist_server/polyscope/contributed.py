@@ -53,7 +53,7 @@ def detection(node: Element) -> str:
 def _move_fingers(node: Element) -> list[str]:
     """Return the lines that move the fingers: percentages are counts up to 255, rounded half up."""
     position, speed, force = (
-        int(numbers(_datum(node, f"{name}InDouble", ""), 1)[0] * 2.55 + 0.5)
+        int(numbers(_datum(node, f"{name}InDouble", ""), 1)[0] * 255.0 / 100.0 + 0.5)
         for name in ("position", "speed", "force")
     )
     lines = [f"rq_set_pos({position})", f"rq_set_speed({speed})", f"rq_set_force({force})", "rq_go_to()"]

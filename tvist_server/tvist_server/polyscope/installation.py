@@ -89,8 +89,9 @@ class Installation:
 def numbers(text: str | None, count: int) -> Pose:
     """Return the finite numbers of a text, separated by commas; raise ValueError unless there are `count`."""
     found = tuple(float(part) for part in (text or "").split(","))
-    if len(found) != count or not all(abs(number) < _LARGEST for number in found):
-        raise ValueError(f"{text!r} is not {count} numbers")
+    found = tuple(number for number in found if abs(number) < _LARGEST)
+    if len(found) != count:
+        raise ValueError(f"{len(found)} numbers below {_LARGEST:g} instead of {count}")
     return found
 
 

@@ -88,9 +88,7 @@ class Moves:
         target = self._references.target(node)
         name = "" if target is None else target.get("referencedName") or ""
         if name not in self._installation.tcps:
-            raise UnknownPartError(
-                f"the TCP {name or 'without a name'}, which its installation does not have"
-            )
+            raise UnknownPartError(f"the TCP {name or 'without a name'} (not in its installation)")
         return f"set_tcp({pose(self._installation.tcps[name].offset)})"
 
     @property
@@ -121,16 +119,9 @@ class Moves:
         self._text.label(self._number[node], self._name(node))
         if style.tcp:
             self._text.line(style.tcp)
-        if style.flange and near:
-            place = f"pose_trans({place}, get_tcp_offset())"
-        if style.kind == "MoveJ":
-            place = (
-                near
-                if style.joints and near
-                else f"get_inverse_kin({place}, qnear={near})"
-                if near
-                else place
-            )
+        if near and place != near:
+            place = f"pose_trans({place}, get_tcp_offset())" if style.flange else place
+            place = f"get_inverse_kin({place}, qnear={near})" if style.kind == "MoveJ" else place
         radius = f", r={blend!r}" if blend else ""
         if style.kind == "MoveP":
             radius = f", r={0.0 if following is None and self._ends else style.blend!r}"
@@ -142,7 +133,7 @@ class Moves:
         return node.get("name") or "Waypoint"
 
     def _place(self, node: Element) -> tuple[str, str]:
-        """Return where a waypoint is: a pose, and a posture near it if it was taught."""
+        """Return where a waypoint is: a pose or posture, and a posture near it if it was taught."""
         name = script_name(self._name(node))
         position = self._references.target(node.find("position"))
         try:
@@ -152,8 +143,9 @@ class Moves:
                 case "Fixed" if position is not None:
                     posture = f"{name}_q"
                     self.waypoints[posture] = str(list(joint_angles(position)))
-                    if not self._style.joints:
-                        self.waypoints[f"{name}_p"] = pose(tool_pose(position))
+                    if self._style.joints or position.find("Kinematics") is None:
+                        return posture, posture
+                    self.waypoints[f"{name}_p"] = pose(tool_pose(position))
                     return f"{name}_p", posture
                 case "Relative" if position is not None:
                     begin = self._references.target(node.find("relativeFromPosition"))
@@ -223,9 +215,7 @@ class Moves:
         if name in _FEATURES:
             return _FEATURES[name]
         if name not in self._installation.features:
-            raise UnknownPartError(
-                f"the feature {name or 'without a name'}, which its installation does not have"
-            )
+            raise UnknownPartError(f"the feature {name or 'without a name'} (not in its installation)")
         return name, script_name(name)
 
     def _until(self, node: Element, number: int) -> None:

@@ -108,8 +108,23 @@ def _functions(root: Element, references: References) -> dict[str, Element]:
 
 
 def _acts(main: Element) -> bool:
-    """Return whether a program has more than scripts: repeating only definitions would compute for ever."""
-    return any(node.tag not in {"Comment", "MainProgram", "Folder"} for node in inside(main))
+    """Return whether a program does more than define functions: repeating that would compute for ever."""
+    return any(
+        node.tag not in {"Comment", "MainProgram", "Folder", "SuppressedNode"}
+        and not (node.tag == "Script" and _only_defines(node.findtext("cachedContents") or ""))
+        for node in inside(main)
+    )
+
+
+def _only_defines(text: str) -> bool:
+    from tvist_urscript import tree
+    from tvist_urscript.errors import ScriptError
+    from tvist_urscript.parsing import parse
+
+    try:
+        return bool(text) and all(isinstance(one, tree.Function) for one in parse(f"{text}\n"))
+    except ScriptError:  # compiling it reports the error
+        return False
 
 
 def program(name: str, body: str) -> str:

@@ -32,4 +32,4 @@ class ScriptText:
             self.line(end)
 
     def __str__(self) -> str:
-        return "\n".join(self._lines) + "\n"
+        return "".join(f"{line}\n" for line in self._lines)
