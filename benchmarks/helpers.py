@@ -31,8 +31,7 @@ from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
 from tvist_server.rtde.codec import PackageKind, PackageReader, package
 from tvist_server.schedule import Schedule
 
-ROBOT = "bare"
-"""Name of the robot whose states `bare_tick` publishes."""
+ROBOT = "bare"  # name of the robot whose states `bare_tick` publishes
 SET_TIMER_SLACK = 29
 """prctl option for the largest delay of this thread's wake-ups [ns]; a served robot sets it, too."""
 

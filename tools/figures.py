@@ -39,7 +39,7 @@ from tvist_lab.figures.style import (
 )
 from tvist_lab.in_process import free_setup
 from tvist_lab.metrics import motions
-from tvist_lab.metrics.settling import REPEATABILITY, distance
+from tvist_lab.metrics.paper import REPEATABILITY, distance
 from tvist_lab.recordings import Floats
 from tvist_lab.studies.paper.experiment import simulate
 from tvist_lab.studies.paper.published import ARMS, MOTIONS, published

@@ -16,7 +16,8 @@ from PIL import Image
 from websockets.exceptions import ConnectionClosed
 
 from tvist_cli.output import progress
-from tvist_cli.tracks import MAGNIFY, compared
+from tvist_cli.pages import MAGNIFY
+from tvist_cli.tracks import compared
 from tvist_view.signals import BRAKES_S
 from tvist_view.stage import Tab, open_stage, page
 from tvist_view.track import Track

@@ -55,7 +55,7 @@ def travelled(text: str, start: str, seconds: float) -> tuple[Floats, str]:
     """Run a program; return the references of the ticks in which the arm moves, shape (T, n) [rad], and its end."""
     with TemporaryDirectory() as folder:
         file = Path(folder, "run.mcap")
-        setup = free_setup(profile="ursim", floor=False, **({"start": start} if start else {}))
+        setup = free_setup(profile="ursim", floor=False, start=start or None)
         watch = run_in_lockstep(
             setup, text, (), record=file, timeout=seconds, attend=lambda _: None, on_record_error=print
         )

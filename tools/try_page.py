@@ -21,7 +21,7 @@ from tvist_plant.sensors import gear_phases
 from tvist_shaping.catalogue import SHAPERS
 from tvist_view.look import Look
 from tvist_view.signals import MOVING, moves
-from tvist_view.track import ShownRobot, Track
+from tvist_view.track import Track
 
 TAKEN = Path(__file__).parents[1] / "view" / "page" / "try" / "made" / "taken.json"
 
@@ -66,7 +66,7 @@ def _ur5e() -> dict[str, Any]:
     for name, label in (("none", "unshaped"), ("zv", "shaped")):
         info, run = asyncio.run(run_beside(name, [poses["Q1"], poses["Q3"]]))
         assert info.geometry is not None  # this version's server sends it
-        tracks.append(Track(ShownRobot(label, Look(info.geometry, info.payload)), run.states, run.truths))
+        tracks.append(Track(label, Look(info.geometry, info.payload), run.states, run.truths))
     span = moves(tracks[0].signals)
     assert span is not None  # the arm has moved
     start, stop = span[0] - 0.1, span[1]

@@ -182,29 +182,20 @@ def report_payload(found: PayloadFound, *, declared: bool, json: bool) -> None:
     if json:
         print_json(
             {
-                "mass_kg": payload.mass,
-                "mass_deviation_kg": found.mass_deviation,
-                "com_m": payload.com,
-                "com_deviation_m": found.com_deviation,
-                "mass_in_motion_kg": found.mass_in_motion,
+                "mass_kg": payload.mass, "mass_deviation_kg": found.mass_deviation, "com_m": payload.com,
+                "com_deviation_m": found.com_deviation, "mass_in_motion_kg": found.mass_in_motion,
                 "mass_in_motion_deviation_kg": found.mass_in_motion_deviation,
-                "declared_kg": found.declared.mass,
-                "poses": found.poses,
+                "declared_kg": found.declared.mass, "poses": found.poses,
                 "set_payload": {"mass": payload.mass, "com": payload.com, "inertia": payload.inertia},
                 "declared": declared,
             }
-        )
+        )  # fmt: skip
         return
     table(
         f"payload identified from the joint torques in {found.poses} poses",
         ("", "found", "± (one standard deviation)", "declared before"),
         [
-            (
-                "mass [kg]",
-                f"{payload.mass:.3f}",
-                f"{found.mass_deviation:.3f}",
-                f"{found.declared.mass:.3f}",
-            ),
+            ("mass [kg]", f"{payload.mass:.3f}", f"{found.mass_deviation:.3f}", f"{found.declared.mass:.3f}"),
             *(
                 (f"centre {axis} [mm]", f"{1e3 * c:.1f}", f"{1e3 * d:.1f}", f"{1e3 * before:.1f}")
                 for axis, c, d, before in zip(

@@ -35,8 +35,7 @@ from tvist_server.config import from_mapping
 from tvist_server.option_values import StartError
 from tvist_server.watching.address import place_of
 
-ROBOT = "ur5e"
-"""Robot that is identified unless another one is named."""
+ROBOT = "ur5e"  # robot that is identified unless another one is named
 READY = 30.0  # longest wait for the robot to follow set-points [s]
 MOVED = 0.01
 """If a joint is further than this from where the moves were planned to start, they are not made [rad]."""

@@ -41,11 +41,9 @@ GROUPS = {
         "unlock": "Make a stopped robot ready to move again; exit code 0 if it is.",
         "forget": "Discard what a served robot has learnt about its payload.",
     },
-    "Logs": {
-        "log": f"Use recordings and other robots' logs: {', '.join(LOG)}.",
-    },
+    "Logs": {"log": f"Use recordings and other robots' logs: {', '.join(LOG)}."},
     "Studies": {
-        "study": "Compare shapers in simulation: on any moves, two of them, all of them, or in your own study.",
+        "study": "Compare shapers in simulation: on any moves, two of them, all of them, or in your own study."
     },
     "Make and manage": {
         "demo": "Run the paper's experiment, in real time or simulated, and compare the results with the paper.",
@@ -200,8 +198,7 @@ def _run() -> None:
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
         print(
-            harmless(f"tvist: {sentence(error, tuple(_known(error.command_chain or ())))}"),
-            file=sys.stderr,
+            harmless(f"tvist: {sentence(error, tuple(_known(error.command_chain or ())))}"), file=sys.stderr
         )
         sys.exit(2)
     except Failure as failure:

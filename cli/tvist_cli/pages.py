@@ -13,6 +13,7 @@ from tvist_cli.output import err
 if TYPE_CHECKING:
     from tvist_view.stage import Meet
 
+MAGNIFY = 100.0  # default magnification of the bending [-]
 NICE = 5  # Niceness of a page's process, so that it yields to a robot's server on the same machine
 
 

@@ -30,19 +30,21 @@ from tvist_server.recording import RecorderError
 from tvist_server.server import Server
 from tvist_server.shutdown import Shutdown
 
+STDIN = "<stdin>"
 SHOWN_EVERY = 0.1  # shortest time between two changes of the progress line [s]
 _CLEAR = "\r\x1b[K"  # moves to the start of the terminal's line and clears it
-STDIN = "-"
 
 
 def named(file: Path) -> str:
     """Return a file's name for messages."""
-    return "<stdin>" if _is_stdin(file) else str(file)
+    return (
+        STDIN if str(file).strip() == "-" else str(file)
+    )  # `readable` may have put a blank before the minus
 
 
 def read_script(file: Path, skip: Sequence[str] = ()) -> str:
     """Read a program, without the nodes of some URCaps; `-` reads the standard input."""
-    if _is_stdin(file):
+    if named(file) == STDIN:
         content = sys.stdin.buffer.read(LARGEST + 1)
         if len(content) > LARGEST:
             raise Failure(
@@ -100,8 +102,7 @@ def check_scripts(files: Sequence[Path], skip: Sequence[str], *, json: bool) -> 
         for one, finding in found:
             print(harmless(placed(one, finding)))
     if errors:
-        programs = "1 program" if len(files) == 1 else f"{len(files)} programs"
-        raise Failure(f"{errors} {'error' if errors == 1 else 'errors'} in {programs}")
+        raise Failure(f"{counted(errors, 'error')} in {counted(len(files), 'program')}")
 
 
 def _findings(file: Path, skip: Sequence[str], *, alone: bool) -> Sequence[ProgramFinding]:
@@ -112,11 +113,6 @@ def _findings(file: Path, skip: Sequence[str], *, alone: bool) -> Sequence[Progr
         if alone:
             raise
         return [ProgramFinding(1, 1, "error", str(error))]
-
-
-def _is_stdin(file: Path) -> bool:
-    """Whether a file is the standard input; `readable` may have put a blank before its name."""
-    return str(file).strip() == STDIN
 
 
 @dataclass(frozen=True)
@@ -225,14 +221,9 @@ class Runner:
             setup = self.config.setup()
         compile_if_new()
         watch = run_in_lockstep(
-            setup,
-            text,
-            self.inputs,
-            record=None if record is None else Path(record),
-            timeout=self.timeout,
-            attend=self.tell,
-            on_record_error=errors.append,
-        )
+            setup, text, self.inputs, record=None if record is None else Path(record), timeout=self.timeout,
+            attend=self.tell, on_record_error=errors.append,
+        )  # fmt: skip
         if record is not None and not errors:
             say(f"recorded into {record}")
         return watch

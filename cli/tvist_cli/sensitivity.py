@@ -1,15 +1,15 @@
 """Compute and print the residual vibration of shapers for a wrong frequency."""
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import number, out, table
 from tvist_cli.shapers_of import of_impulses
-from tvist_cli.studying import Figures, ResultFiles, give
+from tvist_cli.studying import ResultFiles, give
 
 if TYPE_CHECKING:
-    from tvist_lab.recordings import Floats
     from tvist_shaping import Shaper
 
 STANDARD = ("zv", "zvd", "ei")  # shapers of the paper's Figure 4
@@ -23,6 +23,7 @@ def print_sensitivity(
     """Compute and print the residual vibration of shapers for a mode whose frequency they assume wrongly."""
     import numpy as np
 
+    from tvist_lab.figures import sensitivity_figure
     from tvist_lab.frequency_error import residual_over_error
     from tvist_shaping import ShapingError
     from tvist_shaping.impulse_train import check_mode
@@ -42,14 +43,8 @@ def print_sensitivity(
             about = _about(shaper, zeta)
         curves.append({**about, "residual_percent": (100.0 * left).tolist()})
     result = {"zeta": zeta, "error_percent": (100.0 * span).tolist(), "shapers": curves}
-    places.write(result, draw=lambda: _figures(chosen, zeta, span))
+    places.write(result, lambda: {"sensitivity": sensitivity_figure(chosen, zeta, span)})
     give(result, lambda _: _print(chosen, zeta, curves), json=json)
-
-
-def _figures(shapers: "list[Shaper]", zeta: float, span: "Floats") -> Figures:
-    from tvist_lab.figures import sensitivity_figure
-
-    return {"sensitivity": sensitivity_figure(shapers, zeta, span)}
 
 
 def _print(shapers: "list[Shaper]", zeta: float, curves: list[dict[str, Any]]) -> None:
@@ -77,8 +72,6 @@ def _print(shapers: "list[Shaper]", zeta: float, curves: list[dict[str, Any]]) -
 
 def _about(shaper: "Shaper", zeta: float) -> dict[str, Any]:
     """Return name, delay, and the errors between which at most 5 % remains; None for no bound."""
-    import math
-
     low, high = shaper.band(0.05 * (1.0 + 1e-4), zeta)  # a hump of exactly 5 % is inside
     ends = [
         None if not math.isfinite(ratio) or ratio <= 0.0 else 100.0 * (1.0 / ratio - 1.0)

@@ -19,7 +19,7 @@ from tvist_controller.sources.mode_source import modal_source
 from tvist_controller.sources.own_files import is_file
 from tvist_controller.sources.own_shapers import OwnShaper
 from tvist_lab.studies.presets import PRESETS
-from tvist_lab.studies.sweep import NamedRobot, Spec, SweptRobot, read_spec, study
+from tvist_lab.studies.sweep import NamedRobot, Spec, SweptRobot, digest, read_spec, study
 from tvist_lab.study.arms import scattered
 from tvist_lab.study.case import LIMITS
 from tvist_lab.study.catalogue import baselines, some
@@ -60,10 +60,10 @@ def preset_study(name: str, options: StudyOptions) -> Study:
     own = [each.sha256 for one in asked.methods if isinstance(one, Named) for each in one.recipe.own]
     files = [Path(one.path).read_bytes() for one in asked.methods if isinstance(one, FromFile)]
     contents = {
-        "contents of robot": _digest(asked.description),
-        "contents of calibrations": [_digest(one) for one in _calibrations(asked.methods)],
+        "contents of robot": digest(asked.description),
+        "contents of calibrations": [digest(one) for one in _calibrations(asked.methods)],
         "contents of shapers": [*own, *(sha256(one).hexdigest() for one in files)],
-        "contents of moves": _digest([msgspec.to_builtins(one) for one in asked.moves]),
+        "contents of moves": digest([msgspec.to_builtins(one) for one in asked.moves]),
     }
     return replace(made, identity=contents)
 
@@ -170,8 +170,7 @@ def _calibration(
         found = calibrations.load(given)
         if modal and found.modal is None:
             raise Failure(
-                f"calibration {found.name} has no modal model: make one with tvist identify",
-                code=2,
+                f"calibration {found.name} has no modal model: make one with tvist identify", code=2
             )
         return found
     default = calibrations.default_for(description.robot.model)
@@ -266,10 +265,6 @@ def _command(name: str, options: StudyOptions) -> str:
             said = (f"{one:g}" if isinstance(one, float) else str(one) for one in values)
             words += [f"--{option.replace('_', '-')}", *said]
     return " ".join(words)
-
-
-def _digest(content: object) -> str:
-    return sha256(msgspec.json.encode(content, order="sorted")).hexdigest()[:16]
 
 
 def swept(path: Path) -> Study:

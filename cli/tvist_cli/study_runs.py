@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -32,48 +31,38 @@ PATIENCE = 10.0  # time within which a scheduler must answer and have a worker [
 LISTED = 12  # largest number of motions that are listed
 
 
-@dataclass(frozen=True)
-class StudyOutputs:
-    """Output files and folders of a study, each None if not written."""
-
-    rows: Path | None
-    figures: Path | None
-    look: FigureOptions
-    report: Path | None
-
-
 def run(
     name: str,
     file: Path | None,
     options: StudyOptions,
-    places: StudyOutputs,
+    *,
+    folder: Path | None,
+    figures: Path | None,
+    look: FigureOptions,
+    report: Path | None,
     processes: int | None,
     scheduler: str | None,
-    *,
     json: bool,
 ) -> None:
     """Run a study by name or from a file; raise Failure if an option is invalid, it cannot run, or rows failed."""
     executor = _executor(processes, scheduler)
-    places.look.check(places.figures, places.report, options.save_moves)
-    study = _study(name, file, options)
-    result = _ran(study, places.rows, executor)
+    look.check(figures, report, options.save_moves)
+    if file is None:
+        study = preset_study(name, options)
+    else:
+        with failing_on(StudyError, OSError):
+            study = read_study(file) if file.suffix == ".py" else swept(file)
+    result = _ran(study, folder, executor)
     with failing_on(OSError):
-        if places.rows is not None:
-            write_json(places.rows / "result.json", result.values)
-        if places.report is not None:
+        if folder is not None:
+            write_json(folder / "result.json", result.values)
+        if report is not None:
             with house_style():
-                write_report(places.report, study_page(result, study_figures(result), typed()))
-        if places.figures is not None:
-            with places.look.into(places.figures) as save:
+                write_report(report, study_page(result, study_figures(result), typed()))
+        if figures is not None:
+            with look.into(figures) as save:
                 write(save, {name: figure for name, (figure, _) in study_figures(result).items()})
     _tell(result, json=json)
-
-
-def _study(name: str, file: Path | None, options: StudyOptions) -> Study:
-    if file is None:
-        return preset_study(name, options)
-    with failing_on(StudyError, OSError):
-        return read_study(file) if file.suffix == ".py" else swept(file)
 
 
 def _executor(

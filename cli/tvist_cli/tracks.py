@@ -4,20 +4,32 @@ import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from tvist_cli.compiling import compile_if_new
 from tvist_cli.failure import Failure, failing_on
 from tvist_cli.judging import judge
 from tvist_cli.output import progress
 from tvist_cli.pages import PageAddress, serve_page
+from tvist_controller.about import geometry_of
+from tvist_controller.refusal import RefusalError
+from tvist_lab.in_process import run_beside
+from tvist_lab.metrics import MeasuredRecording, pairs
+from tvist_lab.recordings import RecordingError
+from tvist_lab.recordings.mcap_file import RecordingFile, read_checked
+from tvist_plant.description import DescriptionError, RobotDescription, load
+from tvist_plant.plant import PERIOD
+from tvist_protocol.content import checked
+from tvist_protocol.values import Payload
+from tvist_server.option_values import StartError
+from tvist_view import described
+from tvist_view.beside import MotionRecord
+from tvist_view.look import Look
+from tvist_view.playback import meet, playback, said
+from tvist_view.track import Track
 
-if TYPE_CHECKING:
-    from tvist_lab.recordings.mcap_file import RecordingFile
-    from tvist_view.look import Look
-    from tvist_view.track import Track
-
-MAGNIFY = 100.0  # default magnification of the bending [-]
 LEAD = 150  # ticks at rest shown before a motion
 REST = 500  # ticks shown after a motion
 
@@ -27,7 +39,7 @@ class Shows:
     """Tracks for a page to play back."""
 
     title: str
-    tracks: "list[Track]"
+    tracks: list[Track]
     result: dict[str, Any] | None = None
 
     @property
@@ -37,44 +49,23 @@ class Shows:
 
     def page(self, factor: float) -> str:
         """Return the page that plays the tracks back."""
-        from tvist_view.playback import playback
-
         return playback(self.tracks, self.title, factor=factor, result=self.result)
 
     def serve(self, factor: float, door: PageAddress) -> None:
         """Serve the page until Control+C."""
-        from tvist_view.playback import meet
-
         serve_page(self.page(factor), meet, door)
 
 
 def recorded(file: Path) -> Shows:
     """Return the track of a recording."""
-    from tvist_lab.recordings import RecordingError
-    from tvist_lab.recordings.mcap_file import read_checked
-    from tvist_view.look import GeometryError
-    from tvist_view.track import ShownRobot, Track, TrackError
-
-    with failing_on(RecordingError, TrackError, GeometryError, ValueError):
+    with failing_on(RecordingError, ValueError):
         content = read_checked(file)
-        return Shows(
-            file.stem, [Track(ShownRobot(file.stem, _look_of(content)), content.states, content.truths)]
-        )
+        return Shows(file.stem, [Track(file.stem, _look_of(content), content.states, content.truths)])
 
 
 def repeated(file: Path) -> Shows:
     """Return the recorded motion without and with the shaper that brings the tool to rest the most earlier."""
-    import numpy as np
-
-    from tvist_lab.metrics import MeasuredRecording, pairs
-    from tvist_lab.recordings import RecordingError
-    from tvist_lab.recordings.mcap_file import read_checked
-    from tvist_plant.plant import PERIOD
-    from tvist_view.look import GeometryError
-    from tvist_view.playback import said
-    from tvist_view.track import ShownRobot, Track, TrackError
-
-    with failing_on(RecordingError, TrackError, GeometryError, ValueError):
+    with failing_on(RecordingError, ValueError):
         content = read_checked(file)
         measured = MeasuredRecording.of(content.recording)
         found = [one for one in pairs(measured) if one.change.less_percent is not None]
@@ -96,22 +87,12 @@ def repeated(file: Path) -> Shows:
             states = [state for state in content.states if first <= state.tick <= last]
             truths = [truth for truth in content.truths if first <= truth.tick <= last]
             begun = float(content.recording.time[motion.start]) - LEAD * PERIOD
-            tracks.append(Track(ShownRobot(label, look), states, truths, begun))
+            tracks.append(Track(label, look, states, truths, begun))
     return Shows(f"{file.stem}: {best.name}", tracks, said(best.change.as_dict(), shaper, best.name))
 
 
 def compared(shapers: Sequence[str], robot: str) -> Shows:
     """Simulate the same motion with each shaper."""
-    from tvist_controller.refusal import RefusalError
-    from tvist_lab.in_process import run_beside
-    from tvist_plant.description import DescriptionError, load
-    from tvist_server.option_values import StartError
-    from tvist_view.beside import MotionRecord
-    from tvist_view.described import pairs
-    from tvist_view.look import Look
-    from tvist_view.playback import said
-    from tvist_view.track import ShownRobot, Track
-
     if not 2 <= len(shapers) <= 3:
         raise Failure(f"compare has {len(shapers)} shapers: give two or three", code=2)
     compile_if_new()
@@ -121,7 +102,7 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
         progress(len(shapers), "runs") as advance,
     ):
         poses = load(robot).poses
-        named = pairs(list(poses))
+        named = described.pairs(list(poses))
         if not named:
             raise Failure(f"robot file {robot} names no two poses to move between", code=2)
         first, last = named[0]
@@ -129,11 +110,8 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
             info, collected = asyncio.run(run_beside(shaper, (poses[first], poses[last]), robot=robot))
             assert info.geometry is not None  # of our own server
             label = "without" if shaper == "none" else f"with {shaper}" if "none" in shapers else shaper
-            tracks.append(
-                Track(
-                    ShownRobot(label, Look(info.geometry, info.payload)), collected.states, collected.truths
-                )
-            )
+            look = Look(info.geometry, info.payload)
+            tracks.append(Track(label, look, collected.states, collected.truths))
             runs.append(MotionRecord(collected.states, collected.truths, collected.events))
             advance(1, None)
     result = None
@@ -142,14 +120,8 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
     return Shows(f"{' and '.join(shapers)}: {info.model}, {first} → {last}", tracks, result)
 
 
-def _look_of(content: "RecordingFile") -> "Look":
+def _look_of(content: RecordingFile) -> Look:
     """Return the geometry of a recording's robot: as recorded, or from the robot file in a server's recording."""
-    from tvist_controller.about import geometry_of
-    from tvist_plant.description import RobotDescription
-    from tvist_protocol.content import checked
-    from tvist_protocol.values import Payload
-    from tvist_view.look import Look
-
     info, start = content.info, content.start or {}
     if info is not None and info.geometry is not None:
         return Look(info.geometry, info.payload)

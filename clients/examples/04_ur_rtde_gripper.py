@@ -26,34 +26,24 @@ class Gripper:
     def __init__(self, host: str) -> None:
         self._socket = socket.create_connection((host, 63352), timeout=5.0)
 
-    def set(self, **values: int) -> None:
-        """Write registers, such as POS=255, GTO=1."""
-        words = " ".join(f"{name} {value}" for name, value in values.items())
-        self._socket.sendall(f"SET {words}\n".encode())
-        if self._socket.recv(1024) != b"ack":
-            raise RuntimeError(f"the gripper does not take {words}")
-
-    def get(self, name: str) -> int:
-        """Read a register."""
-        self._socket.sendall(f"GET {name}\n".encode())
-        answered, value = self._socket.recv(1024).decode().split()
-        if answered != name:
-            raise RuntimeError(f"the gripper answers {answered} instead of {name}")
-        return int(value)
+    def ask(self, line: str) -> str:
+        """Send a line, and return the answer."""
+        self._socket.sendall(f"{line}\n".encode())
+        return self._socket.recv(1024).decode().strip()
 
     def activate(self) -> None:
         """Activate it, and wait until it is active."""
-        self.set(ACT=0, ATR=0)
-        self.set(ACT=1)
-        while self.get("STA") != 3:
+        self.ask("SET ACT 0 ATR 0")
+        self.ask("SET ACT 1")
+        while self.ask("GET STA") != "STA 3":
             pass
 
     def move(self, position: int) -> bool:
         """Move the fingers, 0 is open and 255 closed; return whether they hold something."""
-        self.set(POS=position, SPE=255, FOR=150, GTO=1)
-        while (stopped := self.get("OBJ")) == 0:
+        self.ask(f"SET POS {position} SPE 255 FOR 150 GTO 1")
+        while (stopped := self.ask("GET OBJ")) == "OBJ 0":
             pass
-        return stopped in {1, 2}
+        return stopped in {"OBJ 1", "OBJ 2"}
 
 
 def main() -> None:

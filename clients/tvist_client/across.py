@@ -2,6 +2,7 @@
 
 import asyncio
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import partial
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -67,15 +68,23 @@ class Across(ABC):
     async def _subscribe(self) -> None:
         """Subscribe, once the session is open."""
 
+    def _of_robots(self, handle: Callable[[RobotPlace, zenoh.Sample], None]) -> "Callback[zenoh.Sample]":
+        """Return a callback that passes what is on robots' keys to a function on the loop."""
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            place = keys.place(str(sample.key_expr))
+            if place is not None:
+                wake(self._loop, partial(handle, RobotPlace(*place), sample))
+
+        return Callback(on_sample, indirect=False)
+
 
 class Newest(NamedTuple):
     """The newest state of a robot."""
 
     state: State
-    received: int
-    """Number of its states since the last call of `look`."""
-    at: float
-    """Time of its arrival on the loop's clock [s]."""
+    received: int  # number of its states since the last call of `look`
+    at: float  # time of its arrival on the loop's clock [s]
 
 
 class ManyStates(Across):
@@ -101,7 +110,7 @@ class ManyStates(Across):
         self._newest: dict[RobotPlace, tuple[bytes, int, float]] = {}
 
     async def _subscribe(self) -> None:
-        self._session.declare_subscriber(self._key, Callback(self._on_sample, indirect=False))
+        self._session.declare_subscriber(self._key, self._of_robots(self._keep))
 
     def look(self) -> dict[RobotPlace, Newest]:
         """Return the newest state of each robot that has ever sent one."""
@@ -114,11 +123,6 @@ class ManyStates(Across):
             self._newest[place] = (data, 0, at)
         return found
 
-    def _on_sample(self, sample: zenoh.Sample) -> None:
-        place = keys.place(str(sample.key_expr))
-        if place is not None:
-            wake(self._loop, partial(self._keep, RobotPlace(*place), sample.payload.to_bytes()))
-
-    def _keep(self, place: RobotPlace, data: bytes) -> None:
-        before = self._newest.get(place, (b"", 0, 0.0))
-        self._newest[place] = (data, before[1] + 1, self._loop.time())
+    def _keep(self, place: RobotPlace, sample: zenoh.Sample) -> None:
+        _, received, _ = self._newest.get(place, (b"", 0, 0.0))
+        self._newest[place] = (sample.payload.to_bytes(), received + 1, self._loop.time())

@@ -22,10 +22,8 @@ Convert = Callable[[Any, str], Any]
 class Given(NamedTuple):
     """How users pass a value."""
 
-    kind: Any
-    """Its type in their programs."""
-    convert: Convert
-    """Converts the value; the second argument is its name for error messages, such as `q[3]`."""
+    kind: Any  # its type in users' programs
+    convert: Convert  # converts the value; the second argument is its name for error messages, such as `q[3]`
 
 
 class Argument(NamedTuple):

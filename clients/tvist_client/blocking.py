@@ -18,6 +18,6 @@ Stepper = without_await(robot.Stepper, "robot")
 Arm = without_await(arm.Arm, "robot", "keep_alive_every")
 Robot = without_await(
     robot.Robot,
-    *("arm", "stepper", "clock_token", "pass_time", "put_setpoint", "until", "watch"),
+    *("arm", "stepper", "pass_time", "put_setpoint", "until", "watch"),
     base=Opened,
 )

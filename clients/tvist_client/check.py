@@ -8,7 +8,7 @@ from contextlib import suppress
 import msgspec
 
 from tvist_client.errors import ClientError, DeniedError, NotConnectedError, UnexpectedReplyError
-from tvist_client.readiness import RELIEVE, Readiness, look, unlock_command
+from tvist_client.readiness import RELIEVE, look, unlock_command
 from tvist_client.robot import ENDPOINT, NAME, Robot
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import robots_at
@@ -20,20 +20,14 @@ from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State, Telemetry
 from tvist_protocol.values import PROTOCOL_VERSION
 
-LISTEN_S = 1.0
-"""Shortest time over which the rate of states is measured [s]."""
-TELEMETRY_S = 3.0
-"""Longest wait for telemetry, which comes once a second [s]."""
-ON_TIME = 0.9
-"""Smallest share of the due states that counts as the full rate [-]."""
-TOO_SLOW = 0.5
-"""Share of the due ticks below which the robot is overloaded, whatever its telemetry says [-]."""
+LISTEN_S = 1.0  # shortest time over which the rate of states is measured [s]
+TELEMETRY_S = 3.0  # longest wait for telemetry, which comes once a second [s]
+ON_TIME = 0.9  # smallest share of the due states that counts as the full rate [-]
+TOO_SLOW = 0.5  # share of the due ticks below which the robot is overloaded, whatever its telemetry says [-]
 LONG_US = 20_000.0
 """Lateness of a tick that is reported if its thread has waited as long for a processor [µs]."""
-RETRY_S = 0.5
-"""Time between two attempts while a robot is starting [s]."""
-STALE = "check"
-"""A token that belongs to no lease."""
+RETRY_S = 0.5  # time between two attempts while a robot is starting [s]
+STALE = "check"  # a token that belongs to no lease
 
 
 class CheckResult(msgspec.Struct, frozen=True):
@@ -41,42 +35,31 @@ class CheckResult(msgspec.Struct, frozen=True):
 
     what: str
     ok: bool
-    said: str
-    """Result of the step, for people."""
+    said: str  # result of the step, for people
 
 
-class CheckReport(msgspec.Struct, frozen=True):
+class CheckReport(msgspec.Struct):
     """Report of `tvist check`, also printed by `--json`."""
 
-    ok: bool
-    """Whether everything that was checked is in order."""
+    ok: bool  # whether everything that was checked is in order
     endpoint: str
-    robot: str
-    """Name of the robot; empty if none was found."""
-    robots: list[str]
-    """Names of all robots found."""
-    protocol: int | None
-    """Version of the protocol that the robot uses; null if it did not answer."""
-    state_rate_hz: float | None
+    robot: str  # name of the robot; empty if none was found
+    robots: list[str] = []  # names of all robots found
+    protocol: int | None = None  # version of the protocol that the robot uses; null if it did not answer
+    state_rate_hz: float | None = None
     """States received per second of this machine's clock [Hz]; null in lockstep, or if no state came."""
-    findings: list[CheckResult]
-    """One result per step; a step that fails is the last one."""
-    ready: bool | None
-    """Whether the robot may be moved; null if that was not checked."""
-    robot_mode: str | None
-    """RTDE name of the robot mode; null if it was not checked or is unknown."""
-    safety_mode: str | None
-    """RTDE name of the safety mode; null if it was not checked or is unknown."""
-    stop: StopReason | None
+    findings: list[CheckResult] = []  # one result per step; a step that fails is the last one
+    ready: bool | None = None  # whether the robot may be moved; null if that was not checked
+    robot_mode: str | None = None  # RTDE name of the robot mode; null if it was not checked or is unknown
+    safety_mode: str | None = None  # RTDE name of the safety mode; null if it was not checked or is unknown
+    stop: StopReason | None = None
     """The stop that keeps the robot from moving; null if there is none or it is unknown."""
-    next: str | None
-    """What to do to make the robot ready; null if nothing is known to be missing."""
+    next: str | None = None  # what to do to make the robot ready; null if nothing is known to be missing
     overloaded: bool | None = None
     """Whether the robot is overloaded, as telemetry defines it; null in lockstep, or if it was not checked."""
     due_per_second: float | None = None
     """Control periods due per second [1/s]; null in lockstep, or if no state came."""
-    starting: bool = False
-    """Whether the robot is still starting; the last finding has the progress."""
+    starting: bool = False  # whether the robot is still starting; the last finding has the progress
 
 
 def check(
@@ -109,72 +92,45 @@ class _Check:
     def __init__(
         self, endpoint: str, name: str | None, security: Folder | None, namespace: str, *, alive: bool
     ) -> None:
-        self.namespace = namespace
-        self.endpoint, self.name, self.security, self.alive = endpoint, name, security, alive
-        self.readiness: Readiness | None = None
-        self.robots: list[str] = []
-        self.protocol: int | None = None
-        self.rate: float | None = None
-        self.due: float | None = None
-        self.overloaded: bool | None = None
-        self.missed = ""
-        self.early = self.starting = False
-        """Whether the robot may appear later, and whether it has reported that it is starting."""
-        self.findings: list[CheckResult] = []
+        self.endpoint, self.name, self.namespace = endpoint, name, namespace
+        self.security, self.alive = security, alive
+        self.report = CheckReport(ok=False, endpoint=endpoint, robot=name or "")
+        self.missed = ""  # how many control periods were missed
+        self.early = False  # whether the robot may appear later
 
     async def run(self) -> CheckReport:
-        step = "connect"
+        report, step = self.report, "connect"
         try:
             if self.name is not None:
                 check_robot_name(self.name)
-            self.robots = await robots_at(self.endpoint, self.security, self.namespace)
-            self.name = self.name or (self.robots[0] if self.robots and NAME not in self.robots else NAME)
+            report.robots = robots = await robots_at(self.endpoint, self.security, self.namespace)
+            report.robot = self.name or (robots[0] if robots and NAME not in robots else NAME)
             async with await Robot.connect(
-                self.endpoint, self.name, security=self.security, namespace=self.namespace
+                self.endpoint, report.robot, security=self.security, namespace=self.namespace
             ) as robot:
-                self.passed(step, f"{self.name} at {self.endpoint}{self.beside()}")
+                others = ", ".join(other for other in robots if other != report.robot)
+                beside = f"; also there: {others}" if others else ""
+                self.passed(step, f"{report.robot} at {self.endpoint}{beside}")
                 steps = [("info", self.info), ("state", self.state)]
                 if not self.alive:
                     steps += [("refusal", self.refusal), ("ready", self.ready), ("load", self.load)]
                 for step, run in steps:
                     self.passed(step, await run(robot))
+            report.ok = True
         except TvistError as error:
-            self.starting = isinstance(error, RefusedError) and error.reply.code == "starting"
-            self.early = self.starting or (step == "connect" and isinstance(error, NotConnectedError))
-            if isinstance(error, RefusedError) and self.starting:
-                self.findings.append(CheckResult("start", ok=False, said=error.reply.why))
-            else:
-                self.findings.append(CheckResult(step, ok=False, said=str(error)))
-        found = self.readiness
-        return CheckReport(
-            ok=all(finding.ok for finding in self.findings),
-            endpoint=self.endpoint,
-            robot=self.name or "",
-            robots=self.robots,
-            protocol=self.protocol,
-            state_rate_hz=self.rate,
-            findings=self.findings,
-            ready=None if found is None else found.ready,
-            robot_mode=None if found is None else found.robot_mode,
-            safety_mode=None if found is None else found.safety_mode,
-            stop=None if found is None else found.stop,
-            next=None if found is None else found.next or None,
-            overloaded=self.overloaded,
-            due_per_second=self.due,
-            starting=self.starting,
-        )
-
-    def beside(self) -> str:
-        """Return the other robots at the endpoint."""
-        others = [robot for robot in self.robots if robot != self.name]
-        return f"; also there: {', '.join(others)}" if others else ""
+            said = str(error)
+            if isinstance(error, RefusedError) and error.reply.code == "starting":
+                report.starting, step, said = True, "start", error.reply.why
+            self.early = report.starting or (step == "connect" and isinstance(error, NotConnectedError))
+            report.findings.append(CheckResult(step, ok=False, said=said))
+        return report
 
     def passed(self, what: str, said: str) -> None:
-        self.findings.append(CheckResult(what, ok=True, said=said))
+        self.report.findings.append(CheckResult(what, ok=True, said=said))
 
     async def info(self, robot: Robot) -> str:
         info = await robot.info()
-        self.protocol = info.protocol
+        self.report.protocol = info.protocol
         if info.protocol != PROTOCOL_VERSION:
             raise UnexpectedReplyError(
                 f"the robot speaks protocol {info.protocol}, this client {PROTOCOL_VERSION}: update the older one"
@@ -194,7 +150,7 @@ class _Check:
         heard: list[Telemetry] = []
         stop = robot.on_telemetry(heard.append)
         try:
-            self.rate, ticks = await _rate(robot)
+            rate, ticks = await _rate(robot)
             with suppress(TimeoutError):
                 async with asyncio.timeout(TELEMETRY_S):
                     while not heard:
@@ -202,13 +158,14 @@ class _Check:
         finally:
             stop()
         last = heard[-1] if heard else None
-        self.due = (await robot.info()).rate_hz if last is None else last.due_per_second
-        if self.due is None:  # an older server, whose speed is unknown
-            return f"{self.rate:.1f} Hz"
-        self.overloaded = ticks < TOO_SLOW * self.due or (last is not None and last.overloaded)
-        said = f"{self.rate:.1f} Hz of {self.due:g} due"
-        if not self.overloaded and self.rate < ON_TIME * self.due:
-            said = f"{said}, {100.0 * self.rate / self.due:.0f} %{_remedy(last, self.due)}"
+        due = (await robot.info()).rate_hz if last is None else last.due_per_second
+        self.report.state_rate_hz, self.report.due_per_second = rate, due
+        if due is None:  # an older server, whose speed is unknown
+            return f"{rate:.1f} Hz"
+        self.report.overloaded = ticks < TOO_SLOW * due or (last is not None and last.overloaded)
+        said = f"{rate:.1f} Hz of {due:g} due"
+        if not self.report.overloaded and rate < ON_TIME * due:
+            said = f"{said}, {100.0 * rate / due:.0f} %{_remedy(last, due)}"
         if last is not None and last.due_ticks:
             self.missed = (
                 f"; since its start it has missed {last.missed_ticks} of {last.due_ticks} control periods"
@@ -236,8 +193,10 @@ class _Check:
         raise ClientError("a command with an invalid token was accepted: the server does not check control")
 
     async def ready(self, robot: Robot) -> str:
-        command = unlock_command(self.endpoint, str(self.name), self.security, self.namespace)
-        found = self.readiness = await look(robot, command)
+        report = self.report
+        found = await look(robot, unlock_command(self.endpoint, report.robot, self.security, self.namespace))
+        report.ready, report.stop, report.next = found.ready, found.stop, found.next or None
+        report.robot_mode, report.safety_mode = found.robot_mode, found.safety_mode
         if not found.ready:
             raise ClientError(found.sentence)
         if found.robot_mode is None:
@@ -246,13 +205,12 @@ class _Check:
 
     async def load(self, robot: Robot) -> str:
         del robot  # `state` has measured it
-        if self.overloaded is None:
+        report = self.report
+        if report.overloaded is None:
             return "not told: a client steps the time, or the server is older"
-        if self.overloaded:
-            raise ClientError(
-                f"it is overloaded: {self.rate:.1f} states/s received of {self.due:g} due{self.missed}. Next: "
-                f"{RELIEVE}"
-            )
+        if report.overloaded:
+            rates = f"{report.state_rate_hz:.1f} states/s received of {report.due_per_second:g} due"
+            raise ClientError(f"it is overloaded: {rates}{self.missed}. Next: {RELIEVE}")
         return "not overloaded"
 
 

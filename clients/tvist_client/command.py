@@ -20,10 +20,8 @@ from tvist_protocol.commands import Command
 from tvist_protocol.replies import Accepted, Done, Posture, ToolPose
 from tvist_protocol.schema import field_docs
 
-TICK = 0.002
-"""Control period [s]."""
-Answer = Accepted | Done | Posture | ToolPose
-"""Replies to a command that was not refused."""
+TICK = 0.002  # control period [s]
+Answer = Accepted | Done | Posture | ToolPose  # replies to a command that was not refused
 _ANSWER = re.compile(r"; (it is )?answered (as|by) [^.]*")
 """Part of a message's description about its answer, which is the method's result."""
 
@@ -128,36 +126,6 @@ class Sent(Described):
     __doc__ = property(_description)
 
 
-def sending(kind: type[Struct], positional: int | None = None) -> Sent:
-    """Return a method that sends a command."""
-    return Sent(kind, _send, positional)
-
-
-def dating(kind: type[Struct], positional: int | None = None) -> Sent:
-    """Return a method that sends a command and returns the tick at which it was carried out."""
-    return Sent(kind, _date, positional)
-
-
-def stopping(kind: type[Struct], positional: int | None = None) -> Sent:
-    """Return a method that sends a command and waits until the arm is at rest."""
-    return Sent(kind, _stop, positional)
-
-
-def beginning(kind: type[Struct], positional: int | None = None) -> Sent:
-    """Return a method that starts a motion and returns it."""
-    return Sent(kind, _begin, positional)
-
-
-def moving(kind: type[Struct]) -> Sent:
-    """Return a method that makes a planned motion and can wait for its end."""
-    return Sent(kind, _move)
-
-
-def guiding(kind: type[Struct], positional: int | None = None) -> Sent:
-    """Return a method for motions that each command replaces; it can let time pass."""
-    return Sent(kind, _guide, positional)
-
-
 def asking(kind: type[Struct], answer: type[Struct], positional: int | None = None) -> Sent:
     """Return a method that asks a robot, and returns the only field of the answer."""
     (name,) = answer.__struct_fields__
@@ -178,23 +146,23 @@ _EXTRA = {
 """Descriptions of arguments that are not fields of the message."""
 
 
-async def _send(arm: Leased, command: Command) -> None:
+async def send(arm: Leased, command: Command) -> None:  # noqa: D103  help would show it for each command
     await arm.robot.request(command)
 
 
-async def _date(arm: Leased, command: Command) -> int | None:
+async def send_and_date(arm: Leased, command: Command) -> int | None:
     """The result is the tick at which it was carried out."""
     reply = await arm.robot.request(command)
     return reply.tick if isinstance(reply, Done) else None
 
 
-async def _stop(arm: Leased, command: Command) -> None:
+async def come_to_rest(arm: Leased, command: Command) -> None:
     """This returns when the arm is at rest."""
     await arm.robot.request(command)
     await arm.robot.rest()
 
 
-async def _begin(arm: Leased, command: Command) -> Motion:
+async def begin(arm: Leased, command: Command) -> Motion:
     """The result is the motion, which `end_force_mode`, a stop or the end of control ends."""
     reply = await arm.robot.request(command)
     if not isinstance(reply, Accepted) or reply.id is None:
@@ -206,16 +174,16 @@ async def _begin(arm: Leased, command: Command) -> Motion:
     return motion
 
 
-async def _move(arm: Leased, command: Command, *, wait: bool = True) -> Motion:
+async def move(arm: Leased, command: Command, *, wait: bool = True) -> Motion:
     """The result is the motion; its `started` and `done` are ticks once they are known."""
-    motion = await _begin(arm, command)
+    motion = await begin(arm, command)
     return await motion.wait() if wait else motion
 
 
-async def _guide(arm: Leased, command: Command, *, duration: float | None = None) -> Motion:
+async def guide(arm: Leased, command: Command, *, duration: float | None = None) -> Motion:
     """The arm keeps its speed, also after `duration`; such commands share one motion until the arm rests."""
     seconds = None if duration is None else positive(duration, "duration")
-    motion = await _begin(arm, command)
+    motion = await begin(arm, command)
     if seconds is not None:
         await arm.robot.pass_time(max(round(seconds / TICK), 1))
     return motion

@@ -1,6 +1,6 @@
 """Commands of an arm under control, and questions to a robot; `make schemas` writes their arguments to a stub."""
 
-from tvist_client.command import Leased, asking, beginning, dating, guiding, moving, sending, stopping
+from tvist_client.command import Leased, Sent, asking, begin, come_to_rest, guide, move, send, send_and_date
 from tvist_protocol import commands, forces, io, kinematics, motions, programs, simulation
 from tvist_protocol.replies import Posture, ToolPose
 
@@ -8,47 +8,47 @@ from tvist_protocol.replies import Posture, ToolPose
 class Commands(Leased):
     """Commands that only the client in control may send."""
 
-    move_j = moving(commands.MoveJ)
-    move_l = moving(motions.MoveL)
-    move_c = moving(motions.MoveC)
-    move_path = moving(motions.MovePath)
+    move_j = Sent(commands.MoveJ, move)
+    move_l = Sent(motions.MoveL, move)
+    move_c = Sent(motions.MoveC, move)
+    move_path = Sent(motions.MovePath, move)
 
-    servo_j = guiding(motions.ServoJ)
-    speed_j = guiding(motions.SpeedJ, 2)
-    speed_l = guiding(motions.SpeedL, 2)
-    stop_j = stopping(motions.StopJ, 1)
-    stop_l = stopping(motions.StopL, 1)
-    force_mode = beginning(forces.ForceMode)
-    freedrive = beginning(forces.Freedrive, 2)
-    end_force_mode = stopping(forces.EndForceMode)
-    zero_ftsensor = sending(forces.ZeroFtsensor)
+    servo_j = Sent(motions.ServoJ, guide)
+    speed_j = Sent(motions.SpeedJ, guide, 2)
+    speed_l = Sent(motions.SpeedL, guide, 2)
+    stop_j = Sent(motions.StopJ, come_to_rest, 1)
+    stop_l = Sent(motions.StopL, come_to_rest, 1)
+    force_mode = Sent(forces.ForceMode, begin)
+    freedrive = Sent(forces.Freedrive, begin, 2)
+    end_force_mode = Sent(forces.EndForceMode, come_to_rest)
+    zero_ftsensor = Sent(forces.ZeroFtsensor, send)
 
-    stop = sending(commands.Stop, 1)
-    pause = sending(commands.Pause)
-    resume = sending(commands.Resume)
-    set_speed = sending(commands.SetSpeed)
-    power_on = sending(commands.PowerOn)
-    power_off = sending(commands.PowerOff)
-    restart_safety = sending(commands.RestartSafety)
+    stop = Sent(commands.Stop, send, 1)
+    pause = Sent(commands.Pause, send)
+    resume = Sent(commands.Resume, send)
+    set_speed = Sent(commands.SetSpeed, send)
+    power_on = Sent(commands.PowerOn, send)
+    power_off = Sent(commands.PowerOff, send)
+    restart_safety = Sent(commands.RestartSafety, send)
 
-    load_program = sending(programs.ProgramLoad, 2)
-    run_program = sending(programs.ProgramRun)
-    play_program = sending(programs.ProgramPlay)
-    pause_program = sending(programs.ProgramPause)
-    stop_program = sending(programs.ProgramStop)
-    close_popup = sending(programs.ProgramClosePopup)
+    load_program = Sent(programs.ProgramLoad, send, 2)
+    run_program = Sent(programs.ProgramRun, send)
+    play_program = Sent(programs.ProgramPlay, send)
+    pause_program = Sent(programs.ProgramPause, send)
+    stop_program = Sent(programs.ProgramStop, send)
+    close_popup = Sent(programs.ProgramClosePopup, send)
 
-    set_shaper = sending(commands.SetShaper, 2)
-    set_estimator = sending(commands.SetEstimator)
-    set_payload = sending(commands.SetPayload)
-    forget = sending(commands.Forget)
-    set_tcp = sending(io.SetTcp)
-    set_registers = sending(io.SetRegisters, 3)
+    set_shaper = Sent(commands.SetShaper, send, 2)
+    set_estimator = Sent(commands.SetEstimator, send)
+    set_payload = Sent(commands.SetPayload, send)
+    forget = Sent(commands.Forget, send)
+    set_tcp = Sent(io.SetTcp, send)
+    set_registers = Sent(io.SetRegisters, send, 3)
 
-    reset = dating(simulation.SimulationReset, 1)
-    inject = sending(simulation.SimulationInject)
-    hand_over = sending(commands.HandOver)
-    keep_alive = sending(commands.KeepAlive)
+    reset = Sent(simulation.SimulationReset, send_and_date, 1)
+    inject = Sent(simulation.SimulationInject, send)
+    hand_over = Sent(commands.HandOver, send)
+    keep_alive = Sent(commands.KeepAlive, send)
 
 
 class Questions:

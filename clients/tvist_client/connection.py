@@ -21,20 +21,14 @@ from tvist_protocol.replies import Done, Refused
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
-BUFFER = 5000
-"""Number of messages that an iterator buffers: 10 s of states."""
-ANSWER_S = 10.0
-"""Longest wait for the answer to a command [s]."""
-STATE_S = 5.0
-"""Longest pause between two states [s]; in lockstep the last one is repeated every second."""
-CHUNK = 50
-"""Ticks to step between two checks whether a motion has ended: 0.1 s."""
+BUFFER = 5000  # number of messages that an iterator buffers: 10 s of states
+ANSWER_S = 10.0  # longest wait for the answer to a command [s]
+STATE_S = 5.0  # longest pause between two states [s]; in lockstep the last one is repeated every second
+CHUNK = 50  # ticks to step between two checks whether a motion has ended: 0.1 s
 MAX_STEP = 1000
 """Largest number of set-points in one `simulation.step`, and of ticks that every server accepts at once."""
-LONGEST_STEP = 100_000
-"""Largest number of ticks in one `simulation.step`."""
-TICK_S = 0.06
-"""Longest duration of a tick on a slow machine [s]; a server may be slower than real time."""
+LONGEST_STEP = 100_000  # largest number of ticks in one `simulation.step`
+TICK_S = 0.06  # longest duration of a tick on a slow machine [s]; a server may be slower than real time
 T = TypeVar("T")
 
 
@@ -172,11 +166,6 @@ class Connection(Questions):
         """Bring the arm to rest now; no control is needed."""
         await self.request(Stop())
 
-    @property
-    def clock_token(self) -> str | None:
-        """Token of the clock; None if this client does not hold it."""
-        return None if self.stepper is None else self.stepper.token
-
     async def advance(self, ticks: int) -> int:
         """Advance time: by steps in lockstep and free, by waiting in real time.
 
@@ -256,7 +245,7 @@ class Connection(Questions):
 
     def _on_lost(self, error: NotConnectedError) -> None:
         for feed in self._feeds:
-            feed.fail(error)
+            feed.end(error)
         self.motions.fail(error)
 
 
@@ -266,7 +255,7 @@ async def step(
     """Send one `simulation.step`, with the clock's token if this client holds the clock; return its last tick."""
     robot.watch()
     ticks = whole(ticks, "ticks", 1, LONGEST_STEP)
-    clock = robot.clock_token or token
+    clock = token if robot.stepper is None else robot.stepper.token
     command = SimulationStep(
         token=clock,
         ticks=ticks,

@@ -49,14 +49,9 @@ class Stream(AsyncIterator[Item], Generic[Item]):
         self._waiting.append(message)
         self._news.set()
 
-    def fail(self, error: ClientError) -> None:
-        """Raise an error in the reader, once, after the waiting messages."""
-        self._error = error
-        self._news.set()
-
-    def finish(self) -> None:
-        """End after the waiting messages."""
-        self._finished = True
+    def end(self, error: ClientError | None) -> None:
+        """After the waiting messages, raise an error in the reader, once; without an error, end."""
+        self._error, self._finished = error or self._error, error is None
         self._news.set()
 
     async def __anext__(self) -> Item:
@@ -129,24 +124,15 @@ class Feed(Generic[M]):
         finally:
             self._waiting.pop(message, None)
 
-    def fail(self, error: ClientError) -> None:
-        """Report to all listeners that the robot disconnected; when it reconnects, its ticks may restart."""
+    def end(self, error: ClientError, *, closed: bool = False) -> None:
+        """Fail all waits and streams, but end the streams of a closed connection; later, ticks may restart."""
+        self._finished = closed
         self.latest = None
         for stream in tuple(self._streams):
-            stream.fail(error)
+            stream.end(None if closed else error)
         for message in tuple(self._waiting):
             if not message.done():
                 message.set_exception(error)
-
-    def finish(self) -> None:
-        """End all streams and fail all waits, because the connection was closed."""
-        self._finished = True
-        self.latest = None
-        for stream in tuple(self._streams):
-            stream.finish()
-        for message in tuple(self._waiting):
-            if not message.done():
-                message.set_exception(NotConnectedError("the connection was closed"))
 
     def _on_message(self, data: bytes) -> None:
         try:

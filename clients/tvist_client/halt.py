@@ -16,19 +16,14 @@ from tvist_protocol.stream import Event, State
 class HaltReport(msgspec.Struct, frozen=True):
     """What was stopped, and whether the arm is at rest."""
 
-    ok: bool
-    """Whether the arm is at rest, or in lockstep will be after the next steps."""
+    ok: bool  # whether the arm is at rest, or in lockstep will be after the next steps
     endpoint: str
-    robot: str
-    """Name of the robot."""
+    robot: str  # name of the robot
     stopped: list[str] | None
     """What was stopped, in order, such as "motion 3"; empty if nothing; null in lockstep, where the next step stops."""
-    control: str | None
-    """Client that has control and can move the robot again; null if none has."""
-    runtime_state: str | None
-    """RTDE name of the state afterwards; null in lockstep."""
-    why: str
-    """What is wrong; empty if all is well."""
+    control: str | None  # client that has control and can move the robot again; null if none has
+    runtime_state: str | None  # RTDE name of the state afterwards; null in lockstep
+    why: str  # what is wrong; empty if all is well
 
 
 def halt(

@@ -34,18 +34,15 @@ _POWER = "run {unlock} --power-on"
 class Readiness(Struct, frozen=True):
     """Whether a robot may be moved, and what prevents it."""
 
-    ready: bool
-    """Whether the robot has power and its safety system allows motion."""
+    ready: bool  # whether the robot has power and its safety system allows motion
     robot_mode: str | None
     """RTDE name of the robot mode; null before the robot's first tick, when it is unknown."""
     safety_mode: str | None
     """RTDE name of the safety mode; null before the robot's first tick, when it is unknown."""
     stop: StopReason | None
     """The stop that keeps it from moving; null if there is none, or the robot does not report it."""
-    why: str
-    """The reason; empty if the robot is ready."""
-    next: str
-    """The remedy; empty if the robot is ready."""
+    why: str  # the reason; empty if the robot is ready
+    next: str  # the remedy; empty if the robot is ready
 
     @property
     def sentence(self) -> str:

@@ -95,9 +95,10 @@ class Robot(Connection):
 
     async def close(self) -> None:
         """Close the connection, which also ends iterators."""
+        closed = NotConnectedError("the connection was closed")
         for feed in self._feeds:
-            feed.finish()
-        self.motions.fail(NotConnectedError("the connection was closed"))
+            feed.end(closed, closed=True)
+        self.motions.fail(closed)
         await self._transport.close()
 
     async def __aenter__(self) -> Self:
@@ -163,8 +164,7 @@ class Robot(Connection):
         self, take: TakeControl | TakeClock, release: type[ReleaseControl | ReleaseClock]
     ) -> AsyncIterator[tuple[str, float | None]]:
         """Hold a right for the duration of a block; yield its token and its duration without renewal [s]."""
-        await self._transport.announce(take.client)
-        try:
+        with self._transport.presence(take.client):
             accepted = await self.request(take)
             if not isinstance(accepted, Accepted) or accepted.token is None:
                 raise UnexpectedReplyError(f"{tag(type(take))} was answered by {accepted}, without a token")
@@ -174,5 +174,3 @@ class Robot(Connection):
                 # If the right is lost or the robot has disconnected, there is nothing to release.
                 with suppress(RefusedError, ClientError):
                     await self.request(release(token=accepted.token))
-        finally:
-            await self._transport.withdraw(take.client)

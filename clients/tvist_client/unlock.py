@@ -13,8 +13,7 @@ from tvist_client.transports.zenoh import only_robot
 from tvist_protocol.info import StopReason
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 
-CLIENT = "tvist unlock"
-"""Name of the client that takes control."""
+CLIENT = "tvist unlock"  # name of the client that takes control
 _WHAT_IT_FOUND: dict[str | None, str] = {
     SafetyMode.VIOLATION.name: "had found a violation",
     SafetyMode.FAULT.name: "had failed",
@@ -25,23 +24,16 @@ _ALLOW_POWER = {mode.name for mode in (SafetyMode.NORMAL, SafetyMode.REDUCED, Sa
 class UnlockReport(msgspec.Struct, frozen=True):
     """What was done, and what remains to be done."""
 
-    ok: bool
-    """Whether the robot is ready to move now."""
+    ok: bool  # whether the robot is ready to move now
     endpoint: str
-    robot: str
-    """Name of the robot."""
+    robot: str  # name of the robot
     done: list[str]
     """What was done, in order, such as "unlocked the protective stop"; empty if there was nothing to do."""
-    robot_mode: str | None
-    """RTDE name of the robot mode afterwards."""
-    safety_mode: str | None
-    """RTDE name of the safety mode afterwards."""
-    stop: StopReason | None
-    """The stop that still, or again, keeps the robot from moving."""
-    why: str
-    """What remains; empty if the robot is ready."""
-    next: str
-    """The remedy; empty if the robot is ready."""
+    robot_mode: str | None  # RTDE name of the robot mode afterwards
+    safety_mode: str | None  # RTDE name of the safety mode afterwards
+    stop: StopReason | None  # the stop that still, or again, keeps the robot from moving
+    why: str  # what remains; empty if the robot is ready
+    next: str  # the remedy; empty if the robot is ready
 
 
 def unlock(

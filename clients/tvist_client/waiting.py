@@ -77,8 +77,7 @@ class Attribute:
     __doc__ = property(_description)
 
 
-_TWINS: dict[Any, Any] = {}
-"""The classes without `await`, by those with it."""
+_TWINS: dict[Any, Any] = {}  # the classes without `await`, by those with it
 
 
 class Waiting:

@@ -59,30 +59,27 @@ class LoopbackHost(Sink):
 
     def report(self, report: Report) -> None:
         """Pass on a state."""
-        callbacks = self._callbacks.get("state")
-        if callbacks:
-            for callback in tuple(callbacks):
-                callback(report.encoded)
+        self._put("state", lambda: report.encoded)
 
     def event(self, event: Event) -> None:
         """Pass on an event."""
-        self._put("event", event)
+        self._put("event", lambda: encode(event))
 
     def truth(self, truth: Truth) -> None:
         """Pass on what a real robot cannot measure."""
-        self._put("truth", truth)
+        self._put("truth", lambda: encode(truth))
 
     def io(self, io: Io) -> None:
         """Pass on inputs, outputs and registers."""
-        self._put("io", io)
+        self._put("io", lambda: encode(io))
 
     def journal(self, entry: Entry) -> None:
         """Store an entry."""
         self.entries.append(entry)
 
-    def _put(self, topic: Topic, message: Event | Truth | Io) -> None:
+    def _put(self, topic: Topic, encoded: Callable[[], bytes]) -> None:
         callbacks = self._callbacks.get(topic)
         if callbacks:
-            data = encode(message)
+            data = encoded()
             for callback in tuple(callbacks):
                 callback(data)

@@ -44,29 +44,21 @@ async def robot_in_process(setup: Setup) -> AsyncIterator[Robot]:
 
 
 async def run_beside(
-    shaper: str,
-    poses: Sequence[Sequence[float]],
-    *,
-    robot: str = "ur5e",
-    seed: int = 0,
+    shaper: str, poses: Sequence[Sequence[float]], robot: str = "ur5e"
 ) -> tuple[Info, Collected]:
     """Move one arm through poses [rad] with a shaper; return the robot's info and all its messages.
 
     Every motion starts at the same tick with any shaper. `robot` is a name or the path of a robot file.
     """
-    setup = free_setup(robot=robot, shaper=shaper, seed=seed)
+    setup = free_setup(robot=robot, shaper=shaper)
     async with robot_in_process(setup) as client, client.control("compare") as arm:
         await arm.reset(q=poses[0])
         with collect(client) as collected:
             begun = await client.advance(LEAD)
             for start, end in pairwise(poses):
                 await arm.move_j(end, velocity=VELOCITY, acceleration=ACCELERATION)
-                begun += _ticks(start, end)
+                # A motion and the rest after it take equally long with all shapers.
+                way = max(abs(a - b) for a, b in zip(start, end, strict=True))
+                begun += math.ceil((way / VELOCITY + VELOCITY / ACCELERATION + REST_S) / PERIOD)
                 await client.advance(begun - (await client.state()).tick)
         return await client.info(), collected
-
-
-def _ticks(start: Sequence[float], end: Sequence[float]) -> int:
-    """Return the ticks from the start of a motion to that of the next, equal for all shapers."""
-    way = max(abs(a - b) for a, b in zip(start, end, strict=True))
-    return math.ceil((way / VELOCITY + VELOCITY / ACCELERATION + REST_S) / PERIOD)

@@ -11,11 +11,11 @@ from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings.mcap_file import Published, RecordingFile
 from tvist_protocol import keys
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import Command
 from tvist_protocol.info import Info
+from tvist_protocol.io import Io
 from tvist_protocol.recorded import TICK_NS
 from tvist_protocol.replies import Refused
-from tvist_protocol.stream import State, Truth
+from tvist_protocol.stream import Event, State, Truth
 from tvist_server.gateways.base import Answer, CommandIntake, Gateway, topic_of
 from tvist_server.gateways.exposure import guarded
 from tvist_server.gateways.network import Network
@@ -37,33 +37,13 @@ class PlaybackDesk(CommandIntake):
         self._info = msgspec.structs.replace(info, name=name, clock="realtime", control=None, stepper=None)
         self.tick = info.tick  # tick of the last state published
 
-    def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  no command is carried out
+    def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  whatever it is
         """Refuse a command."""
         answer(REFUSAL)
-
-    def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:  # noqa: ARG002  likewise
-        """Refuse a command."""
-        answer(REFUSAL)
-
-    def setpoint(self, data: bytes) -> None:
-        """Ignore a set-point: nobody has control."""
 
     def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
         """Answer with the description of the robot and the present tick."""
         answer(lambda: encode(msgspec.structs.replace(self._info, tick=self.tick)))
-
-    def client_seen(self, client: str, session: str = "") -> None:
-        """Ignore a client: none gets control."""
-
-    def client_gone(self, client: str, session: str = "") -> None:
-        """Ignore the end of a client."""
-
-    def session_gone(self, session: str) -> None:
-        """Ignore the end of a session."""
-
-    def holder(self) -> str | None:
-        """Return None: nobody has control."""
-        return None
 
 
 class Playback:
@@ -138,7 +118,7 @@ def played(content: RecordingFile, *, loop: bool = False) -> Iterator[Published]
     length = int(tick[-1] - tick[0]) + 1
     shift = 0
     while True:
-        for message in content.published():
+        for message in content.again(State, Truth, Event, Io):
             yield _shifted(message, shift) if shift else message
         if not loop:
             return

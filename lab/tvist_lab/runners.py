@@ -5,7 +5,7 @@ import multiprocessing.resource_tracker
 import pickle
 import signal
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class Failed:
 
 
 def outcomes(
-    executor: Executor, work: Callable[[Task], Result], tasks: Sequence[Task]
+    executor: Executor, work: Callable[[Task], Result], tasks: Iterable[Task]
 ) -> Iterator[tuple[int, Result | Failed]]:
     """Yield the index of each task with its result or failure, as soon as available, in any order.
 
@@ -48,26 +48,26 @@ def outcomes(
     """
     out: dict[Future[bytes], int] = {}
     arrived: SimpleQueue[Future[bytes]] = SimpleQueue()
-    following = 0
+
+    def next_outcome() -> tuple[int, Result | Failed]:
+        future = arrived.get()
+        return out.pop(future), _outcome(future)
+
     try:
-        while out or following < len(tasks):
-            while following < len(tasks) and len(out) < AHEAD:
-                task = tasks[following]
-                try:
-                    packed = pickle.dumps(task)
-                except Exception as error:  # noqa: BLE001  what a task contains may raise anything
-                    yield following, Failed(TaskError(f"it cannot be pickled: {named(error)}"))
-                else:
-                    with (
-                        _group_signals_blocked()
-                    ):  # also in a process that this starts, until it ignores them
-                        future = executor.submit(_attempt, work, packed)
-                    out[future] = following
-                    future.add_done_callback(arrived.put)
-                following += 1
-            if out:
-                future = arrived.get()
-                yield out.pop(future), _outcome(future)
+        for index, task in enumerate(tasks):
+            try:
+                packed = pickle.dumps(task)
+            except Exception as error:  # noqa: BLE001  what a task contains may raise anything
+                yield index, Failed(TaskError(f"it cannot be pickled: {named(error)}"))
+                continue
+            with _group_signals_blocked():  # also in a process that this starts, until it ignores them
+                future = executor.submit(_attempt, work, packed)
+            out[future] = index
+            future.add_done_callback(arrived.put)
+            if len(out) == AHEAD:
+                yield next_outcome()
+        while out:
+            yield next_outcome()
     except BrokenExecutor:
         raise ChildProcessError("a process died while it did a task; perhaps memory ran out") from None
     except CancelledError:

@@ -46,7 +46,7 @@ def summary(path: str | os.PathLike[str], recording: Recording) -> dict[str, Any
             {
                 "name": name,
                 "shape": list(values.shape),
-                "unit": meaning_of(name).unit(),
+                "unit": meaning_of(name).unit,
                 "meaning": meaning_of(name).meaning,
             }
             for name, values in ordered(recording).items()

@@ -35,8 +35,7 @@ class Region:
 
 
 WORKSPACE = Region(
-    low=(-np.pi, -np.pi, -5.0 * np.pi / 6.0, -np.pi),
-    high=(np.pi, 0.0, 5.0 * np.pi / 6.0, 0.0),
+    low=(-np.pi, -np.pi, -5.0 * np.pi / 6.0, -np.pi), high=(np.pi, 0.0, 5.0 * np.pi / 6.0, 0.0)
 )
 """Workspace of a six-joint arm: above the stand, the wrist's two outer joints at zero."""
 

@@ -26,20 +26,14 @@ class PolynomialModel(_Part, frozen=True, kw_only=True):
     """Indices of the joints that the frequency and damping depend on, 0 for the first."""
     basis: Literal["trigonometric"] = "trigonometric"
     """Trigonometric polynomials, which repeat with every turn."""
-    degree: Annotated[int, Meta(ge=0, le=12)]
-    """Highest total degree."""
+    degree: Annotated[int, Meta(ge=0, le=12)]  # highest total degree
     centre: Annotated[tuple[Angle, ...], Meta(min_length=1, max_length=7)] | None = None
     """Angles that are subtracted from the joint angles [rad]; null: zeros."""
-    scale: None = None
-    """Null: the angles are not scaled. Recordings have it."""
-    f_d_coefficients: Coefficients
-    """Coefficients of f_d, one per term [Hz]."""
-    zeta_coefficients: Coefficients
-    """Coefficients of ζ, one per term [-]."""
-    f_d_range: tuple[Frequency, Frequency]
-    """Range to which values of f_d are clipped [Hz]."""
-    zeta_range: tuple[DampingRatio, DampingRatio]
-    """Range to which values of ζ are clipped [-]."""
+    scale: None = None  # null: the angles are not scaled. Recordings have it
+    f_d_coefficients: Coefficients  # coefficients of f_d, one per term [Hz]
+    zeta_coefficients: Coefficients  # coefficients of ζ, one per term [-]
+    f_d_range: tuple[Frequency, Frequency]  # range to which values of f_d are clipped [Hz]
+    zeta_range: tuple[DampingRatio, DampingRatio]  # range to which values of ζ are clipped [-]
 
 
 class Spread(_Part, frozen=True, kw_only=True):
@@ -65,29 +59,22 @@ Parameter = Annotated[float, Meta(gt=0, le=1e9)]
 class ModalParameter(_Part, frozen=True, kw_only=True):
     """A parameter of the arm's linear model, with the same value for every joint or link listed."""
 
-    quantity: Quantity
-    """Physical quantity."""
+    quantity: Quantity  # physical quantity
     joints: Annotated[tuple[Annotated[int, Meta(ge=0, le=6)], ...], Meta(min_length=1, max_length=7)]
     """Indices of the joints, or of the links for `bending_stiffness`, 0 for the first."""
-    value: Parameter
-    """Value in SI units."""
+    value: Parameter  # value in SI units
     deviation: Annotated[float, Meta(ge=0, le=10)]
     """Standard deviation of its logarithm, approximately its relative standard deviation; 0 if assumed [-]."""
-    interval: tuple[Parameter, Parameter]
-    """95 % confidence interval, assuming that the model is right."""
-    status: Status
-    """Origin of the value."""
+    interval: tuple[Parameter, Parameter]  # 95 % confidence interval, assuming that the model is right
+    status: Status  # origin of the value
 
 
 class RingDownFit(_Part, frozen=True, kw_only=True):
     """One ring-down that the parameters were fitted to."""
 
-    q: Annotated[tuple[Angle, ...], Meta(min_length=1, max_length=7)]
-    """Configuration of the arm [rad]."""
-    payload: Annotated[int, Meta(ge=0, le=99)]
-    """Index of the payload that the arm carried, 0 for the first."""
-    rms: Annotated[float, Meta(ge=0, le=1e4)]
-    """rms of the acceleration per axis [m/s²]."""
+    q: Annotated[tuple[Angle, ...], Meta(min_length=1, max_length=7)]  # configuration of the arm [rad]
+    payload: Annotated[int, Meta(ge=0, le=99)]  # index of the payload that the arm carried, 0 for the first
+    rms: Annotated[float, Meta(ge=0, le=1e4)]  # rms of the acceleration per axis [m/s²]
     residual_to_noise: Annotated[float, Meta(ge=0, le=1e4)]
     """rms of the residual of the fit, relative to that of the noise [-]."""
 
@@ -99,16 +86,13 @@ class ModalModel(_Part, frozen=True, kw_only=True):
     """Each quantity once for every joint, and `bending_stiffness` for every flexible link, whose damping over
     stiffness is that of the joint before it. The five quantities of friction may be missing: then friction is
     unknown."""
-    f_d_min: Frequency
-    """Lowest damped frequency over the workspace, up to the rated payload [Hz]."""
-    zeta_max: DampingRatio
-    """Highest damping ratio over the workspace, up to the rated payload [-]."""
+    f_d_min: Frequency  # lowest damped frequency over the workspace, up to the rated payload [Hz]
+    zeta_max: DampingRatio  # highest damping ratio over the workspace, up to the rated payload [-]
     payloads: Annotated[tuple[Payload, ...], Meta(min_length=1, max_length=100)]
     """Payloads that the arm carried."""
     ring_downs: Annotated[tuple[RingDownFit, ...], Meta(min_length=1, max_length=10_000)]
     """Ring-downs that were fitted."""
-    noise: Annotated[float, Meta(gt=0, le=1e3)]
-    """rms of the accelerometer at rest, per axis [m/s²]."""
+    noise: Annotated[float, Meta(gt=0, le=1e3)]  # rms of the accelerometer at rest, per axis [m/s²]
     residual_to_noise: Annotated[float, Meta(ge=0, le=1e4)]
     """rms of the residual of all ring-downs, relative to that of the noise: 1 is a perfect fit [-]."""
     cross_validated_f_d_percent: Annotated[tuple[Spread | None, ...], Meta(min_length=1, max_length=8)]
@@ -121,16 +105,11 @@ class ModalModel(_Part, frozen=True, kw_only=True):
 class Provenance(_Part, frozen=True, kw_only=True):
     """How a calibration was made: command, version, and the measurements that were kept and rejected."""
 
-    command: Annotated[str, Meta(max_length=500)]
-    """Command that made it."""
-    version: Annotated[str, Meta(max_length=50)]
-    """Version of the package."""
-    seed: Seed | None
-    """Seed of the choice of configurations and of the simulated arm; null for a real arm."""
-    configurations: Annotated[int, Meta(ge=1, le=100_000)]
-    """Number of configurations measured."""
-    ring_downs: Annotated[int, Meta(ge=1, le=1_000_000)]
-    """Total number of ring-downs measured."""
+    command: Annotated[str, Meta(max_length=500)]  # command that made it
+    version: Annotated[str, Meta(max_length=50)]  # version of the package
+    seed: Seed | None  # seed of the choice of configurations and of the simulated arm; null for a real arm
+    configurations: Annotated[int, Meta(ge=1, le=100_000)]  # number of configurations measured
+    ring_downs: Annotated[int, Meta(ge=1, le=1_000_000)]  # total number of ring-downs measured
     rejected: Annotated[int, Meta(ge=0, le=1_000_000)]
     """Number of rejected configurations: the arm could not reach them, or no ring-down could be fitted."""
     measured_f_d_range: tuple[Frequency, Frequency]
@@ -152,22 +131,18 @@ class Provenance(_Part, frozen=True, kw_only=True):
 class Calibration(_Part, frozen=True, kw_only=True):
     """A calibration: robot, payload, models and origin; ValueError if it has no model, or half of a servo's lag."""
 
-    name: Name
-    """Name in `info`."""
-    robot: Annotated[str, Meta(max_length=64)]
-    """Model of the arm."""
+    name: Name  # name in `info`
+    robot: Annotated[str, Meta(max_length=64)]  # model of the arm
     payload: Payload
     """Payload that the arm carried, the heaviest if there were several. The polynomials hold only for this payload."""
     polynomial: PolynomialModel | None = None
     """The lowest mode with that payload, for the estimator `polynomial`."""
-    modal: ModalModel | None = None
-    """Any mode with any payload, for the estimator `modal`."""
+    modal: ModalModel | None = None  # any mode with any payload, for the estimator `modal`
     servo_lag_s: Annotated[float, Meta(gt=0, le=1)] | None = None
     """T of a robot that follows set-points p as q̈ = k (p - q - T q̇), from set-points to angles [s]; null: unknown."""
     servo_gain: Annotated[float, Meta(gt=0, le=1e6)] | None = None
     """k of the same equation [1/s²]; null: unknown."""
-    provenance: Provenance
-    """Origin of the calibration."""
+    provenance: Provenance  # origin of the calibration
 
     def __post_init__(self) -> None:
         if self.polynomial is None and self.modal is None:

@@ -1,6 +1,5 @@
 """Encodes, decodes and validates messages; whatever the bytes, decoding returns a message or raises ProtocolError."""
 
-from collections.abc import Mapping
 from typing import Any, Generic, TypeVar, Union, get_args
 
 import msgspec
@@ -11,6 +10,7 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import (
     EXPLAINED_BYTES,
     FAULTS,
+    Types,
     explain_bytes,
     explain_refusal,
     explain_unencodable,
@@ -34,10 +34,8 @@ _SomeMessage = TypeVar("_SomeMessage", bound=Message)
 class Envelope(msgspec.Struct, frozen=True, gc=False):
     """Type and token of a message; decoding them is at least twenty times as fast as decoding the whole message."""
 
-    type: str | None = None
-    """The message's `type`; None if it has none."""
-    token: str | None = None
-    """Token of the lease; None if the message has none."""
+    type: str | None = None  # the message's `type`; None if it has none
+    token: str | None = None  # token of the lease; None if the message has none
 
 
 class _Calibrated(msgspec.Struct, gc=False):
@@ -50,23 +48,27 @@ class _Untyped(msgspec.Struct, tag_field="type", tag=""):
     """A further member of every union, without which msgspec would not require `type` in a union of one struct."""
 
 
+def _decoded(decoder: msgspec.msgpack.Decoder[_Some], data: bytes, types: Types) -> _Some:
+    try:
+        return decoder.decode(data)
+    except msgspec.ValidationError as error:
+        raise explain_refusal(error, data, types) from error
+    except FAULTS as error:
+        raise explain_bytes(error) from error
+
+
 class _Reader(Generic[_Some]):
     """Decodes and validates the messages of one key."""
 
     def __init__(self, *types: type[msgspec.Struct]) -> None:
-        self.types: Mapping[str, type[msgspec.Struct]] = {str(t.__struct_config__.tag): t for t in types}
+        self.types: Types = {str(t.__struct_config__.tag): t for t in types}
         self._decoder: msgspec.msgpack.Decoder[_Some] = msgspec.msgpack.Decoder(Union[(*types, _Untyped)])
 
     def read(self, data: bytes) -> _Some:
         if len(data) > MAX_BYTES:
             why = f"the message has {len(data)} bytes, at most {MAX_BYTES} are allowed"
             raise ProtocolError("malformed", "", why, MAX_BYTES)
-        try:
-            message = self._decoder.decode(data)
-        except msgspec.ValidationError as error:
-            raise explain_refusal(error, data, self.types) from error
-        except FAULTS as error:
-            raise explain_bytes(error) from error
+        message = _decoded(self._decoder, data, self.types)
         if type(message) is _Untyped:
             raise explain_unknown_type("", self.types)
         return message
@@ -77,11 +79,9 @@ _CALIBRATED: msgspec.msgpack.Decoder[_Calibrated] = msgspec.msgpack.Decoder(_Cal
 _ENCODER = msgspec.msgpack.Encoder()
 _COMMAND: _Reader[Command] = _Reader(*get_args(Command))
 _REPLY: _Reader[Reply] = _Reader(*get_args(Reply))
-_ONLY: dict[type[msgspec.Struct], _Reader[Any]] = {
-    kind: _Reader(kind) for kind in (Setpoint, State, Event, Truth, Telemetry, Io, Info)
-}
-"""Readers of the keys that have one kind of message."""
-_READER_OF = _ONLY | {kind: reader for reader in (_COMMAND, _REPLY) for kind in reader.types.values()}
+_SINGLE = (_Reader[Any](kind) for kind in (Setpoint, State, Event, Truth, Telemetry, Io, Info))
+_READERS: tuple[_Reader[Any], ...] = (_COMMAND, _REPLY, *_SINGLE)
+_READER_OF = {kind: reader for reader in _READERS for kind in reader.types.values()}
 
 
 def encode(message: Message) -> bytes:
@@ -119,12 +119,7 @@ def refusal(error: ProtocolError) -> Refused:
 
 def decode_envelope(data: bytes) -> Envelope:
     """Return type and token of a message without validating other fields; ProtocolError if these are invalid."""
-    try:
-        return _ENVELOPE.decode(data)
-    except msgspec.ValidationError as error:
-        raise explain_refusal(error, data, {}) from error
-    except FAULTS as error:
-        raise explain_bytes(error) from error
+    return _decoded(_ENVELOPE, data, {})
 
 
 def decode_command(data: bytes) -> Command:
@@ -134,19 +129,10 @@ def decode_command(data: bytes) -> Command:
         ProtocolError: The bytes are not a valid command. `decode_reply` and `decode` raise it likewise.
     """
     if EXPLAINED_BYTES < len(data) <= MAX_BYTES and b"set_estimator" in data:
-        _refuse_long_fault(data)
+        decode_envelope(data)  # refuses bytes that are no MessagePack map
+        # Refuse an invalid calibration from its bytes: building a map of it may take a hundred times as long.
+        _decoded(_CALIBRATED, data, {})
     return _COMMAND.read(data)
-
-
-def _refuse_long_fault(data: bytes) -> None:
-    """Refuse an invalid long calibration from its bytes; building a map of it may take a hundred times as long."""
-    decode_envelope(data)  # refuses bytes that are no MessagePack map
-    try:
-        _CALIBRATED.decode(data)
-    except msgspec.ValidationError as error:
-        raise explain_refusal(error, data, {}) from error
-    except FAULTS as error:
-        raise explain_bytes(error) from error
 
 
 def decode_reply(data: bytes) -> Reply:
@@ -156,5 +142,5 @@ def decode_reply(data: bytes) -> Reply:
 
 def decode(kind: type[_SomeMessage], data: bytes) -> _SomeMessage:
     """Decode a message of a key that has one kind of message: `decode(State, data)`."""
-    message: _SomeMessage = _ONLY[kind].read(data)
+    message: _SomeMessage = _READER_OF[kind].read(data)
     return message

@@ -24,7 +24,7 @@ def parse_json(data: bytes) -> Any:
     try:
         return json.loads(data.decode(), parse_constant=_no_number)
     except UnicodeDecodeError as error:
-        raise _no_text(error) from error
+        raise ProtocolError("malformed", "", f"it is not text: byte {error.start} is not UTF-8") from error
     except json.JSONDecodeError as error:
         why = f"it is not valid JSON: line {error.lineno}, column {error.colno}: {error.msg}"
         raise ProtocolError("malformed", "", why) from error
@@ -36,7 +36,3 @@ def parse_json(data: bytes) -> Any:
 
 def _no_number(text: str) -> NoReturn:
     raise ProtocolError("out_of_range", "", f"it contains {text}, which is not a number")
-
-
-def _no_text(error: UnicodeDecodeError) -> ProtocolError:
-    return ProtocolError("malformed", "", f"it is not text: byte {error.start} is not UTF-8")

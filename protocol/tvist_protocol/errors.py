@@ -10,10 +10,8 @@ from typing import Final
 
 from tvist_protocol.replies import Code, Refused
 
-SHOWN = 60
-"""Largest number of characters of a sender's text that a message repeats."""
-LONGEST = 900
-"""Largest number of characters of a message about a file."""
+SHOWN = 60  # largest number of characters of a sender's text that a message repeats
+LONGEST = 900  # largest number of characters of a message about a file
 HARMFUL: Final = re.compile(
     r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )

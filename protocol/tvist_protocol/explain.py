@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
-from enum import Enum
 from typing import Any
 
 import msgspec
@@ -16,14 +15,11 @@ from tvist_protocol.values import PATTERN_MEANINGS
 FAULTS = (ValueError, TypeError, OverflowError, RecursionError, MemoryError)
 """Errors of msgspec: its own, UTF-8, unhashable keys, numbers beyond 64 bits, deep nesting, huge lengths."""
 
-EXPLAINED_BYTES = 4096
-"""Longest message whose values are named [bytes]."""
+EXPLAINED_BYTES = 4096  # longest message whose values are named [bytes]
 
-_DEPTH = 32
-"""Levels that are searched: a value that is nested deeper contains itself."""
+_DEPTH = 32  # levels that are searched: a value that is nested deeper contains itself
 
-Types = Mapping[str, type[msgspec.Struct]]
-"""The possible messages, by `type`."""
+Types = Mapping[str, type[msgspec.Struct]]  # the possible messages, by `type`
 
 
 class _Head(msgspec.Struct):
@@ -186,7 +182,7 @@ def _untyped(data: bytes, kind: Any) -> Any:
 
 def explain_unencodable(message: msgspec.Struct, error: Exception) -> ProtocolError:
     """Return the error of a message that cannot be written as MessagePack, with the field and its value."""
-    where, value = next(_unencodable(message, "", _DEPTH), ("", message))
+    where, value = _unencodable(message, "", _DEPTH)
     kind = f"{type(value).__module__}.{type(value).__qualname__}".removeprefix("builtins.")
     match value:
         case int():
@@ -200,12 +196,14 @@ def explain_unencodable(message: msgspec.Struct, error: Exception) -> ProtocolEr
     return ProtocolError("malformed", where, why)
 
 
-def _unencodable(value: object, where: str, depth: int) -> Iterator[tuple[str, object]]:
-    if depth == 0 or not _is_plain(value):
-        yield where, value
-        return
-    for at, entry in _entries(value, where):
-        yield from _unencodable(entry, at, depth - 1)
+def _unencodable(value: object, where: str, depth: int) -> tuple[str, object]:
+    """Return place and value of the first part that MessagePack does not have."""
+    for at, entry in _entries(value, where) if depth else ():
+        try:
+            msgspec.msgpack.encode(entry)
+        except FAULTS:
+            return _unencodable(entry, at, depth - 1)
+    return where, value
 
 
 def _entries(value: object, where: str) -> Iterator[tuple[str, object]]:
@@ -220,15 +218,3 @@ def _entries(value: object, where: str) -> Iterator[tuple[str, object]]:
             for key, entry in value.items():
                 yield where, key
                 yield f"{where}.{short(str(key))}", entry
-
-
-def _is_plain(value: object) -> bool:
-    if type(value) is int:
-        return -(2**63) <= value < 2**64
-    if type(value) is str:
-        return not any("\ud800" <= character <= "\udfff" for character in value)
-    return (
-        value is None
-        or type(value) in {bool, float, list, tuple, dict}
-        or isinstance(value, Enum | msgspec.Struct)
-    )

@@ -8,16 +8,14 @@ from tvist_protocol.client_message import Leased
 from tvist_protocol.values import Fraction, Pose
 
 Push = Annotated[float, Meta(ge=-1e4, le=1e4)]
-Wrench = Annotated[tuple[Push, Push, Push, Push, Push, Push], "x y z rx ry rz"]
-"""Force [N] and torque [N m]."""
+Wrench = Annotated[tuple[Push, Push, Push, Push, Push, Push], "x y z rx ry rz"]  # force [N] and torque [N m]
 Choices = Annotated[tuple[bool, bool, bool, bool, bool, bool], "x y z rx ry rz"]
 """One value per axis of a frame: three directions, then the rotations about them."""
 Limit = Annotated[float, Meta(ge=0, le=1e3)]
 Limits = Annotated[tuple[Limit, Limit, Limit, Limit, Limit, Limit], "x y z rx ry rz"]
 """One limit per axis [m/s and rad/s, or m and rad]."""
 Gain = Annotated[float, Meta(ge=0, le=2)]
-FrameType = Literal[1, 2, 3]
-"""How the frame is rotated, as URScript numbers it; see `ForceMode`."""
+FrameType = Literal[1, 2, 3]  # how the frame is rotated, as URScript numbers it; see `ForceMode`
 
 
 class ForceMode(Leased, frozen=True, kw_only=True, tag="force_mode"):

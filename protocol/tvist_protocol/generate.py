@@ -12,10 +12,8 @@ from tvist_protocol.channels import MESSAGES, tag
 from tvist_protocol.pages import pages
 from tvist_protocol.schema import json_schema
 
-FOLDER = Path(__file__).parents[1]
-"""`protocol/` in a checkout."""
-PAGES = FOLDER.parent / "docs" / "reference" / "generated"
-"""Folder of the generated pages in a checkout."""
+FOLDER = Path(__file__).parents[1]  # `protocol/` in a checkout
+PAGES = FOLDER.parent / "docs" / "reference" / "generated"  # folder of the generated pages in a checkout
 
 
 def generated(folder: Path) -> dict[Path, bytes]:

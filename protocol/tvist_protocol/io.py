@@ -8,8 +8,7 @@ from tvist_protocol.client_message import ClientMessage, Leased
 from tvist_protocol.programs import Interpreter, ProgramLabel, ProgramState
 from tvist_protocol.values import Fraction, Payload, Token
 
-BITS, NUMBERS = 128, 48
-"""Number of registers in a bank of bits, and in a bank of integers or doubles."""
+BITS, NUMBERS = 128, 48  # number of registers in a bank of bits, and in a bank of integers or doubles
 Bank = Literal["input_bit", "input_int", "input_double", "output_bit", "output_int", "output_double"]
 """Banks of registers: clients write input registers, which programs read; programs write output registers."""
 
@@ -80,20 +79,15 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     frame [N, N m]; zero while the arm is braked. Sent once a second; null in messages sent because of a change."""
 
 
-DigitalBits = Annotated[int, Meta(ge=0, le=2**18 - 1)]
-"""Bits 0–7 standard, 8–15 configurable, 16–17 tool"""
-PairBits = Annotated[int, Meta(ge=0, le=3)]
-"""One bit for each of two terminals"""
-Signal = Annotated[float, Meta(ge=-1, le=30)]
-"""[A or V]"""
+DigitalBits = Annotated[int, Meta(ge=0, le=2**18 - 1)]  # bits 0–7 standard, 8–15 configurable, 16–17 tool
+PairBits = Annotated[int, Meta(ge=0, le=3)]  # one bit for each of two terminals
+Signal = Annotated[float, Meta(ge=-1, le=30)]  # [A or V]
 Register = (
     bool | Annotated[int, Meta(ge=-(2**31), le=2**32 - 1)] | Annotated[float, Meta(ge=-1e308, le=1e308)]
 )
 """A bit, a 32-bit integer or a double"""
-Length = Annotated[float, Meta(ge=-10, le=10)]
-"""[m]"""
-Turn = Annotated[float, Meta(ge=-10, le=10)]
-"""[rad]"""
+Length = Annotated[float, Meta(ge=-10, le=10)]  # [m]
+Turn = Annotated[float, Meta(ge=-10, le=10)]  # [rad]
 
 
 class SetIo(Leased, frozen=True, kw_only=True, tag="set_io"):

@@ -75,12 +75,10 @@ def message_of(entry: Entry) -> Command | Setpoint:
     where = f"the journal's {entry.kind} before tick {entry.tick}"
     if entry.message is None:
         raise ProtocolError("missing_field", "message", f"{where} has no message")
+    kind: Any = Setpoint if entry.kind == "setpoint" else Command
     try:
-        if entry.kind == "setpoint":
-            return msgspec.convert(entry.message, Setpoint)
-        command: Command = msgspec.convert(entry.message, Command)
+        message: Command | Setpoint = msgspec.convert(entry.message, kind)
     except msgspec.ValidationError as error:
-        kind = Setpoint if entry.kind == "setpoint" else Command
         fault = explain_content(error, entry.message, kind)
         raise ProtocolError("malformed", "message", f"{where} is not a valid message: {fault.why}") from error
-    return command
+    return message

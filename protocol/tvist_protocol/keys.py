@@ -21,8 +21,7 @@ ANY_ALIVE = f"{PREFIX}/*/alive"
 
 ANYWHERE_ALIVE = f"**/{ANY_ALIVE}"
 """Selects the liveliness tokens of all robots of all namespaces, for a session without a namespace."""
-ANYWHERE = f"**/{PREFIX}/*"
-"""Selects all robots of all namespaces; a leaf such as `/state` follows."""
+ANYWHERE = f"**/{PREFIX}/*"  # selects all robots of all namespaces; a leaf such as `/state` follows
 
 _NAMESPACE = re.compile(NAMESPACE_PATTERN)
 _ROBOT = re.compile(ROBOT_NAME_PATTERN)
@@ -75,19 +74,8 @@ def any_client(robot: str) -> str:
     return f"{key(robot, 'client')}/**"
 
 
-def client_name(robot: str, key: str) -> str | None:
-    """Return the client's name in the key of a liveliness token; None for any other key than this robot's."""
-    found = _client(robot, key)
-    return None if found is None else found[0]
-
-
-def client_session(robot: str, key: str) -> str:
-    """Return the session in the key of a client's liveliness token; empty if it names none."""
-    found = _client(robot, key)
-    return "" if found is None else found[1]
-
-
-def _client(robot: str, own: str) -> tuple[str, str] | None:
+def client_of(robot: str, own: str) -> tuple[str, str] | None:
+    """Return name and session (empty if there is none) in the key of a client of this robot; None for other keys."""
     prefix = f"{key(robot, 'client')}/"
     name, slash, session = own.removeprefix(prefix).partition("/")
     sound = _CLIENT.match(name) and bool(_SESSION.match(session)) == bool(slash)

@@ -19,11 +19,9 @@ from tvist_protocol.values import (
     Velocity,
 )
 
-Orientation = Literal["interpolated", "tangent"]
-"""Orientation of the tool on an arc."""
+Orientation = Literal["interpolated", "tangent"]  # orientation of the tool on an arc
 
-MAX_SEGMENTS = 500
-"""Largest number of segments of a path."""
+MAX_SEGMENTS = 500  # largest number of segments of a path
 
 
 class MoveL(Leased, frozen=True, kw_only=True, tag="move_l"):

@@ -7,8 +7,7 @@ from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_
 
 import msgspec
 
-ABSENT: Final = object()
-"""Value of a place that the content does not have."""
+ABSENT: Final = object()  # value of a place that the content does not have
 _STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]|\[(\.\.\.)\]")
 
 

@@ -7,15 +7,12 @@ from msgspec import Meta, Struct
 from tvist_protocol.client_message import ClientMessage, Leased
 from tvist_protocol.values import PROGRAM_NAME_PATTERN, Token
 
-ProgramState = Literal["STOPPED", "PLAYING", "PAUSED"]
-"""State of the loaded program."""
+ProgramState = Literal["STOPPED", "PLAYING", "PAUSED"]  # state of the loaded program
 ProgramName = Annotated[str, Meta(pattern=PROGRAM_NAME_PATTERN)]
 
 
-MAX_SCRIPT = 1 << 20
-"""Longest text of a program [characters]."""
-Script = Annotated[str, Meta(min_length=1, max_length=MAX_SCRIPT)]
-"""Text of a program in URScript"""
+MAX_SCRIPT = 1 << 20  # longest text of a program [characters]
+Script = Annotated[str, Meta(min_length=1, max_length=MAX_SCRIPT)]  # text of a program in URScript
 
 
 class ProgramLoad(ClientMessage, frozen=True, kw_only=True, tag="program.load", omit_defaults=True):

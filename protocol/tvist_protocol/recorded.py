@@ -27,12 +27,9 @@ from tvist_protocol.stream import Event, State, Truth
 
 Recorded = State | Event | Truth | Io | Entry
 
-FORMAT = "1"
-"""Version of this format."""
-TICK_NS = 2_000_000
-"""Duration of a tick [ns]."""
-METADATA = "tvist"
-"""Name of the metadata written first: `format`, and `info` and `start` as JSON."""
+FORMAT = "1"  # version of this format
+TICK_NS = 2_000_000  # duration of a tick [ns]
+METADATA = "tvist"  # name of the metadata written first: `format`, and `info` and `start` as JSON
 END_METADATA = "tvist.end"
 """Name of the metadata written last: for each channel, how many messages were dropped."""
 BEHAVIOUR = "behaviour"
@@ -110,16 +107,13 @@ class JsonReader(Generic[_Some]):
         """Decode a message, with NaN for a number that was not finite; raise ProtocolError if it has another type."""
         try:
             try:
-                return self._decoder.decode(self._completed(data))
+                # Add null for omitted fields; if a key occurs twice, msgspec keeps the later one, from the data.
+                return self._decoder.decode(self._before + data[1:] if self._before else data)
             except msgspec.ValidationError:
                 return msgspec.convert(self._with_nan(data), self._kind)
         except ValueError as error:
             why = f"a recorded message is not a valid {tag(self._kind)}: {short(str(error))}"
             raise ProtocolError("malformed", "", why) from error
-
-    def _completed(self, data: bytes) -> bytes:
-        """Add null for omitted fields; if a key occurs twice, msgspec keeps the later one, from the data."""
-        return self._before + data[1:] if self._before else data
 
     def _with_nan(self, data: bytes) -> Any:
         written = msgspec.json.decode(data)
@@ -133,7 +127,8 @@ def viewer_schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
     schema = json_schema(kind)
     shared = schema.pop("$defs", {})
     parts: Mapping[str, dict[str, Any]] = schema["properties"]
-    required = [name for name in schema["required"] if not _has_null(parts[name])]
+    null = {"type": "null"}
+    required = [name for name in schema["required"] if null not in parts[name].get("anyOf", ())]
     properties = {name: _plain(part, shared) for name, part in parts.items()}
     return schema | {"properties": properties, "required": required}
 
@@ -150,10 +145,6 @@ def _plain(part: dict[str, Any], shared: Mapping[str, dict[str, Any]]) -> dict[s
     if entries := kept.pop("prefixItems", None):
         kept["items"] = {"type": entries[0]["type"]}
     return kept if "type" in kept else {"type": "string"} | kept
-
-
-def _has_null(part: Mapping[str, Any]) -> bool:
-    return {"type": "null"} in part.get("anyOf", ())
 
 
 def _nan_for_null(value: Any) -> Any:

@@ -24,9 +24,9 @@ def components(
 ) -> tuple[tuple[dict[str, Any], ...], dict[str, Any]]:
     """Return references to messages (`reference` has `{name}` in it), and the JSON Schemas of all structs by name."""
     roots, parts = msgspec.json.schema_components(messages, ref_template=reference)
-    described = {kind.__name__: field_docs(kind) for kind in _structs(messages)}
+    structs = _structs()
     for name, schema in parts.items():
-        for field, text in described[name].items():
+        for field, text in field_docs(structs[name]).items():
             schema["properties"][field]["description"] = text
     return roots, dict(sorted(parts.items()))
 
@@ -54,24 +54,10 @@ def _classes(module: str) -> dict[str, ast.ClassDef]:
     return {part.name: part for part in ast.walk(tree) if isinstance(part, ast.ClassDef)}
 
 
-def _structs(messages: tuple[type[msgspec.Struct], ...]) -> set[type[msgspec.Struct]]:
-    found: set[type[msgspec.Struct]] = set()
-
-    def visit(part: object) -> None:
-        match part:
-            case msgspec.inspect.StructType(cls=struct):
-                if struct not in found:
-                    found.add(struct)
-                    visit(part.fields)
-            case msgspec.inspect.Field(type=inner):
-                visit(inner)
-            case msgspec.inspect.UnionType(types=inner) | msgspec.inspect.TupleType(item_types=inner):
-                visit(inner)
-            case msgspec.inspect.VarTupleType(item_type=inner) | msgspec.inspect.ListType(item_type=inner):
-                visit(inner)
-            case tuple():
-                for entry in part:
-                    visit(entry)
-
-    visit(msgspec.inspect.multi_type_info(messages))
+def _structs(base: type[msgspec.Struct] = msgspec.Struct) -> dict[str, type[msgspec.Struct]]:
+    """Return the protocol's structs by name, which none shares with another."""
+    found: dict[str, type[msgspec.Struct]] = {}
+    for kind in base.__subclasses__():
+        found |= {kind.__name__: kind} if kind.__module__.startswith("tvist_protocol.") else {}
+        found |= _structs(kind)
     return found

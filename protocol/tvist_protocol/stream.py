@@ -15,8 +15,7 @@ EventKind = Literal[
     "program_stopped", "text", "popup",
 ]  # fmt: skip
 
-PopupKind = Literal["message", "warning", "error"]
-"""How serious a popup is."""
+PopupKind = Literal["message", "warning", "error"]  # how serious a popup is
 
 EVENT_MEANINGS: dict[EventKind, str] = {
     "motion_started": "the motion `id` begins at this tick",

@@ -54,8 +54,7 @@ class Activity(StrEnum):
 class Transition:
     """Rows of the table with the same trigger and target."""
 
-    trigger: str
-    """`type` of a command, or one of `HAPPENINGS`."""
+    trigger: str  # `type` of a command, or one of `HAPPENINGS`
     sources: tuple[StrEnum, ...]
     target: StrEnum
 

@@ -15,11 +15,12 @@ class Forked:
     def fork(self) -> Self:
         """Return an independent copy of the present state, whose outputs for equal inputs have the same bits.
 
-        Use it in the same thread as the original.
+        Use it in the thread of the original. All arrays and all attributes that have a `fork` are copied.
         """
         other = copy.copy(self)
-        other._unshare()  # noqa: SLF001  one of its own kind
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                vars(other)[name] = value.copy()
+            elif hasattr(value, "fork"):
+                vars(other)[name] = value.fork()
         return other
-
-    def _unshare(self) -> None:
-        """Replace everything that is modified in place by copies."""

@@ -36,6 +36,8 @@ class Filter(Forked, ABC):
         period: Sampling period h [s].
         f_d: Damped frequencies in use [Hz], shape (modes,).
         zeta: Damping ratios in use [-], shape (modes,).
+        peak: Factor by which velocity and acceleration may exceed the reference's while the weights are constant: the
+            sum of their magnitudes, which is 1 if none is negative [-].
         excess: Share by which the shaped acceleration may exceed the reference's, if such a bound is known and small
             [-]. The generator of the reference can stay below its limit by this share.
         surplus: Largest shares by which the shaped velocity and acceleration exceed those of a reference at the arm's
@@ -46,29 +48,22 @@ class Filter(Forked, ABC):
             during a motion, so it continues with its last weights, and the caller should stop the motion.
     """
 
-    name: str
-    estimator: Estimator
-    joints: int
-    period: float
     f_d: Floats
     zeta: Floats
-    excess: float
-    surplus: tuple[float, float]
-    clipped: bool
-    feed_forward: FeedForward
-    fault: str | None
 
-    def __init__(self, name: str, estimator: Estimator, joints: int, period: float, capacity: int) -> None:
+    def __init__(
+        self, name: str, estimator: Estimator, joints: int, period: float, capacity: int, peak: float
+    ) -> None:
         """Initialize what all filters have in common; a derived class then calls `reset`."""
         if joints < 1:
             raise FilterError("joints", joints, "at least 1")
         if not 0.0 < period < np.inf:
             raise FilterError("period", period, "a finite number of seconds above 0")
         self.name, self.estimator = name, estimator
-        self.joints, self.period = joints, period
-        self.excess, self.clipped, self.fault = 0.0, False, None
-        self.surplus = (0.0, 0.0)
-        self.feed_forward = "rigid"
+        self.joints, self.period, self.peak = joints, period, peak
+        self.excess, self.surplus, self.clipped = 0.0, (0.0, 0.0), False
+        self.fault: str | None = None
+        self.feed_forward: FeedForward = "rigid"
         self._line = DelayLine(joints, capacity)
         self._reach = capacity
         """Number of newest samples that the weights may use."""
@@ -96,14 +91,6 @@ class Filter(Forked, ABC):
             zeta: Damping ratios [-], shape (modes,).
         """
         return None
-
-    @property
-    def peak(self) -> float:
-        """Factor by which velocity and acceleration may exceed the reference's while the weights are constant.
-
-        It is the sum of the weights' magnitudes [-], which is 1 if none is negative.
-        """
-        return 1.0
 
     @abstractmethod
     def _start(self) -> None:
@@ -170,10 +157,6 @@ class Filter(Forked, ABC):
         if samples.ndim != 2:
             raise ShapingError(f"q_ref has shape {samples.shape}, but must be (T, {self.width})")
         return np.array([self.filter(sample) for sample in samples]).reshape(samples.shape)
-
-    def _unshare(self) -> None:
-        self.estimator, self._line = self.estimator.fork(), self._line.fork()
-        self._q_star = self._q_star.copy()
 
     @property
     def settled(self) -> bool:

@@ -12,8 +12,7 @@ from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats, Forked
 from tvist_shaping.errors import DelayError, ShapingError
 
-_MARGIN = 3
-"""Samples needed beyond a delay: two older ones for interpolation, and the newest with delay 0."""
+_MARGIN = 3  # samples needed beyond a delay: two older ones for interpolation, and the newest with delay 0
 
 
 @compiled
@@ -75,14 +74,6 @@ class DelayLine(Forked):
         scratch: Scratch of `gather`, shape (joints,).
     """
 
-    joints: int
-    capacity: int
-    max_delay: int
-    still: int
-    ring: Floats
-    head: int
-    scratch: Floats
-
     def __init__(self, joints: int, capacity: int) -> None:
         """Create a line filled with zeros.
 
@@ -100,8 +91,8 @@ class DelayLine(Forked):
         self.joints, self._shape = joints, (joints,)
         self.capacity = capacity
         self.max_delay = capacity - _MARGIN
-        self.ring = np.zeros((capacity, joints))
-        self.scratch = np.zeros(joints)
+        self.ring: Floats = np.zeros((capacity, joints))
+        self.scratch: Floats = np.zeros(joints)
         self.head = 0
         self.fill(self.scratch)
 
@@ -194,9 +185,6 @@ class DelayLine(Forked):
         refused = gather(self.ring, self.head, A, delays, self.scratch, out)
         if refused >= 0:
             raise DelayError(float(delays[refused]), self.max_delay)
-
-    def _unshare(self) -> None:
-        self.ring, self.scratch = self.ring.copy(), np.empty_like(self.scratch)
 
     def _sample(self, q: npt.ArrayLike) -> Floats:
         sample = np.asarray(q, dtype=float)

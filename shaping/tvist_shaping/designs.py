@@ -9,8 +9,7 @@ from tvist_shaping.steady import Design, ShortDesign
 
 AT_TARGET = 3
 """Number of modes, from the lowest, that get a zero-vibration shaper in a motion with a known end."""
-LONGEST = 0.26
-"""Longest total time of these shapers, unless the design is slowed down [s]."""
+LONGEST = 0.26  # longest total time of these shapers, unless the design is slowed down [s]
 
 
 class TargetDesign(Design):
@@ -55,9 +54,6 @@ class TargetDesign(Design):
         np.add.at(taps, first + 1, sizes * (within - first))
         return bool(np.array_equal(within, ticks))
 
-    def _unshare(self) -> None:
-        self._design = self._design.fork()
-
 
 class SmoothedDesign(Design):
     """The taps of another design, which no other filter uses, convolved with constant weights of sum 1."""
@@ -81,9 +77,6 @@ class SmoothedDesign(Design):
         done = self._design.go_on(f_d, zeta, seconds, self._own)
         taps[:] = np.convolve(self._own, self._weights)
         return done
-
-    def _unshare(self) -> None:
-        self._design, self._own = self._design.fork(), self._own.copy()
 
 
 class ConstantDesign(Design):

@@ -5,12 +5,12 @@ ShapingError
 ├── ParameterError        a parameter is out of its range
 │   ├── ShaperRangeError  f_d or ζ is outside the range of a shaper
 │   ├── DesignError       a parameter of a shaper's design is invalid
-│   └── EstimatorError    an estimator's parameter is invalid
+│   ├── EstimatorError    an estimator's parameter is invalid
+│   └── FilterError       shaper, estimator and delay line do not fit together
 ├── UnknownShaperError    a name is not in the catalogue
 ├── ShaperFailureError    a shaper's function fails, or violates its shaper's declaration
 ├── ConvergenceError      a design has no solution
-├── DelayError            a delay exceeds the delay line
-└── FilterError           shaper, estimator and delay line do not fit together
+└── DelayError            a delay exceeds the delay line
 """
 
 from collections.abc import Sequence
@@ -33,8 +33,8 @@ class ParameterError(ShapingError):
         limit: Permitted range, in words.
     """
 
-    def __init__(self, field: str, value: object, limit: str) -> None:
-        super().__init__(f"{field} is {value!r}, but must be {limit}")
+    def __init__(self, field: str, value: object, limit: str, advice: str = "") -> None:
+        super().__init__(f"{field} is {value!r}, but must be {limit}{'; ' if advice else ''}{advice}")
         self.field = field
         self.value = value
         self.limit = limit
@@ -101,17 +101,8 @@ class EstimatorError(ParameterError):
     """A parameter of an estimator is invalid."""
 
 
-class FilterError(ShapingError):
+class FilterError(ParameterError):
     """Shaper, estimator and delay line do not fit together; the message says what to change.
 
-    Attributes:
-        field: The value that does not fit: `duration` [s], `zeta_max` [-], `period` [s], `max_delay` [s] or `joints`.
-        value: Present value.
-        limit: Required value, in words.
+    `field` is the value that does not fit: `duration` [s], `zeta_max` [-], `period` [s], `max_delay` [s] or `joints`.
     """
-
-    def __init__(self, field: str, value: float, limit: str, advice: str = "") -> None:
-        super().__init__(f"{field} is {value!r}, but must be {limit}{'; ' if advice else ''}{advice}")
-        self.field = field
-        self.value = value
-        self.limit = limit

@@ -21,13 +21,11 @@ import numpy as np
 from tvist_shaping._types import Floats
 from tvist_shaping.amplitudes import ripple, widening
 from tvist_shaping.errors import ConvergenceError
-from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.impulses import V
 from tvist_shaping.newton import solve
 from tvist_shaping.tabulated import Tabulated
 
-HIGHEST_ZERO = 1.8
-"""Largest permitted ratio of the highest zero to the design frequency [-]."""
+HIGHEST_ZERO = 1.8  # largest permitted ratio of the highest zero to the design frequency [-]
 
 
 class HumpShaper:
@@ -96,60 +94,14 @@ def exact(humps: int, V: float) -> Tabulated:
     )
 
 
-EI, EI2, EI3 = (
-    Tabulated(shaper.follow, shaper.start, zeta_max, f"take {name}, which leaves less", duration_periods)
-    for humps, name, zeta_max, duration_periods in (
-        (1, "ei", 0.52, 1.0),
-        (2, "ei2", 0.32, 1.5),
-        (3, "ei3", 0.2, 2.0),
-    )
-    for shaper in (HumpShaper(humps, V),)
-)
+def _known(humps: int, closed_form: str, zeta_max: float) -> Tabulated:
+    shaper, instead = HumpShaper(humps, V), f"take {closed_form}, which leaves less"
+    return Tabulated(shaper.follow, shaper.start, zeta_max, instead, (humps + 1) / 2.0)
 
 
-def ei_exact(f_d: float, zeta: float) -> Impulses:
-    """One hump of height V = 5 % with any damping up to 0.52; equal to `ei` without damping.
-
-    Args:
-        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
-        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.52.
-
-    Returns:
-        A [-] and τ [s], each of shape (3,), from this module's equations.
-
-    Raises:
-        ShaperRangeError: f_d or ζ is outside the range above.
-    """
-    return EI(f_d, zeta)
-
-
-def ei2_exact(f_d: float, zeta: float) -> Impulses:
-    """Two humps of height V = 5 % with any damping up to 0.32; equal to `ei2` without damping.
-
-    Args:
-        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
-        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.32.
-
-    Returns:
-        A [-] and τ [s], each of shape (4,), from this module's equations.
-
-    Raises:
-        ShaperRangeError: f_d or ζ is outside the range above.
-    """
-    return EI2(f_d, zeta)
-
-
-def ei3_exact(f_d: float, zeta: float) -> Impulses:
-    """Three humps of height V = 5 % with any damping up to 0.2; equal to `ei3` without damping.
-
-    Args:
-        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
-        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.2.
-
-    Returns:
-        A [-] and τ [s], each of shape (5,), from this module's equations.
-
-    Raises:
-        ShaperRangeError: f_d or ζ is outside the range above.
-    """
-    return EI3(f_d, zeta)
+ei_exact = _known(1, "ei", 0.52)
+"""One hump of height V = 5 % with any damping ratio below 0.52; equal to `ei` without damping."""
+ei2_exact = _known(2, "ei2", 0.32)
+"""Two humps of height V = 5 % with any damping ratio below 0.32; equal to `ei2` without damping."""
+ei3_exact = _known(3, "ei3", 0.2)
+"""Three humps of height V = 5 % with any damping ratio below 0.2; equal to `ei3` without damping."""

@@ -15,6 +15,7 @@ Without room, s waits. When the reference is at rest, o and n agree and nothing 
 """
 
 import math
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -24,28 +25,20 @@ from tvist_shaping._types import Floats, Forked
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import FilterError
 
-NEGLIGIBLE = 1e-10
-"""Difference between two outputs that has no effect [rad]."""
-ROUNDING = 1e-7
-"""Share of the acceleration limit that the last step to s = 1 may add [-]."""
-EQUAL = 1e-6
-"""Difference between two mean delays that counts as zero [s]."""
+NEGLIGIBLE = 1e-10  # difference between two outputs that has no effect [rad]
+ROUNDING = 1e-7  # share of the acceleration limit that the last step to s = 1 may add [-]
+EQUAL = 1e-6  # difference between two mean delays that counts as zero [s]
 STRAIGHT = 1e-6
 """Deviation of a joint from the straight line of the others that is tolerated, as a share of its largest step [-]."""
 QUICKEST = 0.3
 """Shortest duration of a fade [s], even with unlimited room: it must be slow compared with the vibration."""
 PUSH = 0.4
 """Share of the limits of acceleration and jerk that s uses to speed up, and to come to rest at 1 [-]."""
-STOP = 0.5
-"""Share of the room that is assumed to be available for stopping s [-]."""
-MARGIN = 0.02
-"""Smallest share of the acceleration limit that is excluded from the room [-]."""
-COAST = 0.5
-"""Share of the remaining way that s may coast while it cannot be stopped but exceeds no limit [-]."""
-BACK = 0.5
-"""Share of a joint's velocity that the fade may remove, so that no joint turns back [-]."""
-EASE = 0.02
-"""Time constant with which ṡ approaches its highest safe value [s]."""
+STOP = 0.5  # share of the room that is assumed to be available for stopping s [-]
+MARGIN = 0.02  # smallest share of the acceleration limit that is excluded from the room [-]
+COAST = 0.5  # share of the remaining way that s may coast while it cannot be stopped but exceeds no limit [-]
+BACK = 0.5  # share of a joint's velocity that the fade may remove, so that no joint turns back [-]
+EASE = 0.02  # time constant with which ṡ approaches its highest safe value [s]
 
 
 @compiled
@@ -180,10 +173,6 @@ class Fade(Forked):
         share: Share of the new filter in the output [-], 0 to 1.
     """
 
-    old: Filter
-    new: Filter
-    share: float
-
     def __init__(
         self, old: Filter, new: Filter, *, velocity: float, acceleration: float, jerk: float
     ) -> None:
@@ -220,11 +209,12 @@ class Fade(Forked):
         """Whether the last output was entirely the new filter's, as all later ones will be."""
         return self.share == 1.0
 
-    def _unshare(self) -> None:
-        shared = self.new.estimator is self.old.estimator  # both use its state
-        self.old, self.new, self._history = self.old.fork(), self.new.fork(), self._history.copy()
-        if shared:
-            self.new.estimator = self.old.estimator
+    def fork(self) -> Self:
+        """Return an independent copy; see `Filter.fork`."""
+        other = super().fork()
+        if self.new.estimator is self.old.estimator:  # both use its state
+            other.new.estimator = other.old.estimator
+        return other
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
         """Shape one sample; see `Filter.filter`."""

@@ -9,8 +9,7 @@ from tvist_shaping.errors import ShaperFailureError
 
 FAILURES: Final = (Exception, SystemExit)
 """Exceptions that a user's function may raise; KeyboardInterrupt is not among them."""
-ROUNDING: Final = 1e-6
-"""Share by which rounding may let a value exceed its shaper's declaration [-]."""
+ROUNDING: Final = 1e-6  # share by which rounding may let a value exceed its shaper's declaration [-]
 _HERE: Final = Path(__file__).parent
 
 

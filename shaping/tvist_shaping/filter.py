@@ -13,11 +13,11 @@ from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
 from tvist_shaping.filter_kernels import eased, shape, shape_all, weigh
 from tvist_shaping.impulse_train import UNSHAPED, Impulses, product
+from tvist_shaping.impulses import Train
 from tvist_shaping.own import longest as longest_of
 from tvist_shaping.shaper import Shaper
 
-EASE = 40.0
-"""Natural frequency of the low-pass for modes that may change abruptly [1/s]."""
+EASE = 40.0  # natural frequency of the low-pass for modes that may change abruptly [1/s]
 QUICKEST = (1.0, 0.2)
 """Largest relative rate of change of f_d after the low-pass, and largest rate of change of ζ [1/s]."""
 
@@ -40,9 +40,6 @@ class TvistFilter(Filter):
         clipped: Whether a mode was clamped to the estimator's `f_d_min` or `zeta_max`. Delays are never clipped, since
             the constructor refuses combinations that could exceed max_delay.
     """
-
-    shaper: Shaper
-    max_delay: float
 
     def __init__(
         self,
@@ -92,15 +89,15 @@ class TvistFilter(Filter):
                 "take a shaper with a higher zeta_max or an estimator with a lower highest damping",
             )
         # One tick more than max_delay, for rounding of τ/h; the others are for interpolation.
-        super().__init__(shaper.name, estimator, joints, period, math.ceil(max_delay / period) + 5)
+        capacity, peak = math.ceil(max_delay / period) + 5, float(shaper.peak**estimator.modes)
+        super().__init__(shaper.name, estimator, joints, period, capacity, peak)
         self._reach = math.ceil(longest / period) + 3  # three are for interpolation
         self._longest, self._most = longest, longest * (1.0 + ROUNDING)
-        self.shaper = shaper
-        self.max_delay = max_delay
+        self.shaper, self.max_delay = shaper, max_delay
         self._impulses: Impulses | None = UNSHAPED
         self._eased: Floats = np.zeros((4, estimator.modes))
-        train = shaper.train if estimator.modes == 1 else None
-        self._train = None if train is None else np.array(train)
+        train = shaper.function if estimator.modes == 1 and isinstance(shaper.function, Train) else None
+        self._train = None if train is None else np.array([train.a, train.periods])
         self._work: Floats = np.zeros((3, 1 if train is None else len(train.a)))
         self.reset(self._q_star)
         self._check_made()
@@ -132,11 +129,6 @@ class TvistFilter(Filter):
         """Sum of the modes' mean delays [s]; see `Filter.mean_delay_of`."""
         give = self.shaper.impulses
         return sum(give(f, z).mean_delay for f, z in zip(f_d.tolist(), zeta.tolist(), strict=True))
-
-    @property
-    def peak(self) -> float:
-        """Product of the shaper's peak, once for each mode [-]; see `Filter.peak`."""
-        return float(self.shaper.peak**self.estimator.modes)
 
     def replace(self, *, shaper: Shaper | None = None, estimator: Estimator | None = None) -> "TvistFilter":
         """Return another filter, with a new shaper or estimator, that continues from the state of this one.
@@ -241,7 +233,3 @@ class TvistFilter(Filter):
         for i in range(done, len(samples)):
             out[i] = self.filter(samples[i])
         return out
-
-    def _unshare(self) -> None:
-        super()._unshare()
-        self._work, self._eased = self._work.copy(), self._eased.copy()

@@ -24,20 +24,13 @@ from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import FilterError
 
-EDGE = 0.012
-"""Length of the fade-out of the weights at the end [s]."""
-ENERGY = 0.01
-"""ρ: weight of the energy in the weights [-]."""
-STEPS = 60
-"""Number of Newton steps before a restart from zero."""
-SOLVED = 1e-9
-"""Norm of the dual's gradient that counts as zero [-]."""
-SCALE = 0.03
-"""Scale of the mean delay's row, so that all rows have the same magnitude [s]."""
-QUICKEST = 0.15
-"""Largest relative change of the length per second [1/s]."""
-GAIN = 0.3
-"""Gain of the control loop for the length [-]."""
+EDGE = 0.012  # length of the fade-out of the weights at the end [s]
+ENERGY = 0.01  # ρ: weight of the energy in the weights [-]
+STEPS = 60  # number of Newton steps before a restart from zero
+SOLVED = 1e-9  # norm of the dual's gradient that counts as zero [-]
+SCALE = 0.03  # scale of the mean delay's row, so that all rows have the same magnitude [s]
+QUICKEST = 0.15  # largest relative change of the length per second [1/s]
+GAIN = 0.3  # gain of the control loop for the length [-]
 
 
 @dataclass(frozen=True)
@@ -89,22 +82,15 @@ class FirDesign:
 class Programme(NamedTuple):
     """Quadratic programme of a design with R rows: requirements, latest solution, and working memory."""
 
-    spread: Floats
-    """`spread` of `FirDesign`, shape (modes,)."""
-    weight: Floats
-    """`weight` of `FirDesign`, shape (modes,)."""
-    dual: Floats
-    """Unknowns of the dual, shape (R,): the initial guess, then the solution."""
-    taps: Floats
-    """Result, shape (N,), with sum 1."""
+    spread: Floats  # `spread` of `FirDesign`, shape (modes,)
+    weight: Floats  # `weight` of `FirDesign`, shape (modes,)
+    dual: Floats  # unknowns of the dual, shape (R,): the initial guess, then the solution
+    taps: Floats  # result, shape (N,), with sum 1
     remains: Floats
     """Residual of each mode, as the root of the sum of squares over its rows [-], shape (modes,)."""
-    rows: Floats
-    """Scratch, shape (R, N)."""
-    columns: Floats
-    """Scratch: `rows` transposed, shape (N, R)."""
-    hessian: Floats
-    """Scratch, shape (R, R + 2)."""
+    rows: Floats  # scratch, shape (R, N)
+    columns: Floats  # scratch: `rows` transposed, shape (N, R)
+    hessian: Floats  # scratch, shape (R, R + 2)
 
     @classmethod
     def of(cls, wanted: FirDesign, taps: int) -> "Programme":
@@ -123,14 +109,7 @@ class Programme(NamedTuple):
 
     def fork(self) -> "Programme":
         """Return a copy with the present solution."""
-        return self._replace(
-            dual=self.dual.copy(),
-            taps=self.taps.copy(),
-            remains=self.remains.copy(),
-            rows=np.empty_like(self.rows),
-            columns=np.empty_like(self.columns),
-            hessian=np.empty_like(self.hessian),
-        )
+        return Programme(*(part.copy() for part in self))
 
 
 @compiled

@@ -12,8 +12,7 @@ from tvist_shaping.failures import ROUNDING
 from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.steady import Design
 
-MAX_TAPS = 500
-"""Largest number of taps of a filter: one second at 500 Hz."""
+MAX_TAPS = 500  # largest number of taps of a filter: one second at 500 Hz
 
 
 @dataclass(frozen=True, slots=True)

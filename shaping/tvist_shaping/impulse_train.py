@@ -68,8 +68,7 @@ class Impulses:
         return float(self.A @ self.tau)
 
 
-UNSHAPED = Impulses(np.ones(1), np.zeros(1))
-"""The single impulse that leaves a reference unchanged."""
+UNSHAPED = Impulses(np.ones(1), np.zeros(1))  # the single impulse that leaves a reference unchanged
 
 
 def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = "") -> None:

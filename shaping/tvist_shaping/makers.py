@@ -1,7 +1,7 @@
 """Shapers with parameters, and shapers from the user's own impulses."""
 
 import math
-from functools import partial
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,8 +15,7 @@ from tvist_shaping.sensitivity import residual
 from tvist_shaping.shaper import Shaper
 from tvist_shaping.specified import specified
 
-ROUNDING = 1e-6
-"""Share of V by which rounding may let a residual exceed it [-]."""
+ROUNDING = 1e-6  # share of V by which rounding may let a residual exceed it [-]
 
 
 def mzv_of(n: int = 3, t: float = 0.75, *, name: str = "", description: str = "") -> Shaper:
@@ -33,7 +32,7 @@ def mzv_of(n: int = 3, t: float = 0.75, *, name: str = "", description: str = ""
     """
     train = Train(modified(n, t), np.linspace(0.0, t, n))
     what = description or f"modified zero vibration, {n} impulses in {t:g} periods"
-    return Shaper(name or f"mzv({n},{t:g})", what, train.at, t, train=train)
+    return Shaper(name or f"mzv({n},{t:g})", what, train, t)
 
 
 def ei_of(
@@ -63,7 +62,7 @@ def ei_of(
         return Shaper(name or f"ei_exact({humps},{V:g})", what, made, made.duration_periods, made.zeta_max)
     duration = (humps + 1) / 2.0
     train = Train(a, np.linspace(0.0, duration, humps + 2))
-    return Shaper(name or f"ei({humps},{V:g})", what, train.at, duration, train=train)
+    return Shaper(name or f"ei({humps},{V:g})", what, train, duration)
 
 
 def si_of(
@@ -92,14 +91,13 @@ def si_of(
     train = Train(*specified(low, high, V))
     zeta_max, f = 0.0, np.linspace(low, high, 301)
     for zeta in np.linspace(0.0, 0.99, 100):
-        if residual(f, zeta, train.of(1.0, zeta)).max() > V * (1.0 + ROUNDING):
+        if residual(f, zeta, train(1.0, zeta)).max() > V * (1.0 + ROUNDING):
             break
         zeta_max = float(zeta)
-    zeta_max = 1.0 if zeta_max > 0.985 else zeta_max
+    if zeta_max <= 0.985:
+        train = replace(train, zeta_max=zeta_max, instead="more than V is left: take a higher V or ei_of")
     what = description or f"specified insensitivity: at most {100.0 * V:g} % from {low:g} to {high:g}"
-    function = partial(_checked, train, zeta_max)
-    duration = float(train.periods[-1])
-    return Shaper(name or f"si({low:g},{high:g},{V:g})", what, function, duration, zeta_max, train=train)
+    return Shaper(name or f"si({low:g},{high:g},{V:g})", what, train, train.duration_periods, train.zeta_max)
 
 
 def custom(
@@ -141,10 +139,3 @@ def custom(
     return Shaper(
         name, description or "impulses of your own", function, train.duration, zeta_max, max(peak, 1.0)
     )
-
-
-def _checked(train: Train, zeta_max: float, f_d: float, zeta: float) -> Impulses:
-    check_mode(
-        f_d, zeta, zeta_max, "" if zeta_max == 1.0 else "more than V is left: take a higher V or ei_of"
-    )
-    return train.of(f_d, zeta)

@@ -21,8 +21,7 @@ from tvist_shaping.fir_shaper import FirShaper
 from tvist_shaping.shaper import Shaper
 from tvist_shaping.steady import AimedFilter, Design, ShortDesign, SteadyFilter
 
-AnyShaper: TypeAlias = Shaper | FirShaper
-"""Types that a user's own shaper may have."""
+AnyShaper: TypeAlias = Shaper | FirShaper  # types that a user's own shaper may have
 
 
 SLOW_HZ = 5.5
@@ -66,15 +65,13 @@ SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
     {"elastic": "elastic", "elastic-position": "elastic-position"}
 )
 """Filters that only smooth the reference, and the feed-forward that suppresses the vibration."""
-SMOOTHING = 40
-"""Length of the smoothing if the name contains none [ms]."""
+SMOOTHING = 40  # length of the smoothing if the name contains none [ms]
 SMOOTHINGS = range(8, 62, 2)
 """Lengths that a name may contain, as in `elastic-16` [ms].
 
 Shorter ones leave the lead too little torque, and longer ones gain little.
 """
-FIRST = 0.63
-"""Share of the first of two running means in the total length, tuned at 40 ms [-]."""
+FIRST = 0.63  # share of the first of two running means in the total length, tuned at 40 ms [-]
 _LENGTH = re.compile(r"(.+)-(0|[1-9][0-9]{0,8})")
 OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
     {
@@ -98,8 +95,7 @@ USES: Mapping[str, str] = MappingProxyType(
 )
 """What each of these is best for, as measured: docs/how-to/evaluate-a-shaper.md has the figures."""
 
-PERIOD = 0.002
-"""Tick of every filter that is created by name [s]."""
+PERIOD = 0.002  # tick of every filter that is created by name [s]
 _NAME = re.compile(r"[a-z0-9][a-z0-9_.,()-]{0,63}")
 
 
@@ -113,8 +109,6 @@ class Registry:
         DesignError: A name is invalid or belongs to another shaper; or a `FirShaper` has another period.
     """
 
-    own: Mapping[str, AnyShaper]
-
     def __init__(self, own: Iterable[AnyShaper] = ()) -> None:
         found: dict[str, AnyShaper] = {}
         for shaper in own:
@@ -126,7 +120,7 @@ class Registry:
             if isinstance(shaper, FirShaper) and shaper.period != PERIOD:
                 raise DesignError("period", shaper.period, f"{PERIOD:g} s, as that of all filters by name")
             found[shaper.name] = shaper
-        self.own = MappingProxyType(found)
+        self.own: Mapping[str, AnyShaper] = MappingProxyType(found)
 
     def names(self) -> tuple[str, ...]:
         """Names of all available filters."""

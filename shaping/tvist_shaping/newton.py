@@ -7,12 +7,9 @@ import numpy as np
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import ConvergenceError
 
-DIFFERENCE_STEP = 1e-7
-"""Step of the difference quotients [-]; all unknowns here are of order one."""
-FARTHEST = 0.2
-"""Largest change of an unknown in one step [-]."""
-SOLVED = 1e-12
-"""Largest residual of an equation that counts as zero [-]."""
+DIFFERENCE_STEP = 1e-7  # step of the difference quotients [-]; all unknowns here are of order one
+FARTHEST = 0.2  # largest change of an unknown in one step [-]
+SOLVED = 1e-12  # largest residual of an equation that counts as zero [-]
 
 
 def solve(equations: Callable[[Floats], Floats], start: Floats) -> Floats:

@@ -14,8 +14,7 @@ from tvist_shaping.shaper import Shaper
 
 TRIED_F_D = (0.1, 200.0)
 """Damped frequencies with which a shaper is tried [Hz]: all that a client may send to a robot."""
-_USUAL = (10.0, 0.1)
-"""Mode that is tried first: damped frequency [Hz], damping ratio [-]."""
+_USUAL = (10.0, 0.1)  # mode that is tried first: damped frequency [Hz], damping ratio [-]
 _F_D = np.geomspace(*TRIED_F_D, 23)
 _SHARES = np.array([*np.linspace(0.0, 1.0, 24, endpoint=False), 0.99])
 """Damping ratios to try, as shares of the shaper's zeta_max [-]."""
@@ -24,8 +23,7 @@ _DECLARED = (
     ("zeta_max", 1e-6, 1.0, "a number from 1e-6 to 1"),
     ("peak", 1.0, 1e6, "a number from 1 to 1e6"),
 )
-_APART = 1.7
-"""Ratio of a mode's frequency to that of the next lower one, in checks of a FIR filter."""
+_APART = 1.7  # ratio of a mode's frequency to that of the next lower one, in checks of a FIR filter
 
 
 def shaper_of(

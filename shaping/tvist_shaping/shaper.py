@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from tvist_shaping.errors import ShaperFailureError
 from tvist_shaping.impulse_train import Impulses
-from tvist_shaping.impulses import Train
 from tvist_shaping.sensitivity import band
 
 
@@ -21,8 +20,6 @@ class Shaper:
         zeta_max: Damping ratios must stay below this [-].
         peak: Σ|A_j|, the largest factor by which the shaped velocity and acceleration may exceed the reference's while
             f_d and ζ are constant; 1 for positive impulses [-].
-        train: The impulses without damping, if `function` only applies damping to them; a filter then computes them in
-            compiled code.
     """
 
     name: str
@@ -31,7 +28,6 @@ class Shaper:
     duration_periods: float
     zeta_max: float = 1.0
     peak: float = 1.0
-    train: Train | None = None
 
     def impulses(self, f_d: float, zeta: float) -> Impulses:
         """Call `function`, and check that it returns impulses, since it may be the user's.

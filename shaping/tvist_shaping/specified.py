@@ -26,10 +26,8 @@ from tvist_shaping.amplitudes import ripple, widening
 from tvist_shaping.errors import DesignError
 from tvist_shaping.newton import solve
 
-MAX_IMPULSES = 12
-"""Largest number of impulses."""
-STRIDE = 0.02
-"""Change of the band's upper end that Newton's method can follow in one step [-]."""
+MAX_IMPULSES = 12  # largest number of impulses
+STRIDE = 0.02  # change of the band's upper end that Newton's method can follow in one step [-]
 
 
 def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:

@@ -23,8 +23,7 @@ from tvist_shaping.failures import FAILURES, failure
 from tvist_shaping.fir import EDGE, GAIN, QUICKEST, FirDesign, Programme, solve
 from tvist_shaping.taps import average, length, product_taps
 
-DESIGN_TICKS = 4
-"""Ticks between two designs."""
+DESIGN_TICKS = 4  # ticks between two designs
 SMOOTH = 64
 """Ticks of each running mean: with fewer, the variance of the delays changes too fast; with more, taps lag."""
 EXCESS = 0.005
@@ -160,9 +159,6 @@ class ShortDesign(Design):
         self._length = min(max(self._length + change, self.wanted.shortest), self.wanted.longest)
         return self._solved and (self._length < self.wanted.longest or excess <= 0.0)
 
-    def _unshare(self) -> None:
-        self._programme = self._programme.fork()
-
     def _solve(self, f_d: Floats, zeta: Floats, taps: Floats) -> None:
         """Compute new taps; if none are found, keep the old ones, which have the right mean delay."""
         self._solved = solve(f_d, zeta, self._length, self.mean_delay, self.period, self._programme)
@@ -188,7 +184,6 @@ class SteadyFilter(Filter):
         design: Computes the taps.
     """
 
-    design: Design
     spared = EXCESS
     """Initial value of `excess` [-]."""
 
@@ -221,14 +216,14 @@ class SteadyFilter(Filter):
                 "modes", estimator.modes, f"{design.modes}, as design {design.name!r} wants",
                 "take an estimator of that many modes, or another design",
             )  # fmt: skip
-        super().__init__(design.name, estimator, joints, design.period, design.taps + 4)
+        super().__init__(design.name, estimator, joints, design.period, design.taps + 4, design.peak)
         self.design, self.feed_forward = design, feed_forward
         self.excess = 0.0 if design.constant else self.spared
         self._reach = design.taps
         self._smooth = 1 if design.constant else smooth
         self._delays = np.arange(design.taps, dtype=float)
         self._designed, self._taps = np.zeros((2, design.taps))
-        self._past, self._sums = np.zeros((3, smooth, design.taps)), np.zeros((3, design.taps))
+        self._past, self._sums = np.zeros((3, self._smooth, design.taps)), np.zeros((3, design.taps))
         self._row, self._tick = 0, 0
         self._length = 0
         self.reset(self._q_star)
@@ -250,19 +245,6 @@ class SteadyFilter(Filter):
     def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:
         """The design's value [s]; see `Filter.mean_delay_of`."""
         return self.design.mean_delay_of(f_d, zeta)
-
-    @property
-    def peak(self) -> float:
-        """The design's value [-]; see `Filter.peak`."""
-        return self.design.peak
-
-    def _unshare(self) -> None:
-        super()._unshare()
-        if self.design.constant:  # nothing in it changes
-            return
-        self.design = self.design.fork()
-        self._designed, self._taps = self._designed.copy(), self._taps.copy()
-        self._past, self._sums = self._past.copy(), self._sums.copy()
 
     def _start(self) -> None:
         self._ask(self.estimator.settle(self._angles(self._q_star)), None)

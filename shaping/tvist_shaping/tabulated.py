@@ -19,16 +19,12 @@ NODES = 32
 It is doubled where the equations end at a branch point just beyond the highest damping, since the polynomials converge
 slowly there.
 """
-CONVERGED = 1e-7
-"""Largest magnitude of the last coefficients of converged polynomials [-]."""
+CONVERGED = 1e-7  # largest magnitude of the last coefficients of converged polynomials [-]
 MOST_NODES = 256
 
 
 class Tabulated:
     """Impulses of one mode as polynomials in ζ."""
-
-    zeta_max: float  # damping ratios must stay below this [-]
-    duration_periods: float  # longest duration over all ζ, to within 1e-9 damped periods [-]
 
     def __init__(
         self,
@@ -43,7 +39,8 @@ class Tabulated:
         `follow` takes ζ and the unknowns at a slightly lower ζ, and returns the unknowns, A [-] and times in damped
         periods [-]; `start` has the unknowns without damping. `instead` says what to use beyond `zeta_max`.
         """
-        self._follow, self._start, self.zeta_max, self._instead = follow, start, zeta_max, instead
+        self._follow, self._start, self._instead = follow, start, instead
+        self.zeta_max = zeta_max  # damping ratios must stay below this [-]
         self.duration_periods = self.longest() if duration_periods is None else duration_periods
 
     def longest(self) -> float:

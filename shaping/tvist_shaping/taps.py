@@ -12,8 +12,7 @@ import numpy as np
 from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 
-MATTERS = 1e-12
-"""Magnitude below which a tap does not count [-]."""
+MATTERS = 1e-12  # magnitude below which a tap does not count [-]
 
 
 @compiled

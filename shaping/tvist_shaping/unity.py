@@ -13,7 +13,6 @@ import math
 import numpy as np
 
 from tvist_shaping._types import Floats
-from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.newton import solve
 from tvist_shaping.tabulated import Tabulated
 
@@ -44,45 +43,19 @@ class UnityShaper:
         return x, self.A, np.concatenate([[0.0], x])
 
 
-ZETA_MAX = 0.5
-"""Highest damping ratio [-]."""
-UM_ZV, UM_ZVD = (
-    Tabulated(shaper.follow, shaper.start, ZETA_MAX, f"take {name}", duration_periods)
-    for name, shaper, duration_periods in (
-        ("zv", UnityShaper(derivative=False), 0.353461707),
-        ("zvd", UnityShaper(derivative=True), 0.790878917),
-    )
-)
+def _solved(positive: str, duration_periods: float, *, derivative: bool) -> Tabulated:
+    shaper = UnityShaper(derivative=derivative)
+    return Tabulated(shaper.follow, shaper.start, ZETA_MAX, f"take {positive}", duration_periods)
 
 
-def um_zv(f_d: float, zeta: float) -> Impulses:
-    """Unity-magnitude zero-vibration shaper: up to 3 times the reference's acceleration.
+ZETA_MAX = 0.5  # highest damping ratio [-]
+um_zv = _solved("zv", 0.353461707, derivative=False)
+"""Unity-magnitude zero-vibration shaper: up to 3 times the acceleration, for ζ < 0.5.
 
-    Args:
-        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
-        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.5.
+A = (1, -1, 1) [-]; without damping τ = (0, 1/6, 1/3)/f_d [s].
+"""
+um_zvd = _solved("zvd", 0.790878917, derivative=True)
+"""Unity-magnitude zero-vibration-and-derivative shaper: up to 5 times the acceleration, for ζ < 0.5.
 
-    Returns:
-        A = (1, -1, 1) [-] and τ [s], each of shape (3,); τ = (0, 1/6, 1/3)/f_d without damping.
-
-    Raises:
-        ShaperRangeError: f_d or ζ is outside the range above.
-    """
-    return UM_ZV(f_d, zeta)
-
-
-def um_zvd(f_d: float, zeta: float) -> Impulses:
-    """Unity-magnitude zero-vibration-and-derivative shaper: up to 5 times the reference's acceleration.
-
-    Args:
-        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
-        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.5.
-
-    Returns:
-        A = (1, -1, 1, -1, 1) [-] and τ [s], each of shape (5,); τ = (0, 0.0895, 0.3662, 0.6430, 0.7325)/f_d
-        without damping.
-
-    Raises:
-        ShaperRangeError: f_d or ζ is outside the range above.
-    """
-    return UM_ZVD(f_d, zeta)
+A = (1, -1, 1, -1, 1) [-]; without damping τ = (0, 0.0895, 0.3662, 0.6430, 0.7325)/f_d [s].
+"""

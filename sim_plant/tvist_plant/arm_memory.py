@@ -9,9 +9,10 @@ import numpy as np
 
 from tvist_plant._compiled import compiled
 from tvist_plant.chain import SCRATCH, WIDTH
-from tvist_plant.joint_parameters import ROWS
+from tvist_plant.drives import JointParameters
 from tvist_plant.model import Floats
 
+ROWS = len(JointParameters._fields)
 LAST, NOW = 0, 1  # indices of the commands and dynamics of the last and the current tick
 LINKS, JOINTS, PERIOD, SUBSTEPS, GRAVITY, ENCODER_STEP, HEAD = range(7)
 """Indices of the scalars at the front of the memory, and their number."""
@@ -79,3 +80,16 @@ def parts(memory: Floats) -> ArmMemory:
         memory[h : h + N * N].reshape(N, N),
         memory[h + N * N :],
     )
+
+
+@compiled
+def of_joint(parameters: Floats, j: int) -> JointParameters[float]:
+    """Return the parameters of joint j from the rows of `ArmMemory.joints`."""
+    return JointParameters(
+        parameters[0, j], parameters[1, j], parameters[2, j], parameters[3, j],
+        parameters[4, j], parameters[5, j], parameters[6, j], parameters[7, j],
+        parameters[8, j], parameters[9, j], parameters[10, j], parameters[11, j],
+        parameters[12, j], parameters[13, j], parameters[14, j], parameters[15, j],
+        parameters[16, j], parameters[17, j], parameters[18, j], parameters[19, j],
+        parameters[20, j], parameters[21, j], parameters[22, j],
+    )  # fmt: skip

@@ -3,10 +3,9 @@
 import math
 
 from tvist_plant._compiled import compiled, compiled_for_long
-from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, NOW, ArmMemory, parts
+from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, NOW, ArmMemory, of_joint, parts
 from tvist_plant.chain import collect_inertia, collect_torques, sweep
 from tvist_plant.integrator import advance, balance
-from tvist_plant.joint_parameters import of_joint
 from tvist_plant.model import Floats
 
 

@@ -1,4 +1,4 @@
-"""The drives' commands at each tick, and the linear part of arm and drives together.
+"""The drives' commands at each tick, and the parameters of drives and gears.
 
 Equations (joint side, one joint j; y = (q, θ) are link-side and motor-side angles):
 
@@ -12,11 +12,16 @@ is in series with the gear's spring, so damping decreases as frequency increases
 """
 
 from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from tvist_plant.description import Drives
-from tvist_plant.model import FlexibleModel, Floats
+from tvist_plant.imperfections import Imperfections
+from tvist_plant.model import FlexibleModel, Floats, Integers
+from tvist_plant.robot_tables import Drives, RobotDescription
+
+T = TypeVar("T")
+TOUCH = 1e-6  # torque below which a gear at rest lies within its backlash [N m]
 
 
 @dataclass(slots=True, eq=False)
@@ -31,64 +36,108 @@ class DriveCommand:
     torque: Floats  # feed-forward torque τ_ff, shape (n,) [N m]
 
 
-@dataclass(frozen=True)
-class LinearPart:
-    """Stiffness, damping and gains of arm and drives, the same in every posture; N links, then n motors."""
+class JointParameters(NamedTuple, Generic[T]):
+    """Parameters of the drive and gear of one joint (floats), or of all joints (arrays of shape (n,))."""
 
-    stiffness: Floats  # springs and position gains, shape (N+n, N+n) [N m/rad]
-    damping: Floats  # dampers, velocity gains and the slope of friction at rest, shape (N+n, N+n) [N m s/rad]
-    gear_damping: Floats  # d_g, shape (n,) [N m s/rad]
-    rotor_inertia: Floats  # b, shape (n,) [kg m^2]
-    velocity_gain: Floats  # k_d, shape (n,) [N m s/rad]
-    position_gain: Floats  # k_d (K_p + K_i), shape (n,) [N m/rad]
-    integral_gain: Floats  # k_d K_p K_i, shape (n,) [N m/(rad s)]
-
-    @classmethod
-    def of(cls, flexible: FlexibleModel, drives: Drives) -> "LinearPart":
-        """Assemble the matrices."""
-        links, joints = flexible.model.nv, len(flexible.joints)
-        gear, gear_damping = np.array(drives.gear_stiffness), np.array(drives.gear_damping)
-        K_d, K_p, K_i = map(np.array, (drives.velocity_gain, drives.position_gain, drives.integral_gain))
-        friction = np.array(drives.coulomb_friction) / drives.friction_width
-        stiffness, damping = np.zeros((2, links + joints, links + joints))
-        link, motor = flexible.joints, links + np.arange(joints)
-        for matrix, spring in ((stiffness, gear), (damping, gear_damping)):
-            matrix[link, link] += spring
-            matrix[motor, motor] += spring
-            matrix[link, motor] -= spring
-            matrix[motor, link] -= spring
-        stiffness[flexible.flexes, flexible.flexes] += flexible.flex_stiffness
-        damping[flexible.flexes, flexible.flexes] += flexible.flex_damping
-        stiffness[motor, motor] += K_d * (K_p + K_i)
-        damping[motor, motor] += K_d + friction
-        return cls(
-            stiffness=stiffness,
-            damping=damping,
-            gear_damping=gear_damping,
-            rotor_inertia=np.array(drives.rotor_inertia),
-            velocity_gain=K_d,
-            position_gain=K_d * (K_p + K_i),
-            integral_gain=K_d * K_p * K_i,
-        )
+    rotor_inertia: T  # b [kg m^2]
+    velocity_gain: T  # k_d [N m s/rad]
+    position_gain: T  # k_d (K_p + K_i) [N m/rad]
+    integral_gain: T  # k_d K_p K_i [N m/(rad s)]
+    friction: T  # f_c; zero if friction is modelled as linear [N m]
+    friction_width: T  # w [rad/s]
+    breakaway: T  # f_s/F_c [-]
+    stribeck_speed: T  # v_s [rad/s]
+    link: T  # index of its link, as a float [-]
+    gear_stiffness: T  # k [N m/rad]
+    gear_damping: T  # d [N m s/rad]
+    gear_error: T  # amplitude ε of the gear's kinematic error [rad]
+    gear_waves: T  # n_w [-]
+    gear_phase: T  # φ [rad]
+    softness: T  # k - K₁ [N m/rad]
+    soft_angle: T  # δ₁ [rad]
+    hysteresis: T  # r K [N m/rad]
+    hysteresis_torque: T  # z_max [N m]
+    backlash: T  # b [rad]
+    stiction: T  # f_s of the stiction [N m]
+    stiction_load: T  # μ_s [-]
+    stiction_speed: T  # v_s of the stiction [rad/s]
+    stiction_stiffness: T  # σ K [N m/rad]
 
 
-@dataclass(frozen=True)
-class Nonlinear:
-    """Friction and gear error, one entry per joint."""
+def joint_parameters(
+    description: RobotDescription, imperfections: Imperfections, links: Integers | int = 0
+) -> JointParameters[Floats]:
+    """Return those of an arm, with phases 0; raise ValueError unless lists have one value per joint."""
+    n, drives, limit = description.joints, description.drives, np.array(description.limits.torque)
+    K, K_d, K_p, K_i = map(
+        np.array,
+        (drives.gear_stiffness, drives.velocity_gain, drives.position_gain, drives.integral_gain),
+    )
+    lists = {name: np.array(getattr(imperfections, name) or np.zeros(n)) for name in ("backlash", "stiction")}
+    for name, values in lists.items():
+        if len(values) != n:
+            raise ValueError(f"{name} has {len(values)} values: must have {n}, one per joint")
+    rows = JointParameters[Any](
+        rotor_inertia=imperfections.rotor * np.array(drives.rotor_inertia),
+        velocity_gain=K_d,
+        position_gain=K_d * (K_p + K_i),
+        integral_gain=K_d * K_p * K_i,
+        friction=np.array(drives.coulomb_friction) * (not drives.linear_friction),
+        friction_width=drives.friction_width,
+        breakaway=imperfections.breakaway,
+        stribeck_speed=imperfections.stribeck_speed,
+        link=links,
+        gear_stiffness=K,
+        gear_damping=drives.gear_damping,
+        gear_error=drives.gear_error_amplitude,
+        gear_waves=drives.gear_error_waves,
+        gear_phase=0.0,
+        softness=(1.0 - imperfections.soft) * K,
+        soft_angle=imperfections.soft_torque * limit / (imperfections.soft * K),
+        hysteresis=imperfections.hysteresis * K,
+        hysteresis_torque=imperfections.hysteresis_torque * limit,
+        stiction_load=imperfections.stiction_load,
+        stiction_speed=imperfections.stiction_speed,
+        stiction_stiffness=imperfections.stiction_stiffness * K,
+        **lists,
+    )
+    return JointParameters(*(np.full(n, row, dtype=float) for row in rows))
 
-    friction: Floats  # f_c, shape (n,); zero if the file models friction as linear [N m]
-    friction_width: float  # w [rad/s]
-    gear_stiffness: Floats  # k_g, shape (n,) [N m/rad]
-    gear_error: float  # amplitude ε [rad]
-    gear_waves: float  # n_w [-]
 
-    @classmethod
-    def of(cls, drives: Drives) -> "Nonlinear":
-        """Take the values from the robot's description."""
-        return cls(
-            friction=np.array(drives.coulomb_friction) * (not drives.linear_friction),
-            friction_width=drives.friction_width,
-            gear_stiffness=np.array(drives.gear_stiffness),
-            gear_error=drives.gear_error_amplitude,
-            gear_waves=drives.gear_error_waves,
-        )
+def static_twist(joints: JointParameters[Floats], torque: Floats) -> Floats:
+    """Return each gear's twist under a steady torque [N m] without hysteresis [rad]."""
+    stiffness = joints.gear_stiffness
+    if not joints.softness.any() and not joints.backlash.any():
+        return torque / stiffness
+    soft = stiffness - joints.softness
+    within = np.minimum(np.abs(torque) / soft, joints.soft_angle)
+    beyond = np.maximum(np.abs(torque) - soft * joints.soft_angle, 0.0)
+    loose = joints.backlash * np.clip(torque / TOUCH, -1.0, 1.0)
+    return np.asarray(loose + np.sign(torque) * (within + beyond / stiffness))
+
+
+def gear_error(joints: JointParameters[Floats], motor: Floats) -> Floats:
+    """Return the kinematic errors of the gears at motor angles [rad]."""
+    return np.asarray(joints.gear_error * np.sin(joints.gear_waves * motor + joints.gear_phase))
+
+
+def springs_and_dampers(
+    flexible: FlexibleModel, joints: JointParameters[Floats], drives: Drives
+) -> tuple[Floats, Floats]:
+    """Return stiffness [N m/rad] and damping [N m s/rad] of N links, then n motors, shape (N+n, N+n) each.
+
+    They are the same in every posture, and include the drives' gains and the slope of friction at rest.
+    """
+    size, link = flexible.model.nv, flexible.joints
+    motor = size + np.arange(len(link))
+    stiffness, damping = np.zeros((2, size + len(link), size + len(link)))
+    for matrix, spring in ((stiffness, joints.gear_stiffness), (damping, joints.gear_damping)):
+        matrix[link, link] += spring
+        matrix[motor, motor] += spring
+        matrix[link, motor] -= spring
+        matrix[motor, link] -= spring
+    stiffness[flexible.flexes, flexible.flexes] += flexible.flex_stiffness
+    damping[flexible.flexes, flexible.flexes] += flexible.flex_damping
+    stiffness[motor, motor] += joints.position_gain
+    damping[motor, motor] += joints.velocity_gain + np.array(drives.coulomb_friction) / drives.friction_width
+    return stiffness, damping

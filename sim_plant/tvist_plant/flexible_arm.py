@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pinocchio as pin
 
@@ -13,10 +12,15 @@ from tvist_plant.arm_memory import PERIOD as PERIOD_AT
 from tvist_plant.arm_tick import evaluate, move, play, tick
 from tvist_plant.chain import BODY, body_of, chain_of
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.drives import DriveCommand, LinearPart, Nonlinear
-from tvist_plant.imperfections import STICTION, GearLaw, Imperfections, imperfect_model
+from tvist_plant.drives import (
+    DriveCommand,
+    gear_error,
+    joint_parameters,
+    springs_and_dampers,
+    static_twist,
+)
+from tvist_plant.imperfections import STICTION, Imperfections, imperfect_model
 from tvist_plant.integrator import rows
-from tvist_plant.joint_parameters import packed
 from tvist_plant.model import FlexibleModel, Floats
 from tvist_plant.modes import Modes, modes
 from tvist_plant.outside import Outside
@@ -52,10 +56,7 @@ class FlexibleArm(SimulatedArm):
         usual = SUBSTEPS_IF_IMPERFECT if description.imperfections.keys() - STICTION else SUBSTEPS_OF_A_PERIOD
         self._substeps = usual if substeps is None else substeps
         self._imperfections = Imperfections.of(description, imperfections)
-        self._law = GearLaw.of(self._imperfections, description)
-        self._nonlinear = Nonlinear.of(description.drives)
         n = description.joints
-        self._phase = np.zeros(n)
         self._width = 3 * n + 3
         self._places = slice(n), slice(n, 2 * n), slice(2 * n, 3 * n), slice(3 * n, None)
         """Slices of what `evaluate` measures: angles, velocities, torques and specific force."""
@@ -63,21 +64,15 @@ class FlexibleArm(SimulatedArm):
         self._load(payload)
         self._accelerometer = Accelerometer(description.sensors.accelerometer_noise, 0)
 
-    @property
-    def payload(self) -> Payload:  # type: ignore[override]
-        """Carried payload."""
-        return self._payload
-
     def _load(self, payload: Payload) -> None:
         """Build the models with this payload, and memory for the state."""
-        self._payload = payload
+        self.payload = payload
         truly = payload if self._carries is None else self._carries(payload)
         self._flexible: FlexibleModel = imperfect_model(self.description, truly, self._imperfections)
         self._outside = Outside(self._flexible)
         self._data: pin.Data = self._flexible.model.createData()
-        rotors = tuple(self._imperfections.rotor * B for B in self.description.drives.rotor_inertia)
-        drives = msgspec.structs.replace(self.description.drives, rotor_inertia=rotors)
-        self._linear = linear = LinearPart.of(self._flexible, drives)
+        joints = joint_parameters(self.description, self._imperfections, self._flexible.joints)
+        self._joints, drives = joints, self.description.drives
         links, n = self._flexible.model.nv, self.description.joints
         self.memory = memory_for(links, n)  # memory of the kernels in `arm_tick`; see `arm_memory`
         self.memory[[PERIOD_AT, SUBSTEPS]] = self.period, self._substeps
@@ -85,8 +80,8 @@ class FlexibleArm(SimulatedArm):
         self.memory[ENCODER_STEP] = self.description.sensors.encoder_step
         arm = parts(self.memory)
         arm.chain[:] = chain_of(self._flexible.model, self._flexible.flange)
-        arm.springs[:] = np.diag(linear.stiffness), np.diag(linear.damping)
-        arm.joints[:] = packed(self._flexible.joints, linear, self._nonlinear, self._law, self._phase)
+        arm.springs[:] = [np.diag(one) for one in springs_and_dampers(self._flexible, joints, drives)]
+        arm.joints[:] = joints
         y, v, _, self._s, *_ = rows(arm.state, n)
         self._q, self._qd, self._motor, self._speed = y[:links], v[:links], y[links:], v[links:]
         self._arm = arm
@@ -96,10 +91,8 @@ class FlexibleArm(SimulatedArm):
         if payload is not None:
             self._load(payload)
         self._outside.clear()
-        self._phase = gear_phases(self.description.joints, seed)
-        self._arm.joints[:] = packed(
-            self._flexible.joints, self._linear, self._nonlinear, self._law, self._phase
-        )
+        self._joints = self._joints._replace(gear_phase=gear_phases(self.description.joints, seed))
+        self._arm.joints[:] = self._joints
         self._accelerometer = Accelerometer(self.description.sensors.accelerometer_noise, seed)
         self._arm.commands[:] = command.q, command.qd, command.torque
         self._arm.readings[:], self._arm.pushed[:] = math.nan, 0.0
@@ -113,11 +106,11 @@ class FlexibleArm(SimulatedArm):
         joints, flexes = self._flexible.joints, self._flexible.flexes
         q = np.zeros_like(self._q)
         q[joints] = command.q
-        error = self._gear_error(command.q)
+        error = gear_error(self._joints, command.q)
         for _ in range(50):
             gravity = pin.computeGeneralizedGravity(self._flexible.model, self._data, q)
             new = np.zeros_like(q)
-            new[joints] = command.q + error - self._law.twist(gravity[joints])
+            new[joints] = command.q + error - static_twist(self._joints, gravity[joints])
             new[flexes] = -gravity[flexes] / self._flexible.flex_stiffness
             moved = np.max(np.abs(new - q))
             q = new
@@ -126,19 +119,14 @@ class FlexibleArm(SimulatedArm):
         self._arm.state[:] = 0.0
         self._q[:], self._motor[:] = q, command.q
         wanted = gravity[joints] - command.torque
-        gain = self._linear.integral_gain
+        gain = self._joints.integral_gain
         self._s[:] = np.divide(wanted, gain, out=np.zeros_like(wanted), where=gain > 0.0)
-
-    def _gear_error(self, motor: Floats) -> Floats:
-        """Return the kinematic errors of the gears at motor angles [rad]."""
-        nonlinear = self._nonlinear
-        return np.asarray(nonlinear.gear_error * np.sin(nonlinear.gear_waves * motor + self._phase))
 
     def _static_deflections(self) -> tuple[Floats, Floats]:
         """Return the deflections of gears and links that remain at rest in this posture [rad]."""
         joints, flexes = self._flexible.joints, self._flexible.flexes
         gravity = pin.computeGeneralizedGravity(self._flexible.model, self._data, self._q)
-        gears = self._gear_error(self._motor) - self._law.twist(gravity[joints])
+        gears = gear_error(self._joints, self._motor) - static_twist(self._joints, gravity[joints])
         given_way = np.zeros_like(gravity)
         given_way[flexes] = -gravity[flexes] / self._flexible.flex_stiffness
         return gears, given_way[self._flexible.bending]
@@ -186,7 +174,7 @@ class FlexibleArm(SimulatedArm):
 
     def load(self, payload: Payload) -> None:
         """Carry another payload from now on."""
-        self._payload, model = payload, self._flexible.model
+        self.payload, model = payload, self._flexible.model
         self._flexible.carry(payload if self._carries is None else self._carries(payload))
         self._arm.chain[model.nv - 1, BODY:] = body_of(model, model.nv)
         self._arm.pushed[:] = 0.0 if self._outside.rests else self._outside.generalized_force(self._q)
@@ -260,13 +248,13 @@ class FlexibleArm(SimulatedArm):
         if q is not None:
             links[:] = 0.0
             links[self._flexible.joints] = q
-        return modes(self._flexible, self._linear, self.description, links)
+        return modes(self._flexible, self._joints, self.description, links)
 
     def energy(self) -> float:
         """Return kinetic, gravitational and elastic energy, to check the integrator [J]."""
         model, data = self._flexible.model, self._data
         kinetic = pin.computeKineticEnergy(model, data, self._q, self._qd)
-        rotors = 0.5 * self._linear.rotor_inertia @ self._speed**2
-        gears = 0.5 * self._nonlinear.gear_stiffness @ (self._q[self._flexible.joints] - self._motor) ** 2
+        rotors = 0.5 * self._joints.rotor_inertia @ self._speed**2
+        gears = 0.5 * self._joints.gear_stiffness @ (self._q[self._flexible.joints] - self._motor) ** 2
         links = 0.5 * self._flexible.flex_stiffness @ self._q[self._flexible.flexes] ** 2
         return float(kinetic + pin.computePotentialEnergy(model, data, self._q) + rotors + gears + links)

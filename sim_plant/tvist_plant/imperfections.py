@@ -30,12 +30,11 @@ import msgspec
 import numpy as np
 import pinocchio as pin
 
-from tvist_plant.model import FLANGE, FlexibleModel, Floats, flexible_model
+from tvist_plant.model import FLANGE, FlexibleModel, flexible_model
 from tvist_plant.robot_tables import Payload, RobotDescription
 
 STICTION = frozenset({"stiction", "stiction_load", "stiction_speed", "stiction_stiffness"})
 """Keys of the motors' stiction."""
-TOUCH = 1e-6  # torque below which a gear at rest lies within its backlash [N m]
 STEEPEST = math.pi / 6  # largest tilt of an arm [rad]
 
 
@@ -52,6 +51,18 @@ class YieldingBase:
         for name in ("stiffness", "mass", "radius"):
             _check(f"base.{name}", getattr(self, name), 0.0, math.inf, above=True)
         _check("base.damping_time", self.damping_time, 0.0, math.inf)
+
+
+_RANGES = {
+    "breakaway": (1.0, math.inf, False), "stribeck_speed": (0.0, math.inf, True),
+    "rotor": (0.0, math.inf, True), "hysteresis": (0.0, math.inf, False),
+    "hysteresis_torque": (0.0, math.inf, True), "soft": (0.0, 1.0, True),
+    "soft_torque": (0.0, math.inf, False), "stiction": (0.0, math.inf, False),
+    "stiction_load": (0.0, math.inf, False), "stiction_speed": (0.0, math.inf, True),
+    "stiction_stiffness": (0.0, math.inf, True), "torsion": (0.0, math.inf, True),
+    "backlash": (0.0, math.inf, False), "tilt": (-STEEPEST, STEEPEST, False),
+}  # fmt: skip
+"""Limits of each value, and whether the lower one is excluded."""
 
 
 @dataclass(frozen=True)
@@ -80,23 +91,13 @@ class Imperfections:
     """Angle by which the arm leans about the world's x axis, at most 30 degrees either way [rad]."""
 
     def __post_init__(self) -> None:
-        _check("breakaway", self.breakaway, 1.0, math.inf)
-        _check("stribeck_speed", self.stribeck_speed, 0.0, math.inf, above=True)
-        _check("rotor", self.rotor, 0.0, math.inf, above=True)
-        _check("hysteresis", self.hysteresis, 0.0, math.inf)
-        _check("hysteresis_torque", self.hysteresis_torque, 0.0, math.inf, above=True)
-        _check("soft", self.soft, 0.0, 1.0, above=True)
-        _check("soft_torque", self.soft_torque, 0.0, math.inf)
-        for joint, torque in enumerate(self.stiction):
-            _check(f"stiction[{joint}]", torque, 0.0, math.inf)
-        _check("stiction_load", self.stiction_load, 0.0, math.inf)
-        for name in ("stiction_speed", "stiction_stiffness"):
-            _check(name, getattr(self, name), 0.0, math.inf, above=True)
-        if self.torsion is not None:
-            _check("torsion", self.torsion, 0.0, math.inf, above=True)
-        for joint, width in enumerate(self.backlash):
-            _check(f"backlash[{joint}]", width, 0.0, math.inf)
-        _check("tilt", self.tilt, -STEEPEST, STEEPEST)
+        for name, (least, most, above) in _RANGES.items():
+            value = getattr(self, name)
+            if isinstance(value, tuple):
+                for joint, one in enumerate(value):
+                    _check(f"{name}[{joint}]", one, least, most, above=above)
+            elif value is not None:
+                _check(name, value, least, most, above=above)
 
     @classmethod
     def of(cls, description: RobotDescription, more: "Imperfections | None" = None) -> "Imperfections":
@@ -107,60 +108,6 @@ class Imperfections:
         none, names = cls(), [one.name for one in fields(cls)]
         given = {name: getattr(more, name) for name in names if getattr(more, name) != getattr(none, name)}
         return replace(own, **given)
-
-
-@dataclass(frozen=True)
-class GearLaw:
-    """Imperfections of friction and gears in the units of the equations; arrays have one entry per joint."""
-
-    breakaway: float  # f_s/F_c [-]
-    stribeck_speed: float  # v_s [rad/s]
-    softness: Floats  # k - K₁, shape (n,) [N m/rad]
-    soft_angle: Floats  # δ₁, shape (n,) [rad]
-    hysteresis: Floats  # r K, shape (n,) [N m/rad]
-    hysteresis_torque: Floats  # z_max, shape (n,) [N m]
-    stiffness: Floats  # k, shape (n,) [N m/rad]
-    backlash: Floats  # b, shape (n,) [rad]
-    stiction: Floats  # f_s of the stiction, shape (n,) [N m]
-    stiction_load: float  # μ_s [-]
-    stiction_speed: float  # v_s of the stiction [rad/s]
-    stiction_stiffness: Floats  # σ K, shape (n,) [N m/rad]
-
-    @classmethod
-    def of(cls, imperfections: Imperfections, description: RobotDescription) -> "GearLaw":
-        """Scale by gears and torque limits; raise ValueError unless lists have one value per joint."""
-        limit = np.array(description.limits.torque)
-        of_joints = {}
-        for name in ("backlash", "stiction"):
-            of_joints[name] = values = np.array(getattr(imperfections, name) or np.zeros(description.joints))
-            if len(values) != description.joints:
-                raise ValueError(
-                    f"{name} has {len(values)} values: must have {description.joints}, one per joint"
-                )
-        K = np.array(description.drives.gear_stiffness)
-        return cls(
-            breakaway=imperfections.breakaway,
-            stribeck_speed=imperfections.stribeck_speed,
-            softness=(1.0 - imperfections.soft) * K,
-            soft_angle=imperfections.soft_torque * limit / (imperfections.soft * K),
-            hysteresis=imperfections.hysteresis * K,
-            hysteresis_torque=imperfections.hysteresis_torque * limit,
-            stiffness=K,
-            stiction_load=imperfections.stiction_load,
-            stiction_speed=imperfections.stiction_speed,
-            stiction_stiffness=imperfections.stiction_stiffness * K,
-            **of_joints,
-        )
-
-    def twist(self, torque: Floats) -> Floats:
-        """Return each gear's twist under a steady torque [N m] without hysteresis [rad]."""
-        if not self.softness.any() and not self.backlash.any():
-            return torque / self.stiffness
-        soft = self.stiffness - self.softness
-        within = np.minimum(np.abs(torque) / soft, self.soft_angle)
-        beyond = np.maximum(np.abs(torque) - soft * self.soft_angle, 0.0)
-        loose = self.backlash * np.clip(torque / TOUCH, -1.0, 1.0)
-        return np.asarray(loose + np.sign(torque) * (within + beyond / self.stiffness))
 
 
 def imperfect_model(

@@ -20,8 +20,8 @@ import math
 from typing import NamedTuple
 
 from tvist_plant._compiled import compiled
-from tvist_plant.arm_memory import LAST, NOW, PERIOD, SUBSTEPS, ArmMemory
-from tvist_plant.joint_parameters import JointParameters, of_joint
+from tvist_plant.arm_memory import LAST, NOW, PERIOD, SUBSTEPS, ArmMemory, of_joint
+from tvist_plant.drives import JointParameters
 from tvist_plant.model import Floats
 from tvist_plant.stiction import relaxed, stiction_after
 
@@ -98,7 +98,7 @@ def set_points(commands: Floats, j: int, share: float) -> tuple[float, float, fl
 
 
 @compiled
-def softened(joint: JointParameters, twist: float) -> float:
+def softened(joint: JointParameters[float], twist: float) -> float:
     """Return a gear's torque minus K δ, due to backlash or softness near zero [N m]."""
     loose = min(max(twist, -joint.backlash), joint.backlash)
     beyond = twist - loose
@@ -107,7 +107,7 @@ def softened(joint: JointParameters, twist: float) -> float:
 
 
 @compiled
-def dragged(joint: JointParameters, z: float, twist: float) -> float:
+def dragged(joint: JointParameters[float], z: float, twist: float) -> float:
     """Return the hysteresis torque of a joint's gear after a further twist [N m]."""
     if joint.hysteresis > 0.0:
         return relaxed(z, twist, joint.hysteresis, joint.hysteresis_torque)
@@ -115,20 +115,20 @@ def dragged(joint: JointParameters, z: float, twist: float) -> float:
 
 
 @compiled
-def stuck(joint: JointParameters, d: float, way: float, speed: float, load: float) -> float:
+def stuck(joint: JointParameters[float], d: float, way: float, speed: float, load: float) -> float:
     """Return the stiction torque of a joint's motor after it has turned [N m]."""
     law = joint.stiction, joint.stiction_load, joint.stiction_speed, joint.stiction_stiffness
     return stiction_after(d, way, speed, load, *law)
 
 
 @compiled
-def coupling(joint: JointParameters, h: float) -> float:
+def coupling(joint: JointParameters[float], h: float) -> float:
     """Return entry c_j of S, between a motor and its joint's link."""
     return float(-0.5 * h * joint.gear_damping - 0.25 * h * h * joint.gear_stiffness)
 
 
 @compiled
-def of_motor(joint: JointParameters, springs: Floats, m: int, h: float) -> float:
+def of_motor(joint: JointParameters[float], springs: Floats, m: int, h: float) -> float:
     """Return the diagonal entry of S at the motor with index m."""
     implicit = 0.5 * h * springs[1, m] + 0.25 * h * h * springs[0, m]
     return float(joint.rotor_inertia + implicit + 0.125 * h * h * h * joint.integral_gain)

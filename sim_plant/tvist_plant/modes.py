@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_plant.description import RobotDescription
-from tvist_plant.drives import LinearPart
+from tvist_plant.drives import JointParameters, springs_and_dampers
 from tvist_plant.model import FlexibleModel, Floats
 
 
@@ -21,7 +21,9 @@ class Modes:
     sum of squares over joints and axes [m/s^2 per rad/s^2]."""
 
 
-def modes(flexible: FlexibleModel, linear: LinearPart, description: RobotDescription, q: Floats) -> Modes:
+def modes(
+    flexible: FlexibleModel, joints: JointParameters[Floats], description: RobotDescription, q: Floats
+) -> Modes:
     """Linearise the closed loop at rest at link angles of shape (N,) [rad], and solve its eigenvalue problem.
 
     With z = (y, ẏ, s), y = (q, θ): M_b ÿ = -(K + ∂g/∂q) y - D ẏ + K_d K_p K_i s and ṡ = -θ. A complex pair λ
@@ -34,16 +36,16 @@ def modes(flexible: FlexibleModel, linear: LinearPart, description: RobotDescrip
     M = np.triu(pin.crba(flexible.model, data, q))
     mass[:links, :links] = M + np.triu(M, 1).T
     motor = links + np.arange(n)
-    mass[motor, motor] = linear.rotor_inertia
-    stiffness = linear.stiffness.copy()
+    mass[motor, motor] = joints.rotor_inertia
+    stiffness, damping = springs_and_dampers(flexible, joints, description.drives)
     stiffness[:links, :links] += pin.computeGeneralizedGravityDerivatives(flexible.model, data, q)
 
     inverse = np.linalg.inv(mass)
     A = np.zeros((2 * size + n, 2 * size + n))
     A[:size, size : 2 * size] = np.eye(size)
     A[size : 2 * size, :size] = -inverse @ stiffness
-    A[size : 2 * size, size : 2 * size] = -inverse @ linear.damping
-    A[size : 2 * size, 2 * size :] = inverse[:, motor] * linear.integral_gain
+    A[size : 2 * size, size : 2 * size] = -inverse @ damping
+    A[size : 2 * size, 2 * size :] = inverse[:, motor] * joints.integral_gain
     A[2 * size :, motor] = -np.eye(n)
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right)
@@ -61,8 +63,8 @@ def modes(flexible: FlexibleModel, linear: LinearPart, description: RobotDescrip
     for k in chosen:
         pole = values[k]
         q_r = np.eye(n) + (windup * pole**2)[:, None] * rigid
-        torque = pole**2 * (rigid + np.diag(linear.rotor_inertia)) + pole * np.diag(friction)
-        push = (linear.velocity_gain * pole + linear.position_gain)[:, None] * q_r + torque
+        torque = pole**2 * (rigid + np.diag(joints.rotor_inertia)) + pole * np.diag(friction)
+        push = (joints.velocity_gain * pole + joints.position_gain)[:, None] * q_r + torque
         modal = left[k, size : 2 * size] @ inverse[:, motor] @ push + left[k, 2 * size :] @ q_r
         flange = jacobian @ right[size : size + links, k] * pole
         participation.append(2.0 * np.linalg.norm(np.outer(flange, modal / pole**3)))

@@ -28,11 +28,8 @@ class Outside:
         self._bodies = {name: (number, pin.SE3.Identity()) for number, name in enumerate(names, 1)}
         flange = flexible.model.frames[flexible.flange]
         self._bodies[FLANGE] = flange.parentJoint, flange.placement
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
+        self.bodies = tuple(self._bodies)
         """Names of the bodies: that of the joint or virtual joint that moves each, or "flange"."""
-        return tuple(self._bodies)
 
     def clear(self) -> None:
         """End all torques and wrenches."""

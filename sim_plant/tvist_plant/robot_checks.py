@@ -154,11 +154,8 @@ def _imperfections(description: RobotDescription) -> Iterator[str]:
     given = description.imperfections
     if not given:
         return
-    from tvist_plant.imperfections import (  # pinocchio is slow to import
-        GearLaw,
-        Imperfections,
-        imperfect_model,
-    )
+    from tvist_plant.drives import joint_parameters  # pinocchio is slow to import
+    from tvist_plant.imperfections import Imperfections, imperfect_model
 
     try:
         made = Imperfections.of(description)
@@ -166,7 +163,7 @@ def _imperfections(description: RobotDescription) -> Iterator[str]:
             table = getattr(made, name.rpartition(".")[0], made)
             keys = ", ".join(one.name for one in fields(table))
             yield f"imperfections.{name:.200} is not a key of a robot file: must be one of {keys}"
-        GearLaw.of(made, description)
+        joint_parameters(description, made)
         imperfect_model(description, description.payload, made)
     except msgspec.ValidationError as error:
         yield in_words(error, {"imperfections": given}, "imperfections")

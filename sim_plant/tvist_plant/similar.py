@@ -83,11 +83,7 @@ class Scale:
         """τ of each joint, shape (n,) [-]."""
         length = stretched(kinematics)
         self.length = length / stretched(measured.kinematics) if length > 0.0 else 1.0  # λ [-]
-
-    @property
-    def time(self) -> float:
-        """Ratio of times, √λ [-]."""
-        return math.sqrt(self.length)
+        self.time = math.sqrt(self.length)  # ratio of times, √λ [-]
 
     def drives(self) -> dict[str, Any]:
         """Return the table `drives` of the arm."""

@@ -117,14 +117,10 @@ def _off(
     return _changed(description, dict.fromkeys(names, share), {"stiffness": share}, _signs(seed, number))
 
 
-def stiffer(description: RobotDescription, factor: float) -> RobotDescription:
+def stiffer(factor: float, description: RobotDescription, _seed: int = 0) -> RobotDescription:
     """Multiply all springs by a factor, without changing their damping."""
     springs, links = dict.fromkeys(SPRINGS, factor), {"stiffness": factor}
     return _changed(description, springs, links, lambda factor, _: factor)
-
-
-def _sprung(factor: float, description: RobotDescription, _seed: int) -> RobotDescription:
-    return stiffer(description, factor)
 
 
 def _sharper(share: float, description: RobotDescription, _seed: int) -> RobotDescription:
@@ -198,8 +194,7 @@ def hidden_payload(declared: Payload, seed: int) -> Payload:
     return _other_payload(declared, factor, random.uniform(-CENTRE, CENTRE, 3))
 
 
-AS_DESCRIBED: Final = Variant("calibrated", "as described")
-"""The arm exactly as described."""
+AS_DESCRIBED: Final = Variant("calibrated", "as described")  # the arm exactly as described
 _ALL = (
     AS_DESCRIBED,
     Variant(
@@ -251,8 +246,8 @@ _ALL = (
         backlash=0.5,
         carries=partial(_other_payload, factor=1.1, aside=(0.015, 0.0, 0.0)),
     ),
-    Variant("springs-30", "springs 30 % softer", partial(_sprung, 0.7)),
-    Variant("springs+30", "springs 30 % stiffer", partial(_sprung, 1.3)),
+    Variant("springs-30", "springs 30 % softer", partial(stiffer, 0.7)),
+    Variant("springs+30", "springs 30 % stiffer", partial(stiffer, 1.3)),
 )
 VARIANTS: Final = {one.name: one for one in _ALL}
 
@@ -293,4 +288,4 @@ def with_springs(factor: float) -> Variant:
     if factor == 1.0:
         return AS_DESCRIBED
     percent = f"{100.0 * (factor - 1.0):+g}"
-    return Variant(f"springs_{percent}_percent", f"springs {percent} %", partial(_sprung, factor))
+    return Variant(f"springs_{percent}_percent", f"springs {percent} %", partial(stiffer, factor))

@@ -5,23 +5,17 @@ Times count from the tick in which the shaped reference came to rest, when a mot
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tvist_testing.fixture_robot import FixtureRobot
     from tvist_testing.history import HistoryRow
 
-BAND = 1e-4
-"""Distance from its final position within which the tool counts as settled [m]."""
-WINDOW = 0.3
-"""Time after the stop in which residual vibration is measured [s]."""
-BEYOND = 0.5
-"""Time for which a robot is observed after the permitted time [s]."""
-TAIL = 0.2
-"""Time at the end of the observed rest whose mean position is the final position [s]."""
-AFTER_STOP = 0.01
-"""Time after the stop in which the end of the deceleration still counts as motion [s]."""
+BAND = 1e-4  # distance from its final position within which the tool counts as settled [m]
+WINDOW = 0.3  # time after the stop in which residual vibration is measured [s]
+BEYOND = 0.5  # time for which a robot is observed after the permitted time [s]
+TAIL = 0.2  # time at the end of the observed rest whose mean position is the final position [s]
+AFTER_STOP = 0.01  # time after the stop in which the end of the deceleration still counts as motion [s]
 
 
 def assert_settles_within(robot: "FixtureRobot", seconds: float, *, band: float = BAND) -> float:
@@ -42,23 +36,19 @@ def assert_settles_within(robot: "FixtureRobot", seconds: float, *, band: float 
     _check("seconds", seconds, least=0.0)
     _check("band", band, least=math.ulp(0.0))
     rows = _at_rest(robot, seconds + BEYOND)
-    found = settling(rows, band)
-    if found.seconds <= seconds:
-        return found.seconds
-    took = (
-        f"{found.seconds:.3f}"
-        if found.seconds < math.inf
-        else f"more than {rows[-1].time - rows[0].time:.3f}"
-    )
-    late = settling([row for row in rows if row.time - rows[0].time >= seconds], band)
+    settled, farthest = settling(rows, band)
+    if settled <= seconds:
+        return settled
+    took = f"{settled:.3f}" if settled < math.inf else f"more than {rows[-1].time - rows[0].time:.3f}"
+    _, late = settling([row for row in rows if row.time - rows[0].time >= seconds], band)
     raise AssertionError(
         f"the tool of {robot.name} does not settle within {seconds:g} s\n"
         + table(
             ("after the stop", "measured", "limit"),
             [
                 ("settling time [s]", took, f"{seconds:g}"),
-                ("distance at the stop [mm]", figure(1e3 * found.farthest), ""),
-                (f"distance after {seconds:g} s [mm]", figure(1e3 * late.farthest), f"{1e3 * band:g}"),
+                ("distance at the stop [mm]", figure(1e3 * farthest), ""),
+                (f"distance after {seconds:g} s [mm]", figure(1e3 * late), f"{1e3 * band:g}"),
                 ("tick of the stop", str(rows[0].tick), ""),
             ],
         )
@@ -151,12 +141,11 @@ def assert_within_limits(
                     (f"joint {joint}: angle [rad]", figure(row.q[joint]), bounds, f"{row.time:.3f}")
                 )
         for what, quantity, limits in rules:
-            found = largest(rows, quantity, joint)
-            if found.value > limits[joint]:
-                name = f"joint {joint}: {what}"
-                beyond.append((name, figure(found.value), figure(limits[joint]), f"{found.time:.3f}"))
-    if tool_speed is not None and (tool := fastest_tool(rows)).value > tool_speed:
-        beyond.append(("tool: speed [m/s]", figure(tool.value), figure(tool_speed), f"{tool.time:.3f}"))
+            value, at = largest(rows, quantity, joint)
+            if value > limits[joint]:
+                beyond.append((f"joint {joint}: {what}", figure(value), figure(limits[joint]), f"{at:.3f}"))
+    if tool_speed is not None and (tool := fastest_tool(rows))[0] > tool_speed:
+        beyond.append(("tool: speed [m/s]", figure(tool[0]), figure(tool_speed), f"{tool[1]:.3f}"))
     if beyond:
         raise AssertionError(
             f"{robot.name} was beyond its limits\n" + table(("what", "largest", "limit", "at [s]"), beyond)
@@ -198,20 +187,11 @@ def _each(name: str, given: float | Sequence[float] | None, own: Sequence[float]
     return limits
 
 
-@dataclass(frozen=True)
-class ToolSettling:
-    """How the tool settled after its reference had come to rest."""
+def settling(rows: "Sequence[HistoryRow]", band: float) -> tuple[float, float]:
+    """Return when the flexible arm's flange stays within `band` [m] of its final position, and its distance.
 
-    seconds: float
-    """Time from the stop until the tool stays within the band [s]; infinite if it did not while observed."""
-    farthest: float
-    """Largest distance from the final position after the stop [m]."""
-
-
-def settling(rows: "Sequence[HistoryRow]", band: float) -> ToolSettling:
-    """Measure how the flexible arm's flange settles around its final position.
-
-    `rows` start at the stop of the reference and last longer than `TAIL`; `band` is a distance [m].
+    The time is that from the stop [s], infinite if it did not settle while observed; the distance is the
+    largest one after the stop [m]. `rows` start at the stop of the reference and last longer than `TAIL`.
     """
     stop, end = rows[0].time, rows[-1].time
     tail = [row.pose for row in rows if row.time > end - TAIL]
@@ -220,7 +200,7 @@ def settling(rows: "Sequence[HistoryRow]", band: float) -> ToolSettling:
     outside = [row.time for row, distance in zip(rows, distances, strict=True) if distance > band]
     last = outside[-1] if outside else stop
     settled = last <= end - TAIL
-    return ToolSettling(last - stop if settled else math.inf, max(distances))
+    return last - stop if settled else math.inf, max(distances)
 
 
 def vibration(rows: "Sequence[HistoryRow]", until: float) -> list[tuple[float, float]]:
@@ -237,25 +217,16 @@ def vibration(rows: "Sequence[HistoryRow]", until: float) -> list[tuple[float, f
     return [(row.time - stop, one) for row, one in zip(late, alpha, strict=True)]
 
 
-@dataclass(frozen=True)
-class Extreme:
-    """Largest absolute value of a quantity of a joint or the tool."""
-
-    value: float
-    time: float
-    """Simulation time at which it occurred [s]."""
-
-
-def largest(rows: "Sequence[HistoryRow]", quantity: str, joint: int) -> Extreme:
-    """Return the largest absolute value of a joint's quantity, an attribute of `HistoryRow`."""
+def largest(rows: "Sequence[HistoryRow]", quantity: str, joint: int) -> tuple[float, float]:
+    """Return the largest |value| of a joint's quantity, an attribute of `HistoryRow`, and its time [s]."""
     row = max(rows, key=lambda one: abs(getattr(one, quantity)[joint]))
-    return Extreme(abs(getattr(row, quantity)[joint]), row.time)
+    return abs(getattr(row, quantity)[joint]), row.time
 
 
-def fastest_tool(rows: "Sequence[HistoryRow]") -> Extreme:
-    """Return the largest speed of the tool centre point [m/s]."""
+def fastest_tool(rows: "Sequence[HistoryRow]") -> tuple[float, float]:
+    """Return the largest speed of the tool centre point [m/s], and its time [s]."""
     row = max(rows, key=lambda one: math.hypot(*one.tool_speed[:3]))
-    return Extreme(math.hypot(*row.tool_speed[:3]), row.time)
+    return math.hypot(*row.tool_speed[:3]), row.time
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

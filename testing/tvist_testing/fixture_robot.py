@@ -13,10 +13,8 @@ from tvist_protocol.stream import Event, State
 from tvist_testing.history import History
 from tvist_testing.robots import RobotProcess
 
-CLIENT = "test"
-"""Name under which the test controls the clock while one of its calls waits."""
-LONGEST = 15_000
-"""Most ticks until the next message of an iterator: 30 s of simulation."""
+CLIENT = "test"  # name under which the test controls the clock while one of its calls waits
+LONGEST = 15_000  # most ticks until the next message of an iterator: 30 s of simulation
 M = TypeVar("M")
 
 

@@ -39,19 +39,16 @@ from tvist_server.shutdown import Shutdown
 from tvist_server.ur_ports import UrPorts
 from tvist_testing.wanted import WantedFault, WantedRobot
 
-LOOK = 0.05
-"""Time between two checks whether the last client is gone [s]."""
-COMPLETING = 20.0
-"""Longest wait for the end of the recording [s]."""
+LOOK = 0.05  # time between two checks whether the last client is gone [s]
+COMPLETING = 20.0  # longest wait for the end of the recording [s]
 ATTEMPTS = 50
 """Ports or addresses to try, since another process may take one just before the robot listens there."""
-CLIENT = "tvist_testing"
-"""Name under which faults are injected while nobody else has control."""
+CLIENT = "tvist_testing"  # name under which faults are injected while nobody else has control
 log = logging.getLogger("robot")
 
 
-class Preparation:
-    """Loads the program and injects the faults that a test's markers describe."""
+class Preparation(Sink):
+    """Loads the program and injects the faults that a test's markers describe; logs events."""
 
     def __init__(self, wanted: WantedRobot) -> None:
         self._wanted = wanted
@@ -65,7 +62,7 @@ class Preparation:
     def observe(self, controller: Controller) -> Sink:
         """Return the observer of the robot's messages; the server calls this."""
         self._controller = controller
-        return _Observer(self)
+        return self
 
     def on(self, robot: ServedRobot) -> None:
         """Do everything that precedes the first tick."""
@@ -77,9 +74,14 @@ class Preparation:
             if fault.after == 0.0:
                 self._inject(fault)
 
-    def tick(self, tick: int) -> None:
+    def event(self, event: Event) -> None:
+        """Log an event."""
+        why = f": {event.why}" if event.why else ""
+        log.info("tick %d: %s%s", event.tick, event.kind, why)
+
+    def state(self, state: State) -> None:
         """Inject the faults that are due after a tick; called in the controller's thread."""
-        while self._later and tick * PERIOD >= self._later[0].after - 0.5 * PERIOD:
+        while self._later and state.tick * PERIOD >= self._later[0].after - 0.5 * PERIOD:
             fault = self._later.pop(0)
             assert self._post is not None
             self._post(lambda fault=fault: self._inject_or_say(fault))  # type: ignore[misc]
@@ -94,39 +96,19 @@ class Preparation:
         assert self._controller is not None
         assert self._request is not None
         lease = self._controller.session.lease
-        token, borrowed = ("", True) if lease is None else (lease.token, False)
-        if borrowed:
+        if lease is not None:
+            token = lease.token
+        else:
             reply = _accepted(self._request(TakeControl(client=CLIENT, lease_s=60.0)))
             assert isinstance(reply, Accepted)
             assert reply.token is not None
             token = reply.token
-        _accepted(
-            self._request(
-                SimulationInject(
-                    token=token,
-                    fault=fault.fault,
-                    joint=fault.joint,
-                    seconds=fault.seconds,
-                    value=fault.value,
-                )
-            )
+        injected = SimulationInject(
+            token=token, fault=fault.fault, joint=fault.joint, seconds=fault.seconds, value=fault.value
         )
-        if borrowed:
+        _accepted(self._request(injected))
+        if lease is None:
             _accepted(self._request(ReleaseControl(token=token)))
-
-
-class _Observer(Sink):
-    """Logs events, and reports each tick to the preparation."""
-
-    def __init__(self, preparation: Preparation) -> None:
-        self._preparation = preparation
-
-    def event(self, event: Event) -> None:
-        why = f": {event.why}" if event.why else ""
-        log.info("tick %d: %s%s", event.tick, event.kind, why)
-
-    def state(self, state: State) -> None:
-        self._preparation.tick(state.tick)
 
 
 def _accepted(reply: Reply) -> Reply:
@@ -212,7 +194,9 @@ def _obey(connection: socket.socket, server: Server, ending: Shutdown) -> None:
             if order == b"close\n" and server.ur_clients:
                 _complete_recording(robot)
             _tell(connection, {"clients": server.ur_clients})
-            _see_off(connection, server)
+            # Wait until the last client of UR's interfaces is gone, or the test's process has ended.
+            while server.ur_clients and not select.select([connection], [], [], LOOK)[0]:
+                pass
             break
     ending.request()
 
@@ -222,17 +206,12 @@ def _complete_recording(robot: ServedRobot) -> None:
     done = threading.Event()
 
     def complete() -> None:
-        robot.close_recording()
+        if robot.recorder is not None:
+            robot.recorder.close()
         done.set()
 
     robot.driven.post(complete)
     done.wait(COMPLETING)
-
-
-def _see_off(connection: socket.socket, server: Server) -> None:
-    """Wait until the last client of UR's interfaces is gone, or the test's process has ended."""
-    while server.ur_clients and not select.select([connection], [], [], LOOK)[0]:
-        pass
 
 
 def _tell(connection: socket.socket, message: dict[str, Any]) -> None:

@@ -10,12 +10,9 @@ if TYPE_CHECKING:
     from tvist_protocol.info import Limits
     from tvist_protocol.stream import Event, State, Truth
 
-LONGEST = 300_000
-"""Most rows that are kept: ten minutes of simulation."""
-EVENTS = 10_000
-"""Most events that are kept."""
-EARLY = 256
-"""Most truths that wait for the state of their tick."""
+LONGEST = 300_000  # most rows that are kept: ten minutes of simulation
+EVENTS = 10_000  # most events that are kept
+EARLY = 256  # most truths that wait for the state of their tick
 
 
 class HistoryRow:
@@ -27,22 +24,15 @@ class HistoryRow:
 
     def __init__(self, state: "State") -> None:
         self.tick = state.tick
-        self.time = state.timestamp
-        """Simulation time [s]."""
-        self.moving = state.runtime_state != RuntimeState.STOPPED
-        """True while the shaped reference moves."""
-        self.q = array("d", state.actual_q)
-        """Measured joint angles [rad]."""
-        self.qd = array("d", state.actual_qd)
-        """Measured joint velocities [rad/s]."""
-        self.qdd = array("d", state.target_qdd)
-        """Accelerations of the shaped reference [rad/s²]."""
-        self.moment = array("d", state.actual_moment)
-        """Measured joint torques [N m]."""
+        self.time = state.timestamp  # simulation time [s]
+        self.moving = state.runtime_state != RuntimeState.STOPPED  # true while the shaped reference moves
+        self.q = array("d", state.actual_q)  # measured joint angles [rad]
+        self.qd = array("d", state.actual_qd)  # measured joint velocities [rad/s]
+        self.qdd = array("d", state.target_qdd)  # accelerations of the shaped reference [rad/s²]
+        self.moment = array("d", state.actual_moment)  # measured joint torques [N m]
         self.tool_speed = array("d", state.actual_TCP_speed)
         """Velocity of the tool centre point [m/s], and its angular velocity [rad/s]."""
-        self.true = False
-        """Whether the truth of this tick is known."""
+        self.true = False  # whether the truth of this tick is known
         self.pose = array("d", state.actual_TCP_pose)
         """Pose of the flexible arm's flange if known, else of the measured tool: x y z [m], rotation vector [rad]."""
         self.acceleration = array("d", state.actual_tool_accelerometer)

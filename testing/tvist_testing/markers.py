@@ -10,10 +10,8 @@ from tvist_testing.wanted import WantedFault
 if TYPE_CHECKING:
     import pytest
 
-Part = dict[str, Any]
-"""What a marker adds to the description of a robot."""
-FILES = (".toml", ".json")
-"""Suffixes of files with a state."""
+Part = dict[str, Any]  # what a marker adds to the description of a robot
+FILES = (".toml", ".json")  # suffixes of files with a state
 
 
 class MarkerError(ValueError):

@@ -16,8 +16,7 @@ import sys
 
 import msgspec
 
-LONGEST = 4 << 20
-"""Longest description of a robot [bytes]; its program may have a million characters."""
+LONGEST = 4 << 20  # longest description of a robot [bytes]; its program may have a million characters
 
 
 def main(number: int) -> None:

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import msgspec
 
@@ -17,8 +17,7 @@ from tvist_testing.wanted import WantedRobot
 
 PATIENCE = 300.0
 """Longest wait for an answer of the process [s]; the first start compiles, for minutes on a slow machine."""
-ENDING = 30.0
-"""Longest wait for a robot to end in order [s]."""
+ENDING = 30.0  # longest wait for a robot to end in order [s]
 NEEDED = (
     "tvist_server", "tvist_shaping", "tvist_urscript",
     "numpy", "numba", "pinocchio", "ruckig", "mcap", "zstandard", "cryptography",
@@ -142,12 +141,6 @@ class Robots:
         if self._process is not None:
             self._process.wait(PATIENCE)
             self._process = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     def _start(self) -> None:
         why = unavailable()

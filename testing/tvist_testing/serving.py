@@ -17,15 +17,11 @@ from tvist_testing.markers import MarkerError, combined
 from tvist_testing.robots import CannotServeError, RobotProcess, Robots
 from tvist_testing.wanted import WantedRobot
 
-NAME = "ur5e"
-"""Name of a single robot, for which clients look by default."""
-MAX_ROBOTS = 100
-"""Most robots of a test."""
+NAME = "ur5e"  # name of a single robot, for which clients look by default
+MAX_ROBOTS = 100  # most robots of a test
 R = TypeVar("R", bound=FixtureRobot)
-LONGEST_NAME = 120
-"""Longest name of a test's folder [characters]."""
-LOG_LINES = 10
-"""Lines of the log that a report shows."""
+LONGEST_NAME = 120  # longest name of a test's folder [characters]
+LOG_LINES = 10  # lines of the log that a report shows
 
 
 @dataclass

@@ -14,9 +14,9 @@ Then, as root, since the script makes two network namespaces:
 
 The robot is at 192.168.56.101 in one namespace, and the library at 192.168.56.1 in the other. So the library's tests
 have a loopback address without a robot, and the robot can connect to the ports 50001 to 50004 of the library's machine.
-Runs at the same time do not use each other's ports, but they share the processors, and some tests fail when a sample is
-some milliseconds late. Each test is run in a process of its own, as ctest does. The exit status is 0 if everything has
-passed, apart from the tests with a known reason.
+Some tests fail when a sample is some milliseconds late, so nothing else should run. Each test is run in a process of
+its own, as ctest does. What programs print is in urcl-logs/. The exit status is 0 if everything has passed, apart from
+the tests with a known reason.
 """
 
 import argparse
@@ -34,9 +34,9 @@ from typing import NamedTuple
 from report import note
 
 ROBOT, CLIENT = "192.168.56.101", "192.168.56.1"
-READY_WITHIN = 300.0
-"""Longest time for the server to start [s]."""
-OUT_OF_TIME = "out of time"
+READY_WITHIN = 300.0  # longest time for the server to start [s]
+LIMIT = 120.0  # longest time of a test or an example [s]
+LOGS = Path("urcl-logs")
 
 HEADLESS = (
     "primary_client_test_headless",
@@ -96,43 +96,30 @@ class Result(NamedTuple):
     """What came of one test or example."""
 
     name: str
-    outcome: str
-    """"passed", or another word."""
+    outcome: str  # "passed", or another word
     seconds: float
 
 
-class Namespaces(NamedTuple):
-    """Names of the two network namespaces."""
-
-    robot: str
-    client: str
-
-    def at_robot(self, *command: str) -> list[str]:
-        """Return a command that runs another one on the robot's machine."""
-        return ["ip", "netns", "exec", self.robot, *command]
-
-    def at_client(self, *command: str) -> list[str]:
-        """Return a command that runs another one on the library's machine."""
-        return ["ip", "netns", "exec", self.client, *command]
-
-
 @contextmanager
-def namespaces() -> Iterator[Namespaces]:
-    """Make two network namespaces that are joined by a pair of interfaces; remove them at the end."""
+def machines() -> Iterator[tuple[list[str], list[str]]]:
+    """Make two network namespaces that are joined by a pair of interfaces; remove them at the end.
+
+    The values are the commands that run another one on the robot's machine and on the library's.
+    """
     pid = os.getpid()
-    names = Namespaces(f"robot{pid}", f"client{pid}")
+    names = f"robot{pid}", f"client{pid}"
     with ExitStack() as made:
         for name in names:
             _ip("netns", "add", name)
             made.callback(_ip, "netns", "del", name)
             _ip("-n", name, "link", "set", "lo", "up")
         ends = f"ur{pid}r", f"ur{pid}c"
-        peer = "type", "veth", "peer", ends[1], "netns", names.client
-        _ip("link", "add", ends[0], "netns", names.robot, *peer)
+        _ip("link", "add", ends[0], "netns", names[0], "type", "veth", "peer", ends[1], "netns", names[1])
         for name, end, address in zip(names, ends, (ROBOT, CLIENT), strict=True):
             _ip("-n", name, "addr", "add", f"{address}/24", "dev", end)
             _ip("-n", name, "link", "set", end, "up")
-        yield names
+        robot, client = (["ip", "netns", "exec", name] for name in names)
+        yield robot, client
 
 
 def _ip(*arguments: str) -> None:
@@ -140,11 +127,10 @@ def _ip(*arguments: str) -> None:
 
 
 @contextmanager
-def server(
-    names: Namespaces, tvist: str, options: Sequence[str], log: Path
-) -> Iterator[subprocess.Popen[bytes]]:
-    """Serve a robot, and stop it at the end; what it says goes to a file."""
-    command = names.at_robot(tvist, "serve", "--ur", "--insecure", "--ur-address", ROBOT, *options)
+def server(at_robot: list[str], tvist: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Serve a robot, and stop it at the end."""
+    command = [*at_robot, tvist, "serve", "--ur", "--insecure", "--ur-address", ROBOT]
+    log = LOGS / "server.txt"
     with log.open("wb") as file, subprocess.Popen(command, stdout=file, stderr=file) as process:
         try:
             latest = time.monotonic() + READY_WITHIN
@@ -155,78 +141,49 @@ def server(
             yield process
         finally:
             process.terminate()
+        if process.poll() not in {None, 0, -15}:
+            raise SystemExit(f"the server ended by itself: see {log}")
 
 
-class Library:
-    """The built library; a test or an example may take `limit` seconds."""
+def tests_of(program: Path) -> list[str]:
+    """Return the names of the tests of a program."""
+    listed = subprocess.run(
+        [program, "--gtest_list_tests"], capture_output=True, text=True, check=True
+    ).stdout
+    found, suite = [], ""
+    for line in listed.splitlines():
+        name = line.partition("#")[0].rstrip()
+        if name.startswith("  "):
+            found.append(suite + name.strip())
+        elif name.endswith("."):
+            suite = name
+    return found
 
-    def __init__(self, sources: Path, build: Path, logs: Path, names: Namespaces, limit: float) -> None:
-        self._sources, self._build, self._logs = sources, build, logs
-        self._names, self._limit = names, limit
 
-    def tests(self, program: str, wanted: str) -> list[str]:
-        """Return the names of the tests of a program that match a filter of GoogleTest."""
-        command = [str(self._program(program)), "--gtest_list_tests", f"--gtest_filter={wanted}"]
-        listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        found, suite = [], ""
-        for line in listed.splitlines():
-            name = line.partition("#")[0].rstrip()
-            if name.startswith("  "):
-                found.append(suite + name.strip())
-            elif name.endswith("."):
-                suite = name
-        return found
+def test(at_client: list[str], sources: Path, program: Path, name: str, mode: Sequence[str]) -> Result:
+    """Run one test."""
+    command = [str(program), f"--gtest_filter={name}", "--robot_ip", ROBOT, *mode]
+    result, said = run([*at_client, "stdbuf", "-oL", *command], name, sources / "tests", program.name)
+    ran = b"[  PASSED  ] 1 test" in said and b"[  SKIPPED ]" not in said
+    return result if ran or result.outcome != "passed" else result._replace(outcome="skipped")
 
-    def test(self, program: str, name: str) -> Result:
-        """Run one test."""
-        command = [str(self._program(program)), f"--gtest_filter={name}", "--robot_ip", ROBOT]
-        if program.endswith("_urcap"):
-            command += ["--headless", "false"]
-        elif program in TAKES_MODE:
-            command += ["--headless", "true"]
-        log = self._logs / f"{program}.txt"
-        before = log.stat().st_size if log.exists() else 0
-        result = self._run(name, command, self._sources / "tests", log)
-        if result.outcome == "passed":
-            with log.open("rb") as file:
-                file.seek(before)
-                said = file.read()
-            if b"[  SKIPPED ]" in said or b"[  PASSED  ] 1 test" not in said:
-                return result._replace(outcome="skipped")
-        return result
 
-    def example(self, name: str) -> Result:
-        """Run one example."""
-        command = [str(self._build / "examples" / name), ROBOT, *EXAMPLES[name]]
-        return self._run(name, command, self._sources, self._logs / f"{name}.txt")
-
-    def _program(self, name: str) -> Path:
-        folder = self._build / "tests"
-        if name.endswith("_urcap") and not (folder / name).exists():
-            name = name.removesuffix("_urcap") + "_headless"
-        return folder / name
-
-    def _run(self, name: str, command: list[str], folder: Path, log: Path) -> Result:
-        env = {**os.environ, "ROBOT_MODEL": "ur5e", "URSIM_VERSION": "latest"}
-        began = time.monotonic()
-        with log.open("ab") as file:
-            process = subprocess.Popen(
-                self._names.at_client("stdbuf", "-oL", *command),
-                cwd=folder,
-                env=env,
-                stdin=subprocess.DEVNULL,
-                stdout=file,
-                stderr=file,
-            )
-            try:
-                code = process.wait(self._limit)
-                outcome = "passed" if code == 0 else "failed" if code == 1 else f"exit status {code}"
-            except subprocess.TimeoutExpired:
-                outcome = OUT_OF_TIME
-            finally:
-                process.kill()
-                process.wait()
-        return Result(name, outcome, time.monotonic() - began)
+def run(command: list[str], name: str, folder: Path, log: str) -> tuple[Result, bytes]:
+    """Run a command; return what came of it and what it printed."""
+    env = {**os.environ, "ROBOT_MODEL": "ur5e", "URSIM_VERSION": "latest"}
+    began, path = time.monotonic(), LOGS / f"{log}.txt"
+    with path.open("ab+") as file:
+        begin = file.tell()
+        try:
+            code = subprocess.run(
+                command, cwd=folder, env=env, stdin=subprocess.DEVNULL, stdout=file, stderr=file, timeout=LIMIT,
+                check=False,
+            ).returncode  # fmt: skip
+            outcome = "passed" if code == 0 else "failed" if code == 1 else f"exit status {code}"
+        except subprocess.TimeoutExpired:
+            outcome = "out of time"
+        file.seek(begin)
+        return Result(name, outcome, time.monotonic() - began), file.read()
 
 
 def report(title: str, results: Sequence[Result], known: dict[str, str]) -> int:
@@ -244,12 +201,11 @@ def report(title: str, results: Sequence[Result], known: dict[str, str]) -> int:
     return unknown
 
 
-def _note(options: argparse.Namespace, what: str, results: list[Result], why: dict[str, str]) -> None:
-    """Keep the results of whole programs for the page of tested clients."""
-    if options.filter == "*" and not (options.examples and options.only):
-        version = re.search(r"<version>(.*)</version>", (options.sources / "package.xml").read_text())
-        assert version is not None
-        note(f"ur_client_library: {what}", version[1], {one.name: one.outcome for one in results}, why)
+def keep(sources: Path, what: str, results: list[Result], why: dict[str, str]) -> None:
+    """Keep the results for the page of tested clients."""
+    version = re.search(r"<version>(.*)</version>", (sources / "package.xml").read_text())
+    assert version is not None
+    note(f"ur_client_library: {what}", version[1], {one.name: one.outcome for one in results}, why)
 
 
 def main() -> None:
@@ -259,55 +215,44 @@ def main() -> None:
     )
     parser.add_argument("sources", type=Path, help="folder of the library's sources")
     parser.add_argument("build", type=Path, help="folder of the library's build")
-    parser.add_argument("only", nargs="*", help="programs to run; all by default")
     parser.add_argument("--examples", action="store_true", help="run the examples instead of the tests")
-    parser.add_argument(
-        "--mode", choices=("headless", "urcap", "both"), default="both",
-        help="whether the library sends its program itself, or the robot's node External Control asks for it; "
-        "default: both, one after the other",
-    )  # fmt: skip
-    parser.add_argument("--filter", default="*", help="run only tests that match this filter of GoogleTest")
-    parser.add_argument("--limit", type=float, default=120.0, help="longest time of a test [s]; default: 120")
     parser.add_argument("--tvist", default="tvist", help="the tvist to run; default: that of the path")
-    parser.add_argument("--serve", default="", help='more options of tvist serve, for example "--shaper zv"')
-    parser.add_argument("--logs", type=Path, default=Path("urcl-logs"), help="folder for what programs print")
-    options = parser.parse_intermixed_args()
+    options = parser.parse_args()
     if os.geteuid() != 0:
         parser.error("run this as root: it makes network namespaces")
-    programs = {
-        "headless": HEADLESS,
-        "urcap": tuple(f"{name}_urcap" for name in BOTH),
-        "both": (*HEADLESS, *(f"{name}_urcap" for name in BOTH)),
-    }[options.mode]
-    available = tuple(EXAMPLES) if options.examples else programs
-    chosen = [name for name in available if name in (options.only or available)]
-    if missing := set(options.only) - set(chosen):
-        parser.error(f"there is no {', '.join(sorted(missing))}; there are {', '.join(available)}")
-    options.logs.mkdir(parents=True, exist_ok=True)
-    for name in ("server", *available):  # what this script has written before, and nothing else
-        (options.logs / f"{name}.txt").unlink(missing_ok=True)
-    log = options.logs / "server.txt"
+    sources, build = options.sources.resolve(), options.build.resolve()
+    LOGS.mkdir(exist_ok=True)
+    for old in LOGS.glob("*.txt"):
+        old.unlink()
     unknown = 0
-    with namespaces() as names, server(names, options.tvist, options.serve.split(), log) as served:
-        library = Library(
-            options.sources.resolve(), options.build.resolve(), options.logs, names, options.limit
-        )
-        results: list[Result] = []
+    with machines() as (at_robot, at_client), server(at_robot, options.tvist):
         print("| program | tests | passed | others | seconds |\n|---|---:|---:|---|---:|", flush=True)
         if options.examples:
-            for name in chosen:
-                results.append(library.example(name))
+            results: list[Result] = []
+            for name, arguments in EXAMPLES.items():
+                command = [*at_client, "stdbuf", "-oL", str(build / "examples" / name), ROBOT, *arguments]
+                results.append(run(command, name, sources, name)[0])
                 unknown += report(name, results[-1:], {})
-            _note(options, "examples", results, {})
+            keep(sources, "examples", results, {})
         else:
-            for program in chosen:
-                tests = library.tests(program, options.filter)
-                results = [library.test(program, test) for test in tests]
-                unknown += report(program, results, KNOWN)
-                _note(options, program, results, KNOWN)
-        if served.poll() is not None:
-            raise SystemExit(f"the server ended by itself: see {log}")
+            for name, program, mode in programs(build / "tests"):
+                results = [test(at_client, sources, program, one, mode) for one in tests_of(program)]
+                unknown += report(name, results, KNOWN)
+                keep(sources, name, results, KNOWN)
     sys.exit(1 if unknown else 0)
+
+
+def programs(folder: Path) -> Iterator[tuple[str, Path, Sequence[str]]]:
+    """Yield the title, the path and the mode of each program.
+
+    The library sends its program itself, or the robot's node External Control asks for it.
+    """
+    for name in HEADLESS:
+        yield name, folder / name, ("--headless", "true") if name in TAKES_MODE else ()
+    for name in BOTH:
+        own = folder / f"{name}_urcap"
+        program = own if own.exists() else folder / f"{name}_headless"
+        yield f"{name}_urcap", program, ("--headless", "false")
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.stream import Event
 from tvist_server.moving import program as r
 from tvist_server.moving.program import MARGIN, Window, program
-from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, ServoSetpoints
+from tvist_server.moving.servo_lag import ServoLag, ServoSetpoints
 
 TICK = 1e3 * PERIOD
 """Control period [ms]."""
@@ -119,7 +119,7 @@ class HiddenRobot(Side):
     def follow(self, speed):
         """Run the program that follows set-points, up to a speed [rad/s]."""
         deceleration = min(self.controller.cycle.description.limits.acceleration)
-        text = program(RUN, speed=speed, deceleration=deceleration, lookahead=LOOKAHEAD, gain=GAIN)
+        text = program(RUN, speed=speed, deceleration=deceleration)
         reply = self.send(ProgramRun, text=text)
         assert not isinstance(reply, Refused), reply
 

@@ -19,8 +19,8 @@ from tvist_protocol.codec import decode, decode_command, encode
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Info
 from tvist_protocol.stream import Telemetry
+from tvist_server.gateways.base import Starting
 from tvist_server.gateways.network import Network
-from tvist_server.gateways.starting import Starting
 
 NEAR = (0.05, *Q1[1:].tolist())
 """A posture close to the one in which the robot starts."""

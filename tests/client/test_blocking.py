@@ -18,7 +18,7 @@ INTERNAL = {
     "Arm": {"keep_alive_every"},
     "Motion": {"on_event", "fail", "wait_event"},
     "Servo": {"check"},
-    "Stream": {"push", "fail", "finish"},
+    "Stream": {"push", "end"},
 }
 
 

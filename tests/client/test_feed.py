@@ -45,7 +45,7 @@ async def test_a_slow_reader_loses_the_oldest_and_knows_how_many(source, states)
     stream = states.stream(3)
     for tick in range(1, 11):
         source.put(encode(state(tick)))
-    states.finish()
+    states.end(NotConnectedError("closed"), closed=True)
     assert [one.tick async for one in stream] == [8, 9, 10]
     assert stream.dropped == 7
 
@@ -54,14 +54,14 @@ async def test_a_repeated_or_late_state_is_told_once(source, states):
     stream = states.stream(10)
     for tick in (5, 5, 6, 4, 6, 7):
         source.put(encode(state(tick)))
-    states.finish()
+    states.end(NotConnectedError("closed"), closed=True)
     assert [one.tick async for one in stream] == [5, 6, 7]
 
 
 async def test_a_robot_that_comes_back_may_count_anew(source, states):
     stream = states.stream(10)
     source.put(encode(state(500)))
-    states.fail(NotConnectedError("gone"))
+    states.end(NotConnectedError("gone"))
     source.put(encode(state(1)))
     assert (await anext(stream)).tick == 500
     assert (await anext(stream)).tick == 1
@@ -74,7 +74,7 @@ async def test_foreign_messages_are_left_out_counted_and_warned_of_once(source, 
     event = encode(Event(tick=1, kind="warning"))
     for data in (b"", b"\xc1", b"junk", event, encode(state(1)), event, encode(state(2))):
         source.put(data)
-    states.finish()
+    states.end(NotConnectedError("closed"), closed=True)
     assert [one.tick async for one in stream] == [1, 2]
     assert states.malformed == 5
     assert len(caplog.records) == 1
@@ -111,7 +111,7 @@ async def test_waiting_for_a_message_ends_with_it_with_time_or_with_the_robot(so
     assert (await states.next(lambda one: one.tick > 1, 10.0)).tick == 2
     with pytest.raises(AnswerTimeoutError, match="no state came within 0 s"):
         await states.next(lambda _: True, 0.0)
-    loop.call_soon(states.fail, NotConnectedError("gone"))
+    loop.call_soon(states.end, NotConnectedError("gone"))
     with pytest.raises(NotConnectedError):
         await states.next(lambda _: True, 10.0)
 
@@ -121,7 +121,7 @@ async def test_events_of_one_tick_are_all_told(source):
     stream = events.stream(10)
     for _ in range(3):
         source.put(encode(Event(tick=1, kind="warning")))
-    events.finish()
+    events.end(NotConnectedError("closed"), closed=True)
     assert len([event async for event in stream]) == 3
 
 

@@ -164,23 +164,6 @@ def test_to_know_the_end_is_to_be_there_sooner_and_a_stream_is_followed_all_the_
     assert abs(robot.states[-1].estimated_f_d[0] - at_rest[0]) > 0.02  # it follows the arm
 
 
-def test_a_filter_that_cannot_do_what_it_should_says_so_once():
-    """Hardly damped modes would need a longer filter than this one gets."""
-    robot = Robot()
-    slow = {"f_d": (2.0, 3.0, 4.0, 5.0), "zeta": (0.01, 0.01, 0.01, 0.01)}
-    assert robot.send(c.SetEstimator, name="fixed", **slow) == Done()
-    assert robot.send(c.SetShaper, name="auto") == Done()
-    robot.tick(50)
-    said = [event for event in robot.events if event.code == "out_of_range"]
-    assert len(said) == 1
-    assert "auto" in said[0].why
-    assert robot.send(c.SetShaper, name="none") == Done()
-    robot.tick(5)
-    assert robot.send(c.SetShaper, name="auto") == Done()
-    robot.tick(5)
-    assert len([event for event in robot.events if event.code == "out_of_range"]) == 2
-
-
 def test_a_clipped_filter_is_a_bit_in_every_state_and_one_event():
     robot = Robot()
     estimator = robot.controller.cycle.tvist.estimator
@@ -189,5 +172,5 @@ def test_a_clipped_filter_is_a_bit_in_every_state_and_one_event():
         robot.tick(3)
     bits = [state.shaper_clipped for state in robot.states]
     assert bits == [False] * 3 + [True] * 3 + [False] * 3 + [True] * 3
-    said = [event.tick for event in robot.events if event.code == "out_of_range"]
-    assert said == [4, 10]
+    said = [(event.tick, event.why[:2]) for event in robot.events if event.code == "out_of_range"]
+    assert said == [(4, "zv"), (10, "zv")]

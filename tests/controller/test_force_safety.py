@@ -214,20 +214,19 @@ def test_a_payload_that_is_swung_about_is_not_taken_for_a_force():
     assert "above 250 N" in protective(robot)[0]
 
 
-@pytest.mark.parametrize(("late", "speed", "sensor", "mass"), [(12, 0.5, True, 3.0)])
-def test_set_points_that_come_late_in_free_air_are_no_contact(late, speed, sensor, mass):
-    """As over a network: four times a second so many ticks bring none, and the next one makes up for them."""
-    robot, _ = touching(0.0, sensor=sensor, mass=mass)
+def test_set_points_that_come_late_in_free_air_are_no_contact():
+    """As over a network: four times a second twelve ticks bring none, and the next one makes up for them."""
+    robot, _ = touching(0.0, mass=3.0)
     start(robot, "thread watch():", "s = 0", "while True:", "s = s + tool_contact(get_actual_tcp_speed())",
           "write_output_integer_register(0, s)", "sync()", "end", "end", "t = run watch()",
           "q = get_target_joint_positions()", "i = 0", "while i < 600:", "k = 1",
-          f"if i % 125 > {124 - late}:", "k = 0", "elif i % 125 == 0:",
-          f"k = {late + 1}", "end", f"d = k * {0.002 * speed}",
+          "if i % 125 > 112:", "k = 0", "elif i % 125 == 0:",
+          "k = 13", "end", "d = k * 0.001",
           "q = [q[0]+d, q[1], q[2]+0.7*d, q[3]-0.2*d, q[4]-d, q[5]-0.5*d]",
           "servoj(q, t=0.002, lookahead_time=0.03, gain=2000)", "i = i + 1", "end", "stopj(5)")  # fmt: skip
     robot.tick(750)
     assert failure(robot) is None
-    assert np.ptp([state.actual_q[0] for state in robot.states]) > 0.9 * speed
+    assert np.ptp([state.actual_q[0] for state in robot.states]) > 0.45
     assert robot.controller.io().output_int_register[0] == 0
 
 

@@ -2,13 +2,7 @@
 
 import pytest
 
-from tvist_protocol.programs import (
-    MAX_SCRIPT,
-    Interpreter,
-    ProgramInterpret,
-    ProgramSkip,
-    ProgramStop,
-)
+from tvist_protocol.programs import MAX_SCRIPT, Interpreter, ProgramInterpret, ProgramSkip, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 
 from .scripts import URSIM, a_robot, failure, finish, playing, said, start

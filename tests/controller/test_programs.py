@@ -396,8 +396,7 @@ def test_what_a_limit_lowers_is_told_with_both_numbers(line, code, words):
     assert all(word in why for word in words), why
 
 
-x, y, z, *turn = placement_vector(*Arm(UR5E).pose(np.array(URSIM)))
-LINE = f"movel(p{[x, y + 0.1, z, *turn]}, a=1.0, v=0.2)"
+LINE = f"movel({pose(dy=0.1)}, a=1.0, v=0.2)"
 
 
 @pytest.mark.parametrize("ticks", [1, 5, 9])
@@ -413,13 +412,12 @@ def test_a_client_may_move_the_arm_while_a_line_is_planned(ticks):
     assert failure(robot) is None
     ended = [(event.kind, event.id) for event in robot.events if event.id is not None]
     assert ended == [("motion_started", 1), ("motion_stopped", 1), ("motion_started", 2), ("motion_done", 2)]
-    _, there = Arm(UR5E).pose(np.array(robot.states[-1].reference_q))
-    np.testing.assert_allclose(there, (x, y + 0.1, z), atol=1e-6)
+    np.testing.assert_allclose(places(robot)[-1], place(0, 0.1, 0), atol=1e-6)
 
 
 def test_servoc_that_was_paused_and_goes_on_can_be_paused_again():
     robot = a_robot()
-    start(robot, f"servoc(p{[x, y + 0.1, z, *turn]}, a=1.0, v=0.05)", "textmsg(1)")
+    start(robot, f"servoc({pose(dy=0.1)}, a=1.0, v=0.05)", "textmsg(1)")
     robot.tick(200)
     assert robot.send(ProgramPause) == Done()
     robot.until_rest()
@@ -453,7 +451,7 @@ def test_protective_stop_pauses_the_program_at_any_next_statement_that_waits(mov
 
 GUIDED = (
     f"servoj({NEAR}, t=0.2)",
-    f"servoc(p{[x, y + 0.1, z, *turn]}, a=1.0, v=0.1)",
+    f"servoc({pose(dy=0.1)}, a=1.0, v=0.1)",
     "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.2)",
     "speedl([0, 0.1, 0, 0, 0, 0], 1, 0.2)",
 )

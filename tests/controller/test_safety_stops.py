@@ -6,7 +6,7 @@ import pytest
 from tvist_controller.about import info_of
 from tvist_controller.instruments.variables import SAFETY_BITS
 from tvist_controller.line.differentiator import Target
-from tvist_controller.safety.brakes import brake
+from tvist_controller.safety.safety_control import brake
 from tvist_controller.setup import body, paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode

@@ -111,7 +111,6 @@ class TestContents:
 
 @pytest.mark.nightly
 class TestFresh:
-    @pytest.mark.nightly
     @pytest.mark.parametrize("name", ["tvist-protocol", "tvist-shaping", "tvist-urscript"])
     def test_the_readmes_first_examples_run(self, fresh, name):
         python = fresh(name)
@@ -123,7 +122,6 @@ class TestFresh:
         assert not imports(python, "zenoh")
         assert imports(python, "numpy") == (name == "tvist-shaping")
 
-    @pytest.mark.nightly
     def test_the_client_is_light_and_moves_a_robot(self, fresh):
         client = fresh("tvist")
         assert not imports(client, "numpy")

@@ -279,6 +279,12 @@ class TestSnippets:
         assert results.attempted > 0
         assert results.failed == 0
 
+    @pytest.mark.parametrize("package", ["shaping", "sim_plant"])
+    def test_a_package_s_readme_is_a_session_that_prints_what_it_says(self, package):
+        results = doctest.testfile(str(ROOT / package / "README.md"), module_relative=False)
+        assert results.attempted > 5
+        assert results.failed == 0
+
     @pytest.mark.realtime
     @pytest.mark.nightly
     @pytest.mark.parametrize("text", blocks("python"))

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.lab.made_logs import damped
 
 from tvist_controller.sources import calibrations
 from tvist_lab.metrics import motions
@@ -59,12 +60,9 @@ def make_recording():
         made |= of_joints
         made["tick"] = tick.astype(float)
         made["timestamp"] = tick * PERIOD
-        pose = np.zeros((ticks, 6))
-        if position is not None:
-            pose[:, :3] = position
-        if rotation is not None:
-            pose[:, 3:] = rotation
-        made["actual_TCP_pose"] = pose
+        made["actual_TCP_pose"] = np.zeros((ticks, 6))
+        made["actual_TCP_pose"][:, :3] = 0.0 if position is None else position
+        made["actual_TCP_pose"][:, 3:] = 0.0 if rotation is None else rotation
         made["actual_tool_accelerometer"] = up + (0.0 if alpha is None else alpha)
         made["estimated_f_d"] = np.full((ticks, 1), 10.0)
         made["estimated_zeta"] = np.full((ticks, 1), 0.2)
@@ -103,9 +101,7 @@ def ring():
     """A damped sine on given axes from a tick on, zero before."""
 
     def make(ticks, start, f_d, zeta, amplitude, *, axis=(1.0, 0.0, 0.0), phase=0.0):
-        t = PERIOD * (np.arange(ticks) - start)
-        sigma = 2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2)
-        wave = np.exp(-sigma * np.maximum(t, 0.0)) * np.cos(2.0 * np.pi * f_d * t + phase) * (t >= 0.0)
+        wave = damped(PERIOD * (np.arange(ticks) - start), f_d, zeta, phase)
         return amplitude * wave[:, None] * (np.array(axis) / np.linalg.norm(axis))
 
     return make

@@ -3,6 +3,7 @@
 import random
 
 import msgspec
+from mcap.writer import CompressionType, Writer
 
 from tvist_protocol import Info, Io, State, Truth
 from tvist_protocol.generate import FOLDER
@@ -32,6 +33,21 @@ def states(count):
         yield changed(
             STATE, tick=tick, timestamp=tick * 0.002, setpoint_sequence=None, actual_q=q, target_q=q[::-1]
         )
+
+
+def foreign(path, messages, encoding="json", metadata=None, name="tvist"):
+    """Write messages, each with its topic, as some other program does."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.NONE)
+        writer.start()
+        if metadata is not None:
+            writer.add_metadata(name, metadata)
+        topics = dict.fromkeys(topic for topic, _ in messages)
+        channels = {topic: writer.register_channel(topic, encoding, 0) for topic in topics}
+        for time, (topic, data) in enumerate(messages):
+            writer.add_message(channels[topic], time, data, time)
+        writer.finish()
+    return path
 
 
 def record(path, messages, *, finish=True, dropped=None):

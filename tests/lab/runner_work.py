@@ -2,7 +2,6 @@
 
 import os
 import signal
-from pathlib import Path
 
 
 class OddError(Exception):
@@ -18,15 +17,6 @@ def square_or_raise(number):
     if number % 10 == 8:
         raise OddError("odd", number)
     return (lambda: number) if number % 10 == 9 else number * number  # no function can be pickled
-
-
-def die_once(task):
-    """Kill the process that does it, the first time that it does task 5."""
-    number, mark = task
-    if number == 5 and not Path(mark).exists():
-        Path(mark).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number * number
 
 
 def die(number):

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 from tests.examples import examples
-from tests.lab.synthetic_logs import SyntheticLog
+from tests.lab.made_logs import SyntheticLog
 
 from tvist_cli.commands.log.advise import advise as command_line
 from tvist_cli.failure import Failure
@@ -90,7 +90,7 @@ def test_the_best_shaper_of_one_mode_is_aimed_at_it_and_keeps_the_limits(rings, 
 
 
 def test_motions_of_different_frequencies_need_modes_of_their_own():
-    low, high = (log_of((f_d, 0.03, 2.0), seed=seed) for seed, f_d in ((1, 7.0), (2, 12.0)))
+    low, high = (log_of((f_d, 0.03, 2.0), seed=seed, motions=1) for seed, f_d in ((1, 7.0), (2, 12.0)))
     elsewhere = {name: high.recording[name] + 0.5 for name in ("target_q", "actual_q")}
     shifted = replace(high.recording, columns=high.recording.columns | elsewhere)
     advice = advise([low, MeasuredRecording.of(shifted)])
@@ -235,16 +235,11 @@ def test_the_page_loads_nothing_and_every_option_is_plain_values(rings, advice, 
     assert plain["recommended"]["left_percent"] == min(same)
 
 
-WAYS, REPETITIONS = 3, 2
-"""Number of random moves of each robot, each made to and fro, and how often."""
-REST, BEFORE = 1.2, 0.4
-"""Time at rest after a motion, and after the arm was put at the start of a move [s]."""
-SPEEDS = ((1.5, 2.0), (2.0, 3.0))
-"""Velocity and acceleration limits [rad/s, rad/s²], in turn."""
-SEEDS = (201, 202)
-"""Seeds of hidden robots and their moves."""
-POINTS = 5.0
-"""Largest difference of a reduction that comes true [percentage points]."""
+WAYS, REPETITIONS = 3, 2  # number of random moves of each robot, each made to and fro, and how often
+REST, BEFORE = 1.2, 0.4  # time at rest after a motion, and after the arm was put at the start of a move [s]
+SPEEDS = ((1.5, 2.0), (2.0, 3.0))  # velocity and acceleration limits [rad/s, rad/s²], in turn
+SEEDS = (201, 202)  # seeds of hidden robots and their moves
+POINTS = 5.0  # largest difference of a reduction that comes true [percentage points]
 
 
 async def predicted_and_real(name, seed):

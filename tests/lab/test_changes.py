@@ -26,8 +26,7 @@ COLUMNS = (
     "actual_tool_accelerometer",
 )  # fmt: skip
 UR5E = load("ur5e")
-GEAR_TEETH = 24 * 101
-"""Waves of the torque's ripple per turn of a joint."""
+GEAR_TEETH = 24 * 101  # waves of the torque's ripple per turn of a joint
 
 
 class ChangingArm:

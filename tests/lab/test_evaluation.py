@@ -197,7 +197,7 @@ class TestReport:
 class TestMoves:
     def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
         methods = (*some(["zv"], ur5e, paper), *baselines(paper, ur5e, (5.0, 5.0)))
-        (job,) = study(StudyRequest(description=ur5e, moves=[move], methods=methods, named=1)).jobs
+        (job,) = study(StudyRequest(description=ur5e, moves=[move], methods=methods, named=1)).jobs()
         shaped, waiting, longer, *others = measure(job)
         assert shaped["reduction_percent"] > 80.0
         assert 28.0 <= shaped["delay_ms"] <= 38.0  # half a period at Q3, where the mode is at 15 Hz

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 from tests.lab.golden import INFO, STATE, TRUTH, changed, record
-from tests.lab.synthetic_logs import SyntheticLog
+from tests.lab.made_logs import SyntheticLog
 
 from tvist_cli.commands.log.analyze import analyze
 from tvist_cli.commands.log.export import export as export_command

@@ -10,7 +10,7 @@ import pytest
 
 from tvist_lab.identification.workspace_map import WorkspaceMap
 from tvist_lab.metrics import motions
-from tvist_lab.metrics.residual import residual as measured
+from tvist_lab.metrics.paper import residual as measured
 from tvist_lab.studies.moves import example
 from tvist_lab.studies.robustness import ERRORS, cells
 from tvist_shaping import SHAPERS, custom, residual
@@ -24,8 +24,7 @@ UNIT = re.compile(
 )
 NARROW = "figure.figsize: 3.503937, 3"
 """Line of a style file with the width of one column of a journal, 89 mm."""
-LEAST_POINTS = 5.5
-"""Smallest size of text in one column [pt]."""
+LEAST_POINTS = 5.5  # smallest size of text in one column [pt]
 
 
 @pytest.fixture(autouse=True)

@@ -21,13 +21,6 @@ def test_with_the_right_frequency_a_mode_settles_when_the_reference_stops(name):
     assert settling_time(shaper, 8.0, 0.1, 0.0) == pytest.approx(shaper.impulses(8.0, 0.1).duration)
 
 
-def test_without_a_shaper_it_settles_when_the_decay_reaches_the_bound():
-    f_d, zeta = 8.0, 0.1
-    time = settling_time(SHAPERS["none"], f_d, zeta, 0.2)
-    sigma = 2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2)
-    assert np.exp(-sigma * time) == pytest.approx(ALLOWED, rel=1e-3)
-
-
 def test_without_damping_what_is_left_never_decays():
     assert settling_time(SHAPERS["zv"], 8.0, 0.0, 0.2) == np.inf
     assert np.isfinite(settling_time(SHAPERS["zv"], 8.0, 0.0, 0.0))

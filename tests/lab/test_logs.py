@@ -1,12 +1,13 @@
 """Logs of other robots are measured whatever their format, and refused with the cause and the line."""
 
 import gzip
+import re
 from functools import cache
 
 import numpy as np
 import polars as pl
 import pytest
-from tests.lab.synthetic_logs import SyntheticLog
+from tests.lab.made_logs import SyntheticLog, text
 
 from tvist_lab.metrics import MeasuredRecording, MotionResult, analyze, compare, grouped_notes, motions
 from tvist_lab.recordings import RecordingError, read, table
@@ -116,51 +117,61 @@ def test_missing_rows_do_not_spoil_a_fit(tmp_path):
 
 @cache
 def good():
-    return tuple(SyntheticLog().text())
+    return tuple(text(SyntheticLog().columns))
 
 
 def lines_of(tmp_path):
     return tmp_path / "log.csv", list(good())
 
 
-def test_repeated_and_torn_lines_are_left_out_and_said(tmp_path):
-    path, lines = lines_of(tmp_path)
-    lines[500:500] = [lines[499]] * 3
-    lines[800] = lines[800][:40]
-    lines[-1] = lines[-1][:60]
-    path.write_text("\n".join(lines))
-    recording = read(path)
-    assert any("3 rows" in note and "line 501" in note for note in recording.notes)
-    assert any("torn" in note and "line 801" in note for note in recording.notes)
-    assert all(within(result) for result in analyze(recording))
-
-
-def test_the_last_number_of_a_file_that_was_cut_off_does_not_count(tmp_path):
-    path, lines = lines_of(tmp_path)
-    path.write_text("\n".join(lines)[:-5])
-    assert f"line {len(lines)} has no end and was left out" in read(path).notes
+def with_cell(lines, cell, row=300, column=4):
+    cells = lines[row].split(",")
+    cells[column] = cell
+    return [*lines[:row], ",".join(cells), *lines[row + 1 :]]
 
 
 def test_an_empty_cell_is_missing_and_not_zero(tmp_path):
     path, lines = lines_of(tmp_path)
-    names = lines[0].split(",")
-    cells = lines[700].split(",")
-    cells[names.index("actual_tool_accelerometer_1")] = ""
-    lines[700] = ",".join(cells)
-    path.write_text("\n".join(lines) + "\n")
+    place = lines[0].split(",").index("actual_tool_accelerometer_1")
+    path.write_text("\n".join(with_cell(lines, "", 700, place)) + "\n")
     recording = read(path)
     assert np.isnan(recording["actual_tool_accelerometer"][699, 1])
     assert all(within(result) for result in analyze(recording))
 
 
-def with_cell(lines, text, row=300, column=4):
-    cells = lines[row].split(",")
-    cells[column] = text
-    return [*lines[:row], ",".join(cells), *lines[row + 1 :]]
-
-
 def in_days(lines):
     return lines[:1] + [f"{5e9 * n},{line.split(',', 1)[1]}" for n, line in enumerate(lines[1:])]
+
+
+EDITED = {
+    "repeated": (lambda lines: lines[:500] + [lines[499]] * 3 + lines[500:], "3 rows .* line 501"),
+    "torn": (lambda lines: [*lines[:800], lines[800][:40], *lines[801:]], "1 torn line .* line 801"),
+    "swapped": (
+        lambda lines: [
+            *lines[:400],
+            lines[401],
+            lines[400],
+            *lines[402:900],
+            lines[901],
+            lines[900],
+            *lines[902:],
+        ],
+        "2 rows out of order sorted by timestamp, the first in line 402",
+    ),
+    "cut off": (lambda lines: [*lines[:-1], lines[-1][:-5]], "line 2701 has no end and was left out"),
+}
+"""Changes of the lines of a good log without its last line break, and the note on them."""
+
+
+@pytest.mark.parametrize("kind", EDITED)
+def test_lines_that_are_not_whole_or_not_in_their_place_are_left_out_or_sorted_and_said(tmp_path, kind):
+    change, words = EDITED[kind]
+    path, lines = lines_of(tmp_path)
+    path.write_text("\n".join(change(lines)))
+    recording = read(path)
+    assert any(re.search(words, note) for note in recording.notes)
+    assert np.all(np.diff(recording.time) > 0)
+    assert all(within(result) for result in analyze(recording))
 
 
 REFUSED = {
@@ -285,16 +296,6 @@ def test_any_names_units_and_separators_are_read(tmp_path):
         read(path, "time=t:weeks")
     with pytest.raises(RecordingError, match="--columns time="):
         read(path)
-
-
-def test_swapped_neighbouring_rows_are_sorted_and_counted(tmp_path):
-    path, lines = lines_of(tmp_path)
-    for row in (400, 900):
-        lines[row], lines[row + 1] = lines[row + 1], lines[row]
-    path.write_text("\n".join(lines) + "\n")
-    recording = read(path)
-    assert "2 rows out of order sorted by timestamp, the first in line 402" in recording.notes
-    assert np.all(np.diff(recording.time) > 0)
 
 
 def test_an_arm_that_still_rings_is_not_called_noise(tmp_path):

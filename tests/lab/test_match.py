@@ -80,7 +80,7 @@ def test_the_report_pairs_moves_and_says_nothing_of_too_few(make):
 
 def test_both_make_the_same_moves_on_the_same_arms(make):
     """A method compared with itself differs nowhere, not in the last bit; and nineteen moves are refused."""
-    job = make(20).jobs[0]
+    job = next(make(20).jobs())
     found = measure(replace(job, methods=job.methods[:1] * 2))
     assert [row["arm"] for row in found] == ["calibrated", "hidden-4"] * 2
     assert found[:2] == found[2:]

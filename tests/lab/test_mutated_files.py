@@ -22,10 +22,8 @@ import numpy as np
 import pytest
 from tests import forked
 
-SECONDS = 5
-"""Longest processor time for one file, some hundred times what a good one takes [s]."""
-MEMORY = 1 << 30
-"""Largest memory that reading may add to what the good files took [bytes]."""
+SECONDS = 5  # longest processor time for one file, some hundred times what a good one takes [s]
+MEMORY = 1 << 30  # largest memory that reading may add to what the good files took [bytes]
 TREE = Path(__file__).parents[2]
 
 NUMBERS = (
@@ -118,7 +116,7 @@ MUTATIONS = (flipped, cut, replaced, replaced, replaced, renumbered, resized, re
 
 
 def _log():
-    from tests.lab.synthetic_logs import SyntheticLog
+    from tests.lab.made_logs import SyntheticLog
 
     return SyntheticLog(motions=1, rest=0.3, rate=60.0)
 
@@ -181,13 +179,14 @@ def _logs(folder):
 
 def _parquet(folder):
     import polars as pl
+    from tests.lab.made_logs import table
     from tests.lab.test_export import recording
 
     from tvist_lab.recordings.export import export
 
     ours, plain = folder / "run.parquet", folder / "plain.parquet"
     export(recording(), ours, "parquet")
-    names, values = _log().table()
+    names, values = table(_log().columns)
     pl.DataFrame(values, schema=names).write_parquet(plain, compression="uncompressed", row_group_size=40)
     return [ours, plain]
 
@@ -365,8 +364,13 @@ HOSTILE = {
 }  # fmt: skip
 """Files made to hang a reader or to take its memory, each with its kind."""
 
-APART = {"parquet": 10, "commands": 3}
-"""How many times fewer files are tried of kinds of which each takes long."""
+GROUPS = {
+    ("csv", "dump", "rosbag", "mcap", "npz"): 1,
+    ("parquet",): 10,
+    ("commands",): 3,
+    ("toml", "urdf", "calibration", "moves", "config", "state", "sweep", "program"): 1,
+}
+"""Kinds that one process reads, and how many times fewer files are tried of those that take long."""
 
 
 def _limit_time() -> None:
@@ -375,27 +379,32 @@ def _limit_time() -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (int(used.ru_utime + used.ru_stime) + SECONDS, hard))
 
 
-def main(kind: str, count: int, seed: int, folder: Path) -> None:
+def main(folder: Path, count: int, kinds: list[str]) -> None:
     """Read mutated files; whatever ends this function is a fault, and the last file is the one that has it."""
-    hostile = HOSTILE.get(kind)
     warnings.simplefilter("error", RuntimeWarning)
-    write, reader = KINDS[kind if hostile is None else hostile[0]]
-    (folder / "good").mkdir()
-    good = write(folder / "good")
-    read, refusal = _readers()[reader]
+    readers = _readers()
+    for kind in kinds:
+        print(kind, end=": ", flush=True)  # noqa: T201  the test tells it
+        hostile = HOSTILE.get(kind)
+        write, reader = KINDS[kind if hostile is None else hostile[0]]
+        (place := folder / kind).mkdir()
+        _read_bad(kind, count, write(place), *readers[reader], None if hostile is None else hostile[1])
+
+
+def _read_bad(kind, count, good, read, refusal, write):
     for path in good:
         read(path)
     taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY, resource.RLIM_INFINITY))
     was_read = 0
     for number in range(count):
-        random = np.random.default_rng((seed, number))
+        random = np.random.default_rng((0, number))
         path = good[number % len(good)]
-        bad = folder / f"bad-{path.name}"
-        if hostile is None:
+        bad = path.with_name(f"bad-{path.name}")
+        if write is None:
             bad.write_bytes(mutated(path.read_bytes(), random, 1 if kind == "commands" else 3))
         else:
-            (bad,) = hostile[1](folder)
+            (bad,) = write(path.parent)
         _limit_time()
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         try:
@@ -406,30 +415,28 @@ def main(kind: str, count: int, seed: int, folder: Path) -> None:
             if "\n" in said or str(bad) not in said or len(said) > 1000:
                 raise AssertionError(f"no sentence: {said}") from error
         assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < SECONDS
-    print(f"{was_read} of {count} were read")  # noqa: T201  the test reads it
+    print(f"{was_read} of {count} were read")  # noqa: T201  likewise
 
 
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_a_file_made_to_hang_its_reader_does_not(kind, tmp_path, measured):
-    _try(kind, 1, tmp_path, measured)
+def test_a_file_made_to_hang_its_reader_does_not(tmp_path, measured):
+    _try(HOSTILE, 1, tmp_path, measured)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kinds", GROUPS, ids=lambda kinds: kinds[0])
 @pytest.mark.parametrize("count", [40, pytest.param(600, marks=pytest.mark.nightly)])
-def test_a_damaged_file_is_read_or_refused_in_a_sentence(kind, count, tmp_path, measured):
-    _try(kind, count // APART.get(kind, 1), tmp_path, measured)
+def test_a_damaged_file_is_read_or_refused_in_a_sentence(kinds, count, tmp_path, measured):
+    _try(kinds, count // GROUPS[kinds], tmp_path, measured)
 
 
-def _try(kind, count, tmp_path, measured):
+def _try(kinds, count, tmp_path, measured):
     child = forked.run(
-        [sys.executable, "-m", "tests.lab.test_mutated_files", kind, str(count), "0", tmp_path],
+        [sys.executable, "-m", "tests.lab.test_mutated_files", tmp_path, str(count), *kinds],
         cwd=TREE, env=os.environ | {"POLARS_MAX_THREADS": "1", "PYTHONPATH": str(TREE)},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     name = signal.Signals(-child.returncode).name if child.returncode < 0 else f"exit {child.returncode}"
-    files = ", ".join(path.name for path in tmp_path.glob("bad-*"))
-    assert child.returncode == 0, f"{name}, one of {files} in {tmp_path}:\n{child.stderr[-3000:]}"
-    measured(kind, child.stdout.strip())
+    assert child.returncode == 0, f"{name} in {tmp_path} at\n{child.stdout}\n{child.stderr[-3000:]}"
+    measured("files read", child.stdout.strip())
 
 
 HARMFUL = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\u202e[red]"
@@ -476,4 +483,4 @@ def test_a_robot_with_a_name_that_cannot_be_shown_is_refused(key, name, tmp_path
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))
+    main(Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])

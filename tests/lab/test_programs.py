@@ -47,10 +47,24 @@ def test_a_program_that_ends_by_itself_is_finished_after_its_robot_time():
     assert [(one.tick, one.text) for one in watch.said] == [(151, "slept")]
 
 
-def test_secondary_programs_run_too_and_halt_is_an_end():
-    watch = run('textmsg("beside")', kind="sec")
-    assert (watch.reason, said(watch)) == ("finished", ["beside"])
-    assert run("halt", 'textmsg("never")').reason == "finished"
+@pytest.mark.parametrize(
+    ("lines", "how", "reason", "why", "told"),
+    [
+        (['textmsg("beside")'], {"kind": "sec"}, "finished", "", ["beside"]),
+        (["halt", 'textmsg("never")'], {}, "finished", "", []),
+        (["movel(p[3, 0, 0.5, 0, 0, 0])", 'textmsg("never")'], {}, "protective_stop",
+         "no joint positions reach this pose", []),
+        (['rtde_set_watchdog("input_int_register_0", 10)', "while True:", "sync()", "end"], {}, "paused",
+         "nobody can resume", ["input_int_register_0"]),
+        (["while True:", "sync()", "end"], {"timeout": 0.4}, "timeout", "after 0.4 s of robot time", []),
+    ],
+)  # fmt: skip
+def test_a_run_says_how_and_why_it_ended(lines, how, reason, why, told):
+    watch = run(*lines, **how)
+    assert (watch.reason, why in (watch.why or "")) == (reason, True)
+    assert watch.seconds == pytest.approx(how.get("timeout", watch.seconds))
+    heard = [one.text for one in watch.said]
+    assert all(words in text for words, text in zip(told, heard, strict=True))
 
 
 def test_an_error_has_its_place():
@@ -59,25 +73,6 @@ def test_an_error_has_its_place():
     assert "2" in watch.error.text
     assert watch.seconds == pytest.approx(0.1)
     assert said(watch, "warning") == []
-
-
-def test_a_program_that_a_protective_stop_pauses_has_failed():
-    watch = run("movel(p[3, 0, 0.5, 0, 0, 0])", 'textmsg("never")')
-    assert watch.reason == "protective_stop"
-    assert "no joint positions reach this pose" in watch.why
-    assert said(watch) == []
-
-
-def test_a_pause_that_nobody_can_resume_is_a_failure():
-    watch = run('rtde_set_watchdog("input_int_register_0", 10)', "while True:", "sync()", "end")
-    assert watch.reason == "paused"
-    (warning,) = said(watch, "warning")
-    assert "input_int_register_0" in warning
-
-
-def test_a_timeout_counts_robot_time():
-    watch = run("while True:", "sync()", "end", timeout=0.4)
-    assert (watch.reason, watch.seconds) == ("timeout", pytest.approx(0.4))
 
 
 def test_popups_are_told_and_do_not_hold_up_the_program():

@@ -6,13 +6,12 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from mcap.writer import Writer
-from tests.lab.golden import HARD_FLOATS, IO, STATE, TRUTH, changed, record
+from tests.lab.golden import HARD_FLOATS, IO, STATE, TRUTH, changed, foreign, record
 
 from tvist_lab.recordings import mcap_file
 from tvist_lab.recordings.mcap_file import RecordingFileError, read
 from tvist_lab.recordings.messages import recording_of_messages
-from tvist_protocol import Event
+from tvist_protocol import Event, Io
 
 JOURNALS = Path(__file__).parents[1] / "journals"
 FLOATS = [*HARD_FLOATS, float("nan"), float("inf"), 1e-310]
@@ -77,7 +76,7 @@ def test_inputs_and_outputs_hold_until_the_next_message(tmp_path):
         messages += [io for io in ios if io.tick <= tick and io not in messages]
         messages.append(changed(STATE, tick=tick))
     content = read(record(tmp_path / "run.mcap", messages))
-    assert content.io == tuple(ios)
+    assert list(content.again(Io)) == ios
     bits = content.recording["actual_digital_output_bits"]
     assert np.array_equal(bits, [np.nan, np.nan, 0, 0, 1, 1, 2**17], equal_nan=True)
     assert content.recording["input_double_register"][2:, 1].tolist() == [0, 0, 0, 0, 0.5]
@@ -87,15 +86,10 @@ def test_inputs_and_outputs_hold_until_the_next_message(tmp_path):
 
 def written(path, states):
     """A file of another program, with an event for each state."""
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        channels = [writer.register_channel(f"tvist/ur5e/{kind}", "json", 0) for kind in ("state", "event")]
-        for tick, state in enumerate(states):
-            for channel, message in zip(channels, (state, Event(tick=tick, kind="warning")), strict=True):
-                writer.add_message(channel, tick, msgspec.json.encode(message), tick)
-        writer.finish()
-    return read(path)
+    messages = []
+    for tick, state in enumerate(states):
+        messages += [("tvist/ur5e/state", state), ("tvist/ur5e/event", Event(tick=tick, kind="warning"))]
+    return read(foreign(path, [(topic, msgspec.json.encode(message)) for topic, message in messages]))
 
 
 def test_a_field_that_an_earlier_version_did_not_write_has_its_default(tmp_path):

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import html5lib
 import pytest
-from tests.lab.synthetic_logs import SyntheticLog
+from tests.lab.made_logs import SyntheticLog
 
 from tvist_cli.output import write_report
 from tvist_lab.metrics import MotionResult

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.lab.made_logs import damped
 
 from tvist_controller.setup import body, paper_payload
 from tvist_lab.metrics import SLOW_POLE, fit_ring_down
@@ -126,11 +127,7 @@ def draws(count, correlation):
     for seed in range(count):
         random = np.random.default_rng([seed, 40])
         f_d, zeta = random.uniform(6.0, 25.0), random.uniform(0.05, 0.35)
-        time = PERIOD * np.arange(500)
-        axis = random.normal(size=3)
-        decay = np.exp(-2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2) * time)
-        wave = decay * np.cos(2.0 * np.pi * f_d * time + random.uniform(0.0, 6.28))
-        alpha = np.outer(wave, axis / np.linalg.norm(axis)) + 0.03 * coloured(random, correlation, (500, 3))
+        alpha, _ = rung(random, [(f_d, zeta, 1.0)], 500.0, correlation, seconds=1.0)
         yield fit_ring_down(alpha, PERIOD, modes=2, offset=True, evidence=SIGNIFICANT), f_d, zeta
 
 
@@ -162,14 +159,13 @@ def test_missing_samples_do_not_spoil_a_fit(ring):
     assert abs(wrong.f_d - 10.0) > 1.0
 
 
-def rung(random, modes, rate, correlation):
-    time = np.arange(int(1.5 * rate)) / rate
+def rung(random, modes, rate, correlation, seconds=1.5):
+    """Damped sines of random direction and phase in noise, and their times."""
+    time = np.arange(int(seconds * rate)) / rate
     alpha = np.zeros((len(time), 3))
     for f_d, zeta, amplitude in modes:
         axis = random.normal(size=3)
-        sigma = 2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2)
-        phase = 2.0 * np.pi * f_d * time + random.uniform(0.0, 6.28)
-        wave = amplitude * np.exp(-sigma * time) * np.cos(phase)
+        wave = amplitude * damped(time, f_d, zeta, random.uniform(0.0, 6.28))
         alpha += np.outer(wave, axis / np.linalg.norm(axis))
     return alpha + 0.03 * coloured(random, correlation, alpha.shape), time
 
@@ -233,9 +229,8 @@ def ring_down(listener, base, q, factor, amplitude, random):
     f_d, zeta = listener._models[base].settle(q)
     time, alpha = 0.002 * np.arange(150)[:, None], [0.0, 0.0, 9.81] + 0.03 * random.normal(size=(150, 3))
     for f, z in zip(factor * f_d[:2], zeta[:2], strict=True):
-        wave = np.exp(-2 * np.pi * f * z / np.sqrt(1 - z * z) * time)
         phases, shares = random.uniform(0, 6, 3), random.uniform(0.3, 1, 3)
-        alpha += amplitude * wave * np.cos(2 * np.pi * f * time + phases) * shares
+        alpha += amplitude * damped(time, f, z, phases) * shares
     return alpha
 
 

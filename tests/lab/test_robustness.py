@@ -37,7 +37,7 @@ def made(ur5e):
 
 @pytest.fixture(scope="module")
 def rows(made):
-    return made.frame([row for job in made.jobs for row in measure(job)])
+    return made.frame([row for job in made.jobs() for row in measure(job)])
 
 
 def test_an_error_of_nothing_is_the_same_whatever_it_is_of_and_a_large_one_costs_reduction(made, rows):

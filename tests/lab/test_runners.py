@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from distributed import Client, LocalCluster
 from polars.testing import assert_frame_equal
-from tests.lab.runner_work import die, die_once, square_or_raise
+from tests.lab.runner_work import die, square_or_raise
 
 from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_lab.runners import Failed, Here, TaskError, outcomes, processes
@@ -46,7 +46,7 @@ def test_rows_do_not_depend_on_what_runs_them(ur5e):
     moves = draw_moves(ur5e, 2, 1, (0.0, 5.0)).moves
     cases = [Case(ur5e, move, seed) for seed, move in enumerate(moves)]
     study = Study(title="", cases=cases, methods=methods)
-    here = [{"case": place, **row} for place, job in enumerate(study.jobs) for row in measure(job)]
+    here = [{"case": place, **row} for place, job in enumerate(study.jobs()) for row in measure(job)]
     assert_frame_equal(run(study).rows, study.frame(here))
     assert_frame_equal(run(study, executor=lambda: processes(2)).rows, study.frame(here))
 
@@ -72,14 +72,6 @@ def test_each_task_gets_its_own_result_or_failure(executor):
 def test_a_process_that_dies_ends_the_run_in_a_sentence():
     with pytest.raises(ChildProcessError, match="a process died"), processes(2) as pool:
         list(outcomes(pool, die, range(20)))
-
-
-def test_a_worker_that_dies_costs_nothing_if_its_task_can_be_done_again(tmp_path):
-    tasks = [(number, str(tmp_path / "mark")) for number in range(30)]
-    with cluster() as pool:
-        got = dict(outcomes(pool, die_once, tasks))
-    assert (tmp_path / "mark").exists()
-    assert got == {number: number * number for number in range(30)}
 
 
 def test_a_task_that_kills_each_worker_fails():

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from scipy.signal import lsim
+from tests.lab.made_logs import damped
 
 from tvist_cli.commands.log.analyze import analyze
 from tvist_lab.metrics import NotMeasurableError
@@ -24,9 +25,7 @@ def klipper(path, rate, alpha, seed=1):
 
 def ringing(rate, f_d, zeta, begins=(1.0, 3.0), length=5.0):
     since = np.arange(0.0, length, 1.0 / rate)[:, None] - begins
-    sigma = 2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2)
-    wave = np.exp(-sigma * np.maximum(since, 0.0)) * np.cos(2.0 * np.pi * f_d * since + 0.4)
-    return 8.0 * np.sum(wave * (since >= 0.0), axis=1)
+    return 8.0 * np.sum(damped(since, f_d, zeta, 0.4), axis=1)
 
 
 def swept(rate, f_d, zeta, length=40.0, highest=133.0):

@@ -292,7 +292,7 @@ class TestScores:
         asked = StudyRequest(description=ur5e, moves=moves, methods=standing, quick=True, facts=facts)
         made = study(asked)
         made = replace(made, cases=[replace(case, arms=ARMS[:1]) for case in made.cases])
-        done = made.frame([row for job in made.jobs for row in measure_each(job)])
+        done = made.frame([row for job in made.jobs() for row in measure_each(job)])
         spoilt = done.with_columns(
             error=pl.when(pl.col("shaper") == "double_s_as_zv").then(pl.lit("the shaper gives NaN at tick 7"))
         )

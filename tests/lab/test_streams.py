@@ -16,8 +16,7 @@ from tvist_shaping.steady import ProductDesign, SteadyFilter
 UR5E = load("ur5e")
 MODAL = load_calibration("ur5e_modal")
 MASSES = (0.0, 1.25, 2.5, 3.75, 5.0)
-SECONDS = 90.0
-"""Of each stream: ten of them are a quarter of an hour."""
+SECONDS = 90.0  # of each stream: ten of them are a quarter of an hour
 RETARGETED = (0.1, 1.5)
 """Shortest and longest time after which a stream turns to a new target, whether or not it has arrived [s]."""
 

@@ -57,10 +57,11 @@ class Quick:
         self.order, self.stop, self.fail, self.asked = order, stop, fail, []
 
     def __call__(self, _executor, _work, tasks):
+        tasks = list(tasks)
         for count, place in enumerate(self.order(range(len(tasks)))):
             if count == self.stop:
                 raise KeyboardInterrupt
-            position = tasks.places[place]
+            position = self.positions[str(tasks[place].case.axes)]
             self.asked.append(position)
             if position in self.fail:
                 yield place, Failed(TaskError("it cannot be pickled: a lock"))
@@ -72,6 +73,7 @@ class Quick:
 
 
 def run(study, folder, runner):
+    runner.positions = {str(case.axes): place for place, case in enumerate(study.cases)}
     with patch("tvist_lab.study.engine.outcomes", runner):
         return run_study(study, folder, nullcontext)
 
@@ -91,39 +93,15 @@ def whole(tmp_path, tasks):
     return run(tasks, tmp_path / "whole", Quick()).rows
 
 
-class TestSpec:
-    @pytest.mark.parametrize(
-        ("text", "words"),
-        [
-            (SPEC + "shaperz = 1", ["line 7", "'shaperz'", "did you mean 'shapers'?"]),
-            (SPEC.replace("moves = 3\n", ""), ["moves is missing"]),
-            (SPEC.replace('["none", "zv"]', "[]"), ["line 2", "shapers has 0 entries", "at least 1 entry"]),
-            (SPEC.replace("stiffness = 15", "stiffness = 95"), ["line 5", "errors[1].stiffness is 95", "90"]),
-            (SPEC.replace("moves = 3", "moves = 3.5"), ["line 3", "moves must be an integer", "a number"]),
-            (SPEC.replace('"uniform"', '"heavy"'), ["line 4", "payloads[1] is 'heavy'", "'uniform'"]),
-            (SPEC.replace("1.5", "nan"), ["payloads[0]", "NaN"]),
-            (SPEC.replace('"none"', '"zv"'), ["line 2", "shapers[1] repeats shapers[0]"]),
-            (SPEC + "stroke = [0.5, 0.4]", ["line 7", "stroke is 0.5 to 0.4", "increase"]),
-            (SPEC + "robots = [{robot = 'ur5e'}]", ["robots[0].calibration is missing"]),
-            (SPEC.replace("moves = 3", "moves = 100000") + "robots = ['a', 'b']", ["1600000 rows", "1000000"]),
-            (SPEC + "x = = 1", ["not valid TOML", "line 7"]),
-        ],
-    )  # fmt: skip
-    def test_what_is_wrong_is_named_with_line_or_key(self, tmp_path, text, words):
-        with pytest.raises(SpecError) as error:
-            tasks_of(tmp_path, text)
-        assert str(error.value).startswith(f"sweep {tmp_path / 'spec.toml'}")
-        assert all(word in str(error.value) for word in words), error.value
-
-    def test_a_key_that_is_left_out_has_a_default(self, tmp_path):
-        spec = tasks_of(tmp_path, "shapers = ['zv']\nmoves = 1\npayloads = [5]").cases.spec
-        assert (spec.robots, spec.seed, spec.modes, spec.limits) == (("ur5e",), 0, 1, "gentle")
-        assert (spec.stroke, spec.wrists, spec.streams) == ((0.3, 1.0), False, False)
+def test_a_key_that_is_left_out_has_a_default(tmp_path):
+    spec = tasks_of(tmp_path, "shapers = ['zv']\nmoves = 1\npayloads = [5]").cases.spec
+    assert (spec.robots, spec.seed, spec.modes, spec.limits) == (("ur5e",), 0, 1, "gentle")
+    assert (spec.stroke, spec.wrists, spec.streams) == ((0.3, 1.0), False, False)
 
 
 class TestTasks:
     def test_rows_are_to_the_bit_what_any_study_measures(self, tasks):
-        task = tasks.jobs[11]
+        (task,) = tasks.jobs([11])
         ur5e = load("ur5e")
         move = draw_moves(ur5e, 3, 4, (0.0, ur5e.limits.payload)).moves[2]
         said = [task.case.axes[name] for name in ("payload", "stiffness_error_percent", "move")]
@@ -137,16 +115,16 @@ class TestTasks:
 
     def test_a_position_has_the_same_bits_whatever_was_done_before(self, tmp_path, tasks):
         again = tasks_of(tmp_path)
-        later = [measure_each(again.jobs[place]) for place in (5, 2)]
-        assert [measure_each(tasks.jobs[place]) for place in (2, 5)] == later[::-1]
+        later = [*map(measure_each, again.jobs([5, 2]))]
+        assert [*map(measure_each, tasks.jobs([2, 5]))] == later[::-1]
 
     def test_moves_and_arms_are_the_same_for_all_payloads_and_errors(self, tasks):
-        same = [tasks.jobs[place] for place in range(1, len(tasks.jobs), 3)]
+        same = [*tasks.jobs()][1::3]
         assert len({(one.case.move.start, one.case.move.target, one.case.seed) for one in same}) == 1
         assert [one.case.axes["payload"] for one in same] == ["1.5", "1.5", "uniform", "uniform"]
 
     def test_a_shaper_that_fails_costs_its_own_row(self, tasks):
-        task = tasks.jobs[0]
+        task = next(tasks.jobs())
         broken = Recipe("zv", None)
         none, zv = measure_each(replace(task, methods=(task.methods[0], Named(broken, "zv"))))
         assert (none["status"], none.get("error")) == ("measured", None)
@@ -155,7 +133,7 @@ class TestTasks:
 
     def test_a_move_for_which_the_drives_are_too_weak_says_so(self, tmp_path):
         text = SPEC.replace("1.5", "60").replace("moves = 3", "moves = 1") + "limits = 'industrial'"
-        rows = measure_each(tasks_of(tmp_path, text).jobs[0])
+        rows = measure_each(next(tasks_of(tmp_path, text).jobs()))
         assert {row["status"] for row in rows} == {"too weak"}
         assert all("of a drive's torque" in row["error"] for row in rows)
 
@@ -250,7 +228,7 @@ class TestFolder:
 
     def test_a_damaged_part_is_named(self, tmp_path, tasks):
         with Store(tmp_path / "x", {}, tasks.schema) as store:
-            store.keep(tasks.frame(failed(tasks.jobs[0], "failed", "x")))
+            store.keep(tasks.frame(failed(next(tasks.jobs()), "failed", "x")))
             (tmp_path / "x" / "parts" / "000001.parquet").write_bytes(b"PAR1")
             with pytest.raises(
                 StoreError, match=r"000001\.parquet cannot be read as rows of a study: remove it"
@@ -309,26 +287,38 @@ def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("file", "change", "words"),
     [
-        (("STUDY =", "study ="), "contains no STUDY"),
-        (('by=("speed",)', 'by=("pace",)'), "'pace' is no axis: there are speed, move, arm, shaper"),
-        (('"shaped_peak_m_s2")', '"peak")'), "'peak' is no measure"),
-        (('"zv", "auto"', '"zvv"'), "there is no method 'zvv', did you mean 'zv'"),
-        (("0.5, 1.0", "1, 'fast'"), "TypeError"),
-        (('"move": number', '"status": number'), "axis 'status' has the name of another column"),
-        (
-            ('"move": number', '"move": number if number else "none"'),
-            "'move' has values of the types int, str",
-        ),
-        (("1.5 * speed", "-1.5 * speed"), "has the velocity limit -0.75: must be a positive number"),
-        (('"unshaped_peak_m_s2", "shaped_peak_m_s2"', ""), "show is empty"),
-        (("show=(", 'columns=(Column("x", median("peek")),), show=('), "a column needs 'peek', no measure"),
-        (("robot = load", "raise SystemExit(3)\nrobot = load"), "running it raises SystemExit"),
+        ("x.toml", ("seed = 4", "shaperz = 1"), ["line 6", "'shaperz'", "did you mean 'shapers'?"]),
+        ("x.toml", ("moves = 3\n", ""), ["moves is missing"]),
+        ("x.toml", ('["none", "zv"]', "[]"), ["line 2", "shapers has 0 entries", "at least 1 entry"]),
+        ("x.toml", ("stiffness = 15", "stiffness = 95"), ["line 5", "errors[1].stiffness is 95", "90"]),
+        ("x.toml", ("moves = 3", "moves = 3.5"), ["line 3", "moves must be an integer", "a number"]),
+        ("x.toml", ('"uniform"', '"heavy"'), ["line 4", "payloads[1] is 'heavy'", "'uniform'"]),
+        ("x.toml", ("1.5", "nan"), ["payloads[0]", "NaN"]),
+        ("x.toml", ('"none"', '"zv"'), ["line 2", "shapers[1] repeats shapers[0]"]),
+        ("x.toml", ("seed = 4", "stroke = [0.5, 0.4]"), ["line 6", "stroke is 0.5 to 0.4", "increase"]),
+        ("x.toml", ("seed = 4", "robots = [{robot = 'ur5e'}]"), ["robots[0].calibration is missing"]),
+        ("x.toml", ("moves = 3", "moves = 100000\nrobots = ['a', 'b', 'c']"), ["2400000 rows", "1000000"]),
+        ("x.toml", ("seed = 4", "x = = 1"), ["not valid TOML", "line 6"]),
+        ("x.py", ("STUDY =", "study ="), ["contains no STUDY"]),
+        ("x.py", ('by=("speed",)', 'by=("pace",)'), ["'pace' is no axis: there are speed, move"]),
+        ("x.py", ('"shaped_peak_m_s2")', '"peak")'), ["'peak' is no measure"]),
+        ("x.py", ('"zv", "auto"', '"zvv"'), ["there is no method 'zvv', did you mean 'zv'"]),
+        ("x.py", ("0.5, 1.0", "1, 'fast'"), ["TypeError"]),
+        ("x.py", ('"move": number', '"status": number'), ["axis 'status' has the name of another column"]),
+        ("x.py", ('"move": number', '"move": number or "0"'), ["'move' has values of the types int, str"]),
+        ("x.py", ("1.5 * speed", "-1.5 * speed"), ["velocity limit -0.75: must be a positive number"]),
+        ("x.py", ('"unshaped_peak_m_s2", "shaped_peak_m_s2"', ""), ["show is empty"]),
+        ("x.py", ("show=(", 'columns=(Column("x", median("peek")),), show=('), ["needs 'peek', no measure"]),
+        ("x.py", ("robot = load", "raise SystemExit(3)\nrobot = load"), ["running it raises SystemExit"]),
     ],
-)
-def test_what_is_wrong_with_a_study_is_a_sentence(tmp_path, change, words):
-    text = "from tvist_lab.study.columns import Column, median\n" + of_the_page()
-    (tmp_path / "speeds.py").write_text(text.replace(*change), encoding="utf-8")
-    with pytest.raises(StudyError, match=words):
-        read_study(tmp_path / "speeds.py")
+)  # fmt: skip
+def test_what_is_wrong_with_a_sweep_or_a_study_is_named(tmp_path, file, change, words):
+    study = "from tvist_lab.study.columns import Column, median\n" + of_the_page()
+    (tmp_path / file).write_text((SPEC if file == "x.toml" else study).replace(*change), encoding="utf-8")
+    kind, read = ("sweep", read_spec) if file == "x.toml" else ("study", read_study)
+    with pytest.raises((SpecError, StudyError)) as error:
+        read(tmp_path / file)
+    assert str(error.value).startswith(f"{kind} {tmp_path / file}")
+    assert all(word in str(error.value) for word in words), error.value

@@ -20,8 +20,7 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, PlantError, SimulatedArm
 from tvist_shaping.named import BUILT_IN
 
-RESTING = 4
-"""Ticks at rest before the motion."""
+RESTING = 4  # ticks at rest before the motion
 
 
 def by_ticks(description, recipe, move, seed):

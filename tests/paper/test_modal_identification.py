@@ -10,9 +10,9 @@ import pytest
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.sources.calibrations import modal_estimator
-from tvist_lab.identification.agreement import SIGNIFICANT
 from tvist_lab.identification.calibrate import calibrate, true_errors
 from tvist_lab.identification.design import choose, free_configurations, jog_of, predicted
+from tvist_lab.identification.forecast import SIGNIFICANT
 from tvist_lab.identification.jogs import make_jogs, plan_jogs
 from tvist_lab.identification.modal_fit import describe, fit_from_many, information, own_poles
 from tvist_lab.identification.ring_downs import CONTRADICTS, IdentificationError

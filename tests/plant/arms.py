@@ -6,6 +6,8 @@ import pinocchio as pin
 
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.imperfections import Imperfections
 from tvist_plant.model import rigid_model
 
 
@@ -42,6 +44,23 @@ def hold(description: RobotDescription, q) -> DriveCommand:
     q = np.array(q, dtype=float)
     gravity = pin.computeGeneralizedGravity(model, model.createData(), q).copy()
     return DriveCommand(q, np.zeros_like(q), gravity)
+
+
+def standing(description: RobotDescription, q, *, carries=None, **imperfections):
+    """The simulated arm at rest in a pose, the command that holds it, and the first measurement.
+
+    Gravity of the file's payload is fed forward; `carries` is another payload that the arm carries.
+    """
+    more = {"imperfections": Imperfections(**imperfections), "substeps": 8} if imperfections else {}
+    arm, command = FlexibleArm(description, description.payload, **more), hold(description, q)
+    return arm, command, arm.reset(command, payload=carries)
+
+
+def rested(arm, command: DriveCommand, ticks: int):
+    """The last measurement of an arm that has been held for some ticks."""
+    for _ in range(ticks):
+        measured = arm.step(command)
+    return measured
 
 
 def chain(joints: int) -> RobotDescription:

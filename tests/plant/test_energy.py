@@ -10,7 +10,7 @@ from tvist_plant.arm_memory import GRAVITY, LAST, NOW
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 
-from .arms import changed, conservative
+from .arms import conservative
 
 PERIODS = (0.002, 0.001, 0.0005)
 
@@ -52,17 +52,3 @@ def test_energy_stays_and_its_drift_shrinks_with_the_period(ur5e, gravity, limit
     assert changes[0] < limit * runs[0][1]
     for coarse, fine in itertools.pairwise(changes):
         assert coarse / fine > 2.5
-
-
-def test_damping_takes_energy_and_never_gives_any(ur5e):
-    arm = conservative(ur5e)
-    arm = changed(arm, "drives", gear_damping=ur5e.drives.gear_damping, coulomb_friction=(6.0,) * 6)
-    plant = FlexibleArm(arm, arm.payload)
-    command = DriveCommand(np.array(arm.poses["Q1"]) + 0.3, np.zeros(6), np.zeros(6))
-    plant.reset(command)
-    energy = [plant.energy()]
-    for _ in range(500):
-        plant.step(command)
-        energy.append(plant.energy())
-    assert np.max(np.diff(energy)) < 1e-3
-    assert energy[-1] < energy[0] - 1.0

@@ -1,14 +1,13 @@
 """The kernel against numpy, its own Python source and Runge-Kutta on the articulated-body algorithm."""
 
 import itertools
-import sys
 
 import numpy as np
 import pytest
 
-from tvist_plant import _compiled, arm_memory, arm_tick, chain, integrator, joint_parameters
+from tvist_plant import arm_memory, arm_tick, chain, integrator
 from tvist_plant.arm_tick import tick
-from tvist_plant.drives import DriveCommand
+from tvist_plant.drives import DriveCommand, springs_and_dampers
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.integrator import cholesky, solve
@@ -91,7 +90,7 @@ def test_compiled_tick_is_its_python_source(ur5e, drive, monkeypatch, imperfecti
     simulated, command = in_motion(ur5e, drive, imperfections), drive[600]
     memory, out = simulated.memory.copy(), np.zeros((2, 21))
     assert tick(simulated.memory, command.q, command.qd, command.torque, out[0])
-    for module in (arm_memory, arm_tick, chain, integrator, joint_parameters):
+    for module in (arm_memory, arm_tick, chain, integrator):
         for name, function in vars(module).copy().items():
             if hasattr(function, "py_func"):
                 monkeypatch.setattr(module, name, function.py_func)
@@ -104,26 +103,17 @@ def test_compiled_tick_is_its_python_source(ur5e, drive, monkeypatch, imperfecti
 def test_the_matrix_of_a_substep_is_that_of_the_equations(ur5e, drive):
     """Motors eliminated first: the links' part of the inverse is that of the whole matrix."""
     simulated = in_motion(ur5e, drive, None)
-    arm, h, linear = arm_memory.parts(simulated.memory), 0.0005, simulated._linear
+    arm, h, joints = arm_memory.parts(simulated.memory), 0.0005, simulated._joints
+    stiffness, damping = springs_and_dampers(simulated._flexible, joints, ur5e.drives)
     links, n = 10, 6
     M = 1.5 * arm.dynamics[arm_memory.NOW, :links] - 0.5 * arm.dynamics[arm_memory.LAST, :links]
-    S = 0.5 * h * linear.damping + 0.25 * h**2 * linear.stiffness
+    S = 0.5 * h * damping + 0.25 * h**2 * stiffness
     S[:links, :links] += np.triu(M) + np.triu(M, 1).T
     motors = links + np.arange(n)
-    S[motors, motors] += linear.rotor_inertia + 0.125 * h**3 * linear.integral_gain
+    S[motors, motors] += joints.rotor_inertia + 0.125 * h**3 * joints.integral_gain
     integrator.factorise(arm, h)
     L = np.tril(arm.factor, -1) + np.diag(1.0 / np.diag(arm.factor))
     np.testing.assert_allclose(np.linalg.inv(L @ L.T), np.linalg.inv(S)[:links, :links], rtol=1e-9)
-
-
-def test_without_numba_the_python_function_serves(monkeypatch):
-    monkeypatch.setitem(sys.modules, "numba", None)
-
-    def double(x):
-        return 2 * x
-
-    assert _compiled.compiled(double) is double
-    assert double.py_func is double
 
 
 def test_acceleration_is_that_of_runge_kutta_with_friction(arm, drive, felt_by_runge_kutta, measured):

@@ -1,12 +1,10 @@
 """The two multibody models against textbook kinematics and against each other."""
 
-import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from tvist_plant.description import Payload, load
-from tvist_plant.drives import LinearPart
+from tvist_plant.description import load
 from tvist_plant.model import FLANGE, carries_weight, flexible_model, rigid_model
 
 from .arms import chain, forward_kinematics
@@ -25,12 +23,6 @@ def stiff(flexible, q):
 
 def symmetric(M):
     return np.triu(M) + np.triu(M, 1).T
-
-
-def test_mass_is_that_of_the_links_and_the_payload(ur5e):
-    total = sum(ur5e.links.mass) + ur5e.payload.mass
-    assert pin.computeTotalMass(rigid_model(ur5e, ur5e.payload)) == pytest.approx(total, rel=1e-12)
-    assert pin.computeTotalMass(flexible_model(ur5e, ur5e.payload).model) == pytest.approx(total, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -95,68 +87,6 @@ def test_lumps_change_the_mass_matrix_by_the_inertia_they_change_and_nothing_els
     assert largest < 0.05
 
 
-def test_virtual_joints_turn_about_the_middle_of_their_link(ur5e):
-    """Bending by a small angle moves the flange by that angle times its distance from the middle."""
-    flexible = flexible_model(ur5e, Payload())
-    data = flexible.model.createData()
-    q = np.zeros(6)
-    angles = stiff(flexible, q)
-    jacobian = pin.computeFrameJacobian(
-        flexible.model, data, angles, flexible.flange, pin.LOCAL_WORLD_ALIGNED
-    )
-    flange = forward_kinematics(ur5e, q)[:3, 3]
-    kinematics = ur5e.kinematics
-    for number, dof in zip((1, 2), flexible.flexes[1::2], strict=True):
-        part = msgspec.structs.replace(
-            ur5e,
-            kinematics=msgspec.structs.replace(
-                kinematics,
-                a=(*kinematics.a[:number], kinematics.a[number] / 2),
-                d=kinematics.d[: number + 1],
-                alpha=kinematics.alpha[: number + 1],
-            ),
-        )
-        middle = forward_kinematics(part, q[: number + 1])
-        np.testing.assert_allclose(
-            jacobian[:3, dof], np.cross(middle[:3, 2], flange - middle[:3, 3]), atol=1e-12
-        )
-
-
 def test_an_arm_with_vertical_axes_alone_carries_no_weight():
     assert carries_weight(load("ur5e"))
     assert not carries_weight(load("one-joint"))
-
-
-@pytest.fixture
-def arm(ur5e):
-    return flexible_model(ur5e, ur5e.payload)
-
-
-def test_matrices_are_symmetric_and_take_energy(ur5e, arm):
-    linear = LinearPart.of(arm, ur5e.drives)
-    for matrix in (linear.stiffness, linear.damping):
-        np.testing.assert_array_equal(matrix, matrix.T)
-        assert np.linalg.eigvalsh(matrix).min() >= -1e-9
-    assert linear.stiffness.shape == (16, 16)
-
-
-def test_turning_the_whole_drive_train_twists_no_gear(ur5e, arm):
-    """A joint and its motor turned alike feel the position loop alone."""
-    linear = LinearPart.of(arm, ur5e.drives)
-    together = np.zeros(16)
-    together[arm.joints] = together[10:] = np.arange(1.0, 7.0)
-    torque = linear.stiffness @ together
-    np.testing.assert_allclose(torque[:10], 0.0, atol=1e-9)
-    drives = ur5e.drives
-    expected = np.array(drives.velocity_gain) * (np.array(drives.position_gain) + drives.integral_gain)
-    np.testing.assert_allclose(torque[10:], expected * np.arange(1.0, 7.0), rtol=1e-12)
-
-
-def test_a_twisted_gear_pulls_both_ways(ur5e, arm):
-    linear = LinearPart.of(arm, ur5e.drives)
-    twist = np.zeros(16)
-    twist[arm.joints[2]] = 1e-3
-    torque = linear.stiffness @ twist
-    assert torque[arm.joints[2]] == pytest.approx(32.5)
-    assert torque[12] == pytest.approx(-32.5)
-    assert np.count_nonzero(torque) == 2

@@ -5,7 +5,6 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import least_squares
 
-from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import rigid_model
@@ -96,22 +95,6 @@ def test_a_ring_down_of_the_nonlinear_arm_has_the_declared_mode(
     nearest = np.argmin(np.abs(declared.f_d - f_d))
     assert nearest <= 1
     assert declared.zeta[nearest] == pytest.approx(zeta, rel=0.01)
-
-
-def test_turning_the_base_changes_no_mode(plant):
-    q = np.array([0.0, -2.1, 1.1, -0.4, 0.7, 0.2])
-    straight, turned = modes(plant, q), modes(plant, [1.234, *q[1:]])
-    for name in ("f_d", "zeta", "participation"):
-        np.testing.assert_allclose(getattr(straight, name), getattr(turned, name), rtol=1e-6)
-
-
-def test_a_heavier_payload_lowers_every_pose(ur5e):
-    poses = np.random.default_rng(3).uniform(-np.pi, np.pi, (10, 6))
-    lowest = []
-    for mass in (0.0, 2.5, 5.0):
-        plant = FlexibleArm(ur5e, Payload(mass=mass, com=ur5e.payload.com))
-        lowest.append([modes(plant, q).f_d[0] for q in poses])
-    assert np.all(np.diff(lowest, axis=0) < 0.0)
 
 
 def test_without_a_pose_the_modes_are_those_where_the_arm_is(ur5e, plant):

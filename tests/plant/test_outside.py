@@ -6,11 +6,11 @@ import pytest
 
 from tvist_plant.description import Payload
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.imperfections import Imperfections, YieldingBase
+from tvist_plant.imperfections import YieldingBase
 from tvist_plant.model import flexible_model
 from tvist_plant.outside import Outside
 
-from .arms import chain, hold, quiet
+from .arms import chain, quiet, rested, standing
 
 FORCE, MOMENT, POINT = (30.0, -20.0, 50.0), (4.0, 7.0, -3.0), (0.02, -0.03, 0.05)
 
@@ -61,41 +61,30 @@ def test_a_wrench_on_any_body_is_what_pinocchio_makes_of_it(joints):
 
 def test_a_weight_hung_on_the_flange_bends_the_arm_as_a_payload_does(arm):
     """In the end: a payload has inertia, too."""
-    loaded = FlexibleArm(arm, arm.payload)
-    command = hold(arm, arm.poses["Q1"])
-    expected = loaded.reset(command).q, loaded.truth()
-    bare = FlexibleArm(arm, Payload())
-    bare.reset(command)
+    loaded, command, expected = standing(arm, arm.poses["Q1"])
+    bare, *_ = standing(arm, arm.poses["Q1"], carries=Payload())
     weight = (0.0, 0.0, -9.81 * arm.payload.mass)
     bare.push_body("flange", weight, point=arm.payload.com)
-    for _ in range(3000):
-        measured = bare.step(command)
-    truth = bare.truth()
-    np.testing.assert_allclose(measured.q, expected[0], rtol=0.0, atol=2e-5)
-    np.testing.assert_allclose(truth.link_deflection, expected[1].link_deflection, rtol=0.0, atol=1e-6)
-    assert np.abs(truth.link_deflection).max() > 1e-5
+    np.testing.assert_allclose(rested(bare, command, 3000).q, expected.q, rtol=0.0, atol=2e-5)
+    bent, deflection = bare.truth().link_deflection, loaded.truth().link_deflection
+    np.testing.assert_allclose(bent, deflection, rtol=0.0, atol=1e-6)
+    assert np.abs(bent).max() > 1e-5
 
 
 def test_a_moment_about_a_joint_and_its_reaction_are_a_torque_on_the_joint(arm):
     q = np.array(arm.poses["Q3"])
-    command = hold(arm, q)
-    pushed, twisted = FlexibleArm(arm, arm.payload), FlexibleArm(arm, arm.payload)
-    for one in (pushed, twisted):
-        one.reset(command)
+    (pushed, command, _), (twisted, *_) = (standing(arm, q) for _ in range(2))
     axis = placed(pushed._flexible, pushed._q).oMi[2].rotation[:, 2]
     pushed.push(np.array([0.0, 25.0, 0.0, 0.0, 0.0, 0.0]))
     twisted.push_body("shoulder", moment=25.0 * axis)
     twisted.push_body("base", moment=-25.0 * axis)
-    for _ in range(50):
-        a, b = pushed.step(command), twisted.step(command)
+    a, b = (rested(one, command, 50) for one in (pushed, twisted))
     np.testing.assert_allclose(a.q, b.q, rtol=0.0, atol=1e-8)
     assert np.abs(a.q - q).max() > 1e-4
 
 
 def test_a_push_ends_with_zeros_or_a_reset(arm):
-    one = FlexibleArm(arm, arm.payload)
-    command = hold(arm, arm.poses["Q1"])
-    rest = one.reset(command)
+    one, command, rest = standing(arm, arm.poses["Q1"])
     one.push_body("flange", FORCE)
     one.push_body("elbow", FORCE)
     one.step(command)
@@ -109,13 +98,10 @@ def test_a_push_ends_with_zeros_or_a_reset(arm):
 
 
 def test_the_ring_of_a_base_that_yields_is_a_body_too(arm):
-    one = FlexibleArm(arm, arm.payload, imperfections=Imperfections(base=YieldingBase()))
-    command = hold(arm, arm.poses["Q1"])
-    one.reset(command)
+    one, command, _ = standing(arm, arm.poses["Q1"], base=YieldingBase())
     before = one._q[1]
     one.push_body("base_y", moment=(0.0, 150.0, 0.0))
-    for _ in range(1000):
-        one.step(command)
+    rested(one, command, 1000)
     assert one._q[1] - before == pytest.approx(150.0 / 1.5e5, rel=1e-2)
 
 

@@ -48,7 +48,7 @@ def test_names_stand_for_the_numbers_of_their_labels(ur5e):
         )
         assert arm.drives.velocity_gain == ur5e.drives.velocity_gain
     assert variant("torsion").make(ur5e, ur5e.payload, 0)._imperfections.torsion == TORSION
-    np.testing.assert_array_equal(variant("backlash").make(ur5e, ur5e.payload, 0)._law.backlash, BACKLASH)
+    np.testing.assert_array_equal(variant("backlash").make(ur5e, ur5e.payload, 0)._joints.backlash, BACKLASH)
     combined = variant("combined").make(ur5e, ur5e.payload, 7)
     ratio = np.array(combined.description.drives.gear_stiffness) / ur5e.drives.gear_stiffness
     np.testing.assert_allclose(np.abs(ratio - 1.0), 0.15)
@@ -83,7 +83,7 @@ def test_other_arms_have_backlash_like_the_joints_of_a_ur5e():
     """Seven joints, and a chain of three, get a width for each joint; an arm with rigid links cannot twist."""
     for joints in (3, 7):
         arm = chain(joints)
-        assert len(variant("backlash").make(arm, arm.payload, 0)._law.backlash) == joints
+        assert len(variant("backlash").make(arm, arm.payload, 0)._joints.backlash) == joints
     with pytest.raises(ValueError, match="torsion is 20000 N m/rad, but no link"):
         variant("torsion").make(load("one-joint"), Payload(), 0)
 

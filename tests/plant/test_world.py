@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from tvist_plant.description import Payload, load
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import GRAVITY, Hand, Plant, PlantError, SimulatedArm
+from tvist_plant.plant import GRAVITY, Hand, Plant, PlantError
 from tvist_plant.world import apart
 from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_plant.world.scene_file import SceneError, find_scene, scenes
@@ -290,19 +290,6 @@ def test_equal_runs_are_equal_to_the_bit_and_a_reset_puts_everything_back(tmp_pa
         )
     for first, second in zip(*runs, strict=True):
         np.testing.assert_array_equal(first, second)
-
-
-def test_many_periods_are_as_one_by_one(tmp_path, ur5e):
-    commands = np.array([[one.q, one.qd, one.torque] for one in moving(DOWN, 40)])
-    found = []
-    for how in (lambda arm: arm.play(commands), lambda arm: SimulatedArm.play(arm, commands)):
-        arm = MujocoArm(ur5e, ur5e.payload, find_scene("table"))
-        arm.reset(still(DOWN))
-        found.append(how(arm))
-    for name in ("specific_force", "flange_position", "flange_rotation"):
-        np.testing.assert_array_equal(*(getattr(one, name) for one in found))
-    for name in ("q", "qd", "moment", "accelerometer"):
-        np.testing.assert_array_equal(*(getattr(one.measured, name) for one in found))
 
 
 def test_a_push_moves_it_and_a_state_that_is_no_number_fails(tmp_path, monkeypatch):

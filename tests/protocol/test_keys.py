@@ -14,8 +14,7 @@ LEAVES = [leaf for leaf in get_args(keys.Leaf) if leaf != "client"]
 def test_a_clients_key_and_its_name_back():
     key = keys.client("ur5e", "palletizer 2")
     assert key == "tvist/ur5e/client/palletizer 2"
-    assert keys.client_name("ur5e", key) == "palletizer 2"
-    assert keys.client_session("ur5e", key) == ""
+    assert keys.client_of("ur5e", key) == ("palletizer 2", "")
     assert keys.any_client("ur5e") == "tvist/ur5e/client/**"
     assert keys.ANY_ALIVE == "tvist/*/alive"
 
@@ -24,7 +23,7 @@ def test_a_clients_key_and_its_name_back():
 def test_a_clients_key_may_say_which_session_it_is_of(session):
     key = keys.client("ur5e", "palletizer 2", session)
     assert key == f"tvist/ur5e/client/palletizer 2/{session}"
-    assert (keys.client_name("ur5e", key), keys.client_session("ur5e", key)) == ("palletizer 2", session)
+    assert keys.client_of("ur5e", key) == ("palletizer 2", session)
 
 
 @pytest.mark.parametrize("session", ["*", "A1", "a/b", "x", "a" * 33, "a\n", " "])
@@ -42,8 +41,7 @@ NO_CLIENTS = [
 
 @pytest.mark.parametrize("key", NO_CLIENTS)
 def test_a_key_that_is_no_clients_has_neither_name_nor_session(key):
-    assert keys.client_name("ur5e", key) is None
-    assert keys.client_session("ur5e", key) == ""
+    assert keys.client_of("ur5e", key) is None
 
 
 @pytest.mark.parametrize("name", ["a", "0", "ur5e", "cell-3_left", "a" * 64])

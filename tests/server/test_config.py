@@ -84,12 +84,12 @@ def test_what_does_not_fit_the_rest(values, named):
 
 def test_one_robot_has_the_name_of_its_file_and_several_have_numbers():
     def names(text):
-        return [member.name for member in members(text)]
+        return [name for _, name in members(text)]
 
     assert names("ur5e") == names("ur5e*1") == ["ur5e"]
     assert names("ur5e*2,/a/b/other.toml") == ["ur5e-1", "ur5e-2", "other"]
     assert names("ur5e, other.toml*2 ,ur5e") == ["ur5e-1", "other-1", "other-2", "ur5e-2"]
-    assert [member.robot for member in members("ur5e,x/other.toml*2")] == ["ur5e", *2 * ["x/other.toml"]]
+    assert [robot for robot, _ in members("ur5e,x/other.toml*2")] == ["ur5e", *2 * ["x/other.toml"]]
     assert len(members(f"ur5e*{MAX_ROBOTS}")) == MAX_ROBOTS
 
 

@@ -6,8 +6,7 @@ import pytest
 
 from tvist_protocol.codec import MAX_BYTES
 from tvist_server.gateways.access import access_control, open_access, router_access
-from tvist_server.gateways.endpoints import is_local
-from tvist_server.gateways.exposure import guarded
+from tvist_server.gateways.exposure import guarded, is_local
 from tvist_server.option_values import StartError
 
 LOCAL = """

@@ -29,7 +29,7 @@ LAG = 17
 """Periods by which the arm of a program alone follows `servoj`."""
 BACK = 1.1 * CLOSE / H**2
 """Acceleration with which the rest of a distance from the set-points is made up for [rad/s²]."""
-GIVEN = {"speed": 0.5, "deceleration": 4.0, "lookahead": 0.03, "gain": 2000.0}
+GIVEN = {"speed": 0.5, "deceleration": 4.0}
 DOCUMENTED = {
     *("get_steptime", "sync", "pow", "norm", "servoj", "stopj", "get_target_joint_positions", "textmsg"),
     *("read_input_integer_register", "read_input_float_register", "write_output_integer_register"),
@@ -49,7 +49,7 @@ class Followed:
     def __init__(self, speed, deceleration, step):
         self.speed, self.most, self.tick = speed, MARGIN * speed * step, 0
         self.told, self.at, self.numbers, self.alone = [], [], [], []
-        self.text = program(RUN, speed=speed, deceleration=deceleration, lookahead=0.03, gain=2000.0)
+        self.text = program(RUN, speed=speed, deceleration=deceleration)
         if step != H:
             self.text = self.text.replace("get_steptime()", str(step))
 
@@ -236,7 +236,7 @@ def test_the_program_is_correct_and_calls_documented_functions_alone():
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("run", 0), ("run", 2**31), ("speed", 0.0), ("lookahead", 0.02), ("gain", float("nan"))],
+    [("run", 0), ("run", 2**31), ("speed", 0.0), ("deceleration", float("nan"))],
 )
 def test_what_a_robot_would_not_take_is_refused(name, value):
     with pytest.raises(ValueError, match=f"^{name} is .*: must be"):

@@ -8,10 +8,10 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from tvist_protocol.stream import Event, Telemetry
 from tvist_server.gateways.base import GatewayError
-from tvist_server.gateways.metrics import COUNTERS, Metrics, page, place
+from tvist_server.gateways.metrics import FIGURES, Metrics, MetricsGateway, page, place
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "generated" / "metrics.md"
-COUNTS = dict.fromkeys((field for _, _, field in COUNTERS), 7)
+COUNTS = {field: 7 for kind, _, _, source, field in FIGURES if (kind, source) == ("counter", "telemetry")}
 TELEMETRY = Telemetry(
     tick=1000, ticks_per_second=499.5, late_p50_us=50.0, late_p99_us=900.0, late_max_us=2000.0, load=0.13,
     overloaded=True, **COUNTS
@@ -35,7 +35,7 @@ def read(metrics):
 
 
 def test_what_a_robot_says_is_on_the_page_with_its_place(metrics):
-    gateway = metrics.gateway("hall-3", "left", nobody)
+    gateway = metrics.add(MetricsGateway("hall-3", "left", nobody))
     gateway.publish("telemetry", TELEMETRY, b"")
     for _ in range(2):
         gateway.publish("event", Event(tick=1, kind="lease_lost", id=None, why="gone"), b"")
@@ -51,7 +51,7 @@ def test_what_a_robot_says_is_on_the_page_with_its_place(metrics):
     assert (overloaded.labels, overloaded.value) == (labels, 1.0)
     (events,) = (sample for sample in families["tvist_events"].samples if sample.name.endswith("_total"))
     assert (events.labels, events.value) == ({**labels, "kind": "lease_lost"}, 2)
-    assert {name for name, _, _ in COUNTERS} < set(families)
+    assert {name for _, name, *_ in FIGURES} < set(families)
 
 
 def test_the_page_of_reference_is_up_to_date():

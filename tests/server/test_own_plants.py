@@ -107,7 +107,7 @@ def moved(chosen, path, ticks=300):
     token = decode_reply(host.request("a", encode(c.TakeControl(client="a", lease_s=30.0)))).token
     assert decode_reply(host.request("a", encode(c.MoveJ(token=token, q=tuple(Q2.tolist()))))).id == 1
     controller = host.controller
-    with Recorder(path, info_of(controller), controller.setup.to_builtins(), overwrite=True) as recorder:
+    with Recorder(path, info_of(controller), controller.setup.to_builtins()) as recorder:
         for entry in host.entries:
             recorder.journal(entry)
         for _ in range(ticks):
@@ -160,7 +160,8 @@ def test_a_hidden_robot_replays_to_the_last_bit_and_only_its_seed_tells_of_it(tm
     found = moved(setup(hidden=SEED), tmp_path / "hidden.mcap")
     again = replay_file(found)
     assert (again.first_difference, len(again.truths)) == (None, 0)
-    plain, other = (moved(setup(**hidden), tmp_path / "x.mcap") for hidden in ({}, {"hidden": SEED + 1}))
+    plain = moved(setup(), tmp_path / "plain.mcap")
+    other = moved(setup(hidden=SEED + 1), tmp_path / "other.mcap")
     for one in (plain, other):
         assert np.abs(np.array(found.states[-1].actual_q) - one.states[-1].actual_q).max() > 1e-5
     assert [state.target_q for state in found.states] == [state.target_q for state in plain.states]

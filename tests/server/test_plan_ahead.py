@@ -65,7 +65,7 @@ class Served:
 
     def empty(self, ticks=0):
         """Run jobs, and ticks between them, until nothing waits any more."""
-        while self.ahead.waiting or self.jobs:
+        while self.ahead._count or self.jobs:
             with self.came:
                 job = self.jobs.popleft() if self.came.wait_for(lambda: self.jobs, 0.01) else None
             if job is not None:

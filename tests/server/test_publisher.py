@@ -21,9 +21,6 @@ class NotingGateway(Gateway):
             raise ZeroDivisionError
         self.published.append((topic, data))
 
-    def close(self):
-        """Nothing is open."""
-
 
 def test_a_gateway_that_fails_is_logged_and_the_others_get_each_message_in_order(caplog):
     robot, gateways, publisher = (
@@ -31,7 +28,7 @@ def test_a_gateway_that_fails_is_logged_and_the_others_get_each_message_in_order
         [NotingGateway(fails=fails) for fails in (False, True, False)],
         Publisher(),
     )
-    publisher.open(gateways)
+    publisher.gateways = gateways
     state = robot.tick()
     publisher.event(Event(tick=1, kind="warning"))
     publisher.io(robot.controller.io())
@@ -44,7 +41,7 @@ def test_a_gateway_that_fails_is_logged_and_the_others_get_each_message_in_order
 
 def test_what_no_gateway_takes_is_not_made():
     robot, gateway, publisher = Robot(truth=True), NotingGateway(), Publisher()
-    publisher.open([gateway])
+    publisher.gateways = [gateway]
     gateway.wanted_topics = {"event"}
     state, report = robot.tick(), copy(robot.controller.report)
     report.made = report.written = None

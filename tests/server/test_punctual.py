@@ -4,7 +4,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 
 import pytest
 
@@ -12,7 +11,6 @@ from tvist_controller.kinematics import arm
 from tvist_controller.safety import payload_student
 from tvist_plant.description import load
 from tvist_server import punctual
-from tvist_server.studies import Studies
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="asked of Linux")
 
@@ -39,16 +37,10 @@ def test_a_thread_knows_how_long_it_has_waited_for_a_processor():
     in_a_thread(wait)
 
 
-def test_studies_run_on_other_processors_than_the_tick_thread():
-    studies, found = Studies(), []
-
-    def tick():
-        ended = studies.later(lambda: found.append(os.sched_getaffinity(0)))
-        while not ended():
-            time.sleep(0.001)
-
-    in_a_thread(tick)
-    studies.close()
+def test_slow_work_runs_on_other_processors_than_the_tick_thread():
+    thread, found = punctual.background("slow"), []
+    in_a_thread(lambda: found.append(thread.submit(os.sched_getaffinity, 0).result()))
+    thread.shutdown()
     assert found == [os.sched_getaffinity(0)]
 
 

@@ -1,7 +1,5 @@
 """What a served robot tells between two ticks."""
 
-from types import SimpleNamespace
-
 from tests.controller.robots import setup
 
 from tvist_lab.recordings.mcap_file import read
@@ -18,17 +16,12 @@ from tvist_server.robot import ServedRobot
 class Told(Gateway):
     """Keeps what is told of a kind."""
 
-    setpoints_refused = 0
-
     def __init__(self, kind):
         self.kind, self.told = kind, []
 
     def publish(self, _topic, message, _data):
         if isinstance(message, self.kind):
             self.told.append(message)
-
-    def close(self):
-        """Nothing is open."""
 
 
 def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_last_commands(tmp_path):
@@ -39,7 +32,7 @@ def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_las
     assert gateway.told[-1].program_state == "STOPPED"
     assert robot.request(ProgramLoad(name="paper.urp")) == Done()
     assert robot.request(ProgramPlay(token=token)) == Done()
-    robot.tell_telemetry(SimpleNamespace(punctuality=lambda _: None))
+    robot.tell_telemetry()
     robot.driven.jobs.do_waiting()
     assert [(io.program, io.program_state) for io in gateway.told[1:]] == [("paper.urp", "PLAYING")]
 
@@ -50,9 +43,9 @@ def test_the_recording_has_inputs_and_outputs_from_the_first_tick_on(tmp_path):
     robot.request(SimulationStep(token=token, ticks=3))
     robot.request(SetIo(token=token, digital_output_mask=2, digital_outputs=2))
     robot.request(SimulationStep(token=token, ticks=2))
-    robot.close_recording()
+    robot.recorder.close()
     content = read(tmp_path / "run.mcap")
-    assert [(io.tick, io.actual_digital_output_bits) for io in content.io] == [(1, 0), (4, 2)]
+    assert [(io.tick, io.actual_digital_output_bits) for io in content.again(Io)] == [(1, 0), (4, 2)]
     assert content.recording["actual_digital_output_bits"].tolist() == [0, 0, 0, 2, 2]
 
 

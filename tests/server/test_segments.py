@@ -12,7 +12,7 @@ from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings import read as read_log
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
-from tvist_protocol import Event, Io, State, Truth
+from tvist_protocol import Event, Io, State
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import segment_name, segment_of, topics
 from tvist_server.recording import RecorderError, writer
@@ -65,9 +65,8 @@ def assert_whole(content, last, at_least=KEEP):
 
 def record_all(path, ticks):
     with Recorder(path, INFO, {"seed": 1}, keep=KEEP, wait=True) as recorder:
-        take = {State: recorder.state, Truth: recorder.truth, Event: recorder.event, Io: recorder.io}
         for message in messages(ticks):
-            take.get(type(message), recorder.journal)(message)
+            recorder.take(message)
     assert recorder.error is None
     return recorder
 
@@ -88,7 +87,7 @@ def test_a_recording_holds_the_last_ticks_in_segments_of_a_quarter_of_them_each(
 
 def test_what_a_segment_lacks_is_counted_in_it_and_in_the_whole(path):
     dropped = dict.fromkeys(topics(INFO.name), 0)
-    written = Segments(path, topics(INFO.name), heading(INFO, {}), dropped, overwrite=False, keep=KEEP)
+    written = Segments(path, topics(INFO.name), heading(INFO, {}), dropped, KEEP)
     for message in messages(60):
         if isinstance(message, State):
             dropped[State] += message.tick in (3, 30, 31)

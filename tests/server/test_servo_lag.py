@@ -12,7 +12,8 @@ from tvist_controller.line.limits import arm_limits
 from tvist_controller.trajectory import JointLine, MotionLimits, ServoFollower, quickest_motion
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD
-from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, ServoSetpoints
+from tvist_server.moving.program import GAIN, LOOKAHEAD
+from tvist_server.moving.servo_lag import ServoLag, ServoSetpoints
 
 REACH = np.array(UR5E.limits.position)
 FAST = 10.0

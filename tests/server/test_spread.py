@@ -5,10 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
+from tvist_server.assembly import check_together, shares
 from tvist_server.config import from_mapping
 from tvist_server.gateways.access import open_access, with_robots_behind
 from tvist_server.option_values import StartError
-from tvist_server.spread import check_together, shares
 
 
 @examples(20)

@@ -54,16 +54,6 @@ def test_a_constant_comes_out_bit_for_bit_at_any_delay(value, name, zeta, spacin
     assert out[0] == value
 
 
-@given(samples, st.integers(1, 17), st.floats(0.0, 0.99))
-def test_whole_delays_with_positive_amplitudes_stay_between_the_samples(values, delay, zeta):
-    line = filled(values)
-    A = shaper("zv").function(1.0, zeta).A
-    out = np.zeros(2)
-    line.gather(A, np.array([0.0, float(delay)]), out)
-    low, high = sorted((values[-1], values[-1 - delay]))
-    assert low - 1e-14 <= out[0] <= high + 1e-14
-
-
 @given(samples, st.floats(0.0, 17.0), st.floats(0.0, 0.99))
 def test_fractional_delays_pass_the_samples_by_no_more_than_a_cubic_can(values, delay, zeta):
     line = filled(values)

@@ -59,15 +59,6 @@ def test_the_fast_evaluation_equals_the_design_matrix_times_the_coefficients(q, 
         assert not estimator.saturating
 
 
-@given(configurations, st.sampled_from([1, 2, 3]))
-def test_a_trigonometric_estimate_is_periodic_in_every_joint(q, joint):
-    estimator, _ = polynomial(degree=3, centre=[0.1, -0.2, 0.3])
-    turned = np.array(q)
-    turned[joint] += 2.0 * np.pi
-    for here, there in zip(estimator.estimate(np.array(q)), estimator.estimate(turned), strict=True):
-        np.testing.assert_allclose(here, there, rtol=1e-12)
-
-
 def wave(**changes):
     """f_d = 10.5 + 20 sin(q) in [Hz], ζ = 0.3, held in 6 to 15 Hz."""
     parameters = {"f_d_range": (6.0, 15.0), "zeta_range": (0.05, 0.5)} | changes

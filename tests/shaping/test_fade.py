@@ -8,8 +8,8 @@ from tests.examples import examples
 
 from tvist_shaping import SHAPERS, Fade, FilterError, Fixed, Polynomial, ShapingError, TvistFilter, shaper
 
-H = 0.002
-VELOCITY, ACCELERATION, JERK = 1.5, 2.0, 100.0
+from .motions import ACCELERATION, JERK, VELOCITY, H, double_s
+
 TOLERANCE = 1e-6
 """Share of a limit that is rounding."""
 STREAMED = 1e-4
@@ -24,20 +24,6 @@ VARYING = Polynomial(
     f_d_range=(5.0, 17.0),
     zeta_range=(0.05, 0.5),
 )
-
-
-def double_s(way, share=1.0):
-    """A motion at a share of the limits, as a convolution of three boxes, and half a second of rest after it."""
-    way = np.asarray(way, dtype=float)
-    velocity, acceleration, jerk = share * VELOCITY, share**2 * ACCELERATION, share**3 * JERK
-    longest = np.abs(way).max()
-    velocity = min(velocity, np.sqrt(longest * acceleration))
-    times = (longest / velocity, velocity / acceleration, acceleration / jerk)
-    profile = np.ones(1)
-    for time in times:
-        ticks = int(np.ceil(time / H))
-        profile = np.convolve(profile, np.full(ticks, 1.0 / ticks))
-    return np.concatenate([np.cumsum(profile), np.ones(250)])[:, None] * way
 
 
 def a_filter(random, name, joints=3):

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from tests.examples import examples
 
@@ -21,48 +21,61 @@ from tvist_shaping import (
 from tvist_shaping import filter as module
 from tvist_shaping.filter import QUICKEST
 from tvist_shaping.named import make_filter
+from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
 
-names = st.sampled_from(list(SHAPERS))
+from .motions import H, double_s, shaped_by
+
+names = st.sampled_from([*SHAPERS, "product", "short"])
+
+
+DESIGNS = {"product": lambda: ProductDesign(0.13), "short": ShortDesign}
 
 
 class Jumping(Estimator):
     """Other modes every tick, without any sense."""
 
-    modes = 2
     f_d_min = 5.0
-    zeta_max = 0.9
 
-    def __init__(self, seed, name="zv"):
-        self.zeta_max = 0.9 * SHAPERS[name].zeta_max
+    def __init__(self, seed, name="zv", modes=2):
+        self.modes, self.zeta_max = modes, 0.9 * SHAPERS[name].zeta_max
         self.random = np.random.default_rng(seed)
         self.seen = []
 
     def estimate(self, q):
         self.seen.append(q.copy())
-        return self.random.uniform(5.0, 30.0, 2), self.random.uniform(0.0, self.zeta_max, 2)
+        f_d = self.random.uniform(5.0, 30.0, self.modes)
+        return f_d, self.random.uniform(0.0, self.zeta_max, self.modes)
+
+
+def jumping(name, seed, joints):
+    """A filter by the name of a shaper or a design, whose modes jump at every tick."""
+    if name in SHAPERS:
+        return TvistFilter(shaper(name), Jumping(seed, name), joints=joints)
+    design = DESIGNS[name]()
+    return SteadyFilter(design, Jumping(seed, modes=design.modes), joints=joints)
 
 
 @examples(30)
 @given(names, st.integers(0, 2**32 - 1), st.lists(st.floats(-7.0, 7.0), min_size=3, max_size=3))
+@example("product", 0, [1.1, -2.0, 6.9])
+@example("short", 0, [1.1, -2.0, 6.9])
 def test_a_reference_at_rest_passes_bit_for_bit_whatever_the_parameters_do(name, seed, q):
-    tvist = TvistFilter(shaper(name), Jumping(seed, name), joints=3)
+    tvist = jumping(name, seed, 3)
     tvist.reset(q)
-    for _ in range(50):
-        np.testing.assert_array_equal(tvist.filter(q), q)
+    for shaped in shaped_by(tvist, [q] * 50):
+        np.testing.assert_array_equal(shaped, q)
 
 
 @examples(15)
 @given(names, st.integers(0, 2**32 - 1))
+@example("product", 0)
+@example("short", 0)
 def test_the_end_of_a_motion_is_reached_bit_for_bit_whatever_the_parameters_do(name, seed):
     random = np.random.default_rng(seed)
-    tvist = TvistFilter(shaper(name), Jumping(seed, name), joints=2)
-    for q in np.cumsum(random.normal(size=(200, 2)), axis=0):
-        tvist.filter(q)
+    tvist = jumping(name, seed, 2)
+    shaped_by(tvist, np.cumsum(random.normal(size=(200, 2)), axis=0))
     end = random.normal(size=2)
-    longest = 2 * SHAPERS[name].duration_periods / 5.0 / 0.002
-    for _ in range(int(longest) + 4):
-        last = tvist.filter(end)
-    np.testing.assert_array_equal(last, end)
+    np.testing.assert_array_equal(shaped_by(tvist, [end] * (tvist._reach + 1))[-1], end)
 
 
 def test_the_output_is_the_convolution_with_the_impulses():
@@ -84,8 +97,9 @@ def test_the_estimator_reads_the_previous_shaped_reference():
     np.testing.assert_array_equal(estimator.seen, [np.zeros(1), *shaped[:-1]])
 
 
-def test_all_joints_get_the_same_impulses():
-    tvist = TvistFilter(shaper("ei2"), Jumping(1), joints=3)
+@pytest.mark.parametrize("name", ["ei2", *DESIGNS])
+def test_all_joints_get_the_same_weights(name):
+    tvist = jumping(name, 1, 3)
     direction = np.array([1.0, -2.0, 0.5])
     for x in np.random.default_rng(1).normal(size=100):
         shaped = tvist.filter(x * direction)
@@ -261,9 +275,6 @@ def test_where_the_compiled_run_cannot_go_on_the_filter_does(monkeypatch):
     assert_equal(tvist, plain)
 
 
-H = 0.002
-
-
 class Jump(Estimator):
     """One mode, whose frequency and damping jump at q = 1."""
 
@@ -298,29 +309,8 @@ def test_where_the_arm_rests_the_modes_are_exact():
     assert shaped[-1] == 1.2
 
 
-def test_a_fork_continues_with_the_same_bits():
-    q = np.linspace(0.0, 3.0, 400)[:, None]
-    tvist = TvistFilter(shaper("zv"), Jump(), joints=1)
-    played(tvist, q[:180])
-    other = tvist.fork()
-    rest = [np.array([one.filter(sample) for sample in q[180:]]) for one in (tvist, other)]
-    assert (rest[0] == rest[1]).all()
-
-
 STROKE = 5.0 * np.pi / 6.0  # [rad]
-VELOCITY, ACCELERATION, JERK_TIME = 1.5, 2.0, 0.020  # [rad/s] [rad/s²] [s]
-
-
-@pytest.fixture(scope="module")
-def double_s():
-    """A double-S move [rad] and rest: a ramp, twice averaged, is just that."""
-    t = H * np.arange(int(3.6 / H))
-    position = np.clip(VELOCITY * (t - 0.1), 0.0, STROKE)
-    for window in (VELOCITY / ACCELERATION, JERK_TIME):
-        n = round(window / H)
-        position = np.convolve(position, np.ones(n) / n)[: t.size]
-    position[-int(0.5 / H) :] = STROKE
-    return position
+MOVE = double_s([STROKE])[:, 0]
 
 
 @pytest.fixture
@@ -345,26 +335,24 @@ def peak_acceleration(position):
 def shape(position, name, modes):
     tvist = TvistFilter(shaper(name), modes, joints=1, period=H)
     tvist.reset([position[0]])
-    return np.array([tvist.filter([q])[0] for q in position])
+    return shaped_by(tvist, position[:, None])[:, 0]
 
 
-def test_while_the_frequency_sweeps_the_acceleration_stays_near_its_limit(double_s, modes):
-    assert peak_acceleration(shape(double_s, "zv", modes)) < 2.1
-    assert peak_acceleration(shape(double_s[::-1].copy(), "zv", modes)) < 2.1
+def test_while_the_frequency_sweeps_the_acceleration_stays_near_its_limit(modes):
+    assert peak_acceleration(shape(MOVE, "zv", modes)) < 2.1
+    assert peak_acceleration(shape(MOVE[::-1], "zv", modes)) < 2.1
 
 
 @pytest.mark.parametrize("name", ["zv", "zvd", "ei", "ei_exact", "mzv", "si", "zvdd", "ei2", "zvddd", "ei3"])
-def test_no_shaper_of_the_catalogue_kicks_the_arm_or_leaves_the_way_between_start_and_end(
-    name, double_s, modes
-):
-    shaped = shape(double_s, name, modes)
+def test_no_shaper_of_the_catalogue_kicks_the_arm_or_leaves_the_way_between_start_and_end(name, modes):
+    shaped = shape(MOVE, name, modes)
     assert peak_acceleration(shaped) < 2.2
     assert shaped.min() >= -1e-6
     assert shaped.max() <= STROKE + 1e-6
 
 
-def test_the_shaped_move_ends_where_the_reference_does_half_a_period_of_the_end_later(double_s, modes):
-    shaped = shape(double_s, "zv", modes)
-    assert shaped[-1] == double_s[-1]
-    last = [np.flatnonzero(np.abs(np.diff(position)) > 1e-9)[-1] for position in (double_s, shaped)]
+def test_the_shaped_move_ends_where_the_reference_does_half_a_period_of_the_end_later(modes):
+    shaped = shape(MOVE, "zv", modes)
+    assert shaped[-1] == MOVE[-1]
+    last = [np.flatnonzero(np.abs(np.diff(position)) > 1e-9)[-1] for position in (MOVE, shaped)]
     assert H * (last[1] - last[0]) == pytest.approx(0.5 / 15.0, abs=2.0 * H)

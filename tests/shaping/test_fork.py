@@ -208,15 +208,6 @@ def test_an_aimed_filter_has_the_modes_where_the_parameter_ends():
     assert said(tvist) == said(other)
 
 
-@pytest.mark.parametrize(("kind", "make"), EVERY)
-def test_a_fork_gives_the_same_bits_and_changes_nothing(kind, make):
-    tvist, x = on(kind, make, round_about), parameter()
-    output(tvist, x[:200])
-    fork = tvist.fork()
-    ahead = output(fork, x[200:])
-    assert (ahead == output(tvist, x[200:])).all()
-
-
 @pytest.mark.parametrize("kind", FILTERS)
 def test_a_fade_goes_on_with_the_parameter_of_the_filter_before(kind):
     old, new, x = on("one mode", "fixed", round_about), FILTERS[kind](ESTIMATORS["polynomial"]), parameter()

@@ -90,15 +90,6 @@ def test_after_a_rest_the_lowest_mode_is_in_force_and_the_output_has_not_moved(n
     assert (shaped[ended:] == 2.0).all()
 
 
-@pytest.mark.parametrize("name", FILTERS)
-@pytest.mark.parametrize("pause", [1, 3, 20, 50])
-def test_a_pause_shorter_than_the_delays_exchanges_no_mode(name, pause):
-    """The shaped reference may repeat itself to the bit in a pause; the line holds the motion still."""
-    reference = np.concatenate([way(0.0, 2.0, 0.8), np.full(pause, 2.0), way(2.0, 1.9, 0.3)])
-    _, f_d = run(FILTERS[name](), reference)
-    assert np.abs(np.diff(f_d) / f_d[1:]).max() < 0.01
-
-
 def test_a_pause_in_which_the_shaped_reference_rests_and_an_older_sample_does_not_exchanges_no_mode():
     """The case the others may miss: two equal outputs while a longer delay would still read the motion."""
     tvist = FILTERS["zv"]()

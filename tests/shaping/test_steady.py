@@ -1,10 +1,7 @@
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.linalg import expm
 
 from tvist_shaping import SHAPERS, Estimator, Fade, FilterError, Fixed, TvistFilter, product, residual, zv
 from tvist_shaping.fir import FirDesign
@@ -12,10 +9,10 @@ from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
 from tvist_shaping.taps import average, length, mean_delay, product_taps
 
-H = 0.002
+from .motions import ACCELERATION, JERK, VELOCITY, H, double_s, oscillation_left, shaped_by
+
 F_D, ZETA = (6.7, 8.0, 18.0, 35.0), (0.3, 0.3, 0.1, 0.1)
 MEAN = {"product": mean_delay(np.array(F_D[:3]), np.zeros(3)), "short": 0.028}
-VELOCITY, ACCELERATION, JERK = 1.5, 2.0, 100.0
 KINDS = ["product", "short"]
 
 
@@ -58,42 +55,6 @@ def a_filter(kind, estimator=None, joints=1, **numbers):
     return SteadyFilter(made, estimator or Arm(made.modes), joints=joints)
 
 
-def shaped_by(tvist, reference):
-    return np.array([tvist.filter(q) for q in reference])
-
-
-def double_s(stroke, joints=1):
-    """A move at the limits and rest [rad], shape (ticks, joints)."""
-    t = H * np.arange(round((stroke / VELOCITY + 2.2) / H))
-    position = np.clip(VELOCITY * (t - 0.1), 0.0, stroke)
-    for window in (VELOCITY / ACCELERATION, ACCELERATION / JERK):
-        n = round(window / H)
-        position = np.convolve(position, np.ones(n) / n)[: t.size]
-    position[-round(0.3 / H) :] = stroke
-    return position[:, None] * np.ones(joints)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(2))
-def test_a_reference_at_rest_passes_bit_for_bit_whatever_the_modes_do(kind, seed):
-    q = np.random.default_rng(seed).uniform(-7.0, 7.0, 3)
-    tvist = a_filter(kind, Jumping(3 if kind == "product" else 4, seed), joints=3)
-    tvist.reset(q)
-    for shaped in shaped_by(tvist, np.tile(q, (200, 1))):
-        np.testing.assert_array_equal(shaped, q)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(2))
-def test_the_end_of_a_motion_is_reached_bit_for_bit(kind, seed):
-    random = np.random.default_rng(seed)
-    tvist = a_filter(kind, Jumping(3 if kind == "product" else 4, seed), joints=2)
-    shaped_by(tvist, np.cumsum(random.normal(size=(200, 2)), axis=0))
-    end = random.normal(size=2)
-    rest = shaped_by(tvist, np.tile(end, (tvist.design.taps + 4, 1)))
-    np.testing.assert_array_equal(rest[-1], end)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_constant_velocity_stays_what_it_is_whatever_the_modes_do(kind, seed):
@@ -110,7 +71,7 @@ def test_a_constant_velocity_stays_what_it_is_whatever_the_modes_do(kind, seed):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("stroke", [0.3, 3.0])
 def test_a_move_at_the_limits_stays_within_them(kind, stroke):
-    reference = double_s(stroke)
+    reference = double_s([stroke])
     limits = [np.abs(np.diff(reference, order, axis=0)).max() / H**order for order in (1, 2)]
     shaped = shaped_by(a_filter(kind), reference)
     assert np.abs(np.diff(shaped, axis=0)).max() / H <= limits[0] * (1 + 1e-4)
@@ -118,31 +79,10 @@ def test_a_move_at_the_limits_stays_within_them(kind, stroke):
     np.testing.assert_array_equal(shaped[-1], reference[-1])
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_all_joints_get_the_same_taps(kind):
-    way = np.array([1.0, -2.0, 0.5])
-    shaped = shaped_by(a_filter(kind, joints=3), double_s(1.5, 3) * way)
-    np.testing.assert_allclose(shaped, shaped[:, :1] * way, atol=1e-12)
-
-
 def impulses_of(tvist):
     used = np.flatnonzero(np.abs(tvist._taps) > 1e-12)
     taps = tvist._taps[: used[-1] + 1]
     return Impulses(taps / taps.sum(), H * np.arange(taps.size))
-
-
-def oscillation_left(reference, f_d, zeta):
-    """Amplitude of a mode's free oscillation at the end, solved exactly: the reference is a line between two ticks."""
-    omega_d = 2.0 * np.pi * f_d
-    omega_n = omega_d / np.sqrt(1.0 - zeta**2)
-    system = np.zeros((4, 4))
-    system[0, 1] = system[2, 3] = 1.0
-    system[1] = [-(omega_n**2), -2.0 * zeta * omega_n, omega_n**2, 0.0]
-    tick, x = expm(system * H), np.array([reference[0], 0.0])
-    for now, then in pairwise(reference):
-        x = (tick @ np.array([*x, now, (then - now) / H]))[:2]
-    off = x[0] - reference[-1]
-    return np.hypot(off, (x[1] + zeta * omega_n * off) / omega_d)
 
 
 @pytest.mark.parametrize(("kind", "share"), [("product", 0.05), ("short", 1.0)])
@@ -165,7 +105,7 @@ def test_no_more_is_left_of_a_mode_than_was_asked_two_ways(kind, share):
 def test_a_mode_comes_to_rest_after_a_move(kind):
     """Of a short jog, which excites the lowest mode most, less than a tenth is left; the modes move on the way."""
     estimator = Arm(3 if kind == "product" else 4, depth=0.2)
-    reference = double_s(0.1)
+    reference = double_s([0.1])
     tvist = a_filter(kind, estimator)
     shaped = shaped_by(tvist, reference)
     stop = [np.flatnonzero(np.abs(np.diff(x[:, 0])) > 1e-12)[-1] + 2 for x in (reference, shaped)]
@@ -179,7 +119,7 @@ def test_a_mode_comes_to_rest_after_a_move(kind):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("steady_first", [True, False])
 def test_a_fade_between_it_and_the_papers_filter_has_no_step(kind, steady_first):
-    reference = double_s(2.0)
+    reference = double_s([2.0])
     slow = 0.7 * reference  # room for the fade
     make = [lambda: a_filter(kind), lambda: TvistFilter(SHAPERS["zv"], Arm(1), joints=1)]
     old, new = (make[0 if steady_first else 1](), make[1 if steady_first else 0]())
@@ -223,7 +163,7 @@ def test_a_lowest_frequency_that_does_not_fit_is_refused_nobody_and_said_where_i
     """Half periods of three modes at 2 Hz are 0.75 s; the line holds 0.26 s, and 0.15 s."""
     tvist = a_filter(kind, Falling(3 if kind == "product" else 4))
     assert not tvist.clipped
-    reference = 2.0 * double_s(1.0)
+    reference = 2.0 * double_s([1.0])
     said = []
     for q in [*reference, *reference[::-1]]:
         out = tvist.filter(q)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from tests.conformance.served import PATIENCE, Served, free_endpoint
 from tests.conformance.wire import STOPPED, Wire
-from tests.lab.two_device_logs import TwoDevices
+from tests.lab.made_logs import TwoDevices
 from tests.system.shell import Ended, begun, python, tvist
 
 from tvist_cli.output import out, table
@@ -309,8 +309,8 @@ def test_a_table_wider_than_the_screen_is_folded_with_its_first_column_in_each_p
 
 def test_every_log_command_reads_the_log_of_a_robot_and_that_of_a_sensor_with_its_own_clock(tmp_path):
     devices = TwoDevices(4, 2.5, 0.003)
-    log = devices.robot(tmp_path / "robot.csv", "zeit,achse {}", first=1, units=(1e-3, math.pi / 180.0))
-    imu = devices.sensor(tmp_path / "imu.csv", header=None)
+    log = devices.robot(tmp_path / "robot.csv", ("zeit", "achse {}"), first=1, units=(1e-3, math.pi / 180.0))
+    imu = devices.sensor(tmp_path / "imu.csv", header=False)
     of_robot = ("--columns", "time=zeit:ms,q=achse {}:deg")
     of_imu = ("--imu", imu, "--imu-columns", "time=1,accelerometer=2-4,gyroscope=5-7", "--robot", "ur5e")
     given = (*of_robot, *of_imu)

@@ -1,9 +1,7 @@
-"""`tvist serve --plant ur://… --enable-motion` moves a robot in another process, and stops with it.
-
-Random faults at random moments are tests/bridge/test_faults.py.
-"""
+"""`tvist serve --plant ur://… --enable-motion` moves a robot in another process, and stops with it."""
 
 import contextlib
+import signal
 import socket
 
 import numpy as np
@@ -171,6 +169,16 @@ def test_a_program_that_is_ended_at_the_robot_is_begun_again_where_the_arm_stand
             eventually(lambda: not refused(control.power_on, "is not moved"))
             move_by_nothing(robot, control)
         assert largest_step(states) < STEP
+
+
+def test_a_bridge_that_was_suspended_says_that_the_robot_got_no_set_point_meanwhile(arm, bridge):
+    def suspended():
+        with Robot.connect(arm.endpoint) as there:
+            bridge.process.send_signal(signal.SIGSTOP)
+            eventually(lambda: max(map(abs, there.state().target_qd)) < 1e-3)
+            bridge.process.send_signal(signal.SIGCONT)
+
+    stopped(bridge, suspended, "no set-point reached it", mode=1)
 
 
 def test_an_arm_without_power_is_switched_on_at_the_robot_and_then_here(arm, bridge):

@@ -37,7 +37,7 @@ def path(tmp_path):
     """A recording that keeps the last ticks, and whose process was killed."""
     path = tmp_path / "run.mcap"
     of, nothing = topics(INFO.name), dict.fromkeys(topics(INFO.name), 0)
-    written = Segments(path, of, heading(INFO, {"seed": 1}), nothing, overwrite=False, keep=300)
+    written = Segments(path, of, heading(INFO, {"seed": 1}), nothing, 300)
     for tick in range(1, TICKS):
         q = [tick * 1e-3] * 6
         written.write(msgspec.structs.replace(IO, tick=tick))

@@ -1,18 +1,62 @@
-"""Random programs: valid ones from the grammar, and texts that have been spoilt."""
+"""Random programs: valid ones from a grammar, and texts that have been spoilt."""
 
 import random
 import re
 
 GLOBALS = ["g0", "g1", "g2", "time", "p"]
 NUMBERS = ["0", "1", "2", "3", "-1", "0.5", "1e-3", "2147483647", "1e300", "7"]
-TEXTS = ['""', '"a"', '"some text"']
-OPERATORS = ["+", "-", "*", "/", "%", "==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"]
-PURE = [
-    ("sin", 1), ("sqrt", 1), ("norm", 1), ("floor", 1), ("pow", 2), ("str_cat", 2), ("to_str", 1), ("length", 1),
-    ("pose_trans", 2), ("pose_inv", 1), ("get_list_length", 1), ("make_list", 2), ("integer_to_binary_list", 1),
-    ("str_sub", 2),
-    ("inv", 1), ("transpose", 1), ("size", 1), ("atan2", 2), ("to_num", 1), ("interpolate_pose", 3),
+OTHERS = ['""', '"a"', "True", "None", "[1, 2, 3]", "[[1, 2], [3, 4]]", "[]", "p[1, 2, 3, 0, 0, 1]"]
+ONE, TWO = "({expression})", "({expression}, {expression})"
+CALLS = [
+    *(f"{name}{ONE}" for name in ("sin", "sqrt", "norm", "floor", "to_str", "length", "pose_inv", "get_list_length",
+                                  "integer_to_binary_list", "inv", "transpose", "size", "to_num")),
+    *(f"{name}{TWO}" for name in ("pow", "str_cat", "pose_trans", "make_list", "str_sub", "atan2")),
+    "interpolate_pose({expression}, {expression}, {expression})",
 ]  # fmt: skip
+OWN_CALLS = ["f0()", f"f1{ONE}", f"f2{ONE}", f"f2{TWO}"]
+ANY = {
+    "statement": {
+        "{assignment}": 50, f"textmsg{TWO}": 30, "if {expression}:\n{body}{branches}end": 30,
+        "while {expression}:\n{body}{step}{leave}end": 20, "sync()": 10, "h = run t0()": 10, "kill {handle}": 5,
+        "join {handle}": 5, "enter_critical": 5, "exit_critical": 5, "halt": 1, "return": 1,
+        "return {expression}": 1, "pass": 8, "movej({expression}, a=1.0)": 3, "{call}": 3,
+    },
+    "branches": {"": 6, "elif {expression}:\n{body}": 3, "elif {expression}:\n" * 17: 1, "else:\n{body}": 6},
+    "step": {"sync()\n": 7, "": 3},
+    "leave": {"": 4, "if {expression}:\nbreak\nend\n": 2, "if {expression}:\ncontinue\nend\n": 1, "break\n": 1},
+    "handle": {"h": 1, "{name}": 1},
+    "assignment": {
+        "{name} = {expression}": 6, "global {name} = {expression}": 2, "local z = {expression}": 2,
+        "{name}[{expression}] = {expression}": 4,
+    },
+    "expression": {
+        "{atom}": 5, "({expression} {operator} {expression})": 2, "({expression} {operator}\n{expression})": 1,
+        "(-({expression}))": 1, "(not ({expression}))": 1, "[{expression}, {expression}]": 1,
+        "({expression})[{expression}]": 1, "({expression})[{expression}, 0]": 0.3, "{call}": 1,
+    },
+    "operator": dict.fromkeys(
+        ["+", "-", "*", "/", "%", "==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"], 1
+    ),
+    "call": dict.fromkeys([*CALLS, *OWN_CALLS], 1),
+    "atom": {"{name}": 3, "{number}": 2, "{other}": 1},
+    "number": dict.fromkeys(NUMBERS, 1),
+    "other": dict.fromkeys(OTHERS, 1),
+}  # fmt: skip
+"""What may stand for a word, and how often."""
+SANE = ANY | {
+    "handle": {"h": 1},
+    "assignment": {"{name} = {expression}": 8, "l[{place}] = {expression}": 2},
+    "place": dict.fromkeys("012", 1),
+    "expression": {
+        "{atom}": 5, "({expression} {sign} {expression})": 2, "l[{place}]": 1, "norm([{expression}, {expression}])": 1,
+        "get_list_length([{expression} {operator} {expression}])": 2, "{call}": 1,
+    },
+    "sign": dict.fromkeys("+-*", 1),
+    "operator": dict.fromkeys(["==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"], 1),
+    "call": dict.fromkeys([f"norm{ONE}", f"atan2{TWO}", *OWN_CALLS], 1),
+    "atom": {"{name}": 3, "{number}": 3},
+}  # fmt: skip
+"""The same with values that fit, so that the program lives long."""
 
 
 class Writer:
@@ -20,158 +64,45 @@ class Writer:
 
     def __init__(self, seed):
         self.random = random.Random(seed)
-        # Values that fit, so that the program lives long; else anything anywhere.
-        self.sane = self.random.random() < 0.7
-        self.functions = []
-        self.threads = []
-        self.lines = []
-        self.depth = 0
+        self.rules = SANE if self.random.random() < 0.7 else ANY
+        self.names = GLOBALS
 
     def program(self):
-        self.line("def program():")
-        self.line("global h = 0")
-        self.line("global l = [1, 2, 3]")
-        for name in GLOBALS:
-            if self.sane:
-                self.line(f"global {name} = {self.random.choice(NUMBERS)}")
-                continue
-            self.line(
-                f"global {name} = {self.random.choice([*NUMBERS, *TEXTS, '[1, 2, 3]', 'p[1, 2, 3, 0.1, 0.2, 0.3]'])}"
-            )
-        self.functions = [(f"f{k}", self.random.randrange(4)) for k in range(self.random.randrange(3))]
-        self.threads = [f"t{k}" for k in range(self.random.randrange(2))]
-        for name, count in self.functions:
-            names = [f"a{k}" for k in range(count)]
-            parameters = [n if k + 1 < count else f"{n}={self.atom([])}" for k, n in enumerate(names)]
-            self.line(f"def {name}({', '.join(parameters)}):")
-            self.body([*names, *GLOBALS], loop=False)
-            self.line("end")
-        for name in self.threads:
-            self.line(f"thread {name}():")
-            self.body(list(GLOBALS), loop=False)
-            self.line("end")
-        self.body(list(GLOBALS), loop=False, most=8)
-        self.line("end")
-        return "\n".join(self.lines) + "\n"
-
-    def line(self, text):
-        self.lines.append(
-            self.random.choice(["", " ", "\t", "    "]) + text + self.random.choice(["", "", "  # why"])
+        first = "{number}" if self.rules is SANE else "{atom}"
+        heads = {"def f0()": [], "def f1(a0)": ["a0"], "def f2(a0, a1=1)": ["a0", "a1"], "thread t0()": []}
+        lines = ["def program():", "global h = 0", "global l = [1, 2, 3]"]
+        lines += [f"global {name} = {self.random.choice(NUMBERS)}" for name in GLOBALS]
+        lines += [f"{name} = {self.filled(first, 9)}" for name in GLOBALS]
+        for head, parameters in heads.items():
+            self.names = [*GLOBALS, *parameters]
+            lines += [f"{head}:", self.body(0, 3), "return 1", "end"]
+        self.names = GLOBALS
+        text = "\n".join([*lines, self.body(0, 8), "end"])
+        return "".join(
+            f"{self.pick(' ', '', chr(9))}{line}{self.pick('', '  # why')}\n" for line in text.split("\n")
         )
 
-    def body(self, names, *, loop, most=3):
-        self.depth += 1
-        for _ in range(self.random.randrange(most + 1)):
-            self.statement(names, loop)
-        self.depth -= 1
+    def pick(self, *words):
+        return self.random.choice(words)
 
-    def statement(self, names, loop):
-        pick = self.random.randrange(20)
-        if pick < 5:
-            self.assign(names)
-        elif pick < 8:
-            self.line(f"textmsg({self.expression(names)}, {self.expression(names)})")
-        elif pick < 11 and self.depth < 4:
-            self.line(f"if {self.expression(names)}:")
-            self.body(names, loop=loop)
-            for _ in range(self.random.choice([0, 0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 17])):
-                self.line(f"elif {self.expression(names)}:")
-                self.body(names, loop=loop, most=2)
-            if self.random.random() < 0.5:
-                self.line("else:")
-                self.body(names, loop=loop)
-            self.line("end")
-        elif pick < 13 and self.depth < 4:
-            self.line(f"while {self.expression(names)}:")
-            self.body(names, loop=True)
-            if self.random.random() < 0.7:
-                self.line("sync()")
-            if self.sane and self.random.random() < 0.5:
-                self.line("break")
-            self.line("end")
-        elif pick == 13:
-            self.line("sync()")
-        elif pick == 14 and self.threads:
-            self.line(f"h = run {self.random.choice(self.threads)}()")
-        elif pick == 15:
-            self.line(
-                f"{self.random.choice(['kill', 'join'])} {'h' if self.sane else self.random.choice(names)}"
-            )
-        elif pick == 16:
-            self.line(self.random.choice(["enter_critical", "exit_critical"]))
-        elif pick == 17 and loop:
-            self.line(self.random.choice(["break", "continue"]))
-        elif pick == 18 and self.random.random() < 0.3:
-            self.line(self.random.choice(["halt", "return", f"return {self.expression(names)}"]))
-        else:
-            self.line(
-                self.random.choice(["pass", f"movej({self.expression(names)}, a=1.0)", self.call(names, 1)])
-            )
+    def body(self, depth, most):
+        lines = [self.filled("{statement}", depth) for _ in range(self.random.randrange(most + 1))]
+        return "".join(f"{line}\n" for line in lines)
 
-    def assign(self, names):
-        name = self.random.choice([*names, "x", "y"])
-        if self.sane and self.random.random() < 0.2:
-            self.line(f"l[{self.random.randrange(3)}] = {self.expression(names)}")
-            return
-        if not self.sane and name in names and self.random.random() < 0.4:
-            self.line(f"{name}[{self.expression(names)}] = {self.expression(names)}")
-            return
-        qualifier = self.random.choice(["", "", "global ", "local "])
-        self.line(f"{qualifier}{name} = {self.expression(names)}")
-        if name not in names:
-            names.append(name)
+    def filled(self, text, depth):
+        """A text with something for each of its words; `depth` limits how deep it becomes."""
+        return re.sub(r"\{(\w+)\}", lambda found: self.word(found[1], depth + 1), text)
 
-    def expression(self, names, depth=0):
-        pick = self.random.randrange(12)
-        if depth > 2 or pick < 5:
-            return self.atom(names)
-        if self.sane:
-            return self.number(names, depth, pick)
-        inner = [self.expression(names, depth + 1) for _ in range(2)]
-        if pick < 8:
-            return (
-                f"({inner[0]} {self.random.choice(OPERATORS)}{self.random.choice([' ', chr(10)])}{inner[1]})"
-            )
-        if pick == 8:
-            return f"({self.random.choice(['-', 'not '])}({inner[0]}))"
-        if pick == 9:
-            return f"[{', '.join(inner)}]"
-        if pick == 10:
-            return (
-                f"({inner[0]})[{inner[1]}]" if self.random.random() < 0.8 else f"({inner[0]})[{inner[1]}, 0]"
-            )
-        return self.call(names, depth + 1)
-
-    def number(self, names, depth, pick):
-        left, right = self.expression(names, depth + 1), self.expression(names, depth + 1)
-        if pick < 7:
-            return f"({left} {self.random.choice('+-*')} {right})"
-        if pick < 9:
-            return f"get_list_length([{left} {self.random.choice(OPERATORS[5:])} {right}])"
-        if pick == 9:
-            return f"l[{self.random.randrange(3)}]"
-        if pick == 10:
-            return f"norm([{left}, {right}])"
-        return self.call(names, depth) if depth < 2 else f"atan2({left}, {right})"
-
-    def call(self, names, depth):
-        choices = [("norm", 1), ("atan2", 2), *self.functions] if self.sane else [*PURE, *self.functions]
-        name, count = self.random.choice(choices)
-        return f"{name}({', '.join(self.expression(names, depth + 1) for _ in range(count))})"
-
-    def atom(self, names):
-        pick = self.random.randrange(6)
-        if pick < 3 and names:
-            return self.random.choice(names)
-        if self.sane:
-            return self.random.choice(NUMBERS)
-        if pick == 3:
-            return self.random.choice(TEXTS)
-        if pick == 4:
-            return self.random.choice(
-                ["True", "False", "None", "[1, 2, 3]", "[[1, 2], [3, 4]]", "[]", "p[1, 2, 3, 0, 0, 1]"]
-            )
-        return self.random.choice(NUMBERS)
+    def word(self, word, depth):
+        if word == "name":
+            return self.random.choice(self.names)
+        if word == "body":
+            return self.body(depth + 1, 0 if depth > 8 else 3)
+        if word == "expression" and depth > 9:
+            word = "atom"
+        rule = self.rules[word]
+        (chosen,) = self.random.choices([*rule], rule.values())
+        return self.filled(chosen, depth + (word == "expression"))
 
 
 def valid(seed):

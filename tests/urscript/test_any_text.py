@@ -6,7 +6,7 @@ from tvist_urscript import Machine, ScriptError, compile_script
 from tvist_urscript.expressions import MOST_OPERATIONS
 from tvist_urscript.machine import OVERDRAFT
 
-from .dry_functions import Memory
+from .dry_functions import DryFunctions
 from .programs import spoilt, valid
 
 CI, NIGHTLY = 25, 5_000
@@ -32,13 +32,13 @@ def all_of(seeds):
 
 
 def runs_or_fails(text):
-    table = Memory().functions()
+    dry = DryFunctions()
     try:
-        script = compile_script(text, {name: entry[0] for name, entry in table.items()})
+        script = compile_script(text, dry.signatures)
     except ScriptError as error:
         stands_in(error, text)
         return "compile"
-    machine = Machine(script, {name: entry[1] for name, entry in table.items()})
+    machine = Machine(script, dry.functions)
     try:
         for _ in range(TICKS):
             left = machine.resume(BUDGET)

@@ -4,12 +4,28 @@ import asyncio
 
 import pytest
 
-from tvist_lab.in_process import run_beside
+from tvist_lab.collect import collect
+from tvist_lab.in_process import free_setup, robot_in_process, run_beside
 from tvist_plant.description import load
 from tvist_view.look import Look
-from tvist_view.track import ShownRobot, Track
+from tvist_view.track import Track
 
 POSES = load("ur5e").poses
+
+
+@pytest.fixture(scope="session")
+def moved():
+    """States and truths of a shaped motion of the flexible arm."""
+
+    async def move():
+        async with robot_in_process(free_setup(shaper="zv")) as robot:
+            with collect(robot) as collected:
+                async with robot.control("test") as arm:
+                    await arm.move_j([0.7, -2.5, 0.5, -1.2, 0.3, 0.2])
+                    await robot.advance(500)
+            return collected
+
+    return asyncio.run(move())
 
 
 @pytest.fixture(scope="module")
@@ -20,5 +36,5 @@ def tracks():
         info, collected = asyncio.run(run_beside(shaper, (POSES["Q1"], POSES["Q2"])))
         label = "without" if shaper == "none" else f"with {shaper}"
         look = Look(info.geometry, info.payload)
-        found.append(Track(ShownRobot(label, look), collected.states, collected.truths))
+        found.append(Track(label, look, collected.states, collected.truths))
     return found

@@ -1,7 +1,7 @@
 """Numbers of the packages, with which those of the page for trying shaping are compared."""
 
 import numpy as np
-from tests.view.one_mass import swing
+from scipy.signal import TransferFunction, lsim
 
 from tvist_controller.api.line import DrivenLine, respond
 from tvist_lab.one_joint import FlexibleShoulder
@@ -15,8 +15,7 @@ MODES = ((1.0, 0.0), (6.7, 0.034), (14.3, 0.11), (4.2, 0.19))
 """Modes at which every shaper is compared: f_d [Hz] and ζ [-], within the range of all."""
 RATIOS = (0.5, 0.8, 0.93, 1.0, 1.1, 1.37)
 """True frequencies over assumed ones at which the residual is compared [-]."""
-AFTER = 350
-"""Ticks at rest at the end of a motion of the arm."""
+AFTER = 350  # ticks at rest at the end of a motion of the arm
 MOTIONS = (
     ("none", "following", (-1.3, 2.6), (0.0, 0.52)),
     ("zv", "following", (-1.3, 2.6), (0.0, 0.52)),
@@ -25,8 +24,12 @@ MOTIONS = (
     ("um_zv", "following", (0.2, 1.0), (0.25, 0.9)),
 )
 """Shaper, estimator, and the angles at which a motion begins and ends [rad]."""
-SWING = (4.3, 0.05), (5.0, 0.05)
-"""f_d [Hz] and ζ of the mass, and those for which its shaper is designed."""
+STEP = 0.002  # time between two samples of the mass [s]
+TURN = 1.0  # angle of its motion [rad]
+MOTION_S = 0.6  # duration of the motion before it is shaped [s]
+JERK_S = 0.04  # time over which its acceleration rises [s]
+LENGTH_S = 2.0  # duration that is computed [s]
+SWING = (4.3, 0.05), (5.0, 0.05)  # f_d [Hz] and ζ of the mass, and those for which its shaper is designed
 
 
 def of_shaper(name, f_d, zeta):
@@ -47,9 +50,24 @@ def filtered():
 
 
 def swung():
-    """Reference and deflection of the mass."""
-    one = swing(*SWING[0], SWING[1])
-    return {"reference": one.reference, "deflection": one.deflection}
+    """Reference and deflection of a mass: δ'' + 2ζω δ' + ω² δ = -q̈, with q̈ constant between samples."""
+    (f_d, zeta), believed = SWING
+    time, impulses = np.arange(0.0, LENGTH_S, STEP), shaper("zv").function(*believed)
+    acceleration = sum(A * _profile(time - tau) for A, tau in zip(impulses.A, impulses.tau, strict=True))
+    omega = 2.0 * np.pi * f_d / np.sqrt(1.0 - zeta**2)
+    mass = TransferFunction([-1.0], [1.0, 2.0 * zeta * omega, omega**2])
+    _, deflection, _ = lsim(mass, acceleration, time, interp=False)
+    return {"reference": np.cumsum(np.cumsum(acceleration) * STEP) * STEP, "deflection": deflection}
+
+
+def _profile(time):
+    """Acceleration of the motion: up, then down, each with finite jerk."""
+    half = MOTION_S / 2.0
+
+    def pulse(t):
+        return np.clip(np.minimum(t, half - t) / JERK_S, 0.0, 1.0)
+
+    return (pulse(time) - pulse(time - half)) * TURN / (half * (half - JERK_S))
 
 
 def moved(name, estimator, start, target):

@@ -10,15 +10,13 @@ import pytest
 from msgspec.structs import replace
 
 from tvist_controller.about import geometry_of
-from tvist_lab.collect import collect
-from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
 from tvist_plant.model import FLANGE, flexible_model, rigid_model
 from tvist_protocol.geometry import Capsule, Geometry, Mesh, World
 from tvist_view.look import GeometryError, Look
 from tvist_view.playback import playback
 from tvist_view.stage import open_stage, page
-from tvist_view.track import ShownRobot, Track
+from tvist_view.track import Track
 
 from .browser import browser
 
@@ -30,21 +28,6 @@ UR5E = load("ur5e")
 def look_of(name):
     description = load(name)
     return Look(geometry_of(description), description.payload)
-
-
-@pytest.fixture(scope="module")
-def moved():
-    """A motion of the flexible arm: its states and truths."""
-
-    async def move():
-        async with robot_in_process(free_setup(shaper="none")) as robot:
-            with collect(robot) as collected:
-                async with robot.control("test") as arm:
-                    await arm.move_j([0.7, -2.5, 0.5, -1.2, 0.3, 0.2])
-                    await robot.advance(500)
-            return collected
-
-    return asyncio.run(move())
 
 
 def standing(moved, look):
@@ -94,7 +77,7 @@ def flanges(tab, angles, bends):
 @pytest.mark.parametrize("name", ["ur5e", SEVEN])
 def test_the_flange_is_where_pinocchio_has_it(opened, moved, name):
     look, description, random = look_of(name), load(name), np.random.default_rng(0)
-    tab = opened(Track(ShownRobot("x", look), standing(moved, look), []))
+    tab = opened(Track("x", look, standing(moved, look), []))
     q = random.uniform(-3.0, 3.0, (50, look.joints))
     bends = random.uniform(-0.5, 0.5, (50, 2 * len(look.geometry.bending)))
     found = flanges(tab, q, bends)
@@ -116,7 +99,7 @@ def test_the_flange_is_where_pinocchio_has_it(opened, moved, name):
 
 def test_at_factor_one_the_drawn_flange_is_the_truths_and_deflections_are_the_factor_times_it(opened, moved):
     look = look_of("ur5e")
-    tab = opened(Track(ShownRobot("x", look), moved.states, moved.truths))
+    tab = opened(Track("x", look, moved.states, moved.truths))
     truths = moved.truths[::100]
     rows = [look.row(moved.states[truth.tick - moved.states[0].tick], truth) for truth in truths]
     drawn = tab.evaluate(
@@ -139,7 +122,7 @@ def test_at_factor_one_the_drawn_flange_is_the_truths_and_deflections_are_the_fa
 
 def test_between_two_rows_the_page_draws_what_is_between(opened, moved):
     look = look_of("ur5e")
-    track = Track(ShownRobot("x", look), moved.states, moved.truths)
+    track = Track("x", look, moved.states, moved.truths)
     tab = opened(track)
     for time in (0.0, 0.5, 0.504, 1e3):
         row = tab.evaluate("(time) => Array.from(tvist.tracks[0].row(time))", time)
@@ -150,7 +133,7 @@ def test_between_two_rows_the_page_draws_what_is_between(opened, moved):
 @pytest.mark.parametrize("name", ARMS)
 def test_every_arm_is_drawn_in_one_piece_and_fills_the_picture(opened, moved, name):
     look = look_of(name)
-    tab = opened(Track(ShownRobot("x", look), standing(moved, look), []))
+    tab = opened(Track("x", look, standing(moved, look), []))
     found = tab.evaluate(
         "() => { const { arm } = tvist.tracks[0].robot; const [a, b] = [tvist.stage.scene.filled(), arm.outline()];"
         " return { ...a, points: b.map((p) => p.toArray()), parts: arm.frames.map((f) => f.children.length) }; }"
@@ -175,7 +158,7 @@ def test_a_urdfs_own_meshes_stand_in_for_what_is_drawn(chromium, moved, tmp_path
     ]
     look = look_of("ur5e")
     look = Look(replace(look.geometry, meshes=meshes), look.payload)
-    packed = Track(ShownRobot("x", look), standing(moved, look), []).packed(0.0)
+    packed = Track("x", look, standing(moved, look), []).packed(0.0)
     packed["look"]["meshes"] = ["/mesh/0.stl", "/mesh/1.stl"]
     text = page({"kind": "playback", "title": "x", "factor": 1, "tracks": [packed]})
     files = {f"/mesh/{number}.stl": (tmp_path / f"part{number}.stl").read_bytes() for number in range(2)}

@@ -67,6 +67,16 @@ def moving(wire, *, since=0):
     return wire.wait("state", lambda state: max(map(abs, state["target_qd"])) > 0.05, since=since)
 
 
+def jog(tab, sign, wire):
+    take(tab)
+    tab.get_by_role("button", name="more").click()
+    button = tab.get_by_role("button", name=f"{sign} hold to jog")
+    button.scroll_into_view_if_needed()
+    button.hover()
+    tab.mouse.down()
+    moving(wire)
+
+
 def silence(wire, stopped):
     """From the last set-point that was played to the stop [s]: ticks, since a browser may take its time."""
     played = [state for state in wire.received["state"] if state["setpoint_sequence"] is not None]
@@ -106,13 +116,7 @@ def test_closing_the_tab_in_a_jog_stops_the_arm_within_260_ms_of_the_last_set_po
     page = chromium.new_page(viewport={"width": 800, "height": 600})
     page.set_default_timeout(MS)
     page.goto(view.url)
-    take(page)
-    page.get_by_role("button", name="more").click()
-    button = page.get_by_role("button", name="+ hold to jog")
-    button.scroll_into_view_if_needed()
-    button.hover()
-    page.mouse.down()
-    moving(wire)
+    jog(page, "+", wire)
     page.close()
     stopped = wire.wait("event", lambda event: event["kind"] == "stream_stopped")
     assert silence(wire, stopped) <= 0.26
@@ -122,13 +126,7 @@ def test_closing_the_tab_in_a_jog_stops_the_arm_within_260_ms_of_the_last_set_po
 
 
 def test_letting_the_jog_button_go_stops_the_arm(tab, wire):
-    take(tab)
-    tab.get_by_role("button", name="more").click()
-    button = tab.get_by_role("button", name="− hold to jog")
-    button.scroll_into_view_if_needed()
-    button.hover()
-    tab.mouse.down()
-    moving(wire)
+    jog(tab, "−", wire)
     tab.mouse.up()
     stopped = wire.wait("event", lambda event: event["kind"] == "stream_stopped")
     assert silence(wire, stopped) <= 0.26
@@ -139,11 +137,7 @@ def test_letting_the_jog_button_go_stops_the_arm(tab, wire):
 @pytest.mark.nightly
 def test_one_tab_has_control_the_other_watches_and_may_stop(chromium):
     """The robot is in slow motion, since software draws two pages slowly."""
-    with (
-        Served("--speed", "0.1") as robot,
-        Page(robot.endpoint) as view,
-        Wire(robot.endpoint) as wire,
-    ):
+    with Served("--speed", "0.1") as robot, Page(robot.endpoint) as view, Wire(robot.endpoint) as wire:
         wire.listen("state", "event")
         tab, other = (chromium.new_page(viewport={"width": 500, "height": 400}) for _ in range(2))
         for page in (tab, other):

@@ -70,7 +70,7 @@ async def test_a_tab_that_closes_while_control_is_taken_does_not_keep_it(robot, 
     robot.gate.clear()
     taking = asyncio.create_task(pilot.take(1))
     await asyncio.sleep(0)
-    leaving = asyncio.create_task(pilot.gone(1))
+    leaving = asyncio.create_task(pilot.give_back(1))
     await asyncio.sleep(0)
     robot.gate.set()
     await asyncio.gather(taking, leaving)

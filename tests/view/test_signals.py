@@ -1,14 +1,10 @@
 """Signals for plots: against the laboratory's own figures, and whatever the order of messages."""
 
-import asyncio
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from tvist_controller.about import geometry_of
-from tvist_lab.collect import collect
-from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_plant.description import load
 from tvist_plant.model import FLANGE, rigid_model
@@ -20,29 +16,14 @@ UR5E = load("ur5e")
 LOOK = Look(geometry_of(UR5E), UR5E.payload)
 
 
-@pytest.fixture(scope="module")
-def collected():
-    """Two motions, shaped, with their truth."""
-
-    async def move():
-        async with robot_in_process(free_setup(shaper="zv")) as robot:
-            with collect(robot) as collected:
-                async with robot.control("test") as arm:
-                    await arm.move_j([0.7, -2.5, 0.5, -1.2, 0.3, 0.2])
-                    await robot.advance(500)
-            return collected
-
-    return asyncio.run(move())
-
-
-def signals(collected, *, truth=True):
-    return signals_of(LOOK, collected.states, {one.tick: one for one in collected.truths} if truth else {})
+def signals(moved, *, truth=True):
+    return signals_of(LOOK, moved.states, {one.tick: one for one in moved.truths} if truth else {})
 
 
 @pytest.mark.parametrize("truth", [True, False])
-def test_alpha_is_the_laboratorys(collected, truth):
-    expected = amplitude(tool_acceleration(collected.recording(), truth=truth))
-    np.testing.assert_allclose(signals(collected, truth=truth).alpha, expected, atol=1e-9)
+def test_alpha_is_the_laboratorys(moved, truth):
+    expected = amplitude(tool_acceleration(moved.recording(), truth=truth))
+    np.testing.assert_allclose(signals(moved, truth=truth).alpha, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["ur5e", "tests/plant/urdf/seven.urdf"])
@@ -58,13 +39,13 @@ def test_up_is_where_an_independent_model_has_it(name):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_what_is_drawn_and_plotted_is_of_one_tick_in_whatever_order_state_and_truth_come(collected, seed):
+def test_what_is_drawn_and_plotted_is_of_one_tick_in_whatever_order_state_and_truth_come(moved, seed):
     random = np.random.default_rng(seed)
     count = 200
     times = np.arange(count) + random.integers(-4, 5, count) + 0.5
     lost = set(random.integers(0, count - LATE_TICKS - 10, seed).tolist())
-    states = [(float(place), state) for place, state in enumerate(collected.states[:count])]
-    truths = [(times[i], truth) for i, truth in enumerate(collected.truths[:count]) if i not in lost]
+    states = [(float(place), state) for place, state in enumerate(moved.states[:count])]
+    truths = [(times[i], truth) for i, truth in enumerate(moved.truths[:count]) if i not in lost]
     running = LatestSignals(LOOK)
     assert running.row() is None
     for _, message in sorted(states + truths, key=lambda pair: pair[0]):
@@ -73,36 +54,36 @@ def test_what_is_drawn_and_plotted_is_of_one_tick_in_whatever_order_state_and_tr
             running.update()
     running.update()
     drawn = running.row()
-    last = collected.truths[count - 1]
+    last = moved.truths[count - 1]
     assert drawn[:6] == last.motor_q
     found = running.signals()
     assert (np.diff(found.time) > 0.0).all()
-    expected = amplitude(tool_acceleration(collected.recording(), truth=True))[:count]
+    expected = amplitude(tool_acceleration(moved.recording(), truth=True))[:count]
     expected[list(lost)] = np.nan
     np.testing.assert_allclose(found.alpha, expected[1:-1], atol=1e-9)
-    whole = signals(collected).unshaped[1 : count - 1]
+    whole = signals(moved).unshaped[1 : count - 1]
     np.testing.assert_allclose(found.unshaped, whole, atol=1e-9)
-    running.add(collected.states[0])  # it has started anew
+    running.add(moved.states[0])  # it has started anew
     assert len(running.signals().time) == 0
 
 
-def test_what_is_told_since_a_count_is_told_once(collected):
+def test_what_is_told_since_a_count_is_told_once(moved):
     running, told = LatestSignals(LOOK), []
     count = 0
-    for number, state in enumerate(collected.states):
+    for number, state in enumerate(moved.states):
         running.add(state)
         if number % 17 == 0:
             running.update()
             told += running.since(count)[0]
             count = running.count
-    assert told == [round(state.timestamp, 4) for state in collected.states[1 : len(told) + 1]]
-    running.add(collected.states[-1])  # told again
+    assert told == [round(state.timestamp, 4) for state in moved.states[1 : len(told) + 1]]
+    running.add(moved.states[-1])  # told again
     running.update()
-    assert running.count == len(collected.states) - 2
+    assert running.count == len(moved.states) - 2
 
 
-def test_the_shaped_reference_comes_to_rest_after_the_unshaped_one(collected):
-    found = signals(collected)
+def test_the_shaped_reference_comes_to_rest_after_the_unshaped_one(moved):
+    found = signals(moved)
     rests = rests_since(found)
     assert rests is not None
     reference, shaped = rests
@@ -110,10 +91,10 @@ def test_the_shaped_reference_comes_to_rest_after_the_unshaped_one(collected):
     assert rests_since(found.between(0.0, reference - 0.1)) is None
 
 
-def test_the_acceleration_before_the_shaper_keeps_the_limit_and_none_is_made_up_over_a_hole(collected):
-    found = signals(collected)
+def test_the_acceleration_before_the_shaper_keeps_the_limit_and_none_is_made_up_over_a_hole(moved):
+    found = signals(moved)
     assert 1.9 < found.unshaped.max() < 2.0 + 1e-6
-    sparse = signals_of(LOOK, collected.states[::7] + collected.states[-3:], {})
+    sparse = signals_of(LOOK, moved.states[::7] + moved.states[-3:], {})
     assert sparse.unshaped.max() < 2.1
 
 

@@ -86,8 +86,7 @@ def test_the_filter_is_that_of_the_library(numbers):
 
 def test_the_mass_swings_as_the_lesson_says(numbers):
     found = numbers.evaluate(
-        "([mode, believed]) => tried.swing(...mode, tried.SHAPERS.zv(...believed))",
-        page_numbers.SWING,
+        "([mode, believed]) => tried.swing(...mode, tried.SHAPERS.zv(...believed))", page_numbers.SWING
     )
     for key, wanted in page_numbers.swung().items():
         close(found[key], wanted)

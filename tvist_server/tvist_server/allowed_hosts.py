@@ -16,13 +16,15 @@ class AllowedHosts:
     """IP addresses, networks and host names that programs may connect to; raise StartError for an invalid entry."""
 
     def __init__(self, given: Sequence[str]) -> None:
+        self._names, self._networks = set(given), list[ipaddress.IPv4Network | ipaddress.IPv6Network]()
         for text in given:
-            if _network(text) is None and not _NAME.fullmatch(text):
-                raise StartError(
-                    f"ur_allow has {text!r}: must be an IP address, a network such as 192.168.1.0/24, or a name"
-                )
-        self._names = set(given)
-        self._networks = [network for text in given if (network := _network(text)) is not None]
+            try:
+                self._networks.append(ipaddress.ip_network(text, strict=False))
+            except ValueError as error:
+                if not _NAME.fullmatch(text):
+                    raise StartError(
+                        f"ur_allow has {text!r}: must be an IP address, a network such as 192.168.1.0/24, or a name"
+                    ) from error
 
     def allows(self, name: str, address: str, origin: str | None) -> bool:
         """Return whether a program from `origin` (None: unknown) may connect to `address`, found for `name`.
@@ -30,7 +32,7 @@ class AllowedHosts:
         The loopback interface is open only to programs from this machine, or if it is listed itself.
         """
         to, sender = _ip(address), None if origin is None else _ip(origin)
-        if _is_here(to):  # a name or a wide network must not open it as a side effect
+        if to.is_loopback or to.is_unspecified:  # a name or a wide network must not open it as a side effect
             named = name == LOCALHOST and name in self._names
             inside = any(network.is_loopback and to in network for network in self._networks)
             return named or inside or (sender is not None and sender.is_loopback)
@@ -41,14 +43,3 @@ def _ip(text: str) -> IpAddress:
     """Parse an address without its zone, and unwrap an IPv4-mapped IPv6 address."""
     found = ipaddress.ip_address(text.partition("%")[0])
     return getattr(found, "ipv4_mapped", None) or found
-
-
-def _is_here(address: IpAddress) -> bool:
-    return address.is_loopback or address.is_unspecified
-
-
-def _network(text: str) -> ipaddress.IPv4Network | ipaddress.IPv6Network | None:
-    try:
-        return ipaddress.ip_network(text, strict=False)
-    except ValueError:  # a name
-        return None

@@ -12,7 +12,7 @@ from functools import partial
 from tvist_controller.host import Host
 from tvist_plant.plant import PlantError
 from tvist_server.jobs import Do, Jobs
-from tvist_server.lateness import Lateness, Punctuality
+from tvist_server.lateness import Lateness
 from tvist_server.punctual import PRIORITY, take_priority
 from tvist_server.schedule import Followed, Schedule
 from tvist_server.tick_counts import TickCounts
@@ -95,17 +95,13 @@ class Clock(ABC):
         self._running = False
         for robot in self._robots:
             robot.ending = True
-            robot.post(_nothing)
+            robot.post(lambda: None)
         if self._thread.is_alive():
             self._thread.join(LONGEST_TICK)
             if self._thread.is_alive():
                 log.error(
                     "a tick, a call of the arm or a wait for a client has not returned for %g s", LONGEST_TICK
                 )
-
-    @abstractmethod
-    def punctuality(self, robot: TickedRobot) -> Punctuality | None:
-        """Return the lateness of a robot's ticks since the last call; None if a client advances time."""
 
     def _guarded(self) -> None:
         try:
@@ -129,9 +125,6 @@ class Lockstep(Clock):
         super().__init__([robot])
         self._jobs = robot.jobs
         self._repeat = repeat
-
-    def punctuality(self, robot: TickedRobot) -> None:
-        """Return None, since a client advances time."""
 
     def _run(self) -> None:
         # The deadline is absolute, because other jobs, such as telemetry, may also arrive every second.
@@ -168,13 +161,11 @@ class Realtime(Clock):
         super().start()
         self._asked.wait()
 
-    def punctuality(self, robot: TickedRobot) -> Punctuality:
-        """Return the lateness since the last call."""
-        return robot.lateness.look()
-
     def _run(self) -> None:
         try:
-            self._ask()
+            _wake_sharply()
+            if self._priority and take_priority():
+                self.granted.append(f"real-time priority {PRIORITY}")
         finally:
             self._asked.set()
         robots, overloads, now, sleep = self._robots, self._overloads, time.monotonic, time.sleep
@@ -197,14 +188,13 @@ class Realtime(Clock):
             begun = now()
             number, late, missed = schedule.begin(begun)
             robot = robots[number]
-            robot.lateness.note(late)
             if missed:
                 robot.host.missed(missed)
             told = overloads[number].note(missed)
             if told is not None:
                 robot.host.warn(told)
             robot.turn()
-            robot.lateness.worked(now() - begun)
+            robot.lateness.note(late, now() - begun)
         for robot in robots:
             robot.guarded(robot.jobs.do_waiting)
 
@@ -225,15 +215,6 @@ class Realtime(Clock):
                 "the arm does not begin its next tick: time stands still, and commands have no effect"
             )
         return True
-
-    def _ask(self) -> None:
-        _wake_sharply()
-        if self._priority and take_priority():
-            self.granted.append(f"real-time priority {PRIORITY}")
-
-
-def _nothing() -> None:
-    pass
 
 
 def _wake_sharply() -> None:

@@ -18,7 +18,6 @@ from tvist_protocol.calibration import Calibration
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Payload
-from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.moving.moved_robot import MovedRobot
 from tvist_server.moving.servo_lag import ServoLag
 from tvist_server.option_values import (
@@ -31,7 +30,7 @@ from tvist_server.option_values import (
     ticks_of,
 )
 from tvist_server.options import DEFAULT_NAME, ProfileName, ServeOptions
-from tvist_server.profiles import PLAIN, PROFILES, Profile
+from tvist_server.profiles import PROFILES, Profile
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.start_files import InitialState, calibration_for, read_cell, shaped_by
 from tvist_server.ur_ports import InterfaceName
@@ -63,17 +62,17 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         found = members(self.robots, MAX_ROBOTS * self.workers)
         # Robots of the same file differ only in name and noise.
         starts: dict[str, Setup] = {}
-        for member in found:
-            if member.robot not in starts:
-                starts[member.robot] = replace(self, robot=member.robot).setup()
+        for robot, _ in found:
+            if robot not in starts:
+                starts[robot] = replace(self, robot=robot).setup()
         return [
             dataclasses.replace(
-                starts[member.robot],
-                name=member.name,
+                starts[robot],
+                name=name,
                 seed=self.seed + index,
                 hidden=None if self.hidden is None else self.hidden + index,
             )
-            for index, member in enumerate(found)
+            for index, (robot, name) in enumerate(found)
         ]
 
     def program_folder(self, name: str) -> ProgramFolder | None:
@@ -89,9 +88,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         if self.dump is None:
             try:
                 return Path(tempfile.gettempdir())
-            except (
-                FileNotFoundError
-            ):  # as in a container without any; what is then saved there says that it is lost
+            except FileNotFoundError:  # in a container without any; what cannot be saved there says so
                 return Path.cwd()
         if not Path(self.dump).is_dir():
             raise StartError(f"dump is {self.dump!r}: must be a folder that exists")
@@ -104,10 +101,6 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         if self.record is None:
             raise StartError(f"keep is {self.keep}, but nothing is recorded: give record, too")
         return ticks_of(self.keep, "keep")
-
-    def allowed_hosts(self) -> AllowedHosts:
-        """Return the machines that programs may connect to."""
-        return AllowedHosts(self.ur_allow)
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
         """Return address and ports of a robot's UR interfaces, by its index; StartError if there is no such address."""
@@ -157,7 +150,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
             chosen, description = self.profile_in_force, load(self.robot)
             if self.ur:
                 self.ur_ports.check_joints(description.robot.name, description.joints)
-            profile = PLAIN if chosen is None else PROFILES[chosen]
+            profile = PROFILES[chosen]
             real = self.plant is not None and is_place(self.plant)
             watched = real and not self.enable_motion
             self._check_real(real=real)

@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Callable
-from typing import Protocol
 
 from tvist_controller.dispatch.admission import Admitted, admit, admit_command, admit_setpoint
 from tvist_controller.dispatch.rights import NoControlError, Presence
@@ -11,14 +10,8 @@ from tvist_protocol.commands import Command, HandOver, TakeClock, TakeControl
 from tvist_protocol.replies import Refused, Reply
 from tvist_server.gateways.base import Answer, CommandIntake
 
-
-class QueueJob(Protocol):
-    """Queues a job for the controller's thread, before its next tick; from any thread, without blocking."""
-
-    def __call__(self, do: Callable[[], None], client: str | None = None, /) -> None:
-        """Take a job and the client that sent it, if known."""
-
-
+QueueJob = Callable[..., None]
+"""Queues a job, and the client that sent it if known, for before the next tick; from any thread, without blocking."""
 CarryOut = Callable[[Admitted, Answer], None]
 """Queues a command for the controller's thread and answers it; from any thread, without blocking."""
 
@@ -41,21 +34,17 @@ class RobotIntake(CommandIntake):
         self.setpoints_refused = 0
 
     def request(self, data: bytes, answer: Answer) -> None:
-        """Take an encoded command; the reply comes from another thread, or at once if the command is rejected."""
         # No lock is needed: the controller replaces `standing` as a whole. A lease may end before the
         # command's turn, so the tick thread checks it again.
         standing = self._host.standing
         self._hand_in(admit(data, standing.lease, standing.clock), answer)
 
     def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
-        """Take a command; `answer` as for `request`, `origin` is the IP address of the machine that sent it."""
         standing = self._host.standing
         admitted = admit_command(command, standing.lease, standing.clock)
         self._hand_in(admitted if isinstance(admitted, Refused) else admitted._replace(origin=origin), answer)
 
     def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
-        """Answer with a description of the robot."""
-
         def tell() -> None:
             data, complete = self._host.info(), self._complete_info
             answer(lambda: data if complete is None else complete(data))
@@ -63,7 +52,6 @@ class RobotIntake(CommandIntake):
         self._post(tell)
 
     def holder(self) -> str | None:
-        """Return the client that has control; None: no client."""
         lease = self._host.standing.lease
         return None if lease is None else lease.client
 
@@ -78,19 +66,16 @@ class RobotIntake(CommandIntake):
             self._post(lambda: self._host.receive_setpoint(setpoint), lease.client)
 
     def client_seen(self, client: str, session: str = "") -> None:
-        """Note that a client's liveliness token has appeared."""
         with self._lock:
             self._presence.seen(client, session)
 
     def client_gone(self, client: str, session: str = "") -> None:
-        """Note that a client's liveliness token, or its session, has disappeared."""
         with self._lock:
             self._presence.gone(client, session)
         if self._host.standing.sessions_of(client):  # _unless_gone handles control that is being granted now
             self._post(lambda: self._host.client_gone(client, session))
 
     def session_gone(self, session: str) -> None:
-        """Note that a session has ended, even if other sessions hold tokens of the same clients."""
         with self._lock:
             clients = self._presence.clients_of(session)
         for client in clients:
@@ -101,22 +86,18 @@ class RobotIntake(CommandIntake):
             admitted.command, TakeControl | HandOver | TakeClock
         ):
             client = admitted.command.client
-            admitted = self._with_session(admitted, client)
-            if isinstance(admitted, Admitted):
+            try:
+                with self._lock:
+                    admitted = admitted._replace(session=self._presence.session_of(client))
                 answer = self._unless_gone(client, answer)
+            except NoControlError as error:
+                admitted = error.reply
         if isinstance(admitted, Refused):
             with self._lock:
                 self.commands_refused += 1
             answer(admitted)
         else:
             self._carry_out(admitted, answer)
-
-    def _with_session(self, admitted: Admitted, client: str) -> Admitted | Refused:
-        try:
-            with self._lock:
-                return admitted._replace(session=self._presence.session_of(client))
-        except NoControlError as error:
-            return error.reply
 
     def _unless_gone(self, client: str, answer: Answer) -> Answer:
         """Answer a command that grants a client control or the clock, and revoke it if the client has disconnected."""

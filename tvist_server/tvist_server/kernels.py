@@ -34,7 +34,7 @@ from tvist_protocol.motions import MoveL
 from tvist_protocol.replies import Accepted, Refused, Reply, ToolPose
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
 from tvist_server.config import from_mapping
-from tvist_server.gateways.starting import Tell
+from tvist_server.gateways.base import Tell
 from tvist_server.punctual import processors
 
 MOVE_TICKS = 1000  # longest time of a motion that uses kernels [ticks]
@@ -70,7 +70,7 @@ def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> Non
 
     `tell` gets the progress. Raise KernelsError if a kernel could not be compiled or stored.
     """
-    waiting, running, said = list(PARTS), list[_Process](), ""
+    waiting, running, said = list(PARTS), list[subprocess.Popen[bytes]](), ""
     try:
         while waiting or running:
             while waiting and len(running) < (processes or processors()):
@@ -90,17 +90,14 @@ def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> Non
         raise KernelsError(said)
 
 
-_Process = subprocess.Popen[bytes]
-
-
-def _begin(part: str) -> _Process:
+def _begin(part: str) -> subprocess.Popen[bytes]:
     """Start a process that compiles a part and ends with this one."""
     command = [sys.executable, "-m", "tvist_server.kernels", part]
     pipe = subprocess.PIPE
     return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT)  # noqa: S603
 
 
-def _said(process: _Process) -> str:
+def _said(process: subprocess.Popen[bytes]) -> str:
     """Return the error of a process that has ended; empty if it succeeded."""
     said = process.communicate()[0].decode(errors="replace").strip()
     if process.returncode == 0:
@@ -177,9 +174,7 @@ PARTS: dict[str, Callable[[], None]] = {"line": _line, "plans": _plans}
 
 
 def _end_with_parent() -> None:
-    os.read(
-        sys.stdin.fileno(), 1
-    )  # returns when the parent ends; sys.stdin would block the interpreter's exit
+    os.read(sys.stdin.fileno(), 1)  # until the parent ends; sys.stdin would block the interpreter's exit
     os._exit(1)
 
 

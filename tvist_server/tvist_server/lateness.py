@@ -29,14 +29,11 @@ class Lateness:
         self._worked = 0.0
         self._looked, self._looked_at = 0, time.monotonic()
 
-    def note(self, late: float) -> None:
-        """Add a tick's lateness [s]."""
+    def note(self, late: float, worked: float) -> None:
+        """Add a tick's lateness, and the duration of the tick and the jobs before it [s]."""
         self._late[self._count % KEPT] = late
         self._count += 1
-
-    def worked(self, seconds: float) -> None:
-        """Add the duration of a tick and the jobs before it [s]."""
-        self._worked += seconds
+        self._worked += worked
 
     def look(self) -> Punctuality:
         """Return the lateness since the last call."""

@@ -4,7 +4,6 @@ import math
 import re
 import tomllib
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -83,16 +82,8 @@ def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[f
     return numbers
 
 
-@dataclass(frozen=True)
-class RobotEntry:
-    """One of the robots listed in `robots`."""
-
-    robot: str  # name of a robot that comes with the package, or path of a robot file
-    name: str  # name of the robot on the network
-
-
-def members(text: str, most: int = MAX_ROBOTS) -> list[RobotEntry]:
-    """Return the robots of a list such as `ur5e*2,other.toml`, named after their files: ur5e-1, ur5e-2, other."""
+def members(text: str, most: int = MAX_ROBOTS) -> list[tuple[str, str]]:
+    """Return robots and their names of a list such as `ur5e*2,other.toml`, after their files: ur5e-1, ur5e-2, other."""
     robots: list[str] = []
     for entry in text.split(","):
         robot, star, count = entry.strip().partition("*")
@@ -107,17 +98,17 @@ def members(text: str, most: int = MAX_ROBOTS) -> list[RobotEntry]:
             )
     stems = [Path(robot).stem for robot in robots]
     total, so_far = Counter(stems), Counter[str]()
-    found: list[RobotEntry] = []
+    found: list[tuple[str, str]] = []
     for robot, stem in zip(robots, stems, strict=True):
         so_far[stem] += 1
         name = stem if total[stem] == 1 else f"{stem}-{so_far[stem]}"
         try:
-            found.append(RobotEntry(robot, check_robot_name(name)))
+            found.append((robot, check_robot_name(name)))
         except ProtocolError as error:
             raise StartError(
                 f"robots has {robot!r}, whose file name is not a robot's name: {error.why}"
             ) from error
-    twice = [name for name, times in Counter(member.name for member in found).items() if times > 1]
+    twice = [name for name, times in Counter(name for _, name in found).items() if times > 1]
     if twice:
         raise StartError(f"robots is {text!r}: two robots would be named {twice[0]}; rename a file")
     return found

@@ -14,7 +14,7 @@ from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command, KeepAlive
-from tvist_protocol.replies import Posture, Refused, Reply, ToolPose
+from tvist_protocol.replies import Posture, Refused, ToolPose
 from tvist_server.gateways.base import Answer
 
 log = logging.getLogger(__name__)
@@ -82,11 +82,6 @@ class PlanAhead:
         if self._thread.is_alive():
             self._thread.join(CLOSE_WAIT)
 
-    @property
-    def waiting(self) -> int:
-        """Number of commands whose preparation has not finished."""
-        return self._count
-
     def submit(self, admitted: Admitted, answer: Answer) -> None:
         """Queue a command, from any thread, without blocking; `answer` takes the reply in the controller's thread."""
         row = COMMANDS[type(admitted.command)]
@@ -98,7 +93,7 @@ class PlanAhead:
             if waits and not full:
                 self._count += 1
                 self._commands += not asks
-                self._queue.put(_Waiting(admitted, _nobody if stops else answer))
+                self._queue.put(_Waiting(admitted, (lambda _: None) if stops else answer))
         if not waits or stops:
             self._post(lambda: answer(self._host.carry_out(admitted)))
         elif full:
@@ -164,7 +159,3 @@ class PlanAhead:
             return False
         waiting.answer(self._host.carry_out(waiting.admitted, plan))
         return True
-
-
-def _nobody(reply: Reply) -> None:
-    """Ignore the reply, because the sender already has one."""

@@ -28,8 +28,8 @@ class Profile(Struct, frozen=True, kw_only=True):
         return UR_START if self.ur_start and is_of_ur_form(description) else None
 
 
-PLAIN = Profile()
-PROFILES: Mapping[ProfileName, Profile] = {
+PROFILES: Mapping[ProfileName | None, Profile] = {
+    None: Profile(),
     "ursim": Profile(payload=0.0, ur_start=True, shaper="none", quiet=True, floor=False, compensate_sag=True),
     "real": Profile(ur_start=True),
 }

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 
 from tvist_controller.instruments.report import Report, Sink
 from tvist_protocol.codec import encode
-from tvist_protocol.io import Io
-from tvist_protocol.stream import Event, Telemetry, Truth
 from tvist_server.gateways.base import Gateway, Message, topic_of
 
 log = logging.getLogger(__name__)
@@ -19,47 +17,25 @@ class Publisher(Sink):
     """Passes everything to the gateways; a failing gateway does not affect the others."""
 
     def __init__(self) -> None:
-        self._gateways: Sequence[Gateway] = ()
+        self.gateways: Sequence[Gateway] = ()  # each gets every message
 
     def want_truth(self, wanted: bool) -> None:
         """Note whether a client subscribes to `truth`; from any thread."""
         self.wants_truth = wanted
 
-    def open(self, gateways: Sequence[Gateway]) -> None:
-        """Set the gateways, each of which gets every message."""
-        self._gateways = gateways
-
     def report(self, report: Report) -> None:
         """Publish a tick's state."""
-        for gateway in self._gateways:
+        for gateway in self.gateways:
             if "state" in gateway.wanted_topics:
                 try:
                     gateway.report(report)
                 except Exception:
                     log.exception("a state is not published")
 
-    def event(self, event: Event) -> None:
-        self._publish(event)
-
-    def truth(self, truth: Truth) -> None:
-        self._publish(truth)
-
-    def io(self, io: Io) -> None:
-        self._publish(io)
-
-    def telemetry(self, telemetry: Telemetry, io: Io) -> None:
-        """Publish the server's own figures, and the present inputs, outputs and registers again."""
-        self._publish(io)
-        self._publish(telemetry)
-
-    def repeat(self, report: Report, io: Io) -> None:
-        """Publish the present state, inputs, outputs and registers again, for new clients."""
-        self._publish(io)
-        self.report(report)
-
-    def _publish(self, message: Message) -> None:
+    def publish(self, message: Message) -> None:
+        """Publish a message other than a state."""
         topic = topic_of(message)
-        takers = [gateway for gateway in self._gateways if topic in gateway.wanted_topics]
+        takers = [gateway for gateway in self.gateways if topic in gateway.wanted_topics]
         if not takers:
             return
         try:
@@ -72,3 +48,5 @@ class Publisher(Sink):
                 gateway.publish(topic, message, data)
             except Exception:
                 log.exception("a message of the topic %s is not published", topic)
+
+    event = truth = io = publish

@@ -5,6 +5,7 @@ import logging
 import os
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 log = logging.getLogger(__name__)
@@ -53,3 +54,10 @@ def take_priority() -> bool:
         )
         return False
     return True
+
+
+def background(name: str) -> ThreadPoolExecutor:
+    """Return a thread for slow work, already started: if the tick thread started it, it would inherit its priority."""
+    thread = ThreadPoolExecutor(1, name)
+    thread.submit(int)
+    return thread

@@ -1,6 +1,8 @@
 """One robot of a server: its controller, and its connections to clock, network and file."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +12,10 @@ from tvist_controller.dispatch.admission import Admitted
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
 from tvist_controller.instruments.report import Sink
+from tvist_controller.planning.plan import Plan
+from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.programs.sockets import SocketNews
+from tvist_controller.safety.experience import Experience
 from tvist_controller.safety.payload_student import experience_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant, RealArm
@@ -19,19 +24,17 @@ from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import State, Telemetry
 from tvist_server.allowed_hosts import AllowedHosts
-from tvist_server.clock import Clock, TickedRobot
+from tvist_server.clock import TickedRobot
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.gateways.sockets import ProgramSockets
 from tvist_server.intake import RobotIntake
 from tvist_server.kernels import warm_up
 from tvist_server.lateness import Punctuality
 from tvist_server.plan_ahead import PlanAhead
-from tvist_server.plans_of_programs import PlansOfPrograms
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.publisher import Publisher
-from tvist_server.punctual import waited_us
+from tvist_server.punctual import background, waited_us
 from tvist_server.recording.black_box import BlackBox
-from tvist_server.studies import Studies
 
 if TYPE_CHECKING:
     from tvist_server.recording.recorder import Recorder
@@ -61,9 +64,9 @@ class ServedRobot:
         self._waited_us = 0.0
         plant = setup.made_plant()
         setup = setup.standing(plant)  # adopts the limits of a real robot
+        self._threads: list[ThreadPoolExecutor] = []
         # When a client advances time, nothing is late, and plans are made when they are needed.
-        self._plans = None if lockstep else PlansOfPrograms(Planner(setup))
-        self.controller = Controller(setup, plant, None if self._plans is None else self._plans.order)
+        self.controller = Controller(setup, plant, None if lockstep else self._plans_of_programs(setup))
         self.setup = setup = self.controller.setup
         if self._realtime:
             warm_up()
@@ -87,13 +90,8 @@ class ServedRobot:
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
-        self._studies = Studies() if self._realtime and setup.adapt else None
-        if self._studies is None:
-            experience = experience_of(setup)
-        else:
-            planner = Planner(setup)  # used only by the studies' thread
-            experience = experience_of(setup, self._studies.later, planner.for_lesson)
-        self._host = Host(
+        experience = self._studies(setup) if self._realtime and setup.adapt else experience_of(setup)
+        self.host = Host(
             self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience,
             survives=True,
         )  # fmt: skip
@@ -102,54 +100,68 @@ class ServedRobot:
         self.want_truth = self.publisher.want_truth if knows and not setup.truth else None
         """Takes whether a local client wants `truth`; None if it is always published or unknown."""
         self.driven = TickedRobot(
-            self._host,
+            self.host,
             self.sockets.patience,
             plant.wait if plant.can(Plant.wait) else None,
             plant.interval() if isinstance(plant, RealArm) and (plant.watched or plant.supervised) else None,
         )
         """The robot as the clock sees it."""
-        self._plan_ahead = (
-            None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post, self._complete)
+        self.plan_ahead = (
+            None if lockstep else PlanAhead(self.host, Planner(setup), self.driven.post, self._complete)
         )
-        carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
+        carry_out = self._carry_out if self.plan_ahead is None else self.plan_ahead.submit
         self.reception = RobotIntake(
-            self._host,
+            self.host,
             self.driven.post,
             carry_out,
             None if programs is None else programs.listed,
         )
         """Desk to which gateways pass messages."""
-        self._gateways: Sequence[Gateway] = ()
+        self.gateways: Sequence[Gateway] = ()
+
+    def _plans_of_programs(self, setup: Setup) -> Callable[[Command, PlanningState], Callable[[], Plan]]:
+        """Return a function that starts to plan a command, and returns one that waits for the plan.
+
+        A program line starts a fixed number of ticks after its call, so a run is the same on every machine. If a
+        plan takes longer, the controller waits for it and its ticks are late.
+        """
+        planner, thread = Planner(setup), background("tvist-program-plans")
+        self._threads.append(thread)
+        return lambda command, now: thread.submit(planner.plan, command, now).result
+
+    def _studies(self, setup: Setup) -> Experience | None:
+        """Return what studies motions one at a time; the robot takes a lesson at a tick that its journal records."""
+        planner, thread = Planner(setup), background("tvist-studies")
+        self._threads.append(thread)
+        return experience_of(setup, lambda work: thread.submit(work).done, planner.for_lesson)
 
     def open(self, gateways: Sequence[Gateway]) -> None:
         """Set this robot's own gateways, which get its messages and are closed with it."""
-        self._gateways = gateways
-        self.publisher.open(gateways)
+        self.gateways = gateways
+        self.publisher.gateways = gateways
 
     def request(self, command: Command) -> Reply:
         """Carry out a command of this process, in the controller's thread or, reproducibly, before the first tick."""
-        return self._host.request(encode(command), LOCAL)
+        return self.host.request(encode(command), LOCAL)
 
     def repeat(self) -> None:
         """Publish the state again for new clients, unless time has passed; in the controller's thread."""
         report = self.controller.report
         # A robot that is stepped publishes newer states; its clients would mistake an old one for a tick.
         if report.tick == self._looked_at:
-            self.publisher.repeat(report, self.controller.io())
+            self.publisher.io(self.controller.io())
+            self.publisher.report(report)
         self._looked_at = report.tick
 
     def _carry_out(self, admitted: Admitted, answer: Answer) -> None:
         client = admitted.client
-
-        def attend() -> bool:
-            return self.driven.attend(client)
 
         def carry_out() -> None:
             completed = admitted if self._complete is None else self._complete(admitted)
             if isinstance(completed, Refused):
                 answer(completed)
             else:
-                answer(self._host.carry_out(completed, attend=attend))
+                answer(self.host.carry_out(completed, attend=partial(self.driven.attend, client)))
 
         self.driven.post(carry_out, client)
 
@@ -159,59 +171,24 @@ class ServedRobot:
         report = self.controller.report
         return report.state if report.tick > 0 else None
 
-    def start(self) -> None:
-        """Start planning; call this before the clock starts."""
-        if self._plan_ahead is not None:
-            self._plan_ahead.start()
-
-    async def let_in(self) -> None:
-        """Admit clients; the robot ticks already."""
-        for gateway in self._gateways:
-            await gateway.open()
-
-    async def let_out(self) -> None:
-        """Admit no more clients, and disconnect the present ones."""
-        for gateway in self._gateways:
-            await gateway.shut()
-
-    def cancel_plans(self) -> None:
-        """Refuse further plans before shutdown."""
-        if self._plan_ahead is not None:
-            self._plan_ahead.end()
-
-    def stop_planning(self) -> None:
-        """Wait for the current plan; call this before the clock ends."""
-        if self._plan_ahead is not None:
-            self._plan_ahead.close()
-
-    def leave_arm(self) -> None:
-        """Release an arm that has power; the controller's thread has ended."""
-        self._host.leave_arm()
-
     def close(self) -> None:
         """Close the gateways; the controller's thread has ended."""
-        if self._plans is not None:
-            self._plans.close()
-        if self._studies is not None:
-            self._studies.close()
-        for gateway in self._gateways:
+        for thread in self._threads:
+            thread.shutdown(cancel_futures=True)
+        for gateway in self.gateways:
             gateway.close()
 
-    @property
-    def failure(self) -> str | None:
-        """Why the robot has stopped ticking; None if it ticks."""
-        return self._host.failure
-
-    def tell_telemetry(self, clock: Clock) -> None:
+    def tell_telemetry(self) -> None:
         """Publish the server's own figures about this robot, in the controller's thread."""
-        punctuality = clock.punctuality(self.driven)
+        punctuality = self.driven.lateness.look()
 
         def tell() -> None:
             # The present io, not the last published one: a program may have been played since.
             if self.driven.pace is not None:  # new clients of a silent arm still get a state
                 self.repeat()
             io = self.controller.io()
-            self.publisher.telemetry(self._telemetry(punctuality), io)
+            self.publisher.io(io)
+            self.publisher.publish(self._telemetry(punctuality))
             if (
                 self.recorder is not None and self._realtime
             ):  # recordings of equal runs in lockstep must be equal
@@ -219,12 +196,11 @@ class ServedRobot:
 
         self.driven.post(tell)
 
-    def _telemetry(self, punctuality: Punctuality | None) -> Telemetry:
+    def _telemetry(self, on_time: Punctuality) -> Telemetry:
         controller, counters, reception = self.controller, self.controller.counters, self.reception
-        gateways = self._gateways
+        gateways = self.gateways
         late, lost, limited = controller.motion.streams.counters()
         refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
-        on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0, 0.0)
         overload = self.driven.overload
         left_out = 0 if controller.watching is None else counters.missed_ticks
         before, self._waited_us = self._waited_us, waited_us() if self._realtime else 0.0
@@ -244,35 +220,24 @@ class ServedRobot:
             setpoints_limited=limited,
             commands=counters.commands + reception.commands_refused,
             refused=counters.refused + reception.commands_refused,
-            load=None if punctuality is None else punctuality.load,
+            load=None if overload is None else on_time.load,
             due_ticks=None if overload is None else overload.due + left_out,
             due_per_second=None if overload is None else overload.due_per_second,
             overloaded=overload is not None and overload.overloaded,
             processor_wait_us=self._waited_us - before,
         )
 
-    def close_recording(self) -> None:
-        """Write the waiting messages and the index."""
-        if self.recorder is not None:
-            self.recorder.close()
-
-    def discard_recording(self) -> None:
-        """Remove a recording that never started, because its file would block the next attempt."""
-        if self.recorder is not None:
-            self.recorder.discard()
-
     def _hear(self, news: SocketNews) -> None:
-
         def hear() -> None:
             self.sockets.note(news)
-            self._host.socket(news)
+            self.host.socket(news)
 
         self.driven.post(hear)
 
     def ask_gripper(self, request: bytes, answer: Callable[[bytes], None]) -> None:
         """Carry out a request to the cell's gripper before the next tick; `answer` runs in the controller's thread."""
-        self.driven.post(lambda: answer(self._host.ask_gripper(request)))
+        self.driven.post(lambda: answer(self.host.ask_gripper(request)))
 
     def warn(self, why: str) -> None:
         """Publish a warning to clients and the console."""
-        self.driven.post(lambda: self._host.warn(why))
+        self.driven.post(lambda: self.host.warn(why))

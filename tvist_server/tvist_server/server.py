@@ -13,22 +13,30 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from tvist_controller.controller import Controller
 from tvist_controller.instruments.report import Sink
-from tvist_server.assembly import check_paces, made_robot, make_clocks, protected, ur_interfaces
+from tvist_server.assembly import (
+    Share,
+    check_paces,
+    check_together,
+    made_robot,
+    make_clocks,
+    protected,
+    ur_interfaces,
+)
 from tvist_server.clock import Realtime
 from tvist_server.config import ServeConfig
-from tvist_server.gateways.base import Gateway
+from tvist_server.gateways.base import Gateway, Prepare, Starting
 from tvist_server.gateways.console import Console, ConsoleGateway
-from tvist_server.gateways.endpoints import is_local
-from tvist_server.gateways.metrics import Metrics
+from tvist_server.gateways.exposure import is_local
+from tvist_server.gateways.metrics import Metrics, MetricsGateway
 from tvist_server.gateways.network import Network
-from tvist_server.gateways.starting import Prepare, Starting
+from tvist_server.plan_ahead import PlanAhead
 from tvist_server.robot import ServedRobot
 from tvist_server.shutdown import Shutdown
-from tvist_server.spread import Share, check_together
 from tvist_server.ur_ports import InterfaceName
 
 if TYPE_CHECKING:
     from tvist_server.gateways.ur.interfaces import UrInterfaces
+    from tvist_server.recording.recorder import Recorder
 
 LEAVE = 0.6  # longest time for clients to read pending messages at shutdown [s]
 
@@ -121,7 +129,8 @@ class Server:
             self.metrics.close()
         for robot in self.robots:
             robot.close()
-            robot.discard_recording()
+        for recorder in self._recorders:
+            recorder.discard()
         self._network.close()
 
     def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
@@ -139,7 +148,9 @@ class Server:
             self.ur.append((interfaces.address, interfaces.ports))
             gateways.append(interfaces)
         if self.metrics is not None:
-            gateways.append(self.metrics.gateway(config.namespace or "", name, lambda: robot.newest))
+            gateways.append(
+                self.metrics.add(MetricsGateway(config.namespace or "", name, lambda: robot.newest))
+            )
         if not self._observed:
             gateways.append(ConsoleGateway(self._console, name, partial(config.command_line, name=name)))
         return gateways
@@ -152,23 +163,23 @@ class Server:
         # Time after which the tick thread demands the interpreter's lock; the default, 5 ms, exceeds a tick.
         sys.setswitchinterval(1e-4)
         self._console.start()
-        for robot in self.robots:
-            robot.start()
+        for plan in self._planning:
+            plan.start()
         for clock in self._clocks:
             clock.start()
             self.granted += clock.granted if isinstance(clock, Realtime) else []
 
     def close(self) -> None:
         """Shut down in order: stop the clocks, close the recordings, deliver pending messages to clients that read."""
-        for robot in self.robots:
-            robot.cancel_plans()
+        for plan in self._planning:
+            plan.end()
         # A planning thread waits for jobs of the tick thread, so it must end first.
-        for robot in self.robots:
-            robot.stop_planning()
+        for plan in self._planning:
+            plan.close()
         for clock in self._clocks:
             clock.close()
-        for robot in self.robots:
-            robot.close_recording()
+        for recorder in self._recorders:
+            recorder.close()
         leaving = Thread(target=self._leave, name="tvist-leave", daemon=True)
         leaving.start()
         leaving.join(LEAVE)
@@ -179,7 +190,7 @@ class Server:
         """Release the arms and close the network. A client that has stopped reading can delay this for ten seconds."""
         try:
             for robot in self.robots:
-                robot.leave_arm()
+                robot.host.leave_arm()
             for robot in self.robots:
                 robot.close()
             self._console.close()
@@ -195,16 +206,18 @@ class Server:
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
         self.start()
         try:
-            for robot in self.robots:
-                await robot.let_in()
+            for gateway in (one for robot in self.robots for one in robot.gateways):
+                await gateway.open()
             ready()
-            while not (ended.is_set() or all(robot.failure for robot in self.robots)):
+            while not (ended.is_set() or all(robot.host.failure for robot in self.robots)):
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(ended.wait(), 1.0)
-                self._tell_telemetry()
+                for robot in self.robots:
+                    robot.tell_telemetry()
+                self._console.update()
         finally:
-            for robot in self.robots:
-                await robot.let_out()
+            for gateway in (one for robot in self.robots for one in robot.gateways):
+                await gateway.shut()
             self.close()
 
     @property
@@ -220,24 +233,24 @@ class Server:
     @property
     def failure(self) -> str | None:
         """Why a robot has stopped ticking; None if all of them tick."""
-        return next((robot.failure for robot in self.robots if robot.failure is not None), None)
+        return next((robot.host.failure for robot in self.robots if robot.host.failure is not None), None)
+
+    @property
+    def _recorders(self) -> "list[Recorder]":
+        return [robot.recorder for robot in self.robots if robot.recorder is not None]
+
+    @property
+    def _planning(self) -> list[PlanAhead]:
+        return [robot.plan_ahead for robot in self.robots if robot.plan_ahead is not None]
 
     @property
     def recordings(self) -> list[RecordingResult]:
         """The recordings, after `close`."""
-        recorders = [robot.recorder for robot in self.robots if robot.recorder is not None]
         return [
             RecordingResult(
                 str(recorder.place or f"a file that is no longer {recorder.path}"),
                 recorder.dropped,
                 recorder.error,
             )
-            for recorder in recorders
+            for recorder in self._recorders
         ]
-
-    def _tell_telemetry(self) -> None:
-        # In lockstep each robot has its own clock.
-        clocks = self._clocks if len(self._clocks) > 1 else self._clocks * len(self.robots)
-        for robot, clock in zip(self.robots, clocks, strict=True):
-            robot.tell_telemetry(clock)
-        self._console.update()

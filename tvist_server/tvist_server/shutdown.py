@@ -102,11 +102,6 @@ class Shutdown:
         """The signal that requested the shutdown; None if none did."""
         return None if self._wish is None else signal.Signals(self._wish)
 
-    @property
-    def interrupted(self) -> bool:
-        """Whether Control+C requested the shutdown."""
-        return self._wish == signal.SIGINT
-
     def close(self) -> None:
         """Ignore the signals until the process ends, because the interpreter removes its handlers earlier."""
         report = sys.unraisablehook

@@ -9,21 +9,21 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 import zenoh
-from zenoh.handlers import Callback
+from zenoh.handlers import Callback, RingChannel
 
 from tvist_plant.user_file import UserFileError
 from tvist_protocol import keys
+from tvist_protocol.codec import decode
+from tvist_protocol.stream import Event, State, Telemetry
+from tvist_server.assembly import Share
 from tvist_server.config import ServeConfig
-from tvist_server.gateways.base import GatewayError
-from tvist_server.gateways.distant_metrics import DistantMetrics
-from tvist_server.gateways.metrics import Metrics
+from tvist_server.gateways.base import GatewayError, Starting
+from tvist_server.gateways.metrics import Metrics, MetricsGateway
 from tvist_server.gateways.network import Network
-from tvist_server.gateways.starting import Starting
 from tvist_server.option_values import StartError
 from tvist_server.recording import RecorderError
 from tvist_server.server import RecordingResult, Server
 from tvist_server.shutdown import Shutdown, limit_shutdown
-from tvist_server.spread import Share
 from tvist_server.ur_ports import InterfaceName
 
 END = 3.5  # longest wait for a process to close its recordings and end [s]; then it is killed
@@ -85,6 +85,28 @@ class ParentPipe:
             self.died()
 
 
+class DistantMetrics(MetricsGateway):
+    """Keeps the newest messages of a robot that another process serves; `session` connects to that process's router."""
+
+    def __init__(self, session: zenoh.Session, namespace: str, robot: str) -> None:
+        super().__init__(namespace, robot, self._arrived)
+        # Nobody reads 500 states a second: Zenoh keeps the newest one without a Python call for each.
+        newest: RingChannel[zenoh.Sample] = RingChannel(1)
+        self._states = session.declare_subscriber(keys.key(robot, "state"), newest)
+        session.declare_subscriber(keys.key(robot, "event"), Callback(self._on_event, indirect=False))
+        session.declare_subscriber(keys.key(robot, "telemetry"), Callback(self._on_telemetry, indirect=False))
+
+    def _arrived(self) -> State | None:
+        sample = self._states.try_recv()
+        return None if sample is None else decode(State, sample.payload.to_bytes())
+
+    def _on_event(self, sample: zenoh.Sample) -> None:
+        self.count(decode(Event, sample.payload.to_bytes()))
+
+    def _on_telemetry(self, sample: zenoh.Sample) -> None:
+        self.telemetry = decode(Telemetry, sample.payload.to_bytes())
+
+
 def meet_clients(
     config: ServeConfig,
     names: Sequence[str],
@@ -142,13 +164,11 @@ def meet_clients(
 def work(config: ServeConfig, share: Share, parent: ParentPipe) -> None:
     """Serve robots until the first process ends it or dies.
 
-    On the first word it makes its robots and reports `Made`; on the next it starts them and reports `WorkerReady`; on
-    the last it reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
+    It makes its robots and reports `Made`; on the first word it starts them and reports `WorkerReady`; on the last it
+    reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
     """
     ending = Shutdown()
     ending.close()  # ignores signals
-    if not parent.receive():
-        return
     try:
         server = Server(config, share=share)
     except (StartError, UserFileError, GatewayError, RecorderError) as error:

@@ -20,17 +20,16 @@ from tvist_controller.controller import Controller
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
 from tvist_controller.setup import Setup
-from tvist_server.assembly import protected
+from tvist_server.assembly import LOCAL, Share, check_together, protected, shares
 from tvist_server.config import ServeConfig
 from tvist_server.gateways.access import with_robots_behind
-from tvist_server.gateways.endpoints import protocol
-from tvist_server.gateways.starting import Prepare
+from tvist_server.gateways.base import Prepare
+from tvist_server.gateways.exposure import protocol
 from tvist_server.kernels import warm_up
 from tvist_server.option_values import StartError
 from tvist_server.own_folder import OwnFolder
 from tvist_server.server import RecordingResult
 from tvist_server.shutdown import Shutdown
-from tvist_server.spread import LOCAL, Share, check_together, shares
 from tvist_server.ur_ports import InterfaceName
 from tvist_server.worker import (
     END,
@@ -73,6 +72,9 @@ class Workers:
         """Address and ports of each robot's UR interfaces; empty if they are closed."""
         self.recordings: list[RecordingResult] = []
         self._folder = OwnFolder()
+        self._inside = (
+            f"{LOCAL}{self._folder.path / 'robots'}"  # endpoint for the processes of this server alone
+        )
         self._front: list[_Worker] = []  # the process that clients connect to
         self._workers: list[_Worker] = []
         try:
@@ -80,12 +82,10 @@ class Workers:
             self.page = self._made(self._front[0]).page
             """Address of the page with figures for Prometheus; None if they are not published."""
             if prepare is not None:
-                prepare(self._note)
+                prepare(lambda done, total: self._tell_front((done, total)))
             for setup in {id(setup.description): setup for setup in self.setups}.values():
                 _rehearse(setup)
             self._fork()
-            for worker in self._workers:
-                worker.pipe.send(True)
             for worker in self._workers:
                 self.ur += self._made(worker).ur
         except BaseException:  # including a signal
@@ -159,11 +159,6 @@ class Workers:
             theirs.close()
         gc.unfreeze()
 
-    @property
-    def _inside(self) -> str:
-        """Endpoint for the processes, in a folder that only this user can enter."""
-        return f"{LOCAL}{self._folder.path / 'robots'}"
-
     def _open(self) -> _Worker:
         config, listen, guard = self._config, self._listen, self._guard
         if not config.connect:
@@ -189,9 +184,6 @@ class Workers:
         )
         process.start()
         return _Worker(who, process, ours)
-
-    def _note(self, done: int, total: int) -> None:
-        self._tell_front((done, total))
 
     def _tell_front(self, word: object) -> None:
         with contextlib.suppress(OSError):  # it has died, which `run` reports

@@ -1,8 +1,7 @@
 """URScript, the language of UR robots: compiled to Python and run tick by tick, without robot, clock or thread."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING
-
+from tvist_urscript.checker import check
+from tvist_urscript.compiler import compile_script
 from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.library import PURE
@@ -47,18 +46,3 @@ __all__ = [
     "signatures",
     "to_str",
 ]
-
-if TYPE_CHECKING:
-    from tvist_urscript.checker import check
-    from tvist_urscript.compiler import compile_script
-
-_PLACES = {"check": "tvist_urscript.checker", "compile_script": "tvist_urscript.compiler"}
-"""Modules of names that are imported on first use, so that a robot starts without loading the compiler."""
-
-
-def __getattr__(name: str) -> object:
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value: object = getattr(import_module(_PLACES[name]), name)
-    globals()[name] = value
-    return value

@@ -22,12 +22,10 @@ from tvist_urscript.values import (
     whole,
 )
 
-MOST_PRODUCTS = 2744
-"""Largest number of multiplications in a product of matrices: two of 14 by 14."""
+MOST_PRODUCTS = 2744  # largest number of multiplications in a product of matrices: two of 14 by 14
 
 Number: TypeAlias = int | float
-Work: TypeAlias = Callable[[int], None]
-"""Called with the number of elements that are about to be computed."""
+Work: TypeAlias = Callable[[int], None]  # called with the number of elements that are about to be computed
 
 
 def total(a: Number, b: Number) -> Number:

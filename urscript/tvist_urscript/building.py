@@ -1,70 +1,63 @@
 """Build a script's tree bottom-up while it is parsed, without recursion, so that nesting cannot overflow the stack."""
 
 import re
+from collections.abc import Sequence
 from typing import Any, Literal, TypeVar
 
-from lark import Token, Transformer
+from lark import Token, Transformer, v_args
 
 from tvist_urscript import tree
 from tvist_urscript.errors import no_program
 from tvist_urscript.values import HIGHEST, LONGEST_TEXT, to_bytes, whole
 
-DEEPEST = 100
-"""Most levels of nested expressions; a block counts as BLOCK levels."""
+DEEPEST = 100  # most levels of nested expressions; a block counts as BLOCK levels
 BLOCK = 4
 
 _LABEL = re.compile(r'\$[ \t]*(\d+)[ \t]*"(.*?)"(?:[ \t]+"\w+")*[ \t\r]*(?:#.*)?', re.ASCII)
 """A label: number, name (which may contain quotes), and words such as "noBreak", which are ignored."""
 
-Children = list[Any]
 T = TypeVar("T", bound=tree.Node)
 
 
+@v_args(inline=True)
 class Builder(Transformer[Token, Any]):
     """Makes a node of each rule's children."""
 
-    def start(self, children: Children) -> list[tree.Statement]:
-        return children
+    def start(self, *children: Any) -> list[tree.Statement]:
+        return list(children)
 
     block = start
 
-    def function(self, children: Children) -> tree.Function:
-        kind, name, *parameters, body = children
+    def function(self, kind: Any, name: Any, *rest: Any) -> tree.Function:
+        *parameters, body = rest
         node = tree.Function(name.line, name.column, str(kind), str(name), parameters, body)  # type: ignore[arg-type]
         return _deeper(node, body, [default for _, default in parameters if default is not None])
 
-    def parameter(self, children: Children) -> tuple[tree.Name, tree.Expression | None]:
-        return self.name(children), children[1] if len(children) > 1 else None
+    def parameter(self, name: Any, default: Any = None) -> tuple[tree.Name, tree.Expression | None]:
+        return self.name(name), default
 
-    def branches(self, children: Children) -> tree.If:
-        word, *rest = children
+    def branches(self, word: Any, *rest: Any) -> tree.If:
         branches = list(zip(rest[0::2], rest[1::2], strict=False))
         otherwise = rest[-1] if len(rest) % 2 else []
         node = tree.If(word.line, word.column, branches, otherwise)
         return _deeper(node, otherwise, *([condition, *body] for condition, body in branches))
 
-    def loop(self, children: Children) -> tree.While:
-        word, condition, body = children
+    def loop(self, word: Any, condition: Any, body: Any) -> tree.While:
         return _deeper(tree.While(word.line, word.column, condition, body), body, [condition])
 
-    def evaluate(self, children: Children) -> tree.Evaluate:
-        (value,) = children
-        return _deeper(tree.Evaluate(value.line, value.column, value), children)
+    def evaluate(self, value: Any) -> tree.Evaluate:
+        return _deeper(tree.Evaluate(value.line, value.column, value), [value])
 
-    def return_value(self, children: Children) -> tree.Return:
-        word, *value = children
+    def return_value(self, word: Any, *value: Any) -> tree.Return:
         return _deeper(tree.Return(word.line, word.column, value[0] if value else None), value)
 
-    def handle(self, children: Children) -> tree.Handle:
-        word, value = children
+    def handle(self, word: Any, value: Any) -> tree.Handle:
         return _deeper(tree.Handle(word.line, word.column, str(word), value), [value])  # type: ignore[arg-type]
 
-    def word(self, children: Children) -> tree.Word:
-        (word,) = children
+    def word(self, word: Any) -> tree.Word:
         return tree.Word(word.line, word.column, str(word))  # type: ignore[arg-type]
 
-    def label(self, children: Children) -> tree.Label:
-        (token,) = children
+    def label(self, token: Any) -> tree.Label:
         found = _LABEL.fullmatch(token)
         if found is None:
             raise no_program(token, "a label is a line with $, a number and a name in quotes")
@@ -74,8 +67,8 @@ class Builder(Transformer[Token, Any]):
             raise no_program(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
         return tree.Label(token.line, token.column, int(found[1]), found[2])
 
-    def assign(self, children: Children) -> tree.Assign:
-        *qualifier, target, equal, value = children
+    def assign(self, *parts: Any) -> tree.Assign:
+        *qualifier, target, equal, value = parts
         indices: list[tree.Expression | tree.Step] = []
         inner, bracket = target, target
         while isinstance(inner, tree.Index | tree.Member):
@@ -93,48 +86,43 @@ class Builder(Transformer[Token, Any]):
         node = tree.Assign(inner.line, inner.column, inner, indices, value, declared)
         return _deeper(node, indices, [value])
 
-    def either(self, children: Children, operator: Literal["or", "xor", "and"] = "or") -> tree.Logic:
-        first = children[0]
-        return _deeper(tree.Logic(first.line, first.column, operator, children), children)
+    def either(self, *values: Any, operator: Literal["or", "xor", "and"] = "or") -> tree.Logic:
+        first, *_ = values
+        return _deeper(tree.Logic(first.line, first.column, operator, [*values]), values)
 
-    def unequal(self, children: Children) -> tree.Logic:
-        return self.either(children, "xor")
+    def unequal(self, *values: Any) -> tree.Logic:
+        return self.either(*values, operator="xor")
 
-    def both(self, children: Children) -> tree.Logic:
-        return self.either(children, "and")
+    def both(self, *values: Any) -> tree.Logic:
+        return self.either(*values, operator="and")
 
-    def unary(self, children: Children) -> tree.Expression:
-        operator, value = children
+    def unary(self, operator: Any, value: Any) -> tree.Expression:
         if operator == "-" and isinstance(value, tree.Constant) and type(value.value) in (int, float):
             value.value = -value.value  # type: ignore[operator]
             value.line, value.column = operator.line, operator.column
             return value
         return _deeper(tree.Unary(operator.line, operator.column, str(operator), value), [value])  # type: ignore[arg-type]
 
-    def plus(self, children: Children) -> tree.Expression:
-        operator, value = children
+    def plus(self, operator: Any, value: Any) -> tree.Expression:
         if not (isinstance(value, tree.Constant) and type(value.value) in (int, float)):
             raise no_program(operator, "a plus sign needs a number behind it")
         return value
 
-    def binary(self, children: Children) -> tree.Binary:
-        left, operator, right = children
+    def binary(self, left: Any, operator: Any, right: Any) -> tree.Binary:
         return _deeper(tree.Binary(operator.line, operator.column, str(operator), left, right), [left, right])
 
-    def index(self, children: Children) -> tree.Index:
-        value, bracket, *indices = children
-        return _deeper(tree.Index(bracket.line, bracket.column, value, indices), [value], indices)
+    def index(self, value: Any, bracket: Any, *indices: Any) -> tree.Index:
+        return _deeper(tree.Index(bracket.line, bracket.column, value, [*indices]), [value], indices)
 
-    def member(self, children: Children) -> tree.Member:
-        value, name = children
+    def member(self, value: Any, name: Any) -> tree.Member:
         return _deeper(tree.Member(name.line, name.column, value, str(name)), [value])
 
-    def method(self, children: Children) -> tree.Method:
-        value, name, *arguments = children
-        return _deeper(tree.Method(name.line, name.column, value, str(name), arguments), [value], arguments)
+    def method(self, value: Any, name: Any, *arguments: Any) -> tree.Method:
+        return _deeper(
+            tree.Method(name.line, name.column, value, str(name), [*arguments]), [value], arguments
+        )
 
-    def number(self, children: Children) -> tree.Constant:
-        (token,) = children
+    def number(self, token: Any) -> tree.Constant:
         try:
             value = whole(int(token)) if token.isdigit() else float(token)
         except (ValueError, OverflowError):  # Python reads at most 4300 digits
@@ -143,48 +131,40 @@ class Builder(Transformer[Token, Any]):
             raise no_program(token, "a number is too large")
         return tree.Constant(token.line, token.column, value)
 
-    def text(self, children: Children) -> tree.Constant:
-        (token,) = children
+    def text(self, token: Any) -> tree.Constant:
         value = str(token)[1:-1]
         if len(to_bytes(value)) > LONGEST_TEXT:
             raise no_program(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
         return tree.Constant(token.line, token.column, value)
 
-    def constant(self, children: Children) -> tree.Constant:
-        (token,) = children
+    def constant(self, token: Any) -> tree.Constant:
         return tree.Constant(token.line, token.column, {"True": True, "False": False, "None": None}[token])
 
-    def name(self, children: Children) -> tree.Name:
-        token = children[0]
+    def name(self, token: Any) -> tree.Name:
         return tree.Name(token.line, token.column, str(token))
 
-    def call(self, children: Children) -> tree.Call:
-        name, *arguments = children
-        node = tree.Call(name.line, name.column, str(name), arguments)
+    def call(self, name: Any, *arguments: Any) -> tree.Call:
+        node = tree.Call(name.line, name.column, str(name), [*arguments])
         return _deeper(node, arguments)
 
-    def run(self, children: Children) -> tree.Call:
-        _, call = children
+    def run(self, _: Any, call: Any) -> tree.Call:
         call.runs = True
         return call  # type: ignore[no-any-return]
 
-    def positional(self, children: Children) -> tree.Argument:
-        (value,) = children
-        return _deeper(tree.Argument(value.line, value.column, None, value), children)
+    def positional(self, value: Any) -> tree.Argument:
+        return _deeper(tree.Argument(value.line, value.column, None, value), [value])
 
-    def named(self, children: Children) -> tree.Argument:
-        name, value = children
+    def named(self, name: Any, value: Any) -> tree.Argument:
         return _deeper(tree.Argument(name.line, name.column, str(name), value), [value])
 
-    def listing(self, children: Children) -> tree.Listing:
-        bracket, *items = children
-        return _deeper(tree.Listing(bracket.line, bracket.column, items), items)
+    def listing(self, bracket: Any, *items: Any) -> tree.Listing:
+        return _deeper(tree.Listing(bracket.line, bracket.column, [*items]), items)
 
-    def parentheses(self, children: Children) -> tree.Expression:
-        return self.listing(children) if len(children) > 2 else children[1]
+    def parentheses(self, bracket: Any, *items: Any) -> tree.Expression:
+        return self.listing(bracket, *items) if len(items) > 1 else items[0]
 
 
-def _deeper(node: T, *parts: list[Any]) -> T:
+def _deeper(node: T, *parts: Sequence[Any]) -> T:
     deepest = 0
     for part in parts:
         for child in part:

@@ -23,8 +23,3 @@ def costs(evaluations: int) -> Callable[[F], F]:
         return function
 
     return note
-
-
-def cost_of(function: Callable[..., Any]) -> int:
-    """Return how many evaluations a call takes from the budget."""
-    return getattr(function, "cost", 1)

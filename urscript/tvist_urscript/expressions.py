@@ -9,21 +9,19 @@ from collections.abc import Callable, Sequence
 from tvist_urscript import tree
 from tvist_urscript.errors import name_not_found
 from tvist_urscript.names import BUILT_IN_ARRAYS, METHOD, Scope
-from tvist_urscript.pieces import DEPTH, MISSING, AstBuilder
-from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
+from tvist_urscript.pieces import DEPTH, LOAD, MISSING, call, compare, invert, located, name
+from tvist_urscript.signatures import REQUIRED, Signatures
 from tvist_urscript.values import LONGEST, NUMBERS, Array, Pose
 
-MOST_OPERATIONS = 1000
-"""Most evaluations of one statement, since nothing can interrupt it."""
-START = 20
-"""Cost of starting a thread, which limits how many threads start in a tick."""
+MOST_OPERATIONS = 1000  # most evaluations of one statement, since nothing can interrupt it
+START = 20  # cost of starting a thread, which limits how many threads start in a tick
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
-ORDER: dict[str, type[ast.cmpop]] = {"<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE}
-EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
-    "==": (ast.Eq, "is_equal"),
-    "!=": (ast.NotEq, "is_unequal"),
-}
+COMPARISONS: dict[str, type[ast.cmpop]] = {
+    "<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE, "==": ast.Eq, "!=": ast.NotEq
+}  # fmt: skip
+EQUALITY = {"==": "is_equal", "!=": "is_unequal"}
+"""Functions of a machine that compare lists, which costs more."""
 
 Report = Callable[[tree.Node, str], None]
 
@@ -39,94 +37,88 @@ class Expressions:
         self.works = False  # whether code translated since the reset may work on lists, which costs more
         self.used: set[str] = set()  # built-in functions that the script calls
         self.constants: dict[str, object] = {}  # lists and default values, by their names in compiled code
-        self.globals: set[str] = set()
 
-    def value(self, node: tree.Expression) -> ast.expr:  # noqa: C901, PLR0911  one for each kind of node
+    def value(self, node: tree.Expression) -> ast.expr:  # noqa: C901  one for each kind of node
         """Translate an expression whose value is needed."""
+        made: ast.expr
         match node:
             case tree.Constant():
-                return AstBuilder.of(node).constant(node.value)
+                made = ast.Constant(node.value)
             case tree.Name():
-                return self.name(node)
+                made = self.name(node)
             case tree.Binary():
-                return self.binary(node)
+                made = self.binary(node)
             case tree.Call():
-                return self.run(node) if node.runs else self.call(node)
+                made = self.run(node) if node.runs else self.call(node)
             case tree.Index():
-                return self.index(node)
+                made = self.index(node)
             case tree.Member():
-                return self.member(node)
+                self.cost += 1
+                made = call("member", self.value(node.value), ast.Constant(node.name))
             case tree.Method():
-                return self.method(node)
+                made = self.method(node)
             case tree.Listing():
-                return self.listing(node)
+                made = self.listing(node)
             case tree.Unary(operator="-"):
                 self.cost += 1
                 self.works = True
-                return AstBuilder.of(node).call("negate", self.value(node.value))
+                made = call("negate", self.value(node.value))
             case tree.Unary():
-                return AstBuilder.of(node).invert(self.test(node.value))
+                made = invert(self.test(node.value))
             case tree.Logic():
-                at = AstBuilder.of(node)
-                return at.invert(at.invert(self.test(node)))
+                made = invert(invert(self.test(node)))
+        return located(made, node)
 
     def test(self, node: tree.Expression) -> ast.expr:
         """Translate an expression of which only the truth is needed."""
+        made: ast.expr
         match node:
             case tree.Logic(operator="xor"):
-                at = AstBuilder.of(node)
-                result = at.invert(self.test(node.values[0]))
+                made = invert(self.test(node.values[0]))
                 self.cost += len(node.values) - 1
                 for value in node.values[1:]:
-                    result = at.invert(at.compare(result, ast.NotEq(), at.invert(self.test(value))))
-                return at.invert(result)
+                    made = invert(compare(made, ast.NotEq(), invert(self.test(value))))
+                made = invert(made)
             case tree.Logic():
                 self.cost += len(node.values) - 1
                 operator = ast.And() if node.operator == "and" else ast.Or()
-                return ast.BoolOp(
-                    operator, [self.test(value) for value in node.values], **AstBuilder.of(node).given
-                )
+                made = ast.BoolOp(operator, [self.test(value) for value in node.values])
             case tree.Unary(operator="not"):
                 self.cost += 1
-                return AstBuilder.of(node).invert(self.test(node.value))
+                made = invert(self.test(node.value))
             case _:
                 return self.value(node)
+        return located(made, node)
 
     def name(self, node: tree.Name) -> ast.expr:
-        """Translate a variable that is read."""
-        at = AstBuilder.of(node)
         variable = self.scope.variable(node.name)
         if variable is None:
             self.report(node, name_not_found(node.name))
-        return at.name(f"v_{node.name}" if variable == "local" else f"g_{node.name}")
+        return located(name(f"v_{node.name}" if variable == "local" else f"g_{node.name}"), node)
 
     def binary(self, node: tree.Binary) -> ast.expr:
-        """Translate arithmetic or a comparison."""
-        at = AstBuilder.of(node)
         self.cost += 1
         left, right = self.value(node.left), self.value(node.right)
-        if node.operator in ARITHMETIC:
-            self.works = True
-            return at.call(ARITHMETIC[node.operator], left, right)
-        if node.operator in ORDER:
-            return at.compare(left, ORDER[node.operator](), right)
-        operator, function = EQUALITY[node.operator]
-        if isinstance(node.left, tree.Constant) or isinstance(node.right, tree.Constant):
-            return at.compare(left, operator(), right)
+        constant = isinstance(node.left, tree.Constant) or isinstance(node.right, tree.Constant)
+        function = ARITHMETIC.get(node.operator) or (None if constant else EQUALITY.get(node.operator))
+        if function is None:
+            return compare(left, COMPARISONS[node.operator](), right)
         self.works = True
-        return at.call(function, left, right)
+        return call(function, left, right)
 
     def listing(self, node: tree.Listing) -> ast.expr:
         """Translate a list; a list of constants is created only once."""
-        at = AstBuilder.of(node)
         if len(node.items) > LONGEST:
             self.report(node, f"a list of {len(node.items)} elements is too long: the limit is {LONGEST}")
-            return at.constant(None)
+            return ast.Constant(None)
         values = [item.value for item in node.items if isinstance(item, tree.Constant)]
         if len(values) == len(node.items):
-            return at.name(self.keep(Array(values)))
+            return name(self.keep(Array(values)))
         self.cost += len(node.items)
-        return at.call("listed", at.tuple([self.value(item) for item in node.items]))
+        return call("listed", self.items(node.items))
+
+    def items(self, nodes: Sequence[tree.Expression]) -> ast.Tuple:
+        return ast.Tuple([self.value(node) for node in nodes], LOAD)
 
     def keep(self, value: object) -> str:
         """Return a name for a value that compiled functions use."""
@@ -134,63 +126,47 @@ class Expressions:
         self.constants[name] = value
         return name
 
-    def default(self, function: str, parameter: Parameter) -> str:
-        """Return a name for the default of a built-in function's parameter."""
-        name = f"d_{function}_{parameter.name}"
-        self.constants[name] = parameter.default
-        return name
-
     def index(self, node: tree.Index) -> ast.expr:
         """Translate an element, or a pose: `p[...]` with six expressions."""
         value, indices = node.value, node.indices
-        at = AstBuilder(*first(indices[0]))
         is_p = isinstance(value, tree.Name) and value.name == "p"
         if is_p and len(indices) == 6:
-            return self.pose(node)
+            return located(self.pose(indices), value)
         if len(indices) > 2 or (is_p and self.scope.variable("p") is None):
-            self.report(
-                value,
-                f"p[...] takes six numbers, not {len(indices)}"
-                if is_p
-                else f"an element has one or two indices, not {len(indices)}",
-            )
-            return at.constant(None)
+            what = "p[...] takes six numbers" if is_p else "an element has one or two indices"
+            self.report(value, f"{what}, not {len(indices)}")
+            return ast.Constant(None)
         if array := self.built_in_array(value):
             return self.call_built_in(value, BUILT_IN_ARRAYS[array][0], indices)
         self.cost += 1
         function = "element" if len(indices) == 1 else "element_of_matrix"
-        return at.call(function, self.value(value), *(self.value(index) for index in indices))
+        made = call(function, self.value(value), *(self.value(index) for index in indices))
+        return located(made, first(indices[0]))
 
-    def pose(self, node: tree.Index) -> ast.expr:
-        """Translate a pose of six expressions."""
-        at = AstBuilder.of(node.value)
+    def pose(self, numbers: list[tree.Expression]) -> ast.expr:
         self.cost += 1
-        values = [item.value for item in node.indices if isinstance(item, tree.Constant)]
+        values = [item.value for item in numbers if isinstance(item, tree.Constant)]
         if len(values) == 6 and all(type(value) in NUMBERS for value in values):
-            return at.name(self.keep(Pose(values)))
-        return at.call("posed", at.tuple([self.value(item) for item in node.indices]))
+            return name(self.keep(Pose(values)))
+        return call("posed", self.items(numbers))
 
     def built_in_array(self, node: tree.Expression) -> str | None:
         """Return the name of the controller's array that an expression refers to; None for other expressions."""
-        if (
-            isinstance(node, tree.Name)
-            and node.name in BUILT_IN_ARRAYS
-            and self.scope.variable(node.name) is None
-        ):
-            return node.name
+        if isinstance(node, tree.Name) and self.scope.variable(node.name) is None:
+            return node.name if node.name in BUILT_IN_ARRAYS else None
         return None
 
     def call_built_in(self, node: tree.Node, name: str, arguments: Sequence[tree.Expression]) -> ast.expr:
         """Translate an access to an array of the controller, which is a call of a built-in function."""
         if name not in self.signatures:
             self.report(node, name_not_found(name))
-            return AstBuilder.of(node).constant(None)
+            return ast.Constant(None)
         given = [tree.Argument(argument.line, argument.column, None, argument) for argument in arguments]
-        return self.call(tree.Call(node.line, node.column, name, given), built_in=True)
+        made = self.call(tree.Call(node.line, node.column, name, given), built_in=True)
+        return located(made, node)
 
     def call(self, node: tree.Call, *, built_in: bool = False) -> ast.expr:
         """Translate a call; functions of the script hide those of the controller."""
-        at = AstBuilder.of(node)
         self.cost += 1
         scope = None if built_in else self.scope.find(node.name)
         if node.name == "struct" and scope is None:
@@ -202,61 +178,61 @@ class Expressions:
                 (parameter.name, MISSING if default is not None else None)
                 for parameter, default in scope.function.parameters
             ]
-            deeper = ast.BinOp(at.name(DEPTH), ast.Add(), at.constant(1), **at.given)
-            return at.waiting(at.call(scope.code_name, deeper, *self.arguments(node, parameters)))
+            deeper = ast.BinOp(name(DEPTH), ast.Add(), ast.Constant(1))
+            return ast.YieldFrom(call(scope.code_name, deeper, *self.arguments(node, parameters)))
         signature = self.signatures.get(node.name)
         if signature is None:
             self.report(node, name_not_found(node.name))
             for argument in node.arguments:
                 self.value(argument.value)
-            return at.constant(None)
+            return ast.Constant(None)
         self.used.add(node.name)
         self.cost += signature.cost - 1
         self.works = self.works or signature.linear
-        known = [
-            (parameter.name, None if parameter.default is REQUIRED else self.default(node.name, parameter))
-            for parameter in signature.parameters
-        ]
-        call = at.call(f"b_{node.name}", *self.arguments(node, known))
-        return at.waiting(call) if signature.blocks else call
+        known: list[tuple[str, str | None]] = []
+        for parameter in signature.parameters:
+            default = None if parameter.default is REQUIRED else f"d_{node.name}_{parameter.name}"
+            known.append((parameter.name, default))
+            if default is not None:
+                self.constants[default] = parameter.default
+        made = call(f"b_{node.name}", *self.arguments(node, known))
+        return ast.YieldFrom(made) if signature.blocks else made
 
     def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
         """Put a call's arguments into the order of the parameters, but compute them in the order of the text.
 
         A parameter is a tuple of its name and the name of its default, or None if it has none.
         """
-        at = AstBuilder.of(node)
         given: dict[str, ast.expr] = {}
         names = [name for name, _ in parameters]
-        known = set(names)
         for place, argument in enumerate(node.arguments):
             value = self.value(argument.value)
-            name = argument.name
-            if name is None:
+            parameter = argument.name
+            if parameter is None:
                 if place >= len(names):
-                    limit = f"at most {_counted(len(names))}" if names else "no arguments"
+                    counted = "1 argument" if len(names) == 1 else f"{len(names)} arguments"
+                    limit = f"at most {counted}" if names else "no arguments"
                     self.report(argument, f"{node.name} takes {limit}, but {len(node.arguments)} are given")
                     return []
                 if place and node.arguments[place - 1].name is not None:
                     self.report(argument, "an argument without a name follows one with a name")
-                name = names[place]
-            elif name not in known:
-                self.report(argument, f"{node.name} has no parameter {name}")
+                parameter = names[place]
+            elif parameter not in names:
+                self.report(argument, f"{node.name} has no parameter {parameter}")
                 return []
-            if name in given:
-                self.report(argument, f"{node.name} is given {name} twice")
-            given[name] = value
-        for name, default in parameters:
-            if name not in given:
+            if parameter in given:
+                self.report(argument, f"{node.name} is given {parameter} twice")
+            given[parameter] = value
+        for parameter, default in parameters:
+            if parameter not in given:
                 if default is None:
-                    self.report(node, f"{node.name} needs a value for its parameter {name}")
+                    self.report(node, f"{node.name} needs a value for its parameter {parameter}")
                     return []
-                given[name] = at.name(default)
-        return _arranged(at, given, names)
+                given[parameter] = name(default)
+        return _arranged(given, names)
 
     def run(self, node: tree.Call) -> ast.expr:
         """Translate the start of a thread."""
-        at = AstBuilder.of(node)
         self.cost += START
         scope = self.scope.find(node.name)
         if scope is None and node.name not in self.signatures:
@@ -266,67 +242,52 @@ class Expressions:
         elif node.arguments:
             self.report(node, f"{node.name} is a thread, which takes no arguments")
         else:
-            return at.call("run", at.name(scope.code_name))
-        return at.constant(None)
+            return call("run", name(scope.code_name))
+        return ast.Constant(None)
 
     def struct(self, node: tree.Call) -> ast.expr:
         """Translate `struct(a=1, b=2)`."""
-        at = AstBuilder.of(node)
         names = [argument.name for argument in node.arguments]
         if not 1 <= len(names) <= LONGEST:
             self.report(node, f"struct takes from 1 to {LONGEST} members, not {len(names)}")
         seen: set[str] = set()
         for argument in node.arguments:
             if argument.name is None:
-                why = "struct needs a name for each member, as in struct(x=1)"
-                self.report(argument, why)
+                self.report(argument, "struct needs a name for each member, as in struct(x=1)")
             elif argument.name in seen:
                 self.report(argument, f"struct is given {argument.name} twice")
             else:
                 seen.add(argument.name)
         self.cost += len(names)
-        values = at.tuple([self.value(argument.value) for argument in node.arguments])
-        return at.call("structured", at.tuple([at.constant(name) for name in names]), values)
-
-    def member(self, node: tree.Member) -> ast.expr:
-        """Translate `a.name`."""
-        self.cost += 1
-        at = AstBuilder.of(node)
-        return at.call("member", self.value(node.value), at.constant(node.name))
+        values = self.items([argument.value for argument in node.arguments])
+        return call("structured", ast.Tuple([ast.Constant(name) for name in names], LOAD), values)
 
     def method(self, node: tree.Method) -> ast.expr:
         """Translate `a.name(arguments)`, which only the controller can evaluate."""
-        at = AstBuilder.of(node)
         self.cost += 1 + len(node.arguments)
         value = self.value(node.value)
-        arguments = at.tuple([self.value(argument.value) for argument in node.arguments])
+        arguments = self.items([argument.value for argument in node.arguments])
         if METHOD not in self.signatures:
             self.report(node, name_not_found(f"{METHOD}{node.name}"))
-            return at.constant(None)
         self.used.add(METHOD)
-        return at.call(f"b_{METHOD}", value, at.constant(node.name), arguments)
+        return call(f"b_{METHOD}", value, ast.Constant(node.name), arguments)
 
 
-def first(node: tree.Expression | tree.Step) -> tuple[int, int]:
-    """Return line and column of the first token of an expression."""
+def first(node: tree.Expression | tree.Step) -> tree.Node:
+    """Return the part of an expression that has its first token."""
     while True:
         if isinstance(node, tree.Binary):
             node = node.left
         elif isinstance(node, tree.Index | tree.Member | tree.Method):
             node = node.value
         else:
-            return node.line, node.column
+            return node
 
 
-def _arranged(at: AstBuilder, given: dict[str, ast.expr], names: list[str]) -> list[ast.expr]:
+def _arranged(given: dict[str, ast.expr], names: list[str]) -> list[ast.expr]:
     """Return the arguments in the order of the parameters; Python computes them in the given order."""
-    if list(given) == names or all(isinstance(value, ast.Constant | ast.Name) for value in given.values()):
-        return [given[name] for name in names]
-    places = {name: place for place, name in enumerate(given)}
-    order = at.tuple([at.constant(places[name]) for name in names])
-    values = at.call("arranged", order, at.tuple(list(given.values())))
-    return [ast.Starred(values, ast.Load(), **at.given)]
-
-
-def _counted(number: int) -> str:
-    return "1 argument" if number == 1 else f"{number} arguments"
+    if list(given) == names or all(isinstance(one, ast.Constant | ast.Name) for one in given.values()):
+        return [given[parameter] for parameter in names]
+    places = {parameter: place for place, parameter in enumerate(given)}
+    order = ast.Tuple([ast.Constant(places[parameter]) for parameter in names], LOAD)
+    return [ast.Starred(call("arranged", order, ast.Tuple(list(given.values()), LOAD)), LOAD)]

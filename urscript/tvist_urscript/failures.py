@@ -8,11 +8,9 @@ from typing import Any
 
 from tvist_urscript.errors import Fault, ScriptError
 
-FILE = "<urscript>"
-"""File name of compiled code, which identifies its frames in a traceback."""
+FILE = "<urscript>"  # file name of compiled code, which identifies its frames in a traceback
 
-LONGEST_REASON = 200
-"""Most characters of an internal exception's text in an error."""
+LONGEST_REASON = 200  # most characters of an internal exception's text in an error
 
 _KINDS = {
     "int": "an integer",

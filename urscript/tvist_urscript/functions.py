@@ -4,19 +4,15 @@ import ast
 
 from tvist_urscript import tree
 from tvist_urscript.names import Scope
-from tvist_urscript.pieces import DEPTH, MISSING, AstBuilder
+from tvist_urscript.pieces import DEPTH, MISSING, assign, branch, call, charge, compare, located, name
 from tvist_urscript.statements import Statements
 
-DEEPEST_CALLS = 200
-"""Most nested calls of functions."""
-MOST_PARAMETERS = 255
-"""Most parameters of one function."""
-MOST_FUNCTIONS = 2000
-"""Most functions and threads of a program."""
+DEEPEST_CALLS = 200  # most nested calls of functions
+MOST_PARAMETERS = 255  # most parameters of one function
+MOST_FUNCTIONS = 2000  # most functions and threads of a program
 MOST_STATEMENTS = 4000
 """Most statements of one function; while Python compiles it, no other thread of the process runs."""
-MOST_NODES = 10_000
-"""Most operations, names, calls and statements of one function, for the same reason."""
+MOST_NODES = 10_000  # most operations, names, calls and statements of one function, for the same reason
 PART, PART_NODES = 200, 1000
 """Largest part of a long main function, in statements and in the nodes that MOST_NODES counts."""
 
@@ -37,7 +33,6 @@ class Functions(Statements):
             self.report(twice, f"{twice.name} is defined twice")
         if scope.outer is not None or (_length(function.body) <= PART and _size(function.body) <= PART_NODES):
             return [self.definition(scope.code_name, function, function.body)]
-        at = AstBuilder.of(function)
         self.is_part = True
         parts = [
             self.definition(f"{scope.code_name}_{number}", function, body)
@@ -45,43 +40,38 @@ class Functions(Statements):
         ]
         self.is_part = False
         calls: list[ast.stmt] = [
-            at.branch(
-                at.waiting(at.call(part.name, at.name(DEPTH))), [ast.Return(at.constant(None), **at.given)]
-            )
+            branch(ast.YieldFrom(call(part.name, name(DEPTH))), [ast.Return(ast.Constant(None))])
             for part in parts
         ]
-        return [*parts, _definition(at, scope.code_name, [], calls)]
+        return [*parts, _definition(function, scope.code_name, [], calls)]
 
-    def definition(self, name: str, function: tree.Function, body: list[tree.Statement]) -> ast.FunctionDef:
+    def definition(self, title: str, function: tree.Function, body: list[tree.Statement]) -> ast.FunctionDef:
         """Translate a function, or a part of the main function, to a function of Python."""
-        at = AstBuilder.of(function)
-        if (length := _length(body)) > MOST_STATEMENTS:
-            many = f"{length} statements of {function.name} are too many in one function"
-            self.report(function, f"{many}: the limit is {MOST_STATEMENTS}")
-            return _definition(at, name, [], [])
         size = _size(body) + sum(default.size for _, default in function.parameters if default is not None)
-        if size > MOST_NODES:
-            many = f"{size} operations and names of {function.name} are too many in one function"
-            self.report(function, f"{many}: the limit is {MOST_NODES}")
-            return _definition(at, name, [], [])
+        for count, most, what in (
+            (_length(body), MOST_STATEMENTS, "statements"),
+            (size, MOST_NODES, "operations and names"),
+        ):
+            if count > most:
+                many = f"{count} {what} of {function.name} are too many in one function"
+                self.report(function, f"{many}: the limit is {most}")
+                return _definition(function, title, [], [])
         self.globals, self.loops = set(), 0
         parameters = self.parameters(function)
         defaults: list[ast.stmt] = []
         for parameter, default in function.parameters:
             if default is not None:
-                here, variable = AstBuilder.of(parameter), f"v_{parameter.name}"
-                missing = here.compare(here.name(variable), ast.Is(), here.name(MISSING))
-                defaults.append(here.branch(missing, [here.assign(variable, self.value(default))]))
-        too_deep = at.branch(
-            at.compare(at.name(DEPTH), ast.Gt(), at.constant(DEEPEST_CALLS)),
-            [at.statement(at.call("too_deep"))],
+                variable = f"v_{parameter.name}"
+                missing = compare(name(variable), ast.Is(), name(MISSING))
+                defaults.append(located(branch(missing, [assign(variable, self.value(default))]), parameter))
+        too_deep = branch(
+            compare(name(DEPTH), ast.Gt(), ast.Constant(DEEPEST_CALLS)), [ast.Expr(call("too_deep"))]
         )
         statements, _ = self.block(body, 0)
-        declared: list[ast.stmt] = [ast.Global(sorted(self.globals), **at.given)] if self.globals else []
-        cost = 1 + len(defaults)
-        return _definition(
-            at, name, parameters, [*declared, *at.charge(cost, check=True), too_deep, *defaults, *statements]
-        )
+        declared: list[ast.stmt] = [ast.Global(sorted(self.globals))] if self.globals else []
+        charged = charge(1 + len(defaults), check=True)
+        inner = [*declared, *charged, too_deep, *defaults, *statements]
+        return _definition(function, title, parameters, inner)
 
     def parameters(self, function: tree.Function) -> list[str]:
         """Check the parameters of a function and return their names in Python."""
@@ -91,27 +81,21 @@ class Functions(Statements):
             many = f"{count} parameters of {function.name} are too many"
             self.report(function, f"{many}: the limit is {MOST_PARAMETERS}")
             return []
-        for name, default in function.parameters:
+        for parameter, default in function.parameters:
             if function.kind == "thread":
-                self.report(name, f"the thread {function.name} cannot have parameters")
-            if f"v_{name.name}" in names:
-                self.report(name, f"the parameter {name.name} is named twice")
+                self.report(parameter, f"the thread {function.name} cannot have parameters")
+            if f"v_{parameter.name}" in names:
+                self.report(parameter, f"the parameter {parameter.name} is named twice")
             if default is None and not needed:
-                self.report(name, f"the parameter {name.name} needs a default as the one before it")
+                self.report(parameter, f"the parameter {parameter.name} needs a default as the one before it")
             needed = needed and default is None
-            names[f"v_{name.name}"] = None
+            names[f"v_{parameter.name}"] = None
         return list(names)
 
 
-def _definition(at: AstBuilder, name: str, parameters: list[str], body: list[ast.stmt]) -> ast.FunctionDef:
-    arguments = [ast.arg(parameter, **at.given) for parameter in (DEPTH, *parameters)]
-    return ast.FunctionDef(
-        name,
-        ast.arguments([], arguments, None, [], [], None, []),
-        body or [ast.Pass(**at.given)],
-        [],
-        **at.given,
-    )
+def _definition(at: tree.Node, name: str, parameters: list[str], body: list[ast.stmt]) -> ast.FunctionDef:
+    given = ast.arguments([], [ast.arg(one) for one in (DEPTH, *parameters)], None, [], [], None, [])
+    return ast.fix_missing_locations(located(ast.FunctionDef(name, given, body or [ast.Pass()], []), at))
 
 
 def _length(body: list[tree.Statement]) -> int:

@@ -6,10 +6,8 @@ from lark import Token, UnexpectedInput
 
 from tvist_urscript.errors import no_program
 
-LONGEST_NAME = 255
-"""Longest name [characters]."""
-MOST_BRACKETS = 100
-"""Most nested brackets."""
+LONGEST_NAME = 255  # longest name [characters]
+MOST_BRACKETS = 100  # most nested brackets
 END = "_NEWLINE"
 
 _OPENS = frozenset(("LPAR", "LSQB"))

@@ -19,8 +19,7 @@ EVALUATIONS = 2000
 """Budget of a tick, in evaluations of all threads together."""
 PATIENCE = 1_000_000
 """Evaluations after which a thread that neither waits nor reads from outside counts as an endless loop."""
-OVERDRAFT = 2000
-"""Most evaluations by which one statement may exceed the budget."""
+OVERDRAFT = 2000  # most evaluations by which one statement may exceed the budget
 
 _MISSING = object()
 Steps = Generator[Any, None, Any]

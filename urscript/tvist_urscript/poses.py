@@ -8,8 +8,7 @@ from tvist_urscript.errors import Fault
 from tvist_urscript.values import Array, Pose, Value, number, pose, vector
 
 Vector: TypeAlias = tuple[float, float, float]
-Quaternion: TypeAlias = tuple[float, float, float, float]
-"""(w, x, y, z) of length 1."""
+Quaternion: TypeAlias = tuple[float, float, float, float]  # (w, x, y, z) of length 1
 
 
 def _parts(value: Any, what: str) -> tuple[Vector, Quaternion]:

@@ -5,7 +5,6 @@ from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, get_origin
 
-from tvist_urscript.costs import cost_of
 from tvist_urscript.values import Value
 
 
@@ -76,7 +75,7 @@ def signature(function: Callable[..., Any], *, linear: bool = False) -> Signatur
             for name, one in found.parameters.items()
         ),
         blocks,
-        cost_of(function),
+        getattr(function, "cost", 1),
         linear,
     )
 

@@ -4,8 +4,7 @@ from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-MOST_THREADS = 100
-"""Most threads of a program at the same time."""
+MOST_THREADS = 100  # most threads of a program at the same time
 
 
 @dataclass(eq=False)

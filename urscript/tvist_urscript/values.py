@@ -12,12 +12,9 @@ from tvist_urscript.errors import Fault
 
 LONGEST = 1000
 """Most elements of a list."""
-LARGEST = 4000
-"""Most elements of a list, including those of nested lists."""
-DEEPEST = 20
-"""Most levels of nested lists."""
-LONGEST_TEXT = 1023
-"""Longest string, in bytes of UTF-8."""
+LARGEST = 4000  # most elements of a list, including those of nested lists
+DEEPEST = 20  # most levels of nested lists
+LONGEST_TEXT = 1023  # longest string, in bytes of UTF-8
 LOWEST, HIGHEST = -(2**31), 2**31 - 1
 """Range of integers, which have 32 bits; a result outside it is a float."""
 

@@ -15,10 +15,9 @@ from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.info import Info
 from tvist_protocol.stream import Event, State, Truth
 from tvist_view import asked
-from tvist_view import pilot as piloting
 from tvist_view.described import usual
 from tvist_view.look import Look
-from tvist_view.pilot import Doing, Pilot, go, motion
+from tvist_view.pilot import Doing, Pilot, carry, declare, go, motion
 from tvist_view.signals import moves, signals_of
 
 REST = 500  # ticks recorded after a motion; before it, the arm comes to rest for half as many
@@ -142,7 +141,7 @@ class Doer:
             case asked.Move() | asked.Compare():
                 await self._go(info, tab, message)
             case asked.Carry(mass):
-                pilot.do(tab, piloting.carry(mass))
+                pilot.do(tab, carry(mass))
             case asked.Setting():
                 if not isinstance(message, asked.Shape | asked.Ready) or await pilot.take(tab):
                     await pilot.set(tab, _setting(pilot, info, message))
@@ -156,10 +155,10 @@ class Doer:
         elif await self.pilot.take(tab):
             self.pilot.do(tab, self._moving(info, message))
 
-    def _moving(self, info: Info, message: asked.Move | asked.Compare) -> piloting.Doing:
+    def _moving(self, info: Info, message: asked.Move | asked.Compare) -> Doing:
         poses = [info.poses[message.first], info.poses[message.last]]
         if isinstance(message, asked.Move):
-            return piloting.motion(poses)
+            return motion(poses)
         shaper = message.shaper if message.shaper not in {"", "none"} else usual(info)
 
         def tell(words: str | None) -> None:
@@ -171,7 +170,7 @@ class Doer:
         return beside(self.robot, self.look, poses, shaper, self.judge, tell, done)
 
 
-def _setting(pilot: Pilot, info: Info, message: asked.Setting) -> piloting.Doing:
+def _setting(pilot: Pilot, info: Info, message: asked.Setting) -> Doing:
     """Return the action for a setting that a tab requests."""
     match message:
         case asked.Shape(shaper, modes):
@@ -179,7 +178,7 @@ def _setting(pilot: Pilot, info: Info, message: asked.Setting) -> piloting.Doing
         case asked.Speed(fraction):
             return lambda arm: arm.set_speed(fraction)
         case asked.Declare(mass):
-            return piloting.declare(mass)
+            return declare(mass)
         case asked.Fault(name):
             return lambda arm: arm.inject(name)
         case _:

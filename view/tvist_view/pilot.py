@@ -33,11 +33,9 @@ class Pilot:
     or lost.
     """
 
-    holder: int | None  # number of the tab that has control; None if no tab has
-
     def __init__(self, robot: Robot, client: str, say: Say) -> None:
         self._robot, self.client, self._say = robot, client, say
-        self.holder = None
+        self.holder: int | None = None  # number of the tab that has control; None if no tab has
         self._arm: Arm | None = None
         self._held: AsyncExitStack | None = None
         self._task: asyncio.Task[None] | None = None
@@ -66,7 +64,7 @@ class Pilot:
             return True
 
     async def give_back(self, tab: int) -> None:
-        """Stop the tab's motion and give its control back; another tab's control stays."""
+        """Stop a tab's motion and give its control back, also if it is closed; others keep theirs."""
         async with self._changing:  # waits for control that is being taken
             if self.holder != tab:
                 return
@@ -75,8 +73,9 @@ class Pilot:
             await self._end(self._jogging)
             await self._end(self._task)
             held, self._held, self._arm, self.holder = self._held, None, None, None
-            if held is not None:
-                await _close(held)
+            with contextlib.suppress(RefusedError, ClientError):  # the robot may be gone
+                if held is not None:
+                    await held.aclose()
 
     async def heard(self, control: str | None) -> None:
         """Give control back if the robot reports that this page no longer has it."""
@@ -107,7 +106,7 @@ class Pilot:
         if self.busy:
             self._say("the arm is still moving: wait, or stop it")
             return False
-        self._task = self._begin(doing(self._arm))
+        self._task = asyncio.create_task(self._told(doing(self._arm)))
         return True
 
     async def set(self, tab: int, doing: Doing) -> bool:
@@ -138,11 +137,7 @@ class Pilot:
             return
         self._jog_until = now + DEADMAN_S
         if self._jogging is None or self._jogging.done():
-            self._jogging = self._begin(self._play_jog(self._arm))
-
-    async def where(self) -> list[float]:
-        """Return the joint angles of the present shaped reference [rad]."""
-        return list((await self._robot.state()).target_q)
+            self._jogging = asyncio.create_task(self._told(self._play_jog(self._arm)))
 
     async def make_ready(self, arm: Arm) -> None:
         """Release what a client can release, and switch the power on; show what remains to be done."""
@@ -152,13 +147,6 @@ class Pilot:
         found = await look(self._robot)
         if not found.ready:
             self._say(found.sentence)
-
-    async def gone(self, tab: int) -> None:
-        """Handle that a tab was closed or has lost its connection."""
-        await self.give_back(tab)
-
-    def _begin(self, doing: Awaitable[Any]) -> asyncio.Task[None]:
-        return asyncio.get_running_loop().create_task(self._told(doing))
 
     async def _told(self, doing: Awaitable[Any]) -> None:
         try:
@@ -198,12 +186,6 @@ class Pilot:
         except StreamStoppedError:
             if not stopped:
                 raise
-
-
-async def _close(held: AsyncExitStack) -> None:
-    """Give control back, if the robot is still there."""
-    with contextlib.suppress(RefusedError, ClientError):
-        await held.aclose()
 
 
 async def go(arm: Arm, q: Sequence[float]) -> None:

@@ -74,11 +74,11 @@ class ShownRobot:
         self.watchers.discard(watcher)
         watcher.robot = None
         if self._doer is not None:
-            await self._doer.pilot.gone(watcher.tab.number)
+            await self._doer.pilot.give_back(watcher.tab.number)
         if watcher.tasks:
             await asyncio.wait(watcher.tasks)
             if self._doer is not None:  # a task may have taken control meanwhile
-                await self._doer.pilot.gone(watcher.tab.number)
+                await self._doer.pilot.give_back(watcher.tab.number)
         self._listen()
 
     def _introduce(self, watcher: Watcher) -> None:

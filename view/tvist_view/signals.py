@@ -110,11 +110,9 @@ class LatestSignals:
     def update(self) -> None:
         """Compute the signals of the messages received."""
         states = list(self._states)
-        if self._truths:  # a state waits for its truth, and later states wait, too
-            known = itertools.takewhile(
-                lambda state: state.tick in self._truths or self._is_late(state), states
-            )
-            states = list(known)
+        if self._truths and self.state is not None:  # a state waits for its truth, and later states wait, too
+            late = self.state.tick - LATE_TICKS
+            states = [*itertools.takewhile(lambda one: one.tick in self._truths or one.tick < late, states)]
         if len(states) < 3:
             return
         found = signals_of(self._look, states, self._truths)
@@ -125,9 +123,6 @@ class LatestSignals:
         self._shown = states[-1]
         for _ in range(len(states) - 2):
             self._states.popleft()
-
-    def _is_late(self, state: State) -> bool:
-        return self.state is not None and state.tick < self.state.tick - LATE_TICKS
 
     def since(self, count: int) -> list[list[float]]:
         """Return the samples after the first `count` as columns: time, |α|, |q̈| before and after the shaper."""

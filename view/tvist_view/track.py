@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,29 +22,22 @@ class TrackError(ValueError):
     """A run cannot be shown."""
 
 
-@dataclass(frozen=True)
-class ShownRobot:
-    """A robot's label and shape."""
-
-    label: str
-    look: Look
-
-
 class Track:
     """One robot's run; a state without a truth is drawn stiff.
 
-    `states` are in the order of their ticks; times count from the simulation time `origin` [s].
+    `label` names it, `look` is its shape; `states` are in the order of their ticks; times count from the
+    simulation time `origin` [s].
     """
 
     def __init__(
-        self, shown: ShownRobot, states: Sequence[State], truths: Sequence[Truth], origin: float = 0.0
+        self, label: str, look: Look, states: Sequence[State], truths: Sequence[Truth], origin: float = 0.0
     ) -> None:
         if not states:
             raise TrackError("the recording contains no state, so there is nothing to show")
-        self.shown, self._states, self._origin = shown, states, origin
+        self.label, self.look, self._states, self._origin = label, look, states, origin
         self._truths = {truth.tick: truth for truth in truths}
         self.has_truth = bool(self._truths)
-        found = signals_of(shown.look, states, self._truths)
+        found = signals_of(look, states, self._truths)
         self.signals: Signals = replace(found, time=found.time - origin)
 
     @property
@@ -69,12 +62,12 @@ class Track:
     def packed(self, start: float) -> dict[str, Any]:
         """Return the message for the page: rows and signals as base64 of 32-bit floats, times from `start` [s]."""
         states = self._states[::ROW_TICKS]
-        rows = [self.shown.look.row(state, self._truths.get(state.tick)) for state in states]
+        rows = [self.look.row(state, self._truths.get(state.tick)) for state in states]
         signals = vars(self.signals) | {"time": self.signals.time - start}
         return {
-            "label": self.shown.label,
-            "look": self.shown.look.packed(),
-            "reach": self.shown.look.reach,
+            "label": self.label,
+            "look": self.look.packed(),
+            "reach": self.look.reach,
             "truth": self.has_truth,
             "width": len(rows[0]),
             "times": _packed(np.array([state.timestamp for state in states]) - self._origin - start),

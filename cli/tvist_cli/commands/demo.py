@@ -10,10 +10,9 @@ from tvist_cli.failure import Failure, failing_on
 from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, write
 from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, print_json, program, progress, words
-from tvist_cli.pages import PageAddress
+from tvist_cli.pages import MAGNIFY, PageAddress
 from tvist_cli.paper_tables import print_paper
 from tvist_cli.studying import give
-from tvist_cli.tracks import MAGNIFY, recorded
 
 if TYPE_CHECKING:
     from tvist_lab.studies.paper.served import ServedExperiment
@@ -124,6 +123,8 @@ def _in_real_time(
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
     if view:
+        from tvist_cli.tracks import recorded
+
         recorded(recording).serve(MAGNIFY, PageAddress("127.0.0.1", PORT, insecure=False))
 
 

@@ -8,11 +8,7 @@ from tvist_cli.output import out, print_json
 from tvist_protocol.io import Io
 
 
-def forget(
-    *,
-    at: Connection = LOCAL,
-    json: bool = False,
-) -> None:
+def forget(*, at: Connection = LOCAL, json: bool = False) -> None:
     """Take control of a served robot and discard what it has learnt about its payload.
 
     A robot served with --adapt payload then moves as if it carried the declared payload, until its motions show

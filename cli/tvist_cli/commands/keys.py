@@ -83,17 +83,11 @@ def keys(
     for line in (
         *(f"made  {what}" for what in ring.made),
         *(f"kept  {what}" for what in ring.kept),
-        *_next(folder, asked),
-    ):
-        out.print(line, soft_wrap=True, markup=False)
-
-
-def _next(folder: Path, asked: dict[str, Role]) -> list[str]:
-    return [
         f"robot:  tvist serve --security {folder} --listen tls/ADDRESS:7447",
         *(f"{name}:  tvist check tls/HOST:7447 --security {folder / name}" for name in asked),
         f"anyone with {folder / AUTHORITY_KEY} can create operators; the robot does not need it: store it elsewhere",
-    ]
+    ):
+        out.print(line, soft_wrap=True, markup=False)
 
 
 @dataclass
@@ -110,8 +104,9 @@ class _KeyRing:
         """Check that nothing is missing and that existing files agree with the request."""
         there = [(self.folder / name).exists() for name in (AUTHORITY, AUTHORITY_KEY)]
         if there == [True, False]:
-            why = f"{self.folder / AUTHORITY_KEY} is missing: put it back to create more certificates"
-            raise Failure(why)
+            raise Failure(
+                f"{self.folder / AUTHORITY_KEY} is missing: put it back to create more certificates"
+            )
         if (self.folder / CERTIFICATE).exists():
             certificate = read_certificate(self.folder / CERTIFICATE)
             name = common_name(certificate)
@@ -166,19 +161,16 @@ class _KeyRing:
             return
         pair = authority.issue(name, "client", days=self.days)
         if name not in self.roles:
-            self._note(name, role)
+            # The file of roles may have been edited by hand.
+            path = self.folder / CLIENTS
+            before = path.read_text(encoding="utf-8") if path.exists() else HEAD
+            gap = "" if before.endswith("\n") or not before else "\n"
+            path.write_text(f'{before}{gap}"{name}" = "{role}"\n', encoding="utf-8")
+            self.roles[name] = role
         own.mkdir(mode=0o700)
         pair.write(own / of_client.CERTIFICATE, own / of_client.KEY)
         write_new(own / of_client.AUTHORITY, (self.folder / AUTHORITY).read_bytes(), 0o644)
         self.made.append(f"{own}: {role}, until {pair.until:%Y-%m-%d}")
-
-    def _note(self, name: str, role: Role) -> None:
-        """Append a line to the file of roles, which may have been edited by hand."""
-        path = self.folder / CLIENTS
-        before = path.read_text(encoding="utf-8") if path.exists() else HEAD
-        gap = "" if before.endswith("\n") or not before else "\n"
-        path.write_text(f'{before}{gap}"{name}" = "{role}"\n', encoding="utf-8")
-        self.roles[name] = role
 
 
 def _roles(names: dict[Role, list[str]]) -> dict[str, Role]:

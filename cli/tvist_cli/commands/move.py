@@ -1,17 +1,18 @@
 """`tvist move`: move a served robot to a pose."""
 
 import asyncio
+import math
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, failing_on, interrupted
 from tvist_cli.offered import POSES, SHAPERS
 from tvist_cli.output import out, print_json, program
-from tvist_cli.poses import pose, tool_numbers
 from tvist_client.arm import Arm
 from tvist_client.motion import Motion
 from tvist_client.readiness import look
-from tvist_protocol.errors import RefusedError
+from tvist_protocol.errors import RefusedError, quoted
 
 BENT = "0,-1.57,1.57,-1.57,-1.57,0"  # joint angles of UR-like arms that are far from any singularity [rad]
 
@@ -51,14 +52,14 @@ def move(
         json: Print one JSON object.
     """
     given = _limits(velocity=velocity, acceleration=acceleration, jerk=jerk, duration=duration)
-    numbers = _numbers(target, line=line, by=by, degrees=degrees)
+    numbers = _checked(target, line=line, by=by, degrees=degrees)
     held = False
 
     async def run() -> tuple[int, int, str | None]:
         nonlocal held
         async with await at.robot() as robot:
             info = await robot.info()
-            q = () if line else pose(target, info.poses, "target", degrees=degrees)
+            q = () if line else _pose(target, info.poses, degrees=degrees)
             standing = await look(robot, at.unlock_command(info.name))
             if not standing.ready:
                 raise Failure(f"{info.name} is not ready: {standing.sentence}")
@@ -71,8 +72,11 @@ def move(
                         motion = await _line(arm, numbers, given, by=by, joints=len(info.joints))
                     else:
                         motion = await arm.move_j(q, **given)
-                except asyncio.CancelledError:
-                    await _stop(arm)
+                except (
+                    asyncio.CancelledError
+                ):  # bring it to rest, even if the motion has not been answered yet
+                    await arm.stop()
+                    await robot.rest()
                     raise
                 return motion.started or 0, motion.done or 0, motion.limited
 
@@ -82,18 +86,12 @@ def move(
         except KeyboardInterrupt:
             ended = "the motion was stopped; the robot is at rest" if held else "nothing was moved"
             raise interrupted(ended) from None
+    seconds = (done - started) * 0.002
     if json:
-        print_json(
-            {
-                "started_tick": started,
-                "done_tick": done,
-                "seconds": (done - started) * 0.002,
-                "limited": limited,
-            }
-        )
+        print_json({"started_tick": started, "done_tick": done, "seconds": seconds, "limited": limited})
     else:
         moved = f"moved the tool {'by' if by else 'to'}" if line else "moved to"
-        out.print(f"{moved} {target.strip()} in {(done - started) * 0.002:.3f} s", markup=False)
+        out.print(f"{moved} {target.strip()} in {seconds:.3f} s", markup=False)
         if limited is not None:
             out.print(limited, markup=False)
 
@@ -106,15 +104,50 @@ def _limits(**given: float | None) -> dict[str, Any]:
     return limits
 
 
-def _numbers(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float, ...]:
+def _checked(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float, ...]:
     """Check the target before the robot is contacted; return its numbers with --line, else nothing."""
     if line:
-        return tool_numbers(target, by=by, degrees=degrees)
+        return _tool_numbers(target, by=by, degrees=degrees)
     if by:
         raise Failure("--by needs --line: only the tool is moved by a distance", code=2)
     if "," in target or not target.strip()[:1].isalpha():
-        pose(target, {}, "target", degrees=degrees)
+        _pose(target, {}, degrees=degrees)
     return ()
+
+
+def _pose(text: str, poses: Mapping[str, tuple[float, ...]], *, degrees: bool) -> tuple[float, ...]:
+    """Return the joint angles [rad] of a named pose, in any case, or of angles separated by commas."""
+    for name, q in poses.items():
+        if name.lower() == text.strip().lower():
+            return q
+    angles = _numbers(text)
+    if not angles:
+        unit = "degrees" if degrees else "rad"
+        known = f"one of {', '.join(poses)}, or " if poses else ""
+        why = f"target is {quoted(text)}: must be {known}joint angles in {unit} separated by commas"
+        raise Failure(why, code=2)
+    return tuple(map(math.radians, angles)) if degrees else angles
+
+
+def _tool_numbers(text: str, *, by: bool, degrees: bool) -> tuple[float, ...]:
+    """Parse a target of the tool: displacement or position [m], or position [m] and rotation vector [rad]."""
+    numbers = _numbers(text)
+    if len(numbers) not in ({3} if by else {3, 6}):
+        unit = "degrees" if degrees else "rad"
+        pose = f"a position x,y,z in m, or x,y,z,rx,ry,rz in m and {unit}"
+        wanted = "a distance dx,dy,dz in m" if by else pose
+        raise Failure(f"target is {quoted(text)}: must be {wanted}", code=2)
+    turn = tuple(map(math.radians, numbers[3:])) if degrees else numbers[3:]
+    return numbers[:3] + turn
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    """Parse numbers separated by commas; return nothing if the text is anything else."""
+    try:
+        numbers = tuple(float(number) for number in text.split(","))
+    except ValueError:
+        return ()
+    return numbers if all(map(math.isfinite, numbers)) else ()
 
 
 async def _line(
@@ -133,9 +166,3 @@ async def _line(
             raise
         example = f", for example with {program()} move {BENT}" if joints == 6 else ""
         raise Failure(f"{error}. Next: move the joints to another posture first{example}") from error
-
-
-async def _stop(arm: Arm) -> None:
-    """Bring the robot to rest, even if the motion has not been answered yet."""
-    await arm.stop()
-    await arm.robot.rest()

@@ -28,8 +28,9 @@ def router(
             endpoint is then tls/ADDRESS:PORT.
         insecure: Accept remote connections without TLS; anyone can move the robots, and act as one.
     """
+    from tvist_client.transports.session import close_session
     from tvist_server.gateways.base import GatewayError
-    from tvist_server.gateways.router import DEFAULT_ENDPOINT, Rate, Router, robots_of
+    from tvist_server.gateways.router import DEFAULT_ENDPOINT, Rate, robots_of, started
     from tvist_server.option_values import StartError
     from tvist_server.shutdown import Shutdown
 
@@ -40,14 +41,8 @@ def router(
             raise Failure("robot needs --rate HZ: it says whose states are reduced", code=2)
         ending = Shutdown()
         with failing_on(GatewayError), ending.at_once():
-            running = Router(
-                listen or [DEFAULT_ENDPOINT],
-                connect or [],
-                rates,
-                robots,
-                security=security,
-                insecure=insecure,
-            )
+            endpoints = listen or [DEFAULT_ENDPOINT]
+            session = started(endpoints, connect or [], rates, robots, security=security, insecure=insecure)
 
     async def run() -> None:
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
@@ -55,8 +50,8 @@ def router(
         await ended.wait()
 
     try:
-        say(f"a router listens on {', '.join(listen or [DEFAULT_ENDPOINT])}. Press Control+C to stop.")
+        say(f"a router listens on {', '.join(endpoints)}. Press Control+C to stop.")
         asyncio.run(run())
     finally:
-        running.close()
+        close_session(session)
     ending.close()

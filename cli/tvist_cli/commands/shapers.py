@@ -51,8 +51,8 @@ def shapers(
         look: How to write the figures.
         json: Print one JSON object.
     """
-    places = ResultFiles(output=output, figures=figures, look=look)
-    places.check()
+    look.check(figures, output)
+    places = ResultFiles(output, figures, look)
     if sensitivity is None and (output is not None or errors != ERRORS):
         raise Failure("--errors and --output are for --sensitivity: give it, or leave them out", code=2)
     if sensitivity is not None:
@@ -81,15 +81,12 @@ def shapers(
     ]
     found = [_about(one, f_d, zeta) for one in listed]
     result = {"f_d_hz": f_d, "zeta": zeta, "shapers": found, "for_calibrated_arms": others}
-    places.write(result, draw=lambda: _figures(listed, f_d, zeta))
+    places.write(result, lambda: _figures(listed, f_d, zeta))
     give(result, _print, json=json)
 
 
 def _figures(listed: "list[AnyShaper]", f_d: float, zeta: float) -> Figures:
-    from tvist_lab.figures import (
-        catalogue_figure,
-        settling_against_delay_figure,
-    )
+    from tvist_lab.figures import catalogue_figure, settling_against_delay_figure
     from tvist_shaping import Shaper
 
     of_impulses = [one for one in listed if isinstance(one, Shaper)]

@@ -49,7 +49,10 @@ def stop(
     if json:
         print_json(report)
     else:
-        out.print(f"{report.robot}: {_said(report.stopped)}", soft_wrap=True, markup=False)
+        said = f"stopped {' and '.join(report.stopped)}" if report.stopped else "nothing was under way"
+        if report.stopped is None:
+            said = "the stop begins with the next step of its clock"
+        out.print(f"{report.robot}: {said}", soft_wrap=True, markup=False)
     if not report.ok:
         raise Failure(f"{report.robot} may still be moving: {report.why}")
 
@@ -74,9 +77,3 @@ def _stop_all(at: Connection, *, json: bool) -> None:
     failed = [report for report in reports if not report.ok]
     if failed:
         raise Failure(f"{len(failed)} of {len(reports)} robots may still be moving: {failed[0].name} first")
-
-
-def _said(stopped: list[str] | None) -> str:
-    if stopped is None:
-        return "the stop begins with the next step of its clock"
-    return f"stopped {' and '.join(stopped)}" if stopped else "nothing was under way"

@@ -67,14 +67,9 @@ def study(
         raise Failure(f"--{name} is for {', '.join(NAMES)}: {file} says itself what it is made of", code=2)
     if file is not None and output is None:
         output = file.with_suffix("")
-    from tvist_cli.study_runs import StudyOutputs, run
+    from tvist_cli.study_runs import run
 
     run(
-        study,
-        file,
-        options,
-        StudyOutputs(output, figures or output, look, report),
-        processes,
-        scheduler,
-        json=json,
-    )
+        study, file, options, folder=output, figures=figures or output, look=look, report=report,
+        processes=processes, scheduler=scheduler, json=json,
+    )  # fmt: skip

@@ -6,12 +6,7 @@ from tvist_cli.output import out, print_json
 from tvist_client import unlock as client
 
 
-def unlock(
-    at: Connection = LOCAL,
-    *,
-    power_on: bool = False,
-    json: bool = False,
-) -> None:
+def unlock(at: Connection = LOCAL, *, power_on: bool = False, json: bool = False) -> None:
     """Take control of a served robot and clear what keeps it from moving.
 
     The command restarts a safety system that found a violation or failed, unlocks a protective stop, and checks for

@@ -1,7 +1,7 @@
 """`tvist view`: show a robot in three dimensions on a web page, with plots and controls."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -9,9 +9,11 @@ from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, failing_on
 from tvist_cli.offered import ROBOTS, SHAPERS
 from tvist_cli.output import err
-from tvist_cli.pages import PageAddress, serve_page
-from tvist_cli.tracks import MAGNIFY, Shows, compared, recorded, repeated
+from tvist_cli.pages import MAGNIFY, PageAddress, serve_page
 from tvist_client.robot import NAME
+
+if TYPE_CHECKING:
+    from tvist_cli.tracks import Shows
 
 LONGEST_S = 120.0  # longest recording that can be written as HTML [s]
 
@@ -71,19 +73,17 @@ def view(
 
 def _recorded_or_simulated(
     what: str, compare: tuple[str, ...] | None, robot: str, *, both: bool
-) -> Shows | None:
+) -> "Shows | None":
     """Return what to play back; None if a served robot is shown live."""
-    if compare is not None:
-        return compared(compare, robot)
-    if _is_file(what):
-        return (repeated if both else recorded)(Path(what))
+    if compare is not None or what.endswith(".mcap") or Path(what).exists():
+        from tvist_cli.tracks import compared, recorded, repeated
+
+        return (
+            compared(compare, robot) if compare is not None else (repeated if both else recorded)(Path(what))
+        )
     if both:
         raise Failure("--beside needs a recording", code=2)
     return None
-
-
-def _is_file(what: str) -> bool:
-    return what.endswith(".mcap") or Path(what).exists()
 
 
 def _live(at: Connection, factor: float, door: PageAddress) -> None:

@@ -29,11 +29,7 @@ STALE_S = 1.0  # age above which a newest state is shown in red [s]
 
 
 def watch(
-    at: Connection = LOCAL,
-    *,
-    states: str | None = None,
-    seconds: float | None = None,
-    json: bool = False,
+    at: Connection = LOCAL, *, states: str | None = None, seconds: float | None = None, json: bool = False
 ) -> None:
     """Show modes, rate, load, joints, accelerometer, estimates and events of a served robot until Control+C.
 

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Literal
 
 from tvist_client.errors import NotConnectedError
@@ -44,12 +45,8 @@ class Transport(ABC):
         """Call a function on the event loop each time the robot disconnects."""
 
     @abstractmethod
-    async def announce(self, client: str) -> None:
-        """Announce a client's presence, until `withdraw` was called as often or the transport is closed."""
-
-    @abstractmethod
-    async def withdraw(self, client: str) -> None:
-        """Undo one call of `announce`."""
+    def presence(self, client: str) -> AbstractContextManager[object]:
+        """Announce a client's presence for the duration of a block, or until the transport is closed."""
 
     @abstractmethod
     async def close(self) -> None:

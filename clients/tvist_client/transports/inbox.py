@@ -9,8 +9,7 @@ log = logging.getLogger(__name__)
 
 Callback = Callable[[bytes], None]
 
-MAX_WAITING = 10_000
-"""Number of messages that may wait while the loop is busy: 20 s of states, about 10 MB."""
+MAX_WAITING = 10_000  # number of messages that may wait while the loop is busy: 20 s of states, about 10 MB
 
 
 class Inbox:

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
 from tvist_client.errors import NotConnectedError
@@ -56,11 +57,9 @@ class LoopbackTransport(Transport):
     def on_lost(self, callback: Callable[[NotConnectedError], None]) -> None:
         """Do nothing: a robot in this process does not disconnect."""
 
-    async def announce(self, client: str) -> None:
+    def presence(self, client: str) -> AbstractContextManager[object]:  # noqa: ARG002
         """Do nothing: a client in this process does not disconnect either."""
-
-    async def withdraw(self, client: str) -> None:
-        """Do nothing, as `announce` does."""
+        return nullcontext()
 
     async def close(self) -> None:
         self._closed = True

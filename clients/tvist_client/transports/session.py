@@ -1,22 +1,27 @@
 """Zenoh sessions of a client; all are closed before the process ends."""
 
+import asyncio
 import contextlib
 import json
 import re
 import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import zenoh
+from zenoh.handlers import Callback
 
 from tvist_client.errors import NotConnectedError
 from tvist_client.transports.certificates import Folder, settings, why_refused
+from tvist_client.transports.inbox import wake
 from tvist_protocol.errors import quoted
 from tvist_protocol.keys import check_namespace
 
 _PORT = "[1-9]\\d{0,3}|[1-5]\\d{4}|6[0-4]\\d{3}|65[0-4]\\d{2}|655[0-2]\\d|6553[0-5]"
 _ENDPOINT = re.compile(rf"(?!(tcp|tls|udp|quic|ws)/)[a-z]+[/-].*|[a-z]+/\S+:({_PORT})([?#].*)?")
 """Matches endpoints with a valid port, and those of protocols without ports, which Zenoh checks itself."""
+ENCODING = zenoh.Encoding("application/msgpack")
 CONFIG: Mapping[str, Any] = {
     "mode": "client",
     # The endpoint is given, so there is nothing to search for.
@@ -47,6 +52,30 @@ def open_session(endpoint: str, security: Folder | None = None, namespace: str =
         raise NotConnectedError(f"no connection to {endpoint}: {refused}" if refused else why) from error
     _OPEN.add(session)
     return session
+
+
+def ask(
+    session: zenoh.Session, key: str, data: bytes | None, timeout_s: float
+) -> asyncio.Future[zenoh.Reply | None]:
+    """Query one key, on the loop; the result is the first answer, or None if nobody answers.
+
+    Zenoh ends a query that reaches no queryable silently at once, and an unanswered one with an error at its timeout.
+    """
+    loop = asyncio.get_running_loop()
+    answer: asyncio.Future[zenoh.Reply | None] = loop.create_future()
+
+    def settle(reply: zenoh.Reply | None) -> None:
+        if not answer.done():
+            answer.set_result(reply)
+
+    def on_reply(reply: zenoh.Reply | None = None) -> None:
+        wake(loop, partial(settle, reply))
+
+    # With the default quality of service, states have another queue and cannot delay answers.
+    encoding = None if data is None else ENCODING
+    callback = Callback(on_reply, on_reply, indirect=False)
+    session.get(key, callback, payload=data, encoding=encoding, timeout=timeout_s)
+    return answer
 
 
 def _no_endpoint(endpoint: object) -> str:

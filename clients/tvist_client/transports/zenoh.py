@@ -6,9 +6,8 @@ thread has to be joined. They only convert payloads to bytes.
 
 import asyncio
 import re
-from collections import Counter
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 
 import zenoh
@@ -24,16 +23,13 @@ from tvist_client.errors import (
 from tvist_client.transports.base import Topic, Transport
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import Inbox, wake
-from tvist_client.transports.session import close_session, open_session
+from tvist_client.transports.session import ENCODING, ask, close_session, open_session
 from tvist_protocol import keys
 
-ENCODING = zenoh.Encoding("application/msgpack")
 FIND_S = 1.0
 """Time after which the present robots are queried, once there is a link [s]; a robot appears within milliseconds."""
-LATE_S = 3.0
-"""Time after which they are queried again if none answered, because the machine may be busy [s]."""
-INFO_S = 10.0
-"""Longest wait for `info` [s]."""
+LATE_S = 3.0  # time after which they are queried again if none answered, because the machine may be busy [s]
+INFO_S = 10.0  # longest wait for `info` [s]
 
 
 class ZenohTransport(Transport):
@@ -48,10 +44,8 @@ class ZenohTransport(Transport):
         self._mailbox = Inbox(self._loop)
         self._alive, self._losses = asyncio.Event(), 0
         self._closed = False
-        self._pending: set[asyncio.Future[bytes]] = set()
+        self._pending: set[asyncio.Future[zenoh.Reply | None]] = set()
         self._lost_callbacks: list[Callable[[NotConnectedError], None]] = []
-        self._tokens: dict[str, zenoh.LivelinessToken] = {}
-        self._announced: Counter[str] = Counter()
         session.liveliness().declare_subscriber(
             keys.key(robot, "alive"), Callback(self._on_alive, indirect=False), history=True
         )
@@ -84,11 +78,6 @@ class ZenohTransport(Transport):
             await transport.close()
             raise
         return transport
-
-    @property
-    def dropped(self) -> int:
-        """Number of messages dropped because the event loop was busy for too long."""
-        return self._mailbox.dropped
 
     async def request(self, data: bytes, timeout_s: float) -> bytes:
         """Send a command as a query and wait for the reply."""
@@ -132,24 +121,18 @@ class ZenohTransport(Transport):
         """Call a function when the robot's liveliness token disappears."""
         self._lost_callbacks.append(callback)
 
-    async def announce(self, client: str) -> None:
-        """Declare the client's liveliness token. It reaches the robot before any command sent later."""
+    @contextmanager
+    def presence(self, client: str) -> Iterator[None]:
+        """Hold a liveliness token of the client. It reaches the robot before any command sent later."""
         if self._closed:
             raise self._gone()
-        self._announced[client] += 1
-        if client not in self._tokens:
-            key = keys.client(self._robot, client, str(self._session.info.zid()))
-            self._tokens[client] = self._session.liveliness().declare_token(key)
-
-    async def withdraw(self, client: str) -> None:
-        """Undeclare the client's liveliness token, once it was withdrawn as often as announced."""
-        self._announced[client] -= 1
-        if self._announced[client] > 0:
-            return
-        del self._announced[client]
-        token = self._tokens.pop(client, None)
-        if token is not None and not self._closed:
-            token.undeclare()  # type: ignore[no-untyped-call]
+        key = keys.client(self._robot, client, str(self._session.info.zid()))
+        token = self._session.liveliness().declare_token(key)
+        try:
+            yield
+        finally:
+            if not self._closed:
+                token.undeclare()  # type: ignore[no-untyped-call]
 
     async def close(self) -> None:
         """Close the session; pending requests fail."""
@@ -160,50 +143,28 @@ class ZenohTransport(Transport):
         await asyncio.to_thread(close_session, self._session)
 
     async def _get(self, key: str, data: bytes | None, timeout_s: float) -> bytes:
-        """Query one key and return the first answer.
-
-        Zenoh ends a query that reaches no queryable silently at once, and an unanswered one with an error at its
-        timeout.
-        """
+        """Query one key and return the first answer."""
         if self._closed:
             raise self._gone()
-        answer: asyncio.Future[bytes] = self._loop.create_future()
-        self._pending.add(answer)
-        nobody = NotConnectedError(
-            f"robot {self._robot!r} at {self._endpoint} does not answer: check that the server is still running"
-        )
-
-        def on_reply(reply: zenoh.Reply) -> None:
-            wake(self._loop, partial(_settle, answer, self._outcome(reply, timeout_s)))
-
-        def on_end() -> None:
-            wake(self._loop, partial(_settle, answer, nobody))
-
         try:
-            # With the default quality of service, states have another queue and cannot delay answers.
-            self._session.get(
-                key,
-                Callback(on_reply, on_end, indirect=False),
-                payload=data,
-                encoding=ENCODING if data is not None else None,
-                timeout=timeout_s,
-            )
-            return await answer
+            answer = ask(self._session, key, data, timeout_s)
         except zenoh.ZError as error:
             raise self._gone() from error
+        self._pending.add(answer)
+        try:
+            reply = await answer
         finally:
             self._pending.discard(answer)
-
-    def _outcome(self, reply: zenoh.Reply, timeout_s: float) -> bytes | ClientError:
+        robot = f"robot {self._robot!r} at {self._endpoint}"
+        if reply is None:
+            raise NotConnectedError(f"{robot} does not answer: check that the server is still running")
         if reply.ok is not None:
             return reply.ok.payload.to_bytes()
         why = reply.err.payload.to_bytes() if reply.err is not None else b""
         if why == b"Timeout":
-            return AnswerTimeoutError(
-                f"robot {self._robot!r} at {self._endpoint} did not answer within {timeout_s:g} s: "
-                "it hangs, or needs more time"
-            )
-        return UnexpectedReplyError(f"the answer is an error instead of a message: {why!r:.80}")
+            late = f"{robot} did not answer within {timeout_s:g} s: it hangs, or needs more time"
+            raise AnswerTimeoutError(late)
+        raise UnexpectedReplyError(f"the answer is an error instead of a message: {why!r:.80}")
 
     def _on_alive(self, sample: zenoh.Sample) -> None:
         there = sample.kind == zenoh.SampleKind.PUT
@@ -228,7 +189,8 @@ class ZenohTransport(Transport):
 
     def _fail_pending(self, error: ClientError) -> None:
         for answer in tuple(self._pending):
-            _settle(answer, error)
+            if not answer.done():
+                answer.set_exception(error)
 
     async def _find(self) -> None:
         robots: list[str] = []
@@ -308,13 +270,3 @@ async def _robots(session: zenoh.Session) -> list[str]:
 def natural(name: str) -> list[int | str]:
     """Return a sort key for names, in which digits count as numbers."""
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
-
-
-def _settle(answer: asyncio.Future[bytes], outcome: bytes | ClientError) -> None:
-    """Set the result of a request, unless it has one already."""
-    if answer.done():
-        return
-    if isinstance(outcome, bytes):
-        answer.set_result(outcome)
-    else:
-        answer.set_exception(outcome)

@@ -4,8 +4,4 @@ from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import turned
 from tvist_controller.paths.poses import placement_vector
 
-__all__ = [
-    "Arm",
-    "placement_vector",
-    "turned",
-]
+__all__ = ["Arm", "placement_vector", "turned"]

@@ -122,10 +122,12 @@ class Cell(_Table, frozen=True, kw_only=True):
 
     def check(self) -> None:
         """Check what the types of the fields cannot express."""
-        self._check_wires()
+        for number, first in _repeated([wire.input for wire in self.wires]):
+            wired = self.wires[number].input
+            raise ValueError(f"wires[{number}].input is {wired!r}, which has a wire: that of wires[{first}]")
         self._check_tools()
-        for key, things in (("tools", self.tools), ("parts", self.parts)):
-            _check_names(key, [one.name for one in things])
+        _check_names("tools", [tool.name for tool in self.tools])
+        _check_names("parts", [part.name for part in self.parts])
         if self.world is not None and self.parts:
             raise ValueError(f"world is {self.world!r}, in which bodies are gripped: leave parts out")
         if self.gripper is None:
@@ -144,15 +146,6 @@ class Cell(_Table, frozen=True, kw_only=True):
                 raise ValueError(
                     f"parts[{number}].size[1] is {part.size[1]:g}: must be less than {self.gripper.stroke:g} m, by "
                     f"which a {self.gripper.model} opens"
-                )
-
-    def _check_wires(self) -> None:
-        wired: dict[str, int] = {}
-        for number, wire in enumerate(self.wires):
-            first = wired.setdefault(wire.input, number)
-            if first != number:
-                raise ValueError(
-                    f"wires[{number}].input is {wire.input!r}, which has a wire: that of wires[{first}]"
                 )
 
     def _check_tools(self) -> None:
@@ -174,11 +167,16 @@ def bit_of(terminal: Terminal) -> int:
     return 1 << get_args(Terminal).index(terminal)
 
 
+def _repeated(names: Sequence[str]) -> list[tuple[int, int]]:
+    """Return the places of names that stood before, and where they first did."""
+    return [(number, names.index(name)) for number, name in enumerate(names) if name in names[:number]]
+
+
 def _check_names(key: str, names: Sequence[str]) -> None:
-    seen: dict[str, int] = {}
+    for number, first in _repeated(names):
+        raise ValueError(
+            f"{key}[{number}].name is {names[first]!r}, which is the name of {key}[{first}], too"
+        )
     for number, name in enumerate(names):
-        first = seen.setdefault(name, number)
-        if first != number:
-            raise ValueError(f"{key}[{number}].name is {name!r}, which is the name of {key}[{first}], too")
         if not name.isprintable():
             raise ValueError(f"{key}[{number}].name is {name!r}: must be characters that can be shown")

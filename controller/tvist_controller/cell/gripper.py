@@ -28,8 +28,7 @@ WRITABLE: Mapping[str, int] = MappingProxyType(
 PORT: Final = 63352  # TCP port on which the URCap listens
 SLAVES = ("9", "1")  # SID values by which clients select the only gripper
 UNKNOWN: Final = b"?"  # answer to an unknown request
-LONGEST: Final = 1024
-"""Longest line [bytes]."""
+LONGEST: Final = 1024  # longest line [bytes]
 _DIGITS = {"PRE": 3, "POS": 3, "SPE": 3, "FOR": 3, "MSC": 3, "FLT": 2}
 """Digits of a bare answer; 1 for other registers."""
 _BARE_GET = re.compile(rb"GET [A-Z]{3}")
@@ -66,10 +65,6 @@ class Gripper:
         least, most = FORCES[self.stroke]
         return least + self._written["FOR"] / 255.0 * (most - least)
 
-    def lose(self) -> None:
-        """Continue closing after a part has slipped out."""
-        self.holds = False
-
     def begin(self) -> None:
         """Reset to the start: open fingers."""
         self._position = float(OPEN)
@@ -78,7 +73,7 @@ class Gripper:
         self._active = self._activated
         self._released = False  # whether an automatic release has ended, which requires another activation
         self._object = ARRIVED
-        self.holds = False  # whether a part is between the fingers
+        self.holds = False  # whether a part is between the fingers; without one, they close further
 
     # ------------------------------------------------------------------ registers
 

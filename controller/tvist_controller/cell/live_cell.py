@@ -47,11 +47,10 @@ class Wires:
         self._outputs: int | None = None  # outputs of the last tick; None before the first
         # Entries of one wire are in order of time, since its delay is constant.
         self._under_way: list[deque[tuple[int, bool]]] = [deque() for _ in wires]
-        self._left = 0
 
     def tick(self, tick: int, outputs: int) -> tuple[int, int]:
         """Return the inputs that change for the next tick as a mask and values; others keep their signal."""
-        if outputs == self._outputs and not self._left:
+        if outputs == self._outputs and not any(self._under_way):
             return 0, 0
         before, self._outputs = self._outputs, outputs
         mask = values = 0
@@ -61,10 +60,8 @@ class Wires:
                 mask, values = mask | input_, values | (input_ if on else 0)
             elif (before ^ outputs) & output:
                 waiting.append((tick + ticks, on))
-                self._left += 1
             while waiting and waiting[0][0] <= tick + 1:
                 _, on = waiting.popleft()
-                self._left -= 1
                 mask, values = mask | input_, values & ~input_ | (input_ if on else 0)
         return mask, values
 
@@ -99,11 +96,6 @@ class LiveCell:
         self._changers = [(bit_of(tool.while_on), tool) for tool in cell.tools[1:] if tool.while_on]
         self.begin(plant.payload)
 
-    @property
-    def empty(self) -> Payload:
-        """Payload at the start, without a part."""
-        return self._first_load
-
     def begin(self, load: Payload) -> None:
         """Reset to the start, with this payload without a part."""
         self._wires = Wires(self._cell.wires)
@@ -111,7 +103,7 @@ class LiveCell:
             self.gripper.begin()
         self._places = [placement(part.pose) for part in self._cell.parts]
         self._tool = self._cell.tools[0] if self._cell.tools else None
-        self._load = self._first_load = load
+        self._load = self.empty = load  # without a part, now and at the start
         self._met: int | None = None  # number of the part met by the closing fingers in this tick
         self._held: int | None = None  # number of the part between the fingers
         self._grip = placement(None)  # pose of that part in the flange frame
@@ -157,7 +149,8 @@ class LiveCell:
             self._put_down(q)
             self._share = 0  # it stays with the tool
         self._tool = tool
-        self._load = self._first_load if tool is self._cell.tools[0] else _tool_body(tool)
+        own = Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
+        self._load = self.empty if tool is self._cell.tools[0] else own
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")
 
     def _move_real_fingers(self, gripper: Gripper, hand: Plant) -> None:
@@ -165,7 +158,7 @@ class LiveCell:
         opening = hand.opening()
         if gripper.holds and opening < gripper.opening - STALLED:
             self._emit("warning", why="cell: the gripper has lost what it held")
-            gripper.lose()
+            gripper.holds = False
 
         def meet(_: float, narrow: float) -> float | None:
             return opening if opening - narrow > STALLED else None
@@ -234,10 +227,6 @@ class LiveCell:
             why=f"the gripper closed on nothing: {name} lies {1e3 * distance:.1f} mm and {angle:.2f} rad from the tool "
             f"centre point; it is gripped within {1e3 * limits.tolerance:g} mm and {limits.angle_tolerance:g} rad",
         )
-
-
-def _tool_body(tool: Tool) -> Payload:
-    return Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
 
 
 def _part_body(part: Workpiece, place: Placement) -> Payload:

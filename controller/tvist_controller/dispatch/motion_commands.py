@@ -1,11 +1,13 @@
 """Commands that move, guide, stop and power the arm, and force control."""
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from tvist_controller.dispatch.robot import RobotParts
+from tvist_controller.line.differentiator import Floats
 from tvist_controller.planning.command_row import CommandCall, CommandRow
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.path_planner import PathPlanner
@@ -98,22 +100,25 @@ def _check_speed(command: m.SpeedJ, description: RobotDescription) -> None:
     check_acceleration(command.acceleration, description)
 
 
-def _servo_j(robot: RobotParts, call: CommandCall[m.ServoJ]) -> Reply:
-    command = call.command
-    q = np.array(command.q, dtype=float)
-    return Accepted(id=robot.guidance.servo(q, command.lookahead, command.gain, shaped=command.shaped))
+def _begun(begin: Callable[[RobotParts, Any], int]) -> Callable[[RobotParts, CommandCall[Any]], Reply]:
+    """Return the handler of a command that begins a motion, which tells the motion's number."""
+    return lambda robot, call: Accepted(id=begin(robot, call.command))
 
 
-def _speed_j(robot: RobotParts, call: CommandCall[m.SpeedJ]) -> Reply:
-    command = call.command
-    qd = np.array(command.qd, dtype=float)
-    return Accepted(id=robot.guidance.move_joints(qd, command.acceleration, shaped=command.shaped))
+def _floats(values: Sequence[float]) -> Floats:
+    return np.array(values, dtype=float)
 
 
-def _speed_l(robot: RobotParts, call: CommandCall[m.SpeedL]) -> Reply:
-    command = call.command
-    twist = np.array(command.xd, dtype=float)
-    return Accepted(id=robot.guidance.move_tool(twist, *_accelerations(command), shaped=command.shaped))
+def _servo_j(robot: RobotParts, command: m.ServoJ) -> int:
+    return robot.guidance.servo(_floats(command.q), command.lookahead, command.gain, shaped=command.shaped)
+
+
+def _speed_j(robot: RobotParts, command: m.SpeedJ) -> int:
+    return robot.guidance.move_joints(_floats(command.qd), command.acceleration, shaped=command.shaped)
+
+
+def _speed_l(robot: RobotParts, command: m.SpeedL) -> int:
+    return robot.guidance.move_tool(_floats(command.xd), *_accelerations(command), shaped=command.shaped)
 
 
 def _accelerations(command: m.SpeedL | m.StopL) -> tuple[float, float]:
@@ -131,17 +136,10 @@ def _stop_l(robot: RobotParts, call: CommandCall[m.StopL]) -> None:
     robot.guidance.stop_tool(*_accelerations(call.command))
 
 
-def _force_mode(robot: RobotParts, call: CommandCall[f.ForceMode]) -> Reply:
-    command = call.command
-    compliant, wrench, limits = (
-        np.array(value, dtype=float) for value in (command.compliant, command.wrench, command.limits)
-    )
+def _force_mode(robot: RobotParts, command: f.ForceMode) -> int:
+    compliant, wrench, limits = map(_floats, (command.compliant, command.wrench, command.limits))
     task = ForceTask(compliant, wrench, limits, command.damping, command.gain)
-    return Accepted(id=robot.force_control.begin(task, command.frame or "base", command.frame_type))
-
-
-def _freedrive(robot: RobotParts, call: CommandCall[f.Freedrive]) -> Reply:
-    return Accepted(id=robot.force_control.free(np.array(call.command.free, dtype=float), call.command.frame))
+    return robot.force_control.begin(task, command.frame or "base", command.frame_type)
 
 
 def _end_force_mode(robot: RobotParts, _: CommandCall[f.EndForceMode]) -> None:
@@ -168,9 +166,7 @@ ROWS: tuple[CommandRow, ...] = (
     CommandRow(c.Pause, _pause),
     CommandRow(c.Resume, lambda robot, _: robot.motion.resume()),
     CommandRow(
-        c.SetSpeed,
-        lambda robot, call: robot.motion.motions.set_speed(call.command.fraction),
-        changes_io=True,
+        c.SetSpeed, lambda robot, call: robot.motion.motions.set_speed(call.command.fraction), changes_io=True
     ),
     CommandRow(
         c.PowerOn, lambda robot, call: robot.safety.power_on(release_brakes=call.command.release_brakes)
@@ -178,17 +174,22 @@ ROWS: tuple[CommandRow, ...] = (
     CommandRow(c.PowerOff, _power_off, stops=True),
     CommandRow(c.UnlockProtectiveStop, lambda robot, _: robot.safety.unlock()),
     CommandRow(c.RestartSafety, lambda robot, _: robot.motion.safety.restart()),
-    CommandRow(m.ServoJ, _servo_j, check=lambda command, description: check_joints(command.q, description)),
-    CommandRow(m.SpeedJ, _speed_j, check=_check_speed),
-    CommandRow(m.SpeedL, _speed_l),
+    CommandRow(
+        m.ServoJ, _begun(_servo_j), check=lambda command, description: check_joints(command.q, description)
+    ),
+    CommandRow(m.SpeedJ, _begun(_speed_j), check=_check_speed),
+    CommandRow(m.SpeedL, _begun(_speed_l)),
     CommandRow(m.StopJ, _stop_j, stops=True),
     CommandRow(m.StopL, _stop_l, stops=True),
-    CommandRow(f.ForceMode, _force_mode),
-    CommandRow(f.Freedrive, _freedrive),
+    CommandRow(f.ForceMode, _begun(_force_mode)),
+    CommandRow(
+        f.Freedrive,
+        _begun(lambda robot, command: robot.force_control.free(_floats(command.free), command.frame)),
+    ),
     CommandRow(f.EndForceMode, _end_force_mode, stops=True),
     CommandRow(f.ZeroFtsensor, _zero, changes_io=True),
     CommandRow(
         f.SetExternalWrench,
-        lambda robot, call: robot.force_control.external.sense(np.array(call.command.wrench, dtype=float)),
+        lambda robot, call: robot.force_control.external.sense(_floats(call.command.wrench)),
     ),
 )

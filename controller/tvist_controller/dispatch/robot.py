@@ -12,8 +12,7 @@ from tvist_controller.dispatch.rights import Authority
 from tvist_controller.events import Counters, Fields
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.instruments.peripherals import Peripherals
-from tvist_controller.instruments.report import Key, Report, truth_of
-from tvist_controller.instruments.state_layout import Layout
+from tvist_controller.instruments.report import Report, truth_of
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.sample import Sample
@@ -86,7 +85,6 @@ class RobotParts(ABC):
         safety.monitors = self._monitors()
         self.true_modes: dict[str, list[float]] = {}
         """The arm's true modes, computed at intervals; empty to recompute them for the next truth."""
-        self._layouts: dict[Key, Layout] = {}
         self.report = self.reported(self.cycle.sample)
         """Report of the last tick, or of the arm at rest if it has not ticked yet or was reset since."""
 
@@ -153,7 +151,7 @@ class RobotParts(ABC):
             motion.motions.speed if self.watching is None else self.watching.speed,
             tvist.f_d, tvist.zeta, tvist.delay + cycle.drives.delay, tvist.clipped,
             None if stream is None else stream.sequence,
-            self.counters.missed_ticks, motion.tool, self._layouts,
+            self.counters.missed_ticks, motion.tool,
         )  # fmt: skip
 
     def emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:

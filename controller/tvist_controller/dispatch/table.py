@@ -156,7 +156,7 @@ def _place(robot: RobotParts, call: CommandCall[SimulationReset]) -> Reply:
         cell.begin(carried)
     robot.safety.put(command.mode)
     if command.mode is not None:
-        robot.modes.forget_stops()
+        robot.modes.stops.clear()
     robot.true_modes = {}
     robot.modes.update()
     robot.report = robot.reported(cycle.sample)

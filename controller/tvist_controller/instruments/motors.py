@@ -45,11 +45,11 @@ LARGEST_SMALL = 60.0  # joints with a larger torque limit are big [N m]
 
 def joint_ratings(description: RobotDescription) -> list[JointRating]:
     """Return the rating of each joint of a robot."""
-    return [_rating(BIG if torque > LARGEST_SMALL else SMALL, torque) for torque in description.limits.torque]
-
-
-def _rating(size: JointRating, torque: float) -> JointRating:
-    return replace(size, torque=torque, torque_constant=size.torque_constant * (torque / size.torque))
+    found = [(BIG if torque > LARGEST_SMALL else SMALL, torque) for torque in description.limits.torque]
+    return [
+        replace(size, torque=torque, torque_constant=size.torque_constant * (torque / size.torque))
+        for size, torque in found
+    ]
 
 
 class Meters:

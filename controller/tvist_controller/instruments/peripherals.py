@@ -1,6 +1,6 @@
 """Terminals, registers and tool centre point of a robot, set by commands and published as `Io`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, get_args
 
 from tvist_controller.refusal import RefusalError
@@ -22,12 +22,6 @@ VOLTAGE = (0.0, 10.0)  # range of an analogue terminal set to voltage [V]
 MIN_INTEGER, MAX_INTEGER = -(2**31), 2**31 - 1  # range of an integer register
 _EMPTY: dict[str, list[Any]] = {"bit": [0] * (BITS // 32), "int": [0] * NUMBERS, "double": [0.0] * NUMBERS}
 """Initial registers of each kind."""
-
-
-def analog_value(share: float, *, voltage: bool) -> float:
-    """Return an analogue terminal's value at a fraction of its range [A or V]."""
-    low, high = VOLTAGE if voltage else CURRENT
-    return low + share * (high - low)
 
 
 def analog_share(value: float, *, voltage: bool) -> float:
@@ -120,17 +114,10 @@ class Peripherals:
         """Set the force and torque counted as zero, see `wrench_zero` [N, N m]."""
         self.wrench_zero, self.changed = wrench, True
 
-    def bit(self, bank: Bank, place: int) -> bool:
-        """Return a bit register."""
-        return bool(self._registers[bank][place // 32] >> place % 32 & 1)
-
-    def integers(self, bank: Bank) -> Sequence[int]:
-        """Return the integer registers of a bank."""
-        return self._registers[bank]
-
-    def doubles(self, bank: Bank) -> Sequence[float]:
-        """Return the double registers of a bank."""
-        return self._registers[bank]
+    def read(self, bank: Bank, place: int) -> Register:
+        """Return a register."""
+        values = self._registers[bank]
+        return bool(values[place // 32] >> place % 32 & 1) if bank.endswith("bit") else values[place]
 
     def write(self, bank: Bank, place: int, value: Register) -> None:
         """Write a register; place and value must be valid."""
@@ -150,20 +137,12 @@ class Peripherals:
     # ------------------------------------------------------------------ for clients
 
     def write_registers(self, command: SetRegisters, tick: int) -> None:
-        """Write registers for a client; only input registers can be written without control."""
-        runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
-        for bank in (run.bank for run in runs if command.token is None and run.bank.startswith("output")):
-            why = f"token is missing: {bank} registers belong to the robot, and writing them needs control"
-            raise RefusalError("missing_field", "token", why)
-        self.set_registers(command)
-        for run in runs:
-            for place in range(run.first, run.first + len(run.values)):
-                self._written[run.bank, place] = tick
-
-    def set_registers(self, command: SetRegisters) -> None:
-        """Write all registers of a command, or refuse them all."""
+        """Write all registers of a client's command, or refuse them all; output registers need control."""
         runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
         for number, run in enumerate(runs):
+            if command.token is None and run.bank.startswith("output"):
+                why = f"token is missing: {run.bank} registers belong to the robot, and writing them needs control"
+                raise RefusalError("missing_field", "token", why)
             where = f"also[{number - 1}].values" if number else "values"
             there = BITS if run.bank.endswith("bit") else NUMBERS
             if run.first + len(run.values) > there:
@@ -174,6 +153,7 @@ class Peripherals:
         for run in runs:
             for place, value in enumerate(run.values, run.first):
                 self.write(run.bank, place, value)
+                self._written[run.bank, place] = tick
 
     def io(
         self,
@@ -223,7 +203,8 @@ class Peripherals:
         return Payload(mass=mass, com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))
 
     def _analog_output(self, number: int) -> float:
-        return analog_value(self.analog_shares[number], voltage=bool(self._analog_types >> (2 + number) & 1))
+        low, high = VOLTAGE if self._analog_types >> (2 + number) & 1 else CURRENT
+        return low + self.analog_shares[number] * (high - low)
 
 
 def _check(where: str, value: Register, bank: Bank) -> None:

@@ -1,6 +1,5 @@
 """One tick of one robot: its messages, and quantities that several RTDE variables depend on."""
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +10,10 @@ from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.wrench import (
     ACTUAL_Q,
     ACTUAL_QD,
+    ROWS,
     RUNNING,
     SHAPED,
     UNSHAPED,
-    as_rows,
     joint_lists,
 )
 from tvist_plant.model import Floats
@@ -23,23 +22,6 @@ from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
 
 POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))  # robot modes with arm power
-
-if TYPE_CHECKING:
-    computed_once = cached_property
-else:
-
-    class computed_once:  # noqa: N801  it stands for a property
-        """A property computed on first read; `cached_property` of Python 3.11 also takes a lock."""
-
-        def __init__(self, func: Callable[[Any], Any]) -> None:
-            self.func, self.__doc__ = func, func.__doc__
-
-        def __set_name__(self, owner: type, name: str) -> None:
-            self.name = name
-
-        def __get__(self, of: Any, owner: type) -> Any:
-            value = of.__dict__[self.name] = self.func(of)
-            return value
 
 
 class Reading:
@@ -78,44 +60,39 @@ class Reading:
         """Whether the drives hold the arm, with released brakes."""
         return self.state.robot_mode == RUNNING
 
-    @computed_once
+    @cached_property
     def joint_lists(self) -> bytearray:
         """Joint lists of the state, see `joint_lists`."""
         return joint_lists(self.state)
 
-    @computed_once
+    @cached_property
     def motion(self) -> Floats:
         """`joint_lists` as an array, shape (10, n)."""
-        return as_rows(self.joint_lists)
+        return np.ndarray((ROWS, len(self.ratings)), buffer=self.joint_lists)
 
-    @computed_once
+    @cached_property
     def target(self) -> Floats:
         """Tool motion of the unshaped reference, see `RigidBody.tool`, shape (18,)."""
         return self.rigid.tool(self.motion[UNSHAPED], self.io.tcp_offset)
 
-    @property
-    def target_tool(self) -> bytes:
-        """`target` as doubles in native byte order."""
-        return self.target.tobytes()
-
-    @computed_once
+    @cached_property
     def shaped(self) -> Floats:
         """Tool motion of the shaped reference, shape (18,)."""
         if self.state.unshaped_q is None:
             return self.target
         return self.rigid.tool(self.motion[SHAPED], self.io.tcp_offset)
 
-    @computed_once
+    @cached_property
     def elbow(self) -> tuple[list[float], list[float]]:
         """Measured position [m] and velocity [m/s] of the elbow."""
         return self.rigid.elbow(self.motion[ACTUAL_Q], self.motion[ACTUAL_QD])
 
-    @computed_once
+    @cached_property
     def rotation(self) -> Floats:
         """Measured rotation from flange to base frame, shape (3, 3)."""
         return self.rigid.flange_rotation(self.motion[ACTUAL_Q])
 
-    @computed_once
+    @cached_property
     def estimate(self) -> Floats:
         """External force and torque at the TCP [N, N m], then joint torques [N m], shape (6 + n,)."""
         if not self.driven:

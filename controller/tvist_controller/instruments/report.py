@@ -1,28 +1,24 @@
 """Reports of a tick: state, built or encoded on demand, and truth; and their receivers."""
 
+from collections.abc import Sequence
 from typing import Literal
 
-import numpy as np
 from msgspec import Struct
 
-from tvist_controller.instruments.state_layout import Layout, width, write_state
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import rotation_vector
 from tvist_controller.line.differentiator import Floats, middle_of
+from tvist_controller.line.line_tick import TORQUE
 from tvist_controller.line.sample import Sample
 from tvist_plant.plant import PERIOD, Plant, PlantTruth
-from tvist_protocol.codec import decode, encode
+from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth
 
-Topic = Literal["state", "event", "truth", "telemetry", "io"]
-"""Topics published without a request."""
-Key = tuple[object, ...]
+Topic = Literal["state", "event", "truth", "telemetry", "io"]  # topics published without a request
 MODES = ("f_d", "zeta", "participation")
 TRUE_MODES_EVERY = 50  # ticks between computations of the arm's true modes, which take a good part of a tick
-NOTHING: Floats = np.empty((0, 0))
-NOWHERE: Floats = np.empty(0)
 
 
 class Report(Struct, gc=False):
@@ -39,88 +35,47 @@ class Report(Struct, gc=False):
     sequence: int | None  # sequence number of the newest accepted set-point
     missed: int  # number of ticks that started late
     arm: Arm  # the arm with its tool; it must not change
-    layouts: dict[Key, Layout]
-    """Layout of the last state, by everything it depends on; usually also that of the next."""
     made: State | None = None
     written: bytes | None = None
 
     @property
     def state(self) -> State:
-        """The state, decoded from its encoding if present, which halves the time."""
+        """The state."""
         if self.made is None:
-            self.made = self._make() if self.written is None else decode(State, self.written)
+            self.made = self._make()
         return self.made
 
     @property
     def encoded(self) -> bytes:
-        """The encoded state, equal to the codec's result."""
+        """The encoded state."""
         if self.written is None:
-            self.written = self._write() if self.made is None else encode(self.made)
+            self.written = encode(self.state)
         return self.written
 
-    def _write(self) -> bytes:
-        sample, sequence, tick, f_d = self.sample, self.sequence, self.tick, self.f_d
-        motors, measured, unshaped = sample.motors, sample.measured, sample.unshaped
-        key = (
-            width(tick), None if sequence is None else width(sequence), self.modes, self.missed, self.clipped,
-            unshaped is None, motors is not None and motors.limited, motors is None, len(f_d),
-            sample.wrench is None,
-        )  # fmt: skip
-        layout = self.layouts.get(key)
-        if layout is None:
-            layout = Layout.of(self.state)
-            self.layouts.clear()
-            self.layouts[key] = layout
-        template, places, integers = layout
-        before, middle, last = unshaped or (NOWHERE, NOWHERE, NOWHERE)
-        out = template.copy()
-        write_state(
-            out, places, integers, tick, sequence or 0, PERIOD, self.speed, self.delay, sample.signals,
-            before, middle, last, measured.q, measured.qd, measured.moment, measured.accelerometer,
-            self.arm.chain, f_d, self.zeta,
-            NOTHING if motors is None else motors.rows, NOWHERE if sample.wrench is None else sample.wrench,
-        )  # fmt: skip
-        return out.tobytes()
-
     def _make(self) -> State:
-        sample, motors = self.sample, self.sample.motors
-        unshaped = None if sample.unshaped is None else middle_of(sample.unshaped, PERIOD)
-        target, measured = sample.target, sample.measured
+        sample, measured = self.sample, self.sample.measured
+        reference, target, target_qd, target_qdd, moment = sample.signals[: TORQUE + 1].tolist()
+        unshaped: Sequence[list[float] | None] = (None, None, None)
+        if sample.unshaped is not None:
+            before = middle_of(sample.unshaped, PERIOD)
+            unshaped = [row.tolist() for row in (before.q, before.qd, before.qdd)]
+        motors = (None, None, None) if sample.motors is None else sample.motors.rows.tolist()
         motion = self.arm.motion(measured.q, measured.qd).tolist()
         robot_mode, safety_mode, runtime = self.modes
         return State(
-            tick=self.tick,
-            timestamp=self.tick * PERIOD,
-            robot_mode=robot_mode,
-            safety_mode=safety_mode,
-            runtime_state=runtime,
-            setpoint_sequence=self.sequence,
-            reference_q=sample.reference.tolist(),
-            target_q=target.q.tolist(),
-            target_qd=target.qd.tolist(),
-            target_qdd=target.qdd.tolist(),
-            target_moment=sample.torque.tolist(),
-            actual_q=measured.q.tolist(),
-            actual_qd=measured.qd.tolist(),
-            actual_moment=measured.moment.tolist(),
-            actual_TCP_pose=motion[:6],
-            actual_TCP_speed=motion[6:],
-            actual_tool_accelerometer=measured.accelerometer.tolist(),
-            speed_scaling=self.speed,
-            estimated_f_d=self.f_d.tolist(),
-            estimated_zeta=self.zeta.tolist(),
-            shaper_delay=self.delay,
-            missed_ticks=self.missed,
-            shaper_clipped=self.clipped,
-            unshaped_q=None if unshaped is None else unshaped.q.tolist(),
-            unshaped_qd=None if unshaped is None else unshaped.qd.tolist(),
-            unshaped_qdd=None if unshaped is None else unshaped.qdd.tolist(),
-            motor_qd=None if motors is None else motors.rows[0].tolist(),
-            motor_qdd=None if motors is None else motors.rows[1].tolist(),
-            motor_moment=None if motors is None else motors.rows[2].tolist(),
-            motor_limited=motors is not None and motors.limited,
+            tick=self.tick, timestamp=self.tick * PERIOD, robot_mode=robot_mode, safety_mode=safety_mode,
+            runtime_state=runtime, setpoint_sequence=self.sequence,
+            reference_q=reference, target_q=target, target_qd=target_qd, target_qdd=target_qdd, target_moment=moment,
+            actual_q=measured.q.tolist(), actual_qd=measured.qd.tolist(), actual_moment=measured.moment.tolist(),
+            actual_TCP_pose=motion[:6], actual_TCP_speed=motion[6:],
+            actual_tool_accelerometer=measured.accelerometer.tolist(), speed_scaling=self.speed,
+            estimated_f_d=self.f_d.tolist(), estimated_zeta=self.zeta.tolist(), shaper_delay=self.delay,
+            missed_ticks=self.missed, shaper_clipped=self.clipped,
+            unshaped_q=unshaped[0], unshaped_qd=unshaped[1], unshaped_qdd=unshaped[2],
+            motor_qd=motors[0], motor_qdd=motors[1], motor_moment=motors[2],
+            motor_limited=sample.motors is not None and sample.motors.limited,
             flange_wrench=None if sample.wrench is None else sample.wrench.tolist(),
-        )
+        )  # fmt: skip
 
 
 class Sink:
@@ -132,26 +87,26 @@ class Sink:
     wants_truth = False
     """Whether this sink wants the truth now, even if the robot does not publish it."""
 
-    def report(self, report: Report) -> None:
+    def report(self, report: Report, /) -> None:
         """Take a tick's report; by default as its state, which takes a while to build."""
         self.state(report.state)
 
-    def state(self, state: State) -> None:
+    def state(self, state: State, /) -> None:
         """Take a tick's state."""
 
-    def event(self, event: Event) -> None:
+    def event(self, event: Event, /) -> None:
         """Take an event; it precedes the state of its tick."""
 
-    def truth(self, truth: Truth) -> None:
+    def truth(self, truth: Truth, /) -> None:
         """Take what a real robot cannot measure, if published or wanted by this sink."""
 
-    def io(self, io: Io) -> None:
+    def io(self, io: Io, /) -> None:
         """Take changed inputs, outputs and registers; they precede the state of their tick."""
 
     def raised(self, error: Exception) -> None:
         """Take an exception of a plant, program function or tick for a log; the robot has handled it."""
 
-    def journal(self, entry: Entry) -> None:
+    def journal(self, entry: Entry, /) -> None:
         """Take an input of the controller, which precedes the tick of its number."""
 
 

@@ -1,7 +1,9 @@
 """One tick of a robot as UR's interfaces report it, with RTDE's names."""
 
+from functools import cached_property
+
 from tvist_controller.instruments.motors import Meters, joint_ratings
-from tvist_controller.instruments.reading import POWERED, Reading, computed_once
+from tvist_controller.instruments.reading import POWERED, Reading
 from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.variables import READERS
 from tvist_controller.instruments.wrench import RUNNING
@@ -15,7 +17,7 @@ class Snapshot(Reading):
 
 
 for _name, _read in READERS.items():
-    _once = computed_once(_read)
+    _once = cached_property(_read)
     _once.__set_name__(Snapshot, _name)
     setattr(Snapshot, _name, _once)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from math import sqrt
-from operator import attrgetter
+from operator import attrgetter, sub
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from tvist_controller.instruments.wrench import (
     UNSHAPED,
     sensed_at_tool,
     since_zeroed,
+    unshaped,
 )
 from tvist_plant.plant import GRAVITY
 from tvist_protocol.io import BITS, NUMBERS
@@ -42,6 +43,7 @@ SAFETY_BITS: dict[int, int] = {
     SafetyMode.FAULT: 1 << 9 | _STOPPED,
 }
 """Bits of `safety_status_bits` for each safety mode."""
+ORDER = (0, 3, 5, 1, 2, 4)  # places of Ixx Iyy Izz Ixy Ixz Iyz, UR's order, in the order of robot files
 _RUNNING: set[int] = {
     RuntimeState.STOPPING, RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESUMING,
 }  # fmt: skip
@@ -103,19 +105,14 @@ def _target_moment(r: Reading) -> list[float]:
     moment = r.state.target_moment
     if r.state.unshaped_q is None:
         return moment
-    unshaped = r.rigid.moment(r.motion[UNSHAPED], r.io.payload)
-    shaped = r.rigid.moment(r.motion[SHAPED], r.io.payload)
-    return [m + (u - s) for m, u, s in zip(moment, unshaped, shaped, strict=True)]
+    before, after = (r.rigid.moment(r.motion[rows], r.io.payload) for rows in (UNSHAPED, SHAPED))
+    return [m + (u - s) for m, u, s in zip(moment, before, after, strict=True)]
 
 
 def _target_current(r: Reading) -> list[float]:
     if not r.driven:
         return [0.0] * len(r.ratings)
     return [m / rating.torque_constant for m, rating in zip(r.target_moment, r.ratings, strict=True)]
-
-
-def _deviation(r: Reading) -> float:
-    return max(abs(a - t) for a, t in zip(r.state.actual_q, r.state.target_q, strict=True)) / DEVIATION
 
 
 def _tool_acceleration(r: Reading) -> list[float]:
@@ -164,11 +161,6 @@ def _length(vector: list[float]) -> float:
     return sqrt(x * x + y * y + z * z)
 
 
-def _payload_inertia(r: Reading) -> list[float]:
-    xx, xy, xz, yy, yz, zz = r.io.payload.inertia
-    return [xx, yy, zz, xy, xz, yz]
-
-
 def _joint_mode(r: Reading) -> int:
     return JOINT_MODES.get(r.state.robot_mode, JOINT_IDLE)
 
@@ -179,11 +171,11 @@ def _joint_mode(r: Reading) -> int:
 _ROWS = (
     _state("target_q", "VECTOR6D",
            "reference before shaping, from the program or client [rad].",
-           lambda r: r.state.target_q if r.state.unshaped_q is None else r.state.unshaped_q),
+           lambda r: unshaped(r.state)[0]),
     _state("target_qd", "VECTOR6D", "velocity of the reference before shaping [rad/s].",
-           lambda r: r.state.target_qd if r.state.unshaped_qd is None else r.state.unshaped_qd),
+           lambda r: unshaped(r.state)[1]),
     _state("target_qdd", "VECTOR6D", "acceleration of the reference before shaping [rad/s²].",
-           lambda r: r.state.target_qdd if r.state.unshaped_qdd is None else r.state.unshaped_qdd),
+           lambda r: unshaped(r.state)[2]),
 
     # Time, modes and the controller's own figures.
     _state("timestamp", "DOUBLE", "tick time plus 40 s, for clients that wait until a robot has booted [s].",
@@ -266,7 +258,8 @@ _ROWS = (
               "one body per joint in air of 25 °C, heated by its electronics and R i² in about 20 minutes [°C].",
               attrgetter("temperatures")),
     _computed("joint_position_deviation_ratio", "DOUBLE",
-              "largest difference of measured and shaped angle, divided by 0.05 rad [-].", _deviation),
+              "largest difference of measured and shaped angle, divided by 0.05 rad [-].",
+              lambda r: max(map(abs, map(sub, r.state.actual_q, r.state.target_q))) / DEVIATION),
 
     # Motion and forces of tool and payload, in the base frame unless stated otherwise.
     _io("tcp_offset", "VECTOR6D", "tool centre point in the flange frame [m, rad]."),
@@ -317,7 +310,7 @@ _ROWS = (
         lambda r: list(r.io.payload.com)),
     _io("payload_inertia", "VECTOR6D",
         "declared inertia about the centre of mass: xx yy zz xy xz yz [kg m²].",
-        _payload_inertia),
+        lambda r: [r.io.payload.inertia[place] for place in ORDER]),
     _constant("target_gravity", "VECTOR3D",
               "0 0 9.81, gravity as an equivalent acceleration of the base [m/s²].",
               [0.0, 0.0, GRAVITY]),

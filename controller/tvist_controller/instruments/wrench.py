@@ -26,22 +26,18 @@ UNSHAPED, SHAPED = slice(0, 3), slice(3, 6)
 SHAPED_QD, SHAPED_QDD, SHAPED_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range(4, ROWS)  # single rows
 
 
+def unshaped(state: State) -> tuple[list[float], list[float], list[float]]:
+    """Return q, q̇ and q̈ of the reference before shaping, at the tick of the shaped one."""
+    if state.unshaped_q is None or state.unshaped_qd is None or state.unshaped_qdd is None:
+        return state.target_q, state.target_qd, state.target_qdd
+    return state.unshaped_q, state.unshaped_qd, state.unshaped_qdd
+
+
 def joint_lists(state: State) -> bytearray:
     """Return the rows one after the other as doubles in native byte order."""
-    q, qd, qdd = state.target_q, state.target_qd, state.target_qdd
-    unshaped = (
-        *(q if state.unshaped_q is None else state.unshaped_q),
-        *(qd if state.unshaped_qd is None else state.unshaped_qd),
-        *(qdd if state.unshaped_qdd is None else state.unshaped_qdd),
-    )
-    shaped = *q, *qd, *qdd, *state.target_moment
-    measured = *state.actual_q, *state.actual_qd, *state.actual_moment
-    return bytearray(pack(f"{ROWS * len(q)}d", *unshaped, *shaped, *measured))
-
-
-def as_rows(lists: bytearray) -> Floats:
-    """Return the result of `joint_lists` as an array, shape (10, n)."""
-    return np.ndarray((ROWS, len(lists) // (8 * ROWS)), buffer=lists)
+    shaped = state.target_q, state.target_qd, state.target_qdd, state.target_moment
+    rows = *unshaped(state), *shaped, state.actual_q, state.actual_qd, state.actual_moment
+    return bytearray(pack(f"{ROWS * len(state.target_q)}d", *[value for row in rows for value in row]))
 
 
 NEAR_SINGULAR = 0.01

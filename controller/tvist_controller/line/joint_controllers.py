@@ -8,7 +8,8 @@ from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.differentiator import Floats
 from tvist_kernels.compiling import inlined
 from tvist_plant.description import RobotDescription
-from tvist_plant.imperfections import GearLaw, Imperfections
+from tvist_plant.drives import joint_parameters
+from tvist_plant.imperfections import Imperfections
 from tvist_plant.stiction import stiction_after
 
 LAWS = 9
@@ -99,8 +100,8 @@ def joint_rows(
 
 def described_friction(description: RobotDescription) -> Floats | None:
     """Return the described friction of an arm with stiction, rows as `LAWS`, shape (9, n); else None."""
-    sticks, drives = GearLaw.of(Imperfections.of(description), description), description.drives
-    if sticks.stiction_load == 0.0 and not sticks.stiction.any():
+    sticks, drives = joint_parameters(description, Imperfections.of(description)), description.drives
+    if not sticks.stiction_load.any() and not sticks.stiction.any():
         return None
     F_c, w, linear = np.array(drives.coulomb_friction), drives.friction_width, drives.linear_friction
     rows = (

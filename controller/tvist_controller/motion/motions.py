@@ -1,7 +1,7 @@
 """Numbered motions; parts, rate and pause of a planned motion in progress."""
 
 import math
-from typing import Protocol, Unpack
+from typing import Unpack
 
 import numpy as np
 
@@ -20,17 +20,6 @@ LEAST_PAUSE = 0.2
 """Smallest fraction of a motion's acceleration that torque must allow for a pause; otherwise it runs on [-]."""
 
 
-class RunningMotion(Protocol):
-    """A motion in progress with adjustable speed."""
-
-    @property
-    def rate(self) -> float:
-        """Time rate [-]."""
-
-    def pace(self, speed: float, slowest: float | None) -> None:
-        """Change the speed [-]; `slowest` is the velocity limit of reduced mode [rad/s], None if inactive."""
-
-
 class RunningMove:
     """One planned motion."""
 
@@ -46,7 +35,7 @@ class RunningMove:
         self._begin()
 
     def go_on(self, speed: float, slowest: float | None) -> None:
-        """Start the next part; arguments as in `RunningMotion`."""
+        """Start the next part; arguments as in `Guided.pace`."""
         self._trajectory, *coming = self.coming
         self.coming, self._held = tuple(coming), False
         self._trajectory.speed = self._rate(speed, slowest)
@@ -109,7 +98,7 @@ class RunningMove:
         return self._trajectory.rate
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Change the rate unless paused; see `RunningMotion`."""
+        """Change the rate unless paused; see `Guided.pace`."""
         if not self._held:
             self._trajectory.speed = self._rate(speed, slowest)
 
@@ -133,7 +122,7 @@ class RunningMove:
         self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
 
     def release(self, speed: float, slowest: float | None) -> None:
-        """Resume after a pause; see `RunningMotion`."""
+        """Resume after a pause; see `Guided.pace`."""
         if self._held:
             self._trajectory.release(self._rate(speed, slowest))
         self._held = False
@@ -146,7 +135,7 @@ class Motions:
         self._cycle, self._safety, self._emit = cycle, safety, emit
         self._reduced_velocity = REDUCED_SHARE * min(cycle.description.limits.velocity)
         self._started = 0
-        self._running: RunningMotion | None = None
+        self._running: RunningMove | Guided | None = None
         self.asked_speed = 1.0  # set speed [-]
         self._scale = 1.0
 
@@ -197,7 +186,7 @@ class Motions:
         self._running = trajectory
         return self._started
 
-    def _begin(self, motion: RunningMotion) -> int:
+    def _begin(self, motion: RunningMove | Guided) -> int:
         self._started += 1
         self._running = motion
         self._emit("motion_started", id=self._started)

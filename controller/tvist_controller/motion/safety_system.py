@@ -11,10 +11,7 @@ from tvist_protocol.values import ResetMode
 Emergency = Literal["robot", "system"]
 Latched = Literal["violation", "fault"]
 
-_EMERGENCIES = {
-    "robot": SafetyMode.ROBOT_EMERGENCY_STOP,
-    "system": SafetyMode.SYSTEM_EMERGENCY_STOP,
-}
+_EMERGENCIES = {"robot": SafetyMode.ROBOT_EMERGENCY_STOP, "system": SafetyMode.SYSTEM_EMERGENCY_STOP}
 _LATCHED = {"violation": SafetyMode.VIOLATION, "fault": SafetyMode.FAULT}
 _MOTION = frozenset(
     row.trigger for row in TRANSITIONS if row.target in {Activity.MOVING, Activity.STREAMING, Activity.GUIDED}

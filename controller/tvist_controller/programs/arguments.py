@@ -94,9 +94,7 @@ def integer(name: str, value: Value, least: int, most: int) -> int:
     """Return an integer within bounds; a float without fraction is accepted."""
     if isinstance(value, bool) or not isinstance(value, int | float) or value != value // 1:
         raise Fault(f"{name} is {shown(value)}: it must be an integer")
-    if not least <= value <= most:
-        raise Fault(f"{name} is {value:g}: it must be {_range(least, most)}")
-    return int(value)
+    return int(number(name, value, least, most))
 
 
 def whole(least: int, most: int) -> Check:

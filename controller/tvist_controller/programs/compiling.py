@@ -26,10 +26,8 @@ class ScriptCompiler:
 
     def rehearse(self) -> None:
         """Build everything that compilation needs, in advance."""
-        from tvist_urscript import compile_script  # imported late, to keep the start fast
-
         # A program, then a statement added to it: the compiler treats them differently.
-        compile_script("sync()", known_signatures(), compile_script("sync()", known_signatures()))
+        _compiled("sync()", _compiled("sync()"))
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:
         """Return the program of a command; None without a text or built-in program."""
@@ -64,7 +62,7 @@ def _program(text: str) -> Script:
 
 
 def _compiled(text: str, after: Script | None = None) -> Script:
-    from tvist_urscript import compile_script
+    from tvist_urscript import compile_script  # imported late, to keep the start fast
 
     try:
         return compile_script(text, known_signatures(), after)
@@ -96,8 +94,7 @@ class Kept(NamedTuple):
     """A program and its sender."""
 
     script: Script
-    origin: str | None
-    """Address of the machine that sent it; None if unknown."""
+    origin: str | None  # address of the machine that sent it; None if unknown
 
 
 class KeptPrograms:

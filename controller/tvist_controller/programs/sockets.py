@@ -132,7 +132,7 @@ class Sockets:
         emit: Emit,
         owner: Callable[[], Machine],
         origin: Callable[[], str | None],
-        cell: LiveCell | None = None,
+        cell: LiveCell | None,
     ) -> None:
         self._emit, self._owner, self._origin, self._cell = emit, owner, origin, cell
         self.orders: list[SocketOrder] = []  # orders for the network, in order; the host removes them

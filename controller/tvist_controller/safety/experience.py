@@ -1,7 +1,7 @@
 """Records a robot's motions, has them studied, and keeps the lessons until the arm rests."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +14,7 @@ from tvist_controller.planning.snapshot import FilterState
 from tvist_plant.user_file import named
 from tvist_protocol.lessons import PayloadLesson
 
-LONGEST = 10_000
-"""Longest recorded motion; longer ones are dropped [ticks]."""
+LONGEST = 10_000  # longest recorded motion; longer ones are dropped [ticks]
 AFTER = 150  # recording time after the end of a motion, for the ring-down [ticks]
 
 
@@ -34,51 +33,53 @@ Record = Callable[[], MotionRecord]
 """Creates the record of a completed motion, which takes longer than a tick."""
 
 
+@dataclass
+class _Motion:
+    beliefs: FilterState  # assumed at its start
+    samples: list[Sample] = field(default_factory=list)
+    stop: int = 0  # as in `MotionRecord`; 0 while it moves
+    whole: bool = True
+
+
 class MotionRecorder:
     """Records one motion after the other."""
 
-    def __init__(self) -> None:
-        self._samples: list[Sample] = []
-        self._ticks, self._stop = 0, 0
-        self._whole = self._moves = False
-        self._beliefs: FilterState | None = None
+    _motion: _Motion | None = None
 
     def take(self, sample: Sample, present: Callable[[], FilterState]) -> Record | None:
         """Take a tick with drives on; return the motion it ends, if any; `present` is called at its start."""
-        resting, done = sample.mode.at_rest, None
-        if not resting and (not self._moves or self._stop):
-            done = self._finished()
-            self.forget()
-            self._moves, self._whole, self._beliefs = True, True, present()
-        if not self._moves:
+        resting, done, motion = sample.mode.at_rest, None, self._motion
+        if not resting and (motion is None or motion.stop):
+            done = None if motion is None else _recorded(motion)
+            motion = self._motion = _Motion(present())
+        if motion is None:
             return done
-        self._whole = self._whole and (resting or sample.mode is LineMode.SHAPED)
-        if self._ticks < LONGEST + AFTER:
-            self._samples.append(sample)
-        self._ticks += 1
-        if resting and not self._stop:
-            self._stop = self._ticks
-        if self._stop and self._ticks == self._stop + AFTER:
-            done = self._finished()
+        motion.whole = motion.whole and (resting or sample.mode is LineMode.SHAPED)
+        if len(motion.samples) < LONGEST + AFTER:
+            motion.samples.append(sample)
+        if resting and not motion.stop:
+            motion.stop = len(motion.samples)
+        if motion.stop and len(motion.samples) == motion.stop + AFTER:
+            done = _recorded(motion)
             self.forget()
         return done
 
     def forget(self) -> None:
         """Drop the present motion, because the drives are off or the arm was placed elsewhere."""
-        self._moves, self._samples, self._ticks, self._stop = False, [], 0, 0
+        self._motion = None
 
-    def _finished(self) -> Record | None:
-        samples, stop, whole, beliefs = self._samples, self._stop, self._whole, self._beliefs
-        if not stop or stop > LONGEST or beliefs is None:
-            return None
 
-        def record() -> MotionRecord:
-            q = np.array([sample.measured.q for sample in samples])
-            return MotionRecord(
-                q, np.array([sample.measured.moment for sample in samples]), stop, whole, beliefs
-            )
+def _recorded(motion: _Motion) -> Record | None:
+    """Return how to create the record of a motion at rest; None if it was too long."""
+    if motion.stop > LONGEST:
+        return None
 
-        return record
+    def record() -> MotionRecord:
+        q = np.array([sample.measured.q for sample in motion.samples])
+        moments = np.array([sample.measured.moment for sample in motion.samples])
+        return MotionRecord(q, moments, motion.stop, motion.whole, motion.beliefs)
+
+    return record
 
 
 Work = Callable[[], None]  # a study; it takes a fraction of a second and touches nothing that ticks use

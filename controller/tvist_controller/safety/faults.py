@@ -1,10 +1,9 @@
 """Deliberate faults of `simulation.inject`, applied to the arm or the safety system."""
 
-import heapq
 import math
 from collections.abc import Callable
 from functools import partial
-from itertools import count
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -67,8 +66,7 @@ class Faults:
         """Functions of faults without duration."""
         self._plant = motion.cycle.plant
         self._push = np.zeros(motion.cycle.description.joints)
-        self._ends: list[tuple[int, int, str, Callable[[], None]]] = []
-        self._number = count()
+        self._ends: list[tuple[int, str, Callable[[], None]]] = []  # tick, fault, and what ends it
 
     def inject(self, command: SimulationInject, tick: int) -> None:
         """Start a fault, or raise RefusalError if the plant does not support it."""
@@ -82,27 +80,29 @@ class Faults:
         if fault == "torque":
             joint, value = command.joint or 0, command.value or 0.0
             self._add(joint, value)
-            self._at(ends, fault, lambda: self._add(joint, -value))
+            self._ends.append((ends, fault, lambda: self._add(joint, -value)))
             return
         # Setting or releasing an input cancels its earlier end time.
-        self._forget({*self._inputs} if fault == "normal" else {fault})
+        cancelled = {*self._inputs} if fault == "normal" else {fault}
+        self._ends = [one for one in self._ends if one[1] not in cancelled]
         if fault in self._inputs:
             begin, end = self._inputs[fault]
             begin()
             if seconds is not None:
-                self._at(ends, fault, end)
+                self._ends.append((ends, fault, end))
         else:
             self._momentary[fault]()
 
     @property
     def next_end(self) -> float:
         """Tick in which the next fault ends; infinite if none does."""
-        return self._ends[0][0] if self._ends else math.inf
+        return min((tick for tick, _, _ in self._ends), default=math.inf)
 
     def end(self, tick: float = math.inf) -> None:
         """End faults that expire before a tick."""
+        self._ends.sort(key=itemgetter(0))
         while self._ends and self._ends[0][0] <= tick:
-            heapq.heappop(self._ends)[-1]()
+            self._ends.pop(0)[-1]()
 
     def clear(self) -> None:
         """End all present faults and external torques."""
@@ -110,14 +110,6 @@ class Faults:
         self._push[:] = 0.0
         if self._plant.can(Plant.push):
             self._plant.push(self._push)
-
-    def _forget(self, faults: set[str]) -> None:
-        """Drop the end times of faults, which then last until ended otherwise."""
-        self._ends = [one for one in self._ends if one[2] not in faults]
-        heapq.heapify(self._ends)
-
-    def _at(self, tick: int, fault: str, end: Callable[[], None]) -> None:
-        heapq.heappush(self._ends, (tick, next(self._number), fault, end))
 
     def _add(self, joint: int, torque: float) -> None:
         self._push[joint] += torque

@@ -5,9 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.line.cycle import ControlCycle
-from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.monitor import Monitor, MonitorFinding
@@ -15,15 +13,6 @@ from tvist_plant.plant import PERIOD
 
 ALLOWED = 0.01  # permitted duration of an overload [s]
 TICKS = round(ALLOWED / PERIOD)
-
-
-@compiled_for_ticks
-def exceeds(values: Floats, limits: Floats) -> bool:
-    """Return whether any magnitude exceeds its limit, arguments of shape (n,)."""
-    for j in range(limits.shape[0]):  # noqa: SIM110  numba has no generators
-        if abs(values[j]) > limits[j]:
-            return True
-    return False
 
 
 class TorqueOverload(Monitor):
@@ -34,18 +23,11 @@ class TorqueOverload(Monitor):
     def __init__(self, joints: Sequence[str], limits: Sequence[float]) -> None:
         self._joints, self._limits = joints, np.array(limits, dtype=float)
         self._beyond = np.zeros(len(limits), dtype=int)
-        self._any = False
-        exceeds(self._limits, self._limits)  # loads compiled code, which takes many ticks
 
     def look(self, sample: Sample) -> MonitorFinding | None:
         """Return the longest overload if too long, and restart the count."""
         moment = sample.measured.moment
-        if not exceeds(moment, self._limits):
-            if self._any:
-                self.restart()
-            return None
-        beyond, self._any = np.abs(moment) > self._limits, True
-        self._beyond = np.where(beyond, self._beyond + 1, 0)
+        self._beyond = np.where(np.abs(moment) > self._limits, self._beyond + 1, 0)
         joint = int(np.argmax(self._beyond))
         if self._beyond[joint] <= TICKS:
             return None
@@ -59,7 +41,6 @@ class TorqueOverload(Monitor):
     def restart(self) -> None:
         """Restart the count."""
         self._beyond[:] = 0
-        self._any = False
 
 
 class ShaperMonitor(Monitor):

@@ -1,7 +1,5 @@
 """A robot with its own controller, whose reports become the state here, and whose safety state is obeyed."""
 
-from enum import IntEnum
-
 import msgspec
 
 from tvist_controller.events import Emit
@@ -100,7 +98,8 @@ class Watching(RemoteStatus):
         self.tell(sight, before)
         _, safety, _ = self._modes.now = sight.modes
         if before is not None and safety != before.modes[1]:
-            why = f"the robot reports safety_mode {_name(SafetyMode, safety)}"
+            name = SafetyMode(safety).name if safety in set(SafetyMode) else safety
+            why = f"the robot reports safety_mode {name}"
             # Not a `protective_stop`: that could be unlocked by clients, this one only at the robot.
             self._emit("warning" if safety in _NO_STOP else "safety_stop", why=why)
 
@@ -177,7 +176,3 @@ class Supervision(RemoteStatus):
             system.emergencies.add("robot")
         self._safety.reduce(reduced=mode == SafetyMode.REDUCED)
         self._motion.changed = True
-
-
-def _name(kind: type[IntEnum], number: int) -> str:
-    return kind(number).name if number in {member.value for member in kind} else str(number)

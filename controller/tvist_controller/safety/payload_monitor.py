@@ -28,13 +28,6 @@ PATIENCE = 20.0  # longest time that a doubt waits for that [s]
 
 
 @compiled_for_ticks
-def add(total: Floats, moment: Floats, expected: Floats) -> None:
-    """Add the difference of a moment from the expected one to a sum, each of shape (n,) [N m]."""
-    for j in range(total.shape[0]):
-        total[j] += moment[j] - expected[j]
-
-
-@compiled_for_ticks
 def correlate(
     chain: Floats,  # of which only the kilogram has mass, see `tvist_plant.chain`, shape (n+1, 22)
     q: Floats,  # shape (n,) [rad]
@@ -95,10 +88,8 @@ class PayloadMonitor(Monitor):
         self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
         self._fade = np.exp(-TICKS_AVERAGED * PERIOD / np.array([MEMORY, RECENT]))
         self.declare(declared, SLEW)
-        still = np.zeros_like(self._sum)  # the first calls load compiled code, which takes many ticks
-        add(still, still, still)
-        nothing = np.zeros_like(self._sums)
-        self._correlate(np.zeros((QDD + 1, len(still))), nothing)
+        signals = np.zeros((QDD + 1, len(self._sum)))
+        self._correlate(signals, np.zeros_like(self._sums))  # loads compiled code, which takes many ticks
 
     def declare(self, payload: Payload, ticks: int, *, found: bool = False, told: bool = False) -> None:
         """Set another payload and discard measurements; `found` by the robot itself, `told` in a warning."""
@@ -135,7 +126,7 @@ class PayloadMonitor(Monitor):
         if self._wait > 0:
             self._wait -= 1
             return None
-        add(self._sum, sample.measured.moment, sample.command.torque)
+        self._sum += sample.measured.moment - sample.command.torque
         self._ticks += 1
         if self._ticks < TICKS_AVERAGED:
             return None

@@ -17,7 +17,7 @@ class RobotModes:
 
     def __init__(self, motion: MotionControl) -> None:
         self._motion = motion
-        self._stops: dict[SafetyMode, Event] = {}
+        self.stops: dict[SafetyMode, Event] = {}
         """Events of stops that may still hold, by resulting safety mode, newest last."""
         self.now = 0, 0, 0
         self.update()
@@ -27,7 +27,7 @@ class RobotModes:
         motion = self._motion
         robot, safety = motion.robot_mode, motion.safety_mode
         if safety in _MAY_MOVE and robot is RobotMode.RUNNING:
-            self._stops.clear()
+            self.stops.clear()
         self.now = int(robot), int(safety), int(motion.runtime)
         # A paused motion stops without an event.
         motion.changed = motion.activity is Activity.PAUSED
@@ -39,23 +39,19 @@ class RobotModes:
             return
         cause = _cause(event, self._motion.safety_mode)
         if cause is not None:
-            self._stops.pop(cause, None)  # moves the newest to the end
-            self._stops[cause] = event
+            self.stops.pop(cause, None)  # moves the newest to the end
+            self.stops[cause] = event
 
     @property
     def stop_reason(self) -> StopReason | None:
         """The stop that blocks the robot, or cut the power still off; None without one or its event."""
         robot, safety, event = self._motion.robot_mode, self._motion.safety_mode, None
         if safety not in _MAY_MOVE:
-            event = self._stops.get(safety)
+            event = self.stops.get(safety)
         elif robot is not RobotMode.RUNNING:
-            took_power = [event for mode, event in self._stops.items() if mode not in _KEEP_POWER]
+            took_power = [event for mode, event in self.stops.items() if mode not in _KEEP_POWER]
             event = took_power[-1] if took_power else None
         return None if event is None else StopReason(tick=event.tick, code=event.code, why=event.why or "")
-
-    def forget_stops(self) -> None:
-        """Discard all stops, because the robot mode was set."""
-        self._stops.clear()
 
 
 def _cause(event: Event, mode: SafetyMode) -> SafetyMode | None:

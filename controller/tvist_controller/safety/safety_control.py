@@ -3,21 +3,27 @@
 from collections.abc import Sequence
 
 import numpy as np
+import pinocchio as pin
 
 from tvist_controller.events import Emit
 from tvist_controller.foresight.stops import StopPlan
+from tvist_controller.line.differentiator import Target
 from tvist_controller.line.limits import REDUCED_SHARE
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.monitor import Monitor
 from tvist_controller.motion.safety_system import PUT, Emergency, Latched, at_rest
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety.brakes import brake
-from tvist_controller.trajectory import Compliant
+from tvist_controller.trajectory import Compliant, SampledPositions
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.model import FLANGE, payload_inertia, rigid_model
 from tvist_plant.plant import PERIOD, Halt, PlantError, SimulatedArm
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
+
+HOLD = 1.25  # least ratio of a brake's torque to the load by gravity and other joints [-]
+LONGEST_BRAKING = 5.0  # time after which the arm counts as stopped [s]
 
 
 class SafetyControl:
@@ -238,3 +244,38 @@ class SafetyControl:
         else:
             motion.activity = at_rest(motion.activity, emergency=bool(motion.safety.emergencies))
         self._restart_monitors()
+
+
+def brake(description: RobotDescription, carried: Payload, state: Target, period: float) -> SampledPositions:
+    """Simulate the rigid arm under its brakes from a state of motion, in ticks of `period` seconds.
+
+    Each joint is slowed down by its brake, assumed as strong as its drive, and stays at rest afterwards. With rotors:
+
+        (M(q) + B) q̈ + C(q, q̇) q̇ + g(q) = -τ_b sgn(q̇)    over the joints that still turn.
+
+    Brakes do not follow a path, so the arm leaves its path.
+    """
+    model = rigid_model(description, Payload())
+    if carried.mass > 0.0:
+        flange = model.frames[model.getFrameId(FLANGE)]
+        model.inertias[flange.parentJoint] += flange.placement.act(payload_inertia(carried))
+    data = model.createData()
+    rotor, strength = np.array(description.drives.rotor_inertia), np.array(description.limits.torque)
+    q, qd = state.q.copy(), state.qd.copy()
+    positions = [q]
+    turning = np.abs(qd) > 0.0
+    for _ in range(round(LONGEST_BRAKING / period)):
+        if not turning.any():
+            break
+        mass = np.array(pin.crba(model, data, q, pin.Convention.WORLD)) + np.diag(rotor)
+        bias = np.array(pin.nonLinearEffects(model, data, q, qd))
+        torque = np.maximum(strength, HOLD * np.abs(bias)) * np.sign(qd) + bias
+        free = np.flatnonzero(turning)
+        new = np.zeros_like(qd)
+        new[free] = qd[free] - period * np.linalg.solve(mass[np.ix_(free, free)], torque[free])
+        turning &= new * qd > 0.0
+        new[~turning] = 0.0
+        qd = new
+        q = q + period * qd
+        positions.append(q)
+    return SampledPositions(positions[1:] or positions, period)

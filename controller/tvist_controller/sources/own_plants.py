@@ -16,8 +16,7 @@ from tvist_plant.variants import VARIANTS, Variant
 from tvist_plant.world.scene_file import SceneError, find_scene
 
 GROUP = "tvist.plants"  # entry-point group for plants of installed packages
-WORLD = "world:"
-"""Prefix of the place of a plant that is the arm in a scene."""
+WORLD = "world:"  # prefix of the place of a plant that is the arm in a scene
 Maker = Callable[[RobotDescription, Payload], Plant]
 """Makes a plant from a robot's description and its carried payload."""
 

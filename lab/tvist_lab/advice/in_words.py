@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from tvist_lab.advice.advise import Advice
-from tvist_lab.advice.options import ANY, EACH, ROBOT, Modes, Option
+from tvist_lab.advice.options import ANY, EACH, ROBOT, Option
 from tvist_lab.metrics import MeasuredRecording
 from tvist_lab.words import counted, spread
 
@@ -26,51 +26,43 @@ def verdict(advice: Advice, logs: Sequence[MeasuredRecording]) -> list[str]:
         said.append(
             f"{counted(len(advice.shaped), 'motion')} made with {names} already: not counted as unshaped."
         )
-    if advice.best is not None and any(_untold(log) for log in logs):
+    untold = any(log.recording.foreign and "reference_q" not in log.recording for log in logs)
+    if advice.best is not None and untold:
         said.append(
             "A log without the reference before shaping cannot show whether a shaper was on: it must have been off."
         )
     return said
 
 
-def _untold(log: MeasuredRecording) -> bool:
-    return log.recording.foreign and "reference_q" not in log.recording
-
-
 def _first(advice: Advice) -> str:
-    best, measured = advice.best, len(advice.ringing) + len(advice.quiet)
-    if best is not None:
-        aim = (
-            _against(best.aim.modes[_worst_group(advice)])
-            if best.aim.scope != ROBOT
-            else "with its calibration"
-        )
+    if (best := advice.best) is not None:
+        aim, gain = "with its calibration", advice.still_s - best.still_s
+        if best.aim.scope != ROBOT:
+            worst = max(advice.ringing, key=lambda one: one.unshaped.rms)
+            modes = (f"{f_d:.1f} Hz (ζ {zeta:.2f})" for f_d, zeta in best.aim.modes[worst.group])
+            aim = f"against {' and '.join(modes)}"
         each = ", and the like before other motions" if best.aim.scope == EACH else ""
-        lead = f"Use {best.shaper} {aim}{each}: it leaves {best.left_percent:.0f} % of the vibration after a stop"
-        gain = advice.still_s - best.still_s
         sooner = ""
         if math.isfinite(gain) and abs(gain) >= 0.01:
-            sooner = (
-                f", and the tool is still {abs(1e3 * gain):.0f} ms {'earlier' if gain > 0.0 else 'later'}"
-            )
-        return f"{lead}{sooner}, for motions that end {1e3 * best.added_s:.0f} ms later."
+            order = "earlier" if gain > 0.0 else "later"
+            sooner = f", and the tool is still {abs(1e3 * gain):.0f} ms {order}"
+        return (
+            f"Use {best.shaper} {aim}{each}: it leaves {best.left_percent:.0f} % of the vibration after a stop"
+            f"{sooner}, for motions that end {1e3 * best.added_s:.0f} ms later."
+        )
+    if advice.options:
+        return "No shaper that keeps the arm's limits would help: change the motions or the mount."
     if advice.ringing:
-        return _none_helps(advice)
+        low, high = ANY
+        return (
+            f"No advice: what rings has no frequency that is known, or none from {low:g} to {high:g} Hz. Record longer "
+            "rests, and each motion several times."
+        )
     if advice.quiet:
-        return f"Nothing to do: nothing rings noticeably after {counted(measured, 'unshaped stop')}."
+        return f"Nothing to do: nothing rings noticeably after {counted(len(advice.quiet), 'unshaped stop')}."
     if advice.shaped:
         return "No advice: every motion had a shaper already. Record the same motions without one."
     return _unmeasured(advice)
-
-
-def _none_helps(advice: Advice) -> str:
-    if advice.options:
-        return "No shaper that keeps the arm's limits would help: change the motions or the mount."
-    low, high = ANY
-    return (
-        f"No advice: what rings has no frequency that is known, or none from {low:g} to {high:g} Hz. Record longer "
-        "rests, and each motion several times."
-    )
 
 
 def _unmeasured(advice: Advice) -> str:
@@ -113,14 +105,6 @@ def _reasons(advice: Advice, best: Option) -> list[str]:
     return said
 
 
-def _worst_group(advice: Advice) -> int:
-    return max(advice.ringing, key=lambda one: one.unshaped.rms).group
-
-
-def _against(modes: Modes) -> str:
-    return f"against {' and '.join(f'{f_d:.1f} Hz (ζ {zeta:.2f})' for f_d, zeta in modes)}"
-
-
 def command(advice: Advice, logs: Sequence[MeasuredRecording]) -> list[str]:
     """Return the lines that apply an advice; none if there is nothing to apply."""
     # A robot of this controller gets the shaper over the network; the reference of another robot goes through
@@ -128,10 +112,11 @@ def command(advice: Advice, logs: Sequence[MeasuredRecording]) -> list[str]:
     best = advice.best
     if best is None:
         return []
+    if best.aim.scope == ROBOT and best.count == 1:
+        return [f"tvist serve --shaper {best.shaper}"]
+    set_shaper = f'await arm.set_shaper("{best.shaper}", modes={best.count})'
     if best.aim.scope == ROBOT:
-        if best.count == 1:
-            return [f"tvist serve --shaper {best.shaper}"]
-        return [f'await arm.set_shaper("{best.shaper}", modes={best.count})']
+        return [set_shaper]
     ours = not any(log.recording.foreign for log in logs)
     lines = []
     for group, modes in best.aim.modes.items():
@@ -139,21 +124,15 @@ def command(advice: Advice, logs: Sequence[MeasuredRecording]) -> list[str]:
         if ours:
             lines.append(f'await arm.set_estimator("fixed", f_d={f_d}, zeta={zeta})')
         else:
+            joints = logs[0].recording.joints
             lines.append(
-                f'shaped = make_filter("{best.shaper}", Fixed(f_d={f_d}, zeta={zeta}), joints={_joints(logs)})'
+                f'shaped = make_filter("{best.shaper}", Fixed(f_d={f_d}, zeta={zeta}), joints={joints})'
             )
         if best.aim.scope != EACH:
             break
         numbers = sorted({one.number for one in advice.ringing if one.group == group})
         lines[-1] += f"  # before motion {', '.join(map(str, numbers))}"
-    if ours:
-        return [*lines, f'await arm.set_shaper("{best.shaper}", modes={best.count})']
-    return ["from tvist_shaping import Fixed, make_filter", *lines]
-
-
-def _joints(logs: Sequence[MeasuredRecording]) -> int:
-    recording = logs[0].recording
-    return int(recording["target_q" if "target_q" in recording else "actual_q"].shape[1])
+    return [*lines, set_shaper] if ours else ["from tvist_shaping import Fixed, make_filter", *lines]
 
 
 def as_dict(advice: Advice, logs: Sequence[MeasuredRecording]) -> dict[str, Any]:

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from statistics import median
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -122,17 +123,12 @@ def _judged(name: str, aim: Aim) -> Option | None:
         except (NotMeasurableError, ShapingError):
             return None  # one that some motion cannot be judged by is no choice for all
         added[stop] = float(impulses.tau[-1])
-        if (share := by_the_modes(stop, impulses)) is not None:
+        if (share := left_of_modes(stop, partial(residual, impulses=impulses))) is not None:
             by_modes[stop] = share
     return Option(name, aim, left, by_modes, added)
 
 
-def by_the_modes(stop: StopWithRest, impulses: Impulses) -> float | None:
-    """Return the root of the share of energy that impulses leave of a stop's modes [-]; None if no modes are known."""
-    return left_of_modes(stop, lambda f_d, zeta: float(residual(f_d, zeta, impulses)))
-
-
-def left_of_modes(stop: StopWithRest, left: Callable[[float, float], float]) -> float | None:
+def left_of_modes(stop: StopWithRest, left: Callable[[float, float], Any]) -> float | None:
     """Return the root of the share of energy left of a stop's modes [-]; None if no modes are known.
 
     `left` gives for f_d [Hz] and ζ of a mode the share of its amplitude that is left [-].
@@ -142,7 +138,7 @@ def left_of_modes(stop: StopWithRest, left: Callable[[float, float], float]) -> 
         f_d, zeta = mode["f_d_hz"], mode["zeta"]
         energy = mode["amplitude"] ** 2 / decay_rate(f_d, zeta)
         before += energy
-        after += energy * left(f_d, zeta) ** 2
+        after += energy * float(left(f_d, zeta)) ** 2
     return math.sqrt(after / before) if before > 0.0 else None
 
 

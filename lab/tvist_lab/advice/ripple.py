@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from tvist_lab.metrics.ring_down import decay_rate
@@ -83,13 +82,9 @@ def _directions(time: Floats, alpha: Floats, poles: Poles) -> Floats:
     return np.asarray(np.linalg.svd(found)[2][:, 0])
 
 
-def _turning(ends: Floats) -> NDArray[np.intp]:
-    return np.flatnonzero(ends[1] - ends[0] > TURNS)
-
-
 def _excited(q: Floats, ends: Floats, poles: Poles, period: float) -> Iterator[Floats]:
     """Yield the response of each mode to the waves of each joint that turns, in both phases."""
-    for joint in _turning(ends):
+    for joint in np.flatnonzero(ends[1] - ends[0] > TURNS):
         for pole in poles:
             for wave in PHASES:
                 yield from _response(wave(WAVES * q[:, joint]), pole, period)

@@ -15,9 +15,8 @@ import numpy as np
 
 from tvist_lab.advice.ripple import Ripple, fitted, poles_of
 from tvist_lab.metrics import MeasuredRecording, MotionResult, MotionRows, NotMeasurableError
-from tvist_lab.metrics.common_clock import NOISE_PEAK, RINGS, STILL
+from tvist_lab.metrics.common_clock import NOISE_PEAK, RINGS, STILL, acceleration_of
 from tvist_lab.metrics.comparison import MotionEnds
-from tvist_lab.metrics.felt import acceleration_of
 from tvist_lab.metrics.ring_down import fit_ring_down
 from tvist_lab.metrics.vibration import low_pass_at
 from tvist_lab.recordings import Floats, Recording
@@ -68,7 +67,8 @@ class StopWithRest:
     def of(cls, measured: MeasuredRecording, place: int, file: int = 0) -> "StopWithRest":
         """Cut a motion out of a measured log; raise NotMeasurableError if too little rest was recorded."""
         recording, motion = measured.recording, measured.motions[place]
-        time, alpha = acceleration_of(recording, motion, slice(motion.start, motion.end))
+        rows = slice(motion.start, motion.end)
+        time, alpha = acceleration_of(recording, motion, rows)
         time = time - recording.time[motion.arm_stop(recording)]
         if not len(time) or time[-1] < COUNTED_FROM + COUNTED[0] + TAIL:
             rest = max(time[-1], 0.0) if len(time) else 0.0
@@ -79,14 +79,10 @@ class StopWithRest:
             raise NotMeasurableError("the accelerometer shows the same value throughout the rest")
         even = np.arange(time[0], time[-1], recording.period)
         alpha = _at(even, time, low_pass_at(time, alpha, recording.period))
-        name = followed(recording)
-        rows = slice(motion.start, motion.end)
-        q = _at(
-            even, recording.time[rows] - recording.time[motion.arm_stop(recording)], recording[name][rows]
-        )
-        time = even
-        noise = _noise(alpha[time >= time[-1] - TAIL], recording.period)
-        return cls(file, place + 1, measured, motion, measured.results[place], time, alpha, q, noise)
+        late = recording.time[rows] - recording.time[motion.arm_stop(recording)]
+        q = _at(even, late, recording[followed(recording)][rows])
+        noise = _noise(alpha[even >= even[-1] - TAIL], recording.period)
+        return cls(file, place + 1, measured, motion, measured.results[place], even, alpha, q, noise)
 
     @cached_property
     def way(self) -> MotionEnds:
@@ -151,10 +147,9 @@ class StopWithRest:
         power = np.sum(shaped**2, axis=1)
         noise = self.noise * float(np.sum(np.square(sizes)))
         limit = max(STILL, NOISE_PEAK * (noise / 3.0) ** 0.5)
-        loud = np.flatnonzero(power[late > 0.0] > limit**2)
-        times = self.time[late > 0.0]
-        still = float(times[loud[-1]]) if loud.size else float(delays[-1])
-        if loud.size and loud[-1] == len(times) - 1:
+        loud = np.flatnonzero((late > 0.0) & (power > limit**2))
+        still = float(self.time[loud[-1]]) if loud.size else float(delays[-1])
+        if loud.size and loud[-1] == len(late) - 1:
             still = np.inf
         least = (NONLINEAR * self.unshaped.rms) ** 2 if len(sizes) > 1 else 0.0
         return Left((max(float(np.mean(power[counts])) - noise, 0.0) + least) ** 0.5, still)
@@ -182,13 +177,11 @@ def shaped_by(stop: StopWithRest, impulses: Impulses, *, gears: bool = True) -> 
 
 def grouped(stops: Sequence[StopWithRest]) -> list[StopWithRest]:
     """Number the stops by motion, and give them the smallest noise of each file's sensor."""
-    noise = {
-        file: min(one.noise for one in stops if one.file == file) for file in {one.file for one in stops}
-    }
     firsts: list[StopWithRest] = []
     found = []
     for stop in stops:
         group = next((place for place, first in enumerate(firsts) if first.repeats(stop)), len(firsts))
         firsts += [stop] if group == len(firsts) else []
-        found.append(replace(stop, group=group, noise=noise[stop.file]))
+        noise = min(one.noise for one in stops if one.file == stop.file)
+        found.append(replace(stop, group=group, noise=noise))
     return found

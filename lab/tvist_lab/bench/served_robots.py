@@ -83,12 +83,9 @@ async def punctuality(server: RunningServer, seconds: float) -> tuple[dict[str, 
     for function in forget:
         function()
     return {
-        "seconds": seconds,
-        "missed": missed,
-        "states_received": states,
-        "missed_percent": 100.0 * missed_share(heard),
-        **over_all(heard),
-    }, share
+        "seconds": seconds, "missed": missed, "states_received": states,
+        "missed_percent": 100.0 * missed_share(heard), **over_all(heard),
+    }, share  # fmt: skip
 
 
 async def _setpoints(robot: Robot, arm: Arm, seconds: float) -> list[float]:

@@ -1,27 +1,33 @@
-"""Figures of calibrations, compared with measurements and, over the workspace, with the truth."""
+"""Figures of an identification: its moves, the fit, and the modes over the workspace beside the true ones."""
 
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
+from tvist_controller.api.line import body
 from tvist_lab.figures.style import (
     FAINT,
     INK,
     OF_SHAPED,
+    OF_UNSHAPED,
     UNSHAPED,
     explain,
     legend,
     note,
     panels,
+    tint,
     title,
 )
+from tvist_lab.identification.jogs import JogPlan
 from tvist_lab.identification.workspace_map import WorkspaceMap
 from tvist_lab.recordings import Floats
+from tvist_plant.model import rigid_model
 
 LABELS = {
     "f_d_hz": ("$f_d$", "damped frequency of the lowest mode", "Hz"),
@@ -30,6 +36,38 @@ LABELS = {
 """Symbol, meaning and unit of each map, by its key."""
 NARROW = 5.0  # width up to which maps are drawn one below the other [inch]
 LEVELS = 9  # largest number of levels of a map
+
+
+def move_plan_figure(plan: JogPlan) -> Figure:
+    """Draw the arm from the side and from above: at present, in every posture on the way, and where it rings."""
+    model = rigid_model(plan.arm.description, body(plan.arm.payloads[0]))
+    data = model.createData()
+
+    def line(q: Floats) -> Floats:
+        pin.framesForwardKinematics(model, data, q)
+        joints = [np.zeros(3), *(data.oMi[joint].translation for joint in range(1, model.njoints))]
+        return np.array([*joints, data.oMf[model.getFrameId("flange")].translation])
+
+    figure, axes = panels(1, 4.6, columns=2, share_x=False)
+    passed = [line(q) for jog in plan.jogs for q in jog.way[:-1]]
+    rings = [line(jog.q) for jog in plan.jogs]
+    drawn = (
+        ("Passed on the way", passed, {"color": tint(INK, 0.3)}),
+        ("Rings here", rings, {"color": tint(OF_UNSHAPED.color, 0.5)}),
+        ("Stands now", [line(plan.at)], {"color": OF_SHAPED.color, "linewidth": 2.5}),
+    )
+    for panel, across, what in ((axes[0], 2, "from the side"), (axes[1], 1, "from above")):
+        for label, lines, how in drawn:
+            for number, points in enumerate(lines):
+                panel.plot(points[:, 0], points[:, across], label=None if number else label, **how)
+        for number, points in enumerate(rings, 1):
+            note(panel, str(number), (points[-1, 0], points[-1, across]), (3, 3))
+        panel.set_aspect("equal")
+        panel.margins(0.08)
+        panel.set(xlabel="x (m)", ylabel="z (m)" if across == 2 else "y (m)")
+        title(panel, f"{plan.arm.description.robot.model} {what}")
+    legend(figure, axes[0])
+    return figure
 
 
 def identified_figure(name: str, measured: Floats, fitted: Floats) -> Figure:
@@ -96,14 +134,8 @@ def _map(
     for name, (row, column) in found.poses.items():
         at.setdefault((float(np.degrees(column)), float(np.degrees(row))), []).append(name)
     for place, names in at.items():
-        dot: Any = {
-            "color": UNSHAPED,
-            "markeredgecolor": "white",
-            "markersize": 5.0,
-            "clip_on": False,
-            "zorder": 5,
-        }
-        panel.plot(*place, "o", **dot)
+        dot: Any = {"color": UNSHAPED, "markeredgecolor": "white", "markersize": 5.0}
+        panel.plot(*place, "o", clip_on=False, zorder=5, **dot)
         note(panel, ", ".join(names), place, (5, 4), fontsize=small)
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_locator(MultipleLocator(60.0))

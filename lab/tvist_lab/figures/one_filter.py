@@ -65,15 +65,12 @@ def figure_3() -> Figure:
     for panel, words in zip((sequence, responses, references), headings, strict=True):
         title(panel, words)
         dotted(panel, 1e3 * float(impulses.tau[1]), width=0.8)
-    legend(
-        figure,
-        responses,
-        {
-            r"$A_j$, $\tau_j$": "amplitude and time of an impulse",
-            "$x$": "reference",
-            "$x^*$": r"shaped reference, $\sum{A_j}\,x(t-\tau_j)$",
-        },
-    )
+    symbols = {
+        r"$A_j$, $\tau_j$": "amplitude and time of an impulse",
+        "$x$": "reference",
+        "$x^*$": r"shaped reference, $\sum{A_j}\,x(t-\tau_j)$",
+    }
+    legend(figure, responses, symbols)
     return figure
 
 

@@ -1,5 +1,6 @@
 """Figures of studies: medians over their axes, shapers side by side, and every move as a point."""
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 from typing import Any
@@ -10,11 +11,15 @@ from matplotlib.figure import Figure
 
 from tvist_lab.figures.style import (
     FAINT,
+    INK,
     MUTED,
+    OF_SHAPED,
+    OF_UNSHAPED,
     SERIES,
     SHAPED,
     decades,
     legend,
+    name_over,
     note,
     panels,
     tint,
@@ -28,6 +33,8 @@ EACH = 0.22
 """Height for each setting of a sweep [inch]."""
 LONG_NAME = 16  # length from which a name takes two lines [letters]
 FLOOR = 1e-4  # smaller peaks are drawn at this value [m/s²]
+NOTICEABLE = 1.01
+"""Largest peak over its limit that still counts as keeping it [-]; a filter's own ripple stays below."""
 
 
 def study_figure(
@@ -94,27 +101,21 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
     height = 1.9 + EACH * (1.0 + 0.3 * len(shapers)) * len(names)
     figure, axes = panels(2, 2.0 * height, share_x=False)
     found = {(one["shaper"], name): one for one, name in zip(entries, settings, strict=True)}
+    reduction = ("reduction_percent_p5", *["reduction_percent_median"] * 2)
     for panel, words, keys in (
-        (
-            axes[0],
-            "Reduction: median, bar to 5th percentile",
-            ("reduction_percent_p5", *["reduction_percent_median"] * 2),
-        ),
+        (axes[0], "Reduction: median, bar to 5th percentile", reduction),
         (axes[1], "Delay: median", ("delay_ms_median",) * 3),
     ):
+        cells = {one: [found.get((one, name), {}) for name in names] for one in shapers}
         _dots(
             panel,
             names,
-            [
-                (one, [[found.get((one, name), {}).get(key) for key in keys] for name in names])
-                for one in shapers
-            ],
+            [(one, [[cell.get(key) for key in keys] for cell in own]) for one, own in cells.items()],
         )
         title(panel, words)
     axes[0].axvline(0.0, color=FAINT, linewidth=0.8)
     axes[0].set(xlabel="Reduction (%)")
-    axes[1].set(xlabel="Delay (ms)")
-    axes[1].set_xlim(left=0.0)
+    axes[1].set(xlabel="Delay (ms)", xlim=(0.0, None))
     legend(figure, axes[0])
     return figure
 
@@ -165,12 +166,8 @@ def residual_by_move_figure(rows: Sequence[Row]) -> Figure:
     """Draw peak |α| after the stop, shaped against unshaped, by move, and the distribution of the reductions."""
     reductions = np.sort([row["reduction_percent"] for row in rows if row["reduction_percent"] is not None])
     several = reductions.size >= QUANTILES_FROM
-    figure, (above, *rest) = panels(
-        2 if several else 1,
-        6.0 if several else 3.6,
-        share_x=False,
-        ratios=(3, 2) if several else None,
-    )
+    rows_of, height, ratios = (2, 6.0, (3, 2)) if several else (1, 3.6, None)
+    figure, (above, *rest) = panels(rows_of, height, share_x=False, ratios=ratios)
     above.set(xscale="log", yscale="log")
     for counts, color, marker, label in (
         (True, SHAPED, "o", "Move"),
@@ -194,3 +191,93 @@ def residual_by_move_figure(rows: Sequence[Row]) -> Figure:
         below.set(xlabel="Reduction (%)", ylabel="Moves with less (%)", ylim=(0, 100))
     legend(figure, above)
     return figure
+
+
+def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
+    """Draw the medians of each ranked shaper over arms, moves and payload errors, and the Pareto front as a line."""
+    # A triangle marks a shaper that exceeds a limit of the motion by more than 1 %, with its largest peak
+    # over the limit.
+    figure, (panel,) = panels(1, 4.6)
+    panel.set_yscale("log")
+    placed: list[tuple[float, float, bool]] = []
+    for place, row in enumerate(sorted(rows, key=_point)):
+        y, x = _point(row)
+        excess = _excess(row)
+        exceeds = excess > NOTICEABLE
+        style = OF_UNSHAPED if exceeds else OF_SHAPED
+        filled = style.color if row["pareto"] and not exceeds else "white"
+        how: dict[str, Any] = {"color": style.color, "markersize": 5.5, "markerfacecolor": filled}
+        panel.plot(x, y, "^" if exceeds else "o", **how)
+        right = _beside(place, (x, y), [_point(other)[::-1] for other in rows])
+        raised = any(
+            abs(x - near) < 2.0 and abs(math.log(y / level)) < 0.1 and side == right
+            for near, level, side in placed
+        )
+        placed.append((x, y, right))
+        where: dict[str, Any] = {
+            "xytext": (6 if right else -6, 9 if raised else 0),
+            "ha": "left" if right else "right",
+        }
+        words = f"{row['shaper']} ({excess:.1f}×)" if exceeds else row["shaper"]
+        note(panel, words, (x, y), textcoords="offset points", va="center", **where)
+    front = sorted(_point(row)[::-1] for row in rows if row["pareto"])
+    if front:
+        panel.plot(*zip(*front, strict=True), color=FAINT, linewidth=1.0, zorder=0)
+    panel.plot([], [], "o", color=OF_SHAPED.color, label="Keeps the limits within 1 %, and is on the front")
+    panel.plot([], [], "o", color=OF_SHAPED.color, markerfacecolor="white", label="Keeps them")
+    panel.plot([], [], "^", color=OF_UNSHAPED.color, markerfacecolor="white", label="Exceeds one (times)")
+    decades(panel, "y")
+    panel.set(xlabel="Still after the unshaped reference's stop (ms)", ylabel="Residual, 3 to 60 Hz (m/s²)")
+    panel.margins(x=0.35)
+    title(panel, "Settling against residual vibration")
+    legend(figure, panel)
+    return figure
+
+
+def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
+    """Draw median and 90th percentile of the settling time against each shaper's delay."""
+    # On the diagonal, the arm is at rest as soon as its shaped reference stops.
+    figure, (panel,) = panels(1, 4.2)
+    known = [row for row in rows if row["time_until_still_ms_median"] is not None]
+    for place, row in enumerate(sorted(known, key=lambda row: float(row["declared_delay_ms_median"]))):
+        x, still, high = row["declared_delay_ms_median"], row["time_until_still_ms_median"], _slowest(row)
+        panel.plot([x, x], [still, high], color=FAINT, linewidth=1.0, zorder=1)
+        panel.plot([x], [still], **OF_SHAPED.points(4.5, label="Median" if place == 0 else None))
+        panel.plot([x], [high], **OF_UNSHAPED.points(3.0, label="90th percentile" if place == 0 else None))
+    longest = max((float(row["declared_delay_ms_median"]) for row in known), default=1.0)
+    diagonal: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": ":"}
+    panel.plot([0.0, longest], [0.0, longest], label="Still when the reference stops", **diagonal)
+    panel.set(xlabel="Delay of the shaper (ms)", ylabel="Still after the unshaped stop (ms)")
+    if known:
+        ends = [(row["declared_delay_ms_median"], _slowest(row)) for row in known]
+        delays, highest = np.array(ends, dtype=np.float64).T
+        name_over(panel, delays, highest, [row["shaper"] for row in known])
+        panel.set_ylim(0.0, 1.9 * float(highest.max()))
+    panel.margins(x=0.06)
+    legend(figure, panel)
+    return figure
+
+
+def _slowest(row: dict[str, Any]) -> float:
+    """Return the 90th percentile of the settling time [ms], or the median if over a tenth never settle."""
+    slow = row["time_until_still_ms_p90"]
+    return float(row["time_until_still_ms_median"] if slow is None else slow)
+
+
+def _excess(row: dict[str, Any]) -> float:
+    """Return the largest peak of acceleration or velocity over its limit [-]."""
+    return max(float(row[f"reference_{kind}_ratio_max"]) for kind in ("acceleration", "velocity"))
+
+
+def _point(row: dict[str, Any]) -> tuple[float, float]:
+    """Return residual vibration [m/s²] and settling time [ms]."""
+    return row["residual_m_s2_median"], row["time_until_still_ms_median"]
+
+
+def _beside(place: int, point: tuple[float, float], points: Sequence[tuple[float, float]]) -> bool:
+    """Whether to put a name on the right: away from a neighbour of similar height, else alternately."""
+    x, y = point
+    away = [other - x for other, height in points if abs(math.log(y / height)) < 0.12]
+    if any(0.0 < other < 45.0 for other in away):
+        return False
+    return place % 2 == 1 or any(-45.0 < other < 0.0 for other in away)

@@ -22,12 +22,9 @@ from tvist_lab.figures.sheets import headed, in_print
 
 SHAPED, UNSHAPED, THIRD = "C0", "C1", "C2"
 """Colours of shaped, unshaped and a third series, as places in the style sheet's cycle."""
-INK = "#1F2933"
-"""Colour of text and axes."""
-FAINT = "#8A8A8A"
-"""Colour of limits and other auxiliary lines."""
-MUTED = "#5B6670"
-"""Colour of secondary text."""
+INK = "#1F2933"  # colour of text and axes
+FAINT = "#8A8A8A"  # colour of limits and other auxiliary lines
+MUTED = "#5B6670"  # colour of secondary text
 LIMIT = (0, (4, 3))  # Dashes of limits and other auxiliary lines
 ALPHA = r"$|\alpha|$ (m/s²)"  # axis label for the tool's acceleration
 OF_ALPHA = {r"$|\alpha|$": "acceleration of the tool, without gravity"}
@@ -179,11 +176,7 @@ def dotted(panel: Axes, at: float, *, color: str = FAINT, width: float = 0.9) ->
 
 
 def note(
-    panel: Axes,
-    words: str,
-    at: tuple[float, float],
-    offset: tuple[float, float] | None = None,
-    **how: Any,
+    panel: Axes, words: str, at: tuple[float, float], offset: tuple[float, float] | None = None, **how: Any
 ) -> Text:
     """Write small text at a point in data coordinates, unless `xycoords` names others, with an offset [pt]."""
     backing = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from heapq import merge
 from importlib import resources
+from itertools import pairwise
 from operator import itemgetter
 from pathlib import Path
 from typing import IO, Any
@@ -16,8 +17,7 @@ from mcap.writer import LIBRARY_IDENTIFIER, Writer
 from scipy.spatial.transform import Rotation
 
 from tvist_lab.foxglove.arm import PAYLOAD, FoxgloveArm, Z, arm_of
-from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration
+from tvist_lab.metrics.vibration import NotMeasurableError, amplitude, best_tool_acceleration
 from tvist_lab.recordings import Floats, Recording, RecordingError
 from tvist_lab.recordings.export import FOXGLOVE, ExportError, written_by
 from tvist_lab.recordings.mcap_file import RecordingFile
@@ -134,9 +134,8 @@ def _schema_of(example: Any) -> dict[str, Any]:
 def _entity(arm: FoxgloveArm, body: Body) -> dict[str, Any]:
     start, end = np.array(body.start), np.array(body.end)
     length, wide = float(np.linalg.norm(end - start)), 2.0 * body.radius
-    colour = dict(zip("rgb", DARK if body.link < 0 or body.name == PAYLOAD else LIGHT, strict=True)) | {
-        "a": 1.0
-    }
+    shade = DARK if body.link < 0 or body.name == PAYLOAD else LIGHT
+    colour = dict(zip("rgba", (*shade, 1.0), strict=True))
     turn, _ = Rotation.align_vectors((end - start)[None] if length else Z[None], Z[None])
     ends = [start, end] if length else [start]
     spheres = [
@@ -182,7 +181,7 @@ def _transforms(
     arm: FoxgloveArm, first: int, ticks: Floats, q: Floats, bends: Floats
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     places, turns = (np.round(values, DIGITS) for values in arm.steps(q, bends))
-    names = list(zip(arm.frames, arm.frames[1:], strict=False))
+    names = list(pairwise(arm.frames))
     for number, tick in enumerate(ticks.astype(int).tolist()):
         time = tick * TICK_NS if number else first
         steps = zip(names, places[number], turns[number], strict=True)

@@ -10,15 +10,20 @@ import numpy as np
 from msgspec.structs import replace as with_fields
 
 from tvist_controller.api.line import body, modal_estimator, paper_payload
-from tvist_lab.identification.agreement import contradicting, cross_validate
 from tvist_lab.identification.design import free_configurations
-from tvist_lab.identification.forecast import ForecastModes, LeftOut, ModeForecast
+from tvist_lab.identification.forecast import (
+    ForecastModes,
+    LeftOut,
+    ModeForecast,
+    contradicting,
+    cross_validate,
+)
 from tvist_lab.identification.jogs import MIN_RING_DOWNS, Jog, RingDownLogs, plan_ways
 from tvist_lab.identification.modal_fit import (
-    MODES,
     ModalFit,
     describe,
     fit_from_many,
+    lowest_poles,
     of_masses,
     softened,
 )
@@ -38,13 +43,7 @@ from tvist_lab.recordings import Floats
 from tvist_lab.workspace import identified, ranges
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_protocol.calibration import (
-    Calibration,
-    ModalModel,
-    Provenance,
-    RingDownFit,
-    Spread,
-)
+from tvist_protocol.calibration import Calibration, ModalModel, Provenance, RingDownFit, Spread
 from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.drivetrain import Drivetrain
@@ -132,12 +131,12 @@ def calibrate(
         np.maximum(np.diag(fit.covariance), np.diag(jackknife)) + np.sum(forecast.moved**2, axis=1)
     )
     first = np.array(
-        [np.ravel(describe(fit.drivetrain.poles(arm.mass(r.q, r.payload))[0][:1])) for r in ringings]
+        [np.ravel(describe(lowest_poles(fit.drivetrain, arm.mass(r.q, r.payload))[:1])) for r in ringings]
     )
     (low_f, low_z), (high_f, high_z) = first.min(axis=0).tolist(), first.max(axis=0).tolist()
     f_d_min, zeta_max = mode_range(description, fit.drivetrain)
     unseen = _errors(left)
-    used = sum(stop.ringing is not None for stop in stops)
+    ringing = [stop.ringing for stop in stops if stop.ringing is not None]
     arms = {getattr(log.recording.info, "arm", None) for log in measured.logs}
     calibration = Calibration(
         name=name,
@@ -150,7 +149,7 @@ def calibrate(
             payloads=arm.payloads,
             ring_downs=tuple(
                 RingDownFit(
-                    q=tuple(r.q.tolist()), payload=r.payload, rms=r.rms, residual_to_noise=float(ratio)
+                    q=tuple(r.q.tolist()), payload=r.payload, rms=r.rms(), residual_to_noise=float(ratio)
                 )
                 for r, ratio in zip(ringings, fit.residual_to_noise, strict=True)
             ),
@@ -165,15 +164,15 @@ def calibrate(
             command=command[:500],
             version=version("tvist"),
             seed=measured.seed,
-            configurations=len({stop.ringing.q.tobytes() for stop in stops if stop.ringing is not None}),
-            ring_downs=used,
-            rejected=len(stops) - used + measured.refused,
+            configurations=len({one.q.tobytes() for one in ringing}),
+            ring_downs=len(ringing),
+            rejected=len(stops) - len(ringing) + measured.refused,
             measured_f_d_range=(low_f, high_f),
             measured_zeta_range=(low_z, high_z),
             arm=arms.pop() if len(arms) == 1 else None,
         ),
     )
-    every = [replace(s.ringing, softening=ringings[0].softening) for s in stops if s.ringing is not None]
+    every = [replace(one, softening=ringings[0].softening) for one in ringing]
     calibration, no_polynomial = _with_polynomials(calibration, arm, every, fit)
     progress("looking for moves that would tell more")
     places = identified(ranges(description)).spread(PLACES, description.joints, 1)
@@ -211,10 +210,8 @@ def agreeing(
         )
     progress("comparing ring-downs")
     arm = ArmModes(description, payloads)
-    fitted = [
-        usable[k * len(usable) // min(len(usable), MAX_RING_DOWNS)]
-        for k in range(min(len(usable), MAX_RING_DOWNS))
-    ]
+    count = min(len(usable), MAX_RING_DOWNS)
+    fitted = [usable[k * len(usable) // count] for k in range(count)]
     ringings = softened(arm, [ringing for number in fitted if (ringing := stops[number].ringing) is not None])
     wrong = contradicting(arm, ringings)
     for number in wrong:
@@ -252,34 +249,24 @@ def _with_polynomials(
     counted = Counter(r.payload for r in ringings)
     payload = max(counted, key=lambda number: (counted[number], arm.payloads[number].mass))
     try:
-        fit = polynomials(arm, [r for r in ringings if r.payload == payload], springs)
+        model, deviations = polynomials(arm, [r for r in ringings if r.payload == payload], springs)
     except FitError as error:
         return calibration, f"with {arm.payloads[payload].mass:g} kg, {error}"
-    provenance = with_fields(
-        calibration.provenance,
-        residual_f_d_percent=fit.residual_f_d,
-        residual_zeta_percent=fit.residual_zeta,
-        cross_validated_f_d_percent=fit.cross_validated_f_d,
-        cross_validated_zeta_percent=fit.cross_validated_zeta,
-    )
+    provenance = with_fields(calibration.provenance, **deviations)
     held = arm.payloads[payload]
-    return with_fields(calibration, polynomial=fit.model, payload=held, provenance=provenance), ""
+    return with_fields(calibration, polynomial=model, payload=held, provenance=provenance), ""
 
 
 def _errors(left: Sequence[LeftOut]) -> list[ModeErrors | None]:
     """Return the errors of each mode at configurations whose ring-down is accurate enough."""
     errors: list[ModeErrors | None] = []
-    for mode in range(REPORTED_MODES):
-        pairs = [
-            (one.f_d[mode], one.own.f_d[mode], one.zeta[mode], one.own.zeta[mode])
-            for one in left
-            if mode in one.own.certain
+    for k in range(REPORTED_MODES):
+        sure = [
+            (one.f_d[k], one.own.f_d[k], one.zeta[k], one.own.zeta[k]) for one in left if k in one.own.certain
         ]
-        if len(pairs) < MIN_RING_DOWNS - 1:
-            errors.append(None)
-            continue
-        f_d, own_f_d, zeta, own_zeta = np.array(pairs).T
-        errors.append(ModeErrors(spread(f_d, own_f_d), spread(zeta, own_zeta)))
+        f_d, own_f_d, zeta, own_zeta = np.array(sure).reshape(-1, 4).T
+        enough = len(sure) >= MIN_RING_DOWNS - 1
+        errors.append(ModeErrors(spread(f_d, own_f_d), spread(zeta, own_zeta)) if enough else None)
     return errors
 
 
@@ -306,11 +293,8 @@ def true_errors(
 def mode_range(description: RobotDescription, drivetrain: Drivetrain) -> tuple[float, float]:
     """Return the lowest f_d and highest ζ that a filter must support up to the rated payload, with a margin."""
     everywhere = identified(ranges(description)).spread(WORKSPACE, description.joints, 0)
-    lowest, highest = np.inf, 0.0
-    payloads = [paper_payload(description, mass) for mass in (0.0, description.limits.payload)]
-    whole = ArmModes(description, payloads)
-    for payload in range(2):
-        for q in everywhere:
-            f_d, zeta = describe(drivetrain.poles(whole.mass(q, payload))[0][:MODES])
-            lowest, highest = min(lowest, float(f_d.min())), max(highest, float(zeta.max()))
-    return MARGIN * lowest, 1.0 - MARGIN * (1.0 - highest)
+    masses = (0.0, description.limits.payload)
+    whole = ArmModes(description, [paper_payload(description, mass) for mass in masses])
+    poles = [lowest_poles(drivetrain, whole.mass(q, payload)) for payload in range(2) for q in everywhere]
+    f_d, zeta = describe(np.concatenate(poles))
+    return MARGIN * float(f_d.min()), 1.0 - MARGIN * (1.0 - float(zeta.max()))

@@ -5,6 +5,7 @@ parameters. Ring-downs are added one by one such that the determinant of the sum
 """
 
 from collections.abc import Sequence
+from itertools import islice
 
 import numpy as np
 import pinocchio as pin
@@ -50,14 +51,10 @@ def free_configurations(
     joints = description.joints
     models = [CollisionModel(description, body(payload)) for payload in payloads]
     jog = jog_of(joints)
-    found: list[Floats] = []
     aside = np.zeros(joints) if like is None else like * [joint not in (1, 2, 3) for joint in range(joints)]
-    for q in identified(ranges(description), LENGTH).spread(20 * count, joints, seed) + aside:
-        if len(found) == count:
-            break
-        if all(model.meeting(end) is None for model in models for end in (q, q - jog)):
-            found.append(q)
-    return found
+    spread = identified(ranges(description), LENGTH).spread(20 * count, joints, seed) + aside
+    ends = (q for q in spread if all(model.meeting(end) is None for model in models for end in (q, q - jog)))
+    return list(islice(ends, count))
 
 
 def choose(
@@ -71,20 +68,23 @@ def choose(
     `known` holds the logarithms of the parameters and their covariance; None means the guess.
     """
     at, covariance = (arm.guess, np.diag(arm.deviation**2)) if known is None else known
-    knowledge = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
     says = {
         (number, payload): information(arm, predicted(arm, q, payload, at), at)
         for number, q in enumerate(candidates)
         for payload in range(len(arm.payloads))
         if counts[payload] > 0
     }
-    left, chosen = list(counts), []
-    while any(left) and says:
-        open_ = [key for key in says if left[key[1]] > 0]
-        if not open_:
-            break
+    return most_informative(np.asarray(np.linalg.inv(covariance), dtype=np.float64), says, counts)
+
+
+def most_informative(
+    knowledge: Floats, says: dict[tuple[int, int], Floats], counts: Sequence[int]
+) -> list[tuple[int, int]]:
+    """Return the keys of the most informative matrices, the best first: `counts[k]` of those that end in k."""
+    left, chosen = list(counts), list[tuple[int, int]]()
+    while open_ := [key for key in says if key not in chosen and left[key[1]] > 0]:
         best = max(open_, key=lambda key: float(np.linalg.slogdet(knowledge + says[key])[1]))
-        knowledge += says.pop(best)
+        knowledge = knowledge + says[best]
         left[best[1]] -= 1
         chosen.append(best)
     return chosen
@@ -92,7 +92,7 @@ def choose(
 
 def predicted(arm: ArmModes, q: Floats, payload: int, logarithms: Floats | None = None) -> Ringing:
     """Predict the ring-down after a jog of an arm, linearized at its end, with perfect feed-forward."""
-    flexible, mass = arm.flexible(payload), arm.mass(q, payload)
+    flexible, mass = arm.flexible[payload], arm.mass(q, payload)
     drivetrain = arm.drivetrain(arm.guess if logarithms is None else logarithms)
     inertia, damping, stiffness = drivetrain.system(mass)
     N, L = len(inertia), len(mass)
@@ -128,5 +128,4 @@ def _pushes(rows: Floats, rigid: Floats, jog: Floats) -> Floats:
         way.append(motion.next())
     q = np.array([np.zeros_like(jog), *way, *[jog] * (SKIPPED + SAMPLES + 1)])
     qd = np.gradient(q, PERIOD, axis=0)
-    qdd = np.gradient(qd, PERIOD, axis=0)
-    return np.asarray(K_d * (qd + K_p * q) + qdd @ (rigid + np.diag(B)))
+    return np.asarray(K_d * (qd + K_p * q) + np.gradient(qd, PERIOD, axis=0) @ (rigid + np.diag(B)))

@@ -1,12 +1,20 @@
-"""Predict modes and their uncertainty at any configuration from fitted springs and drives."""
+"""Find ring-downs that contradict the others, cross-validate a fit, and predict modes with their uncertainty."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tvist_lab.identification.modal_fit import MODES, ModalFit, OwnPoles, describe
-from tvist_lab.identification.ring_downs import Ringing
+from tvist_lab.identification.modal_fit import (
+    MODES,
+    ModalFit,
+    OwnPoles,
+    describe,
+    fit_modal,
+    lowest_poles,
+    own_poles_near,
+)
+from tvist_lab.identification.ring_downs import IdentificationError, Ringing
 from tvist_lab.identification.unknowns import Z_95, ArmModes
 from tvist_lab.recordings import Floats
 
@@ -14,6 +22,14 @@ DIFFERENCE_STEP = 1e-3  # step of a logarithm for finite differences [-]
 MIN_ERRORS = (0.015, 0.06)
 """Smallest assumed errors of f_d and ζ [-]: joints that share a parameter differ; friction and gears are nonlinear."""
 FEWEST = 6  # number of modes in left-out ring-downs needed to check the intervals
+CONTRADICTION = 0.2
+"""Share of a ring-down explained only by its own poles from which it contradicts the others [-]."""
+SIGNIFICANT = 60.0
+"""Significance required for a contradiction, to exclude noise; see `OwnPoles.significance` [-]."""
+SUSPECTS = 3  # number of ring-downs that are left out in turn
+GUILTY = 3  # if more than one in this number is wrong, the wrong ring-downs cannot be determined
+SINGLY = 14  # largest number of configurations that are left out one by one
+FOLDS = 10  # number of parts into which more configurations are divided
 
 
 @dataclass(frozen=True)
@@ -56,20 +72,14 @@ class ModeForecast:
         """Return the lowest modes at a configuration with one of the payloads."""
         # An error of the masses shifts the modes, but it also shifted the fitted parameters, which mostly
         # compensates.
-        arm, here = self.arm, self.fit.logarithms
-        mass = arm.mass(q, payload)
-        modes = min(modes, MODES)
+        arm, here, mass = self.arm, self.fit.logarithms, self.arm.mass(q, payload)
 
         def logarithms(parameters: Floats, mass: Floats) -> Floats:
-            return np.log(describe(arm.drivetrain(parameters).poles(mass)[0][:modes]))
+            return np.log(describe(lowest_poles(arm.drivetrain(parameters), mass)[:modes]))
 
         found = logarithms(here, mass)
-        slopes = np.array(
-            [
-                (logarithms(here + step, mass) - found) / DIFFERENCE_STEP
-                for step in DIFFERENCE_STEP * np.eye(len(here))
-            ]
-        )
+        steps = DIFFERENCE_STEP * np.eye(len(here))
+        slopes = np.array([(logarithms(here + step, mass) - found) / DIFFERENCE_STEP for step in steps])
         heavier = np.array([logarithms(here, other) - found for other in arm.heavier(q, payload)])
         by_mass = heavier + np.einsum("pm,pvk->mvk", self.moved, slopes)
         variance = np.einsum("pvk,pr,rvk->vk", slopes, self.covariance, slopes) + np.sum(by_mass**2, axis=0)
@@ -94,3 +104,50 @@ class ModeForecast:
             return self
         f_d, zeta = np.sqrt(np.mean(squares, axis=0)).tolist()
         return replace(self, wider=(max(f_d, 1.0), max(zeta, 1.0)))
+
+
+def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
+    """Find ring-downs that no springs and drives can explain together with the others."""
+    # A wrong ring-down also spoils the fit of the others. Among the worst explained ones, the one whose
+    # omission gives the best fit is therefore left out, until the rest agree.
+    fit = fit_modal(arm, ringings)
+    rest = list(range(len(ringings)))
+    guilty: list[int] = []
+    while len(guilty) <= len(ringings) // GUILTY:
+        explained = {number: own_poles_near(arm, ringings[number], fit) for number in rest}
+        worst = sorted(rest, key=lambda number: -explained[number].share)[:SUSPECTS]
+        if all(own.share < CONTRADICTION or own.significance < SIGNIFICANT for own in explained.values()):
+            return sorted(guilty)
+        without = {
+            number: fit_modal(arm, [ringings[other] for other in rest if other != number], fit.logarithms)
+            for number in worst
+        }
+        removed = min(worst, key=lambda number: without[number].cost)
+        guilty.append(removed)
+        rest.remove(removed)
+        fit = without[removed]
+    raise IdentificationError(
+        f"the {len(ringings)} ring-downs contradict each other: no springs and drives explain them together. Was "
+        "the payload the declared one each time, is the robot the one of the file, and did nothing shake it?"
+    )
+
+
+def cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> tuple[list[LeftOut], Floats]:
+    """Fit without each configuration in turn, or without each of `FOLDS` parts of many configurations.
+
+    Also return the jackknife covariance of the parameters' logarithms, shape (P, P), which includes model
+    errors as well as noise.
+    """
+    places = {place: number for number, place in enumerate(dict.fromkeys(r.q.tobytes() for r in ringings))}
+    folds = len(places) if len(places) <= SINGLY else FOLDS
+    logarithms, left = [], []
+    for fold in range(folds):
+        out = [r for r in ringings if places[r.q.tobytes()] % folds == fold]
+        others = [r for r in ringings if places[r.q.tobytes()] % folds != fold]
+        unseen = fit_modal(arm, others, fit.logarithms)
+        logarithms.append(unseen.logarithms)
+        for ringing in out:
+            poles = lowest_poles(unseen.drivetrain, arm.mass(ringing.q, ringing.payload))
+            left.append(LeftOut(ringing, *describe(poles), own_poles_near(arm, ringing, unseen)))
+    apart = np.array(logarithms) - np.mean(logarithms, axis=0)
+    return left, (folds - 1) / folds * apart.T @ apart

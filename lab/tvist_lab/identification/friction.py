@@ -22,7 +22,7 @@ from tvist_lab.identification.ring_downs import IdentificationError
 from tvist_lab.identification.travel import or_none, reach
 from tvist_lab.identification.unknowns import Unknown, parameter
 from tvist_lab.metrics import motions
-from tvist_lab.metrics.coloured import widening
+from tvist_lab.metrics.ring_down import widening
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import ModalParameter
@@ -58,8 +58,7 @@ async def identify_friction(
     robot: Robot, control: Arm, description: RobotDescription, places: Sequence[Floats]
 ) -> tuple[ModalParameter, ...]:
     """Move all joints slowly there and back, and fit the friction of each."""
-    recording = await _sweep(robot, control, places)
-    speed, torque = there_and_back(recording)
+    speed, torque = there_and_back(await _sweep(robot, control, places))
     return tuple(
         parameter
         for joint, unknown in enumerate(unknown_friction(description))
@@ -72,7 +71,7 @@ async def _sweep(robot: Robot, control: Arm, places: Sequence[Floats]) -> Record
     period = 1.0 / (await robot.info()).rate_hz
     for middle in places[:PLACES]:
         for side in (0.5 * LENGTH, -0.5 * LENGTH):
-            if await or_none(_reached(control, middle - side)) is None:
+            if await or_none(reach(control, middle - side)) is None:
                 continue
             with collect(robot) as collected:
                 await robot.advance(round(REST / period))
@@ -85,11 +84,6 @@ async def _sweep(robot: Robot, control: Arm, places: Sequence[Floats]) -> Record
     raise IdentificationError(
         f"there is no room for a way of {LENGTH:g} rad of all joints, which friction is measured on: give the arm more"
     )
-
-
-async def _reached(control: Arm, q: Floats) -> bool:
-    await reach(control, q)
-    return True
 
 
 def there_and_back(recording: Recording) -> tuple[Floats, Floats]:

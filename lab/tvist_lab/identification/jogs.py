@@ -29,7 +29,14 @@ from tvist_controller.api.line import (
 from tvist_lab.collect import collect
 from tvist_lab.identification.design import LIMITS, choose, free_configurations, jog_of
 from tvist_lab.identification.friction import identify_friction
-from tvist_lab.identification.ring_downs import BEGINS, IdentificationError, Log, Progress, stops_of
+from tvist_lab.identification.ring_downs import (
+    BEGINS,
+    IdentificationError,
+    Log,
+    Progress,
+    check_model,
+    stops_of,
+)
 from tvist_lab.identification.servo_response import ServoResponse, servo_response
 from tvist_lab.identification.travel import or_none
 from tvist_lab.identification.unknowns import ArmModes
@@ -95,15 +102,13 @@ class JogPlan:
     @property
     def seconds(self) -> float:
         """Duration [s]."""
-        found, at = (0.0 if self.turned is None else 2 * TURNS * (PAUSE + AFTER)), self.at
+        rests, at, moves = len(self.jogs) + (0 if self.turned is None else 2 * TURNS), self.at, []
         for jog in self.jogs:
-            for ends in pairwise([at, *jog.way]):
-                found += quickest_motion(JointLine(*ends), self.ways, PERIOD).duration
-            found += (
-                quickest_motion(JointLine(jog.way[-1], jog.q), jog.limits, PERIOD).duration + PAUSE + AFTER
-            )
+            moves += [(*ends, self.ways) for ends in pairwise([at, *jog.way])]
+            moves.append((jog.way[-1], jog.q, jog.limits))
             at = jog.q
-        return found
+        lasting = (quickest_motion(JointLine(a, b), limits, PERIOD).duration for a, b, limits in moves)
+        return sum(lasting, rests * (PAUSE + AFTER))
 
 
 @dataclass(frozen=True)
@@ -136,10 +141,7 @@ async def plan_jogs(
     takes only positions. Raises IdentificationError if ring-downs or ways are too few or the file does not fit.
     """
     info, state = await robot.info(), await robot.state()
-    if info.model != description.robot.model:
-        raise IdentificationError(
-            f"the robot is a {info.model}, its description of a {description.robot.model}: name its file"
-        )
+    check_model(info, description)
     carried = payloads or (info.payload,)
     least = max(MIN_RING_DOWNS, len(carried))
     if ring_downs < least:
@@ -166,9 +168,9 @@ async def plan_jogs(
                 f"from where the arm stands, {len(jogs)} of {ring_downs} configurations can be reached without "
                 "touching itself or the floor: move it to where it has more room, or ask for fewer ring-downs"
             )
-        capped = [replace(jog.limits, velocity=min(jog.limits.velocity, speed)) for jog in jogs]
-        slow = tuple(replace(jog, limits=limits) for jog, limits in zip(jogs, capped, strict=True))
-        return JogPlan(arm, at, slow, ways, seed, bool(payloads), turned)
+        slow = (replace(jog.limits, velocity=min(jog.limits.velocity, speed)) for jog in jogs)
+        capped = tuple(replace(jog, limits=limits) for jog, limits in zip(jogs, slow, strict=True))
+        return JogPlan(arm, at, capped, ways, seed, bool(payloads), turned)
 
     return await asyncio.to_thread(planned)
 
@@ -273,9 +275,9 @@ async def _jogs(
     """Return the recordings of all jogs that the robot did not refuse."""
     servo = known.servo
     told = [one for one in known.friction if one.quantity == "breakaway" and one.status == "identified"]
-    sticks = any(one.value > STICKS for one in told)
-    inexact = STICKING if sticks else INEXACT
+    inexact = STICKING if any(one.value > STICKS for one in told) else INEXACT
     begins = BEGINS if plan.turned is None else UNKNOWN if servo is None else servo.delay
+    driven = () if servo is None else servo.poles
     logs, share, carried = list[Log](), FIRST, None
     for number, jog in enumerate(plan.jogs, 1):
         progress(f"ring-down {number} of {len(plan.jogs)}")
@@ -286,10 +288,9 @@ async def _jogs(
         recording = await or_none(_jogged(robot, control, jog, plan.ways, share))
         if recording is None:
             continue
-        driven = () if servo is None else servo.poles
         logs.append(Log(f"jog {number}", replace(recording, info=info), payload, begins, inexact, driven))
         heard = stops_of(logs[-1:])[0][-1].ringing
-        loud = 0.0 if heard is None else heard.rms_after(LATER)
+        loud = 0.0 if heard is None else heard.rms(LATER)
         share = float(np.clip(share * np.sqrt(LOUD / max(loud, 1e-3)), GENTLEST, 1.0))
     return logs
 

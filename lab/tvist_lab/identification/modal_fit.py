@@ -23,7 +23,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import least_squares
 
 from tvist_lab.identification.ring_downs import Ringing
-from tvist_lab.identification.unknowns import ArmModes
+from tvist_lab.identification.unknowns import FURTHEST, ArmModes
 from tvist_lab.metrics import SLOW_POLE
 from tvist_lab.recordings import Floats
 from tvist_shaping.estimators.drivetrain import Drivetrain
@@ -40,6 +40,8 @@ INSIDE = 1e-3  # distance of a starting point from the bounds of the search [-]
 EVALUATIONS = 60
 SOFTENINGS = (0.0, 50.0, 100.0, 200.0, 300.0)
 """Softening by hysteresis to try [1/m]: 200 is 3 % for an amplitude of 1 m/s² at 13 Hz."""
+LOOSE = 0.5
+"""Standard deviation of the logarithms of a ring-down's own f_d and ζ about their starting values [-]."""
 CERTAIN = (0.05, 0.2)
 """Largest standard errors of a ring-down's own f_d and ζ with which it can judge a model [-]."""
 STARTS = 4  # number of starting points of the search; the first one is the guess
@@ -69,11 +71,8 @@ class _Signal:
         self.mass, self.force = arm.mass(ringing.q, ringing.payload), ringing.force
         self.noise = float(np.hypot(ringing.noise, ringing.inexact))
         self.time = ringing.time
-        self._lost = np.zeros(len(self.force))
-        if ringing.softening:
-            self._lost = ringing.softening * cumulative_trapezoid(
-                _amplitude(ringing, self.time), self.time, initial=0.0
-            )
+        moved = cumulative_trapezoid(_amplitude(ringing, self.time), self.time, initial=0.0)
+        self._lost = ringing.softening * moved
         still = np.exp(np.outer(self.time, np.array(ringing.driven, dtype=complex)))
         self._always = np.column_stack(
             [np.exp(-SLOW_POLE * self.time), np.ones(len(self.force)), still.real, still.imag]
@@ -93,22 +92,26 @@ class _Signal:
         orthonormal, _ = np.linalg.qr(self._columns(poles))
         return np.asarray((self.force - orthonormal @ (orthonormal.T @ self.force)).ravel() / self.noise)
 
-    def heavier(self, drivetrain: Drivetrain, masses: Sequence[Floats]) -> Floats:
-        """Return the change of `left` due to other mass matrices, one column each, shape (samples, number)."""
-        here = self.left(drivetrain.poles(self.mass)[0][:MODES])
-        return np.column_stack([self.left(drivetrain.poles(mass)[0][:MODES]) - here for mass in masses])
+    def left_with(self, drivetrain: Drivetrain) -> Floats:
+        """Return the residual for the lowest modes of springs and drives."""
+        return self.left(lowest_poles(drivetrain, self.mass))
 
-    def change(self, drivetrains: Sequence[Drivetrain], poles: Complex, shapes: Complex) -> Floats:
-        """Return the derivative of `left` by each parameter, from a step in each, shape (samples, P)."""
-        here = self.left(poles)
-        columns = []
-        for drivetrain in drivetrains:
-            L = len(self.mass)
+    def slopes(self, arm: ArmModes, logarithms: Floats) -> Floats:
+        """Return the derivative of the residual by each parameter, shape (samples, P)."""
+        poles, shapes = (part[:MODES] for part in arm.drivetrain(logarithms).poles(self.mass))
+        here, columns, L = self.left(poles), [], len(self.mass)
+        for step in DIFFERENCE_STEP * np.eye(len(logarithms)):
+            drivetrain = arm.drivetrain(logarithms + step)
             moved, scratch = poles.copy(), np.zeros((L + len(poles), L + 1), dtype=complex)
             if not follow(self.mass, drivetrain.rows, moved, shapes.copy(), scratch):
-                moved = drivetrain.poles(self.mass)[0][:MODES]
+                moved = lowest_poles(drivetrain, self.mass)
             columns.append((self.left(moved) - here) / DIFFERENCE_STEP)
         return np.column_stack(columns)
+
+
+def lowest_poles(drivetrain: Drivetrain, mass: Floats) -> Complex:
+    """Return the poles of the modes that are fitted, the lowest first [1/s]."""
+    return drivetrain.poles(mass)[0][:MODES]
 
 
 def _amplitude(ringing: Ringing, time: Floats) -> Floats:
@@ -125,14 +128,14 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
 
     def residual(logarithms: Floats) -> Floats:
         drivetrain = arm.drivetrain(logarithms)
-        left = [signal.left(drivetrain.poles(signal.mass)[0][:MODES]) for signal in signals]
+        left = [signal.left_with(drivetrain) for signal in signals]
         return np.concatenate([*left, (logarithms - arm.guess) / arm.deviation])
 
     def jacobian(logarithms: Floats) -> Floats:
-        changes = [sensitivity(arm, signal, logarithms) for signal in signals]
+        changes = [signal.slopes(arm, logarithms) for signal in signals]
         return np.vstack([*changes, np.diag(1.0 / arm.deviation)])
 
-    low, high = arm.guess - arm.furthest, arm.guess + arm.furthest
+    low, high = (arm.guess + side * FURTHEST * arm.deviation for side in (-1.0, 1.0))
     found = least_squares(
         residual,
         arm.guess if start is None else np.clip(start, low + INSIDE, high - INSIDE),
@@ -152,12 +155,7 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
     return ModalFit(
         logarithms=found.x,
         covariance=np.linalg.inv(knowledge),
-        residual_to_noise=np.array(
-            [
-                float(np.sqrt(np.mean(signal.left(drivetrain.poles(signal.mass)[0][:MODES]) ** 2)))
-                for signal in signals
-            ]
-        ),
+        residual_to_noise=np.sqrt([np.mean(signal.left_with(drivetrain) ** 2) for signal in signals]),
         cost=float(found.cost),
         drivetrain=drivetrain,
     )
@@ -189,27 +187,20 @@ def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floa
     # Masses are not fitted, since they are known better than a fit could find them. The shift is of first
     # order.
     signals = [_Signal(arm, r) for r in ringings]
-    changes = np.vstack([sensitivity(arm, signal, fit.logarithms) for signal in signals])
-    heavier = np.vstack(
-        [
-            signal.heavier(fit.drivetrain, arm.heavier(r.q, r.payload))
-            for signal, r in zip(signals, ringings, strict=True)
-        ]
-    )
-    return np.asarray(-np.linalg.solve(changes.T @ changes + np.diag(arm.deviation**-2), changes.T @ heavier))
-
-
-def sensitivity(arm: ArmModes, signal: _Signal, logarithms: Floats) -> Floats:
-    """Return the derivative of a ring-down's residual by each parameter, shape (samples, P)."""
-    poles, shapes = (part[:MODES] for part in arm.drivetrain(logarithms).poles(signal.mass))
-    steps = DIFFERENCE_STEP * np.eye(len(logarithms))
-    return signal.change([arm.drivetrain(logarithms + step) for step in steps], poles, shapes)
+    changes, heavier = [], []
+    for signal, r in zip(signals, ringings, strict=True):
+        changes.append(signal.slopes(arm, fit.logarithms))
+        here, masses = signal.left_with(fit.drivetrain), arm.heavier(r.q, r.payload)
+        others = [signal.left(lowest_poles(fit.drivetrain, mass)) - here for mass in masses]
+        heavier.append(np.column_stack(others))
+    change = np.vstack(changes)
+    knowledge = change.T @ change + np.diag(arm.deviation**-2)
+    return np.asarray(-np.linalg.solve(knowledge, change.T @ np.vstack(heavier)))
 
 
 def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
     """Return the information of a ring-down about the parameters: their inverse covariance, shape (P, P)."""
-    signal = _Signal(arm, ringing)
-    change = sensitivity(arm, signal, logarithms)
+    change = _Signal(arm, ringing).slopes(arm, logarithms)
     return np.asarray(change.T @ change)
 
 
@@ -234,14 +225,11 @@ class OwnPoles:
         return [k for k, (f_d, zeta) in enumerate(errors) if f_d < CERTAIN[0] and zeta < CERTAIN[1]]
 
 
-LOOSE = 0.5
-"""Standard deviation of the logarithms of a ring-down's own f_d and ζ about their starting values [-]."""
-
-
 def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
     """Fit poles to one ring-down, starting near others, independent of springs and drives."""
     signal = _Signal(arm, ringing)
-    start = _logarithms(poles)
+    f_d, zeta = describe(poles)
+    start = np.log(np.concatenate([f_d, np.clip(zeta, 1e-4, 0.95)]))
 
     def residual(logarithms: Floats) -> Floats:
         return np.concatenate([signal.left(_poles(logarithms)), (logarithms - start) / LOOSE])
@@ -251,10 +239,8 @@ def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
     errors = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)) * excess)
     f_d, zeta = np.exp(found.x.reshape(2, -1))
     f_d_error, zeta_error = errors.reshape(2, -1)
-    others, own, nothing = (
-        float(np.sum(signal.left(some) ** 2)) for some in (poles, _poles(found.x), poles[:0])
-    )
-    significance = max(others - own, 0.0)
+    others, own, nothing = (np.sum(signal.left(p) ** 2) for p in (poles, _poles(found.x), poles[:0]))
+    significance = max(float(others - own), 0.0)
     return OwnPoles(
         f_d=f_d,
         zeta=zeta,
@@ -268,17 +254,12 @@ def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
 
 def own_poles_near(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
     """Fit a ring-down's own poles, starting from those of a fit."""
-    return own_poles(arm, ringing, fit.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES])
+    return own_poles(arm, ringing, lowest_poles(fit.drivetrain, arm.mass(ringing.q, ringing.payload)))
 
 
 def describe(poles: Complex) -> tuple[Floats, Floats]:
     """Return f_d [Hz] and ζ [-] of poles."""
     return np.asarray(poles.imag / (2.0 * np.pi)), np.asarray(-poles.real / np.abs(poles))
-
-
-def _logarithms(poles: Complex) -> Floats:
-    f_d, zeta = describe(poles)
-    return np.asarray(np.log(np.concatenate([f_d, np.clip(zeta, 1e-4, 0.95)])))
 
 
 def _poles(logarithms: Floats) -> Complex:

@@ -11,7 +11,7 @@ from tvist_lab.identification.ring_downs import INEXACT, Log, RingDownStop, nois
 from tvist_lab.metrics import MotionRows, motions
 from tvist_lab.metrics.vibration import SENSOR
 from tvist_lab.recordings import Floats, RecordingError
-from tvist_lab.recordings.kabsch import rotation
+from tvist_lab.recordings.two_clocks import closest_rotation
 from tvist_lab.study.line import Unchanged
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
@@ -74,14 +74,11 @@ def observe(logs: Sequence[Log], payloads: Sequence[Payload]) -> tuple[list[Obse
         for number, motion in enumerate(motions(log.recording), 1):
             reason = objection(log.recording, motion)
             one = None if reason else _observed(log, number, motion, payloads)
-            if one is None:
-                others.append(
-                    RingDownStop(
-                        log.name, number, None, reason or f"the arm rested for less than {LEAST_AFTER:g} s"
-                    )
-                )
-            else:
+            if one is not None:
                 found.append(one)
+                continue
+            short = f"the arm rested for less than {LEAST_AFTER:g} s"
+            others.append(RingDownStop(log.name, number, None, reason or short))
     return found, others
 
 
@@ -151,7 +148,7 @@ def felt_by(response: Response, motion: Observed, mounting: Floats) -> Floats:
 
 def mounting_of(pairs: Sequence[tuple[Floats, Floats]]) -> Floats:
     """Return the rotation from flange to accelerometer, from simulated and measured forces, shape (3, 3)."""
-    return rotation(sum((measured.T @ simulated for simulated, measured in pairs), np.zeros((3, 3))))
+    return closest_rotation(sum((measured.T @ simulated for simulated, measured in pairs), np.zeros((3, 3))))
 
 
 def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats) -> Floats:
@@ -167,8 +164,8 @@ def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats
             difference = middle - values
             if (
                 values is motion.angles[1]
-            ):  # where friction holds the arm before is history, and angles may not sag
-                difference = difference - difference[0]
+            ):  # friction holds the arm where its past says, and angles may not sag
+                difference -= difference[0].copy()
             parts.append((difference / scale).ravel())
     return np.concatenate(parts)
 

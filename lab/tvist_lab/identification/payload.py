@@ -19,7 +19,8 @@ from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.collect import collect
-from tvist_lab.identification.ring_downs import IdentificationError, Progress
+from tvist_lab.identification.design import most_informative
+from tvist_lab.identification.ring_downs import IdentificationError, Progress, check_model
 from tvist_lab.identification.travel import or_none, reach
 from tvist_lab.identification.unknowns import ball, heavier
 from tvist_lab.recordings import Floats, Recording
@@ -52,7 +53,7 @@ class PayloadFound:
 
     payload: Payload  # payload to declare; its inertia is that of a steel ball of the same mass
     mass_deviation: float  # standard deviation of the mass [kg]
-    com_deviation: tuple[float, float, float]  # standard deviation of each coordinate [m]
+    com_deviation: tuple[float, ...]  # standard deviation of each coordinate [m]
     mass_in_motion: float  # mass according to the short motion [kg]
     mass_in_motion_deviation: float  # standard deviation of that mass [kg]
     declared: Payload
@@ -60,39 +61,32 @@ class PayloadFound:
 
 
 async def identify_payload(
-    robot: Robot,
-    control: Arm,
-    description: RobotDescription,
-    *,
-    poses: int = POSES,
-    seed: int = 0,
-    progress: Progress,
+    robot: Robot, control: Arm, description: RobotDescription, *, seed: int = 0, progress: Progress
 ) -> PayloadFound:
     """Identify the payload as a client; raise IdentificationError if the arm or its poses do not allow it."""
     info = await robot.info()
-    _check(info, description, poses)
+    _check(info, description)
     arm = _Regressor(description)
     period = 1.0 / info.rate_hz
-    rows, torques, rested_at, rested = [], [], list[Floats](), 0
-    for q in arm.choose(_free(description, info.payload, seed), 3 * poses):
-        if rested == poses:
+    rows, torques, rested = [], [], list[Floats]()
+    for q in arm.choose(_free(description, info.payload, seed), 3 * POSES):
+        if len(rested) == POSES:
             break
         held = await or_none(_hold(robot, control, q, period))
         if held is None:
             continue
-        rested += 1
-        progress(f"pose {rested} of {poses}")
         at, torque = held
+        rested.append(at)
+        progress(f"pose {len(rested)} of {POSES}")
         rows.append(arm.static(at))
-        rested_at.append(at)
         torques.append(torque - arm.torque(at, np.zeros_like(at), np.zeros_like(at)))
-    if rested < MIN_POSES:
+    if len(rested) < MIN_POSES:
         raise IdentificationError(
-            f"only {rested} of {poses} poses could be reached, {MIN_POSES} are needed: give the arm more room"
+            f"only {len(rested)} of {POSES} poses could be reached, {MIN_POSES} are needed: give the arm more room"
         )
     matrix = np.vstack(rows)
     found, deviations = arm.solve(matrix, np.concatenate(torques))
-    deviations = np.hypot(deviations, arm.of_masses(matrix, rested_at))
+    deviations = np.hypot(deviations, arm.of_masses(matrix, rested))
     progress("a short motion")
     in_motion, in_motion_deviation = arm.move(await _swing(robot, control, q, period))
     mass = max(float(found[0]), 0.0)
@@ -109,29 +103,22 @@ async def identify_payload(
     com = found[1:] / mass if mass >= LIGHT else np.zeros(3)
     spread = np.hypot(deviations[1:], com * deviations[0]) / mass if mass >= LIGHT else np.full(3, np.inf)
     return PayloadFound(
-        payload=Payload(mass=mass, com=_three(com), inertia=ball(mass)),
+        payload=Payload(mass=mass, com=tuple(com.tolist()), inertia=ball(mass)),
         mass_deviation=float(deviations[0]),
-        com_deviation=_three(spread),
+        com_deviation=tuple(spread.tolist()),
         mass_in_motion=in_motion,
         mass_in_motion_deviation=in_motion_deviation,
         declared=info.payload,
-        poses=rested,
+        poses=len(rested),
     )
 
 
-def _check(info: Info, description: RobotDescription, poses: int) -> None:
+def _check(info: Info, description: RobotDescription) -> None:
     """Check, before the arm moves, that its torques can show the payload."""
-    if info.model != description.robot.model:
-        raise IdentificationError(
-            f"the robot is a {info.model}, its description of a {description.robot.model}: name its file"
-        )
+    check_model(info, description)
     if not carries_weight(description):
         raise IdentificationError(
             f"no joint of a {info.model} carries weight, so its torques at rest say nothing of the payload: weigh it"
-        )
-    if poses < MIN_POSES:
-        raise IdentificationError(
-            f"{poses} poses do not tell mass and centre of mass: at least {MIN_POSES} do"
         )
 
 
@@ -167,15 +154,10 @@ class _Regressor:
 
     def choose(self, candidates: Sequence[Floats], count: int) -> list[Floats]:
         """Choose the poses with most information about mass and centre of mass, the best first."""
-        knowledge = np.diag([1e-2, 1.0, 1.0, 1.0])
-        left = {number: self.static(q) / self._friction[:, None] for number, q in enumerate(candidates)}
-        chosen: list[Floats] = []
-        while left and len(chosen) < count:
-            best = max(left, key=lambda n: float(np.linalg.slogdet(knowledge + left[n].T @ left[n])[1]))
-            rows = left.pop(best)
-            knowledge += rows.T @ rows
-            chosen.append(candidates[best])
-        return chosen
+        rows = (self.static(q) / self._friction[:, None] for q in candidates)
+        says = {(number, 0): row.T @ row for number, row in enumerate(rows)}
+        chosen = most_informative(np.diag([1e-2, 1.0, 1.0, 1.0]), says, [count])
+        return [candidates[number] for number, _ in chosen]
 
     def solve(self, rows: Floats, torques: Floats) -> tuple[Floats, Floats]:
         """Estimate (m, m c) by weighted least squares, with standard deviations from the residual."""
@@ -243,22 +225,19 @@ def _free(description: RobotDescription, declared: Payload, seed: int) -> list[F
     ]
     rng = np.random.default_rng(seed)
     found: list[Floats] = []
-    region = workspace(ranges(description), ASIDE)
-    for pose in region.random(20 * CANDIDATES, joints, seed):
+    for q in workspace(ranges(description), ASIDE).random(20 * CANDIDATES, joints, seed):
         if len(found) == CANDIDATES:
             break
-        q = pose.copy()
         q[0] *= 0.25
         q[4:] = rng.uniform(-np.pi / 2.0, np.pi / 2.0, joints - 4) if joints > 4 else []
-        ends = (q, q - ASIDE, q + ASIDE)
-        if all(model.meeting(end) is None for model in models for end in ends):
+        if all(model.meeting(end) is None for model in models for end in (q, q - ASIDE, q + ASIDE)):
             found.append(q)
     return found
 
 
 async def _hold(robot: Robot, control: Arm, q: Floats, period: float) -> tuple[Floats, Floats]:
     """Return angles and torques at rest in a pose, averaged over approaches from both sides."""
-    angles, torques = [], []
+    rested = []
     for side in (-1.0, 1.0):
         await reach(control, q + side * ASIDE)
         await control.move_j(q, acceleration=1.0)
@@ -266,17 +245,16 @@ async def _hold(robot: Robot, control: Arm, q: Floats, period: float) -> tuple[F
         with collect(robot) as collected:
             await robot.advance(round(LOOK / period))
         recording = collected.recording()
-        angles.append(recording["actual_q"].mean(axis=0))
-        torques.append(recording["actual_moment"].mean(axis=0))
-    return np.mean(angles, axis=0), np.mean(torques, axis=0)
+        rested.append([recording[name].mean(axis=0) for name in ("actual_q", "actual_moment")])
+    angles, torques = np.mean(rested, axis=0)
+    return angles, torques
 
 
 async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Recording:
     """Move there and back on a collision-free straight line, and record the motion."""
-    shares = (1.0, 0.5, 0.25, -0.25, -0.5)
     swing = np.zeros_like(q)
     swing[1:4] = SWING
-    for share in shares:
+    for share in (1.0, 0.5, 0.25, -0.25, -0.5):
         with collect(robot) as collected:
             if await or_none(control.move_j(q + share * swing)) is None:
                 continue
@@ -284,8 +262,3 @@ async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Record
             await robot.advance(round(LOOK / period))
         return collected.recording()
     raise IdentificationError("there is no room for a short motion: give the arm more")
-
-
-def _three(values: Floats) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return x, y, z

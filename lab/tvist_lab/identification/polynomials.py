@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,18 +22,14 @@ class FitError(ValueError):
     """The measurements do not suffice for a model; the message tells why."""
 
 
-@dataclass(frozen=True)
-class Fit:
-    """A model and its deviations from the measurements."""
-
-    model: PolynomialModel
-    residual_f_d: Spread
-    residual_zeta: Spread
-    cross_validated_f_d: Spread  # deviation of each measurement from a fit without it
-    cross_validated_zeta: Spread
+Deviations = dict[str, Spread]
+"""Deviations of a model from the measurements [%], by field of `Provenance`; cross-validated are those from fits
+without them."""
 
 
-def polynomials(arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit) -> Fit:
+def polynomials(
+    arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit
+) -> tuple[PolynomialModel, Deviations]:
     """Fit polynomials to the lowest mode of each ring-down, separated from higher modes by springs and drives.
 
     Raises FitError if the ring-downs are too few, or cover too little of the workspace.
@@ -46,13 +41,13 @@ def polynomials(arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit) -
     kept = [(q, poles.f_d[0], poles.zeta[0]) for q, poles in own if 0 in poles.certain]
     _check_count(len(kept), changing, degree)
     q, f_d, zeta = (np.array(column) for column in zip(*kept, strict=True))
-    fit = fit_polynomials(q, f_d, zeta, joints=changing, degree=degree)
-    if fit.cross_validated_f_d.p90 > ROUGH:
+    model, deviations = fit_polynomials(q, f_d, zeta, joints=changing, degree=degree)
+    if (error := deviations["cross_validated_f_d_percent"].p90) > ROUGH:
         raise FitError(
-            f"f_d would be off by {fit.cross_validated_f_d.p90:.0f} % and more at one stop in ten: they cover too "
+            f"f_d would be off by {error:.0f} % and more at one stop in ten: they cover too "
             "little of the workspace"
         )
-    return fit
+    return model, deviations
 
 
 def _check_count(configurations: int, joints: tuple[int, ...], degree: int) -> None:
@@ -65,16 +60,20 @@ def _check_count(configurations: int, joints: tuple[int, ...], degree: int) -> N
         )
 
 
-def fit_polynomials(q: Floats, f_d: Floats, zeta: Floats, *, joints: tuple[int, ...], degree: int) -> Fit:
+def fit_polynomials(
+    q: Floats, f_d: Floats, zeta: Floats, *, joints: tuple[int, ...], degree: int
+) -> tuple[PolynomialModel, Deviations]:
     """Fit f_d [Hz] and ζ [-], each of shape (N,), at q, shape (N, n) [rad], by relative deviation."""
     design = terms(q, joints=joints, degree=degree)
-    coefficients = [_solve(design, y) for y in (f_d, zeta)]
-    fold = np.arange(len(design)) % FOLDS
-    unseen = np.empty((2, len(design)))
-    for part in range(FOLDS):
-        seen = fold != part
-        for row, y in zip(unseen, (f_d, zeta), strict=True):
-            row[~seen] = design[~seen] @ _solve(design[seen], y[seen])
+    fold, coefficients, deviations = np.arange(len(design)) % FOLDS, [], Deviations()
+    for name, y in (("f_d", f_d), ("zeta", zeta)):
+        unseen = np.empty(len(design))
+        for part in range(FOLDS):
+            seen = fold != part
+            unseen[~seen] = design[~seen] @ _solve(design[seen], y[seen])
+        coefficients.append(_solve(design, y))
+        deviations[f"residual_{name}_percent"] = spread(design @ coefficients[-1], y)
+        deviations[f"cross_validated_{name}_percent"] = spread(unseen, y)
     model = PolynomialModel(
         joints=joints,
         degree=degree,
@@ -83,13 +82,7 @@ def fit_polynomials(q: Floats, f_d: Floats, zeta: Floats, *, joints: tuple[int, 
         f_d_range=(0.7 * float(f_d.min()), 1.25 * float(f_d.max())),
         zeta_range=(0.3 * float(zeta.min()), min(1.4 * float(zeta.max()), 0.95)),
     )
-    return Fit(
-        model=model,
-        residual_f_d=spread(design @ coefficients[0], f_d),
-        residual_zeta=spread(design @ coefficients[1], zeta),
-        cross_validated_f_d=spread(unseen[0], f_d),
-        cross_validated_zeta=spread(unseen[1], zeta),
-    )
+    return model, deviations
 
 
 def spread(estimated: Floats, true: Floats) -> Spread:

@@ -13,7 +13,9 @@ from tvist_lab.identification.unknowns import ball
 from tvist_lab.metrics import MotionRows, motions, still_driven
 from tvist_lab.metrics.vibration import SENSOR
 from tvist_lab.recordings import Floats, Recording, RecordingError
+from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
+from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
 
 BEGINS = 7 * PERIOD
@@ -37,6 +39,14 @@ class IdentificationError(ClientError):
     """The robot could not be identified; the message tells what to do."""
 
 
+def check_model(info: Info, description: RobotDescription) -> None:
+    """Check that a robot file is of the robot that is connected."""
+    if info.model != description.robot.model:
+        raise IdentificationError(
+            f"the robot is a {info.model}, its description of a {description.robot.model}: name its file"
+        )
+
+
 @dataclass(frozen=True)
 class Ringing:
     """Acceleration of the tool at a configuration after a stop."""
@@ -51,13 +61,8 @@ class Ringing:
     """Poles with which the set-point still comes to rest, one of each pair [1/s]; empty if it rests."""
     softening: float = 0.0  # share by which hysteresis softens the springs, per amplitude of the tool [1/m]
 
-    @property
-    def rms(self) -> float:
-        """Rms of the force without its mean, per axis [m/s²]."""
-        return self.rms_after(0.0)
-
-    def rms_after(self, late: float) -> float:
-        """Return the rms from `late` after the first sample [m/s²]."""
+    def rms(self, late: float = 0.0) -> float:
+        """Return the rms of the force without its mean, per axis, from `late` after the first sample [m/s²]."""
         rest = self.force[self.time >= late]
         return float(np.sqrt(np.mean((rest - rest.mean(axis=0)) ** 2)))
 
@@ -76,9 +81,9 @@ class Log:
 
     def carried(self, row: int) -> Payload:
         """Return the given, recorded or declared payload at a row; raise RecordingError if it is unknown."""
-        recording = self.recording
         if self.payload is not None:
             return self.payload
+        recording = self.recording
         if "payload" in recording and np.isfinite(recording["payload"][row]):
             mass = float(recording["payload"][row])
             com = recording["payload_cog"][row] if "payload_cog" in recording else np.zeros(3)
@@ -140,8 +145,7 @@ def objection(recording: Recording, motion: MotionRows) -> str:
 
 def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> RingDownStop:
     recording = log.recording
-    reason = objection(recording, motion)
-    if reason:
+    if reason := objection(recording, motion):
         return RingDownStop(log.name, number, None, reason)
     stop, begin = motion.arm_stop(recording), log.begins
     if recording.foreign:
@@ -159,9 +163,9 @@ def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> RingDownSt
     ringing = Ringing(
         q, payload, recording[SENSOR][rows], noise_of(recording, motion), late, driven=log.driven
     )
-    if ringing.rms < SIGNAL_TO_NOISE * ringing.noise:
+    if ringing.rms() < SIGNAL_TO_NOISE * ringing.noise:
         return RingDownStop(log.name, number, None, "the vibration does not stand out of the noise")
-    return RingDownStop(log.name, number, replace(ringing, inexact=log.inexact * ringing.rms))
+    return RingDownStop(log.name, number, replace(ringing, inexact=log.inexact * ringing.rms()))
 
 
 def fresh(recording: Recording) -> NDArray[np.intp]:

@@ -68,8 +68,7 @@ def servo_response(moves: Sequence[Recording]) -> ServoResponse | None:
 
 def followed_by(target: Floats, lag: float, gain: float) -> Floats:
     """Return the angles of a servo that follows set-points, each held for a period, shape (T,) [rad]."""
-    system = np.array([[0.0, 1.0, 0.0], [-gain, -gain * lag, gain], [0.0, 0.0, 0.0]])
-    move = expm(PERIOD * system)
+    move = expm(PERIOD * np.array([[0.0, 1.0, 0.0], [-gain, -gain * lag, gain], [0.0, 0.0, 0.0]]))
     state, found = np.array([target[0], 0.0]), np.empty(len(target))
     for tick, setpoint in enumerate(target):
         state = move[:2, :2] @ state + move[:2, 2] * setpoint

@@ -6,6 +6,7 @@ from typing import TypeVar
 import numpy as np
 
 from tvist_client.arm import Arm
+from tvist_client.motion import Motion
 from tvist_lab.recordings import Floats
 from tvist_protocol.errors import RefusedError
 
@@ -22,10 +23,11 @@ async def or_none(measuring: Awaitable[Result]) -> Result | None:
         return None
 
 
-async def reach(arm: Arm, q: Floats) -> None:
+async def reach(arm: Arm, q: Floats) -> Motion:
     """Move to a configuration, if a straight line collides via the upright arm; else raise RefusedError `collision`."""
-    if await or_none(arm.move_j(q)) is None:
-        upright = np.zeros_like(q)
-        upright[[joint for joint in (1, 3) if joint < len(q)]] = -np.pi / 2
-        await arm.move_j(upright)
-        await arm.move_j(q)
+    if (there := await or_none(arm.move_j(q))) is not None:
+        return there
+    upright = np.zeros_like(q)
+    upright[[joint for joint in (1, 3) if joint < len(q)]] = -np.pi / 2
+    await arm.move_j(upright)
+    return await arm.move_j(q)

@@ -22,7 +22,6 @@ from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD, Response
 from tvist_protocol.calibration import ModalParameter
-from tvist_protocol.values import Payload
 
 DIFFERENCE_STEP = 1e-3  # step for finite differences, relative to a number's deviation before the fit [-]
 ROUNDS = 5  # largest number of computations of derivatives
@@ -41,11 +40,6 @@ class Prediction:
     motion: int
     measured: float  # rms of the tool's acceleration from 10 ms to half a second after the stop [m/s²]
     twin: float  # the same of the twin [m/s²]
-
-    @property
-    def error_percent(self) -> float:
-        """Error of the prediction [%]."""
-        return 100.0 * abs(self.twin / self.measured - 1.0)
 
 
 @dataclass(frozen=True)
@@ -76,7 +70,7 @@ class Twin:
 
     def error_percent(self, share: float) -> float | None:
         """Return a quantile of the errors of the predicted residual [%]; None without predictions."""
-        errors = [one.error_percent for one in self.predictions]
+        errors = [100.0 * abs(one.twin / one.measured - 1.0) for one in self.predictions]
         return float(np.quantile(errors, share)) if errors else None
 
 
@@ -90,12 +84,13 @@ class _Fit:
 
     def mount(self, values: Floats, motions: Sequence[Observed]) -> None:
         """Find how the accelerometer of each log is mounted; ours is in the flange's frame."""
-        for log in {motion.log for motion in motions}:
-            own = [motion for motion in motions if motion.log == log]
-            self.mountings[log] = np.eye(3)
-            if own[0].foreign:
-                pairs = [(felt_by(self.repeat(values, one), one, np.eye(3)), one.felt[1]) for one in own]
-                self.mountings[log] = mounting_of(pairs)
+        pairs: dict[str, list[tuple[Floats, Floats]]] = {}
+        for one in motions:
+            self.mountings[one.log] = np.eye(3)
+            if one.foreign:
+                felt = felt_by(self.repeat(values, one), one, np.eye(3))
+                pairs.setdefault(one.log, []).append((felt, one.felt[1]))
+        self.mountings |= {log: mounting_of(own) for log, own in pairs.items()}
 
     def repeat(self, values: Floats, motion: Observed) -> Response:
         payload = self.parameters.payload(values, motion.payload)
@@ -134,7 +129,8 @@ def fit_twin(
     stops, arm, ringings = agreeing(description, logs, progress)
     progress("fitting springs and drives to the stops")
     modal = arm.parameters(fit_from_many(arm, ringings).logarithms)
-    payloads = tuple(dict.fromkeys((*arm.payloads, *_carried(checks))))
+    carried = (log.carried(motion.shaped_stop) for log in checks for motion in motions(log.recording))
+    payloads = tuple(dict.fromkeys((*arm.payloads, *carried)))
     wrong = {(stop.log, stop.motion) for stop in stops if stop.reason == CONTRADICTS}
     seen, others = observe(logs, payloads)
     seen = [one for one in seen if (one.log, one.motion) not in wrong]
@@ -147,8 +143,7 @@ def fit_twin(
     values = _begin(parameters, modal)
     fit.mount(values, seen)
     values, left, slopes = _descend(fit, values, progress)
-    samples = sum(map(len, left))
-    excess = max(sum(float(one @ one) for one in left) / samples, 1.0)
+    excess = max(sum(float(one @ one) for one in left) / sum(map(len, left)), 1.0)
     prior = np.diag(parameters.deviation**-2.0)
     whole = sum((slope.T @ slope for slope in slopes), np.zeros_like(prior)) / excess + prior
     progress("predicting motions that the fit has not seen")
@@ -180,28 +175,22 @@ def fit_twin(
     )
 
 
-def _carried(logs: Sequence[Log]) -> list[Payload]:
-    """Return the payloads of all motions of logs."""
-    return [log.carried(motion.shaped_stop) for log in logs for motion in motions(log.recording)]
-
-
 def _begin(parameters: TwinParameters, modal: Sequence[ModalParameter]) -> Floats:
     """Return the numbers that correspond to the springs and drives fitted to ring-downs, shape (P,)."""
     values = np.zeros(len(parameters.entries))
     drives, links = parameters.description.drives, parameters.description.link_flexibility
     for one in modal:
         for joint in one.joints:
-            table, key, place, guess = "drives", str(one.quantity), joint, 0.0
-            match one.quantity:
-                case "gear_stiffness" | "velocity_gain" | "rotor_inertia":
-                    guess = getattr(drives, key)[place]
-                case "bending_stiffness":
-                    table, key, place = "link_flexibility", "stiffness", links.links.index(joint)
-                    guess = links.stiffness[place]
-                case "position_gain":
-                    guess = drives.position_gain[place] + drives.integral_gain[place]
+            table, key, place = "drives", str(one.quantity), joint
+            if one.quantity == "bending_stiffness":
+                table, key, place = "link_flexibility", "stiffness", links.links.index(joint)
             number = parameters.index(table, key, place)
-            if number is not None and guess > 0.0:
+            if number is None:
+                continue
+            guess = getattr(getattr(parameters.description, table), key)[place]
+            if one.quantity == "position_gain":
+                guess += drives.integral_gain[place]
+            if guess > 0.0:
                 limit = FURTHEST * parameters.deviation[number]
                 values[number] = np.clip(np.log(one.value / guess), -limit, limit)
     return values

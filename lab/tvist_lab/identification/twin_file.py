@@ -87,11 +87,8 @@ def toml_of(description: RobotDescription) -> str:
     """Return a robot file as TOML."""
     content: dict[str, Any] = msgspec.to_builtins(description)
     tables = {name: value for name, value in content.items() if isinstance(value, dict) and value}
-    lines = [
-        f"{name} = {_value(value)}\n"
-        for name, value in content.items()
-        if isinstance(value, list | tuple) and value
-    ]
+    lists = {name: value for name, value in content.items() if isinstance(value, list | tuple) and value}
+    lines = [f"{name} = {_value(value)}\n" for name, value in lists.items()]
     for name, table in tables.items():
         lines += [f"\n[{name}]\n", *(f"{_key(key)} = {_value(value)}\n" for key, value in table.items())]
     return "".join(lines)

@@ -99,18 +99,12 @@ class ArmModes:
         self.description = description
         self.payloads = tuple(payloads)
         self.unknowns = unknowns(description)
-        self._flexible: list[FlexibleModel] = [flexible_model(description, body(p)) for p in payloads]
-        self._masses = [mass_matrix(flexible) for flexible in self._flexible]
+        self.flexible: list[FlexibleModel] = [flexible_model(description, body(p)) for p in payloads]
+        self._masses = [mass_matrix(flexible) for flexible in self.flexible]
         self.guess: Floats = np.log([unknown.guess for unknown in self.unknowns])
         """Logarithms of the guesses, shape (P,)."""
         self.deviation: Floats = np.array([unknown.deviation for unknown in self.unknowns])
         """Standard deviations of these logarithms, shape (P,)."""
-        self.furthest: Floats = FURTHEST * self.deviation
-        """Largest differences of these logarithms from the guesses, shape (P,)."""
-
-    def flexible(self, payload: int) -> FlexibleModel:
-        """Return the model with one of the payloads."""
-        return self._flexible[payload]
 
     def mass(self, q: Floats, payload: int) -> Floats:
         """Return M(q), shape (L, L)."""
@@ -123,7 +117,7 @@ class ArmModes:
 
     def drivetrain(self, logarithms: Floats) -> Drivetrain:
         """Return springs and drives for the parameters' logarithms, shape (P,)."""
-        return drivetrain(self.parameters(logarithms), self.description, self._flexible[0])
+        return drivetrain(self.parameters(logarithms), self.description, self.flexible[0])
 
     def parameters(self, logarithms: Floats, deviations: Floats | None = None) -> tuple[ModalParameter, ...]:
         """Convert logarithms and their standard deviations to parameters of a calibration."""
@@ -135,17 +129,10 @@ class ArmModes:
 def heavier(description: RobotDescription, carried: Body) -> list[tuple[RobotDescription, Body]]:
     """Return descriptions and payloads with one mass each larger by a standard deviation."""
     links, found = description.links, []
-    for link in range(description.joints):
-        factor = np.ones(description.joints)
-        factor[link] += LINK_MASS
+    for factor in 1.0 + LINK_MASS * np.eye(description.joints):
         mass = tuple((factor * links.mass).tolist())
-        inertia = tuple((factor[:, None] * links.inertia).tolist())
-        found.append(
-            (
-                replace(description, links=replace(links, mass=mass, inertia=tuple(map(tuple, inertia)))),
-                carried,
-            )
-        )
+        inertia = tuple(map(tuple, (factor[:, None] * links.inertia).tolist()))
+        found.append((replace(description, links=replace(links, mass=mass, inertia=inertia)), carried))
     more = PAYLOAD_MASS * description.limits.payload
     return [*found, (description, replace(carried, mass=carried.mass + more))]
 

@@ -51,9 +51,7 @@ def workspace_map(
     moved = [joint for joint in range(count) if changing.high[joint] > changing.low[joint]]
     first, second = sorted([*moved, *(joint for joint in range(count) if joint not in moved)][:2])
     middle = np.zeros(description.joints)
-    middle[:count] = [0.5 * (low + high) for low, high in zip(changing.low, changing.high, strict=True)][
-        :count
-    ]
+    middle[:count] = np.mean([changing.low, changing.high], axis=0)[:count]
     middle[[first, second]] = 0.0
     angles = tuple(np.linspace(whole.low[joint], whole.high[joint], points) for joint in (first, second))
 

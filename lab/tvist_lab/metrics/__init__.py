@@ -13,12 +13,10 @@ from tvist_lab.metrics.common_clock import (
     vibration_after_stop,
 )
 from tvist_lab.metrics.comparison import ComparedMotion, Comparison, MotionPair, compare, pairs, shaper_of
-from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
-from tvist_lab.metrics.residual import Residual, residual
+from tvist_lab.metrics.paper import Residual, Settling, attained_position, distance, residual, settling
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
-from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
 from tvist_lab.metrics.table import (
     MeasuredRecording,
     MotionResult,
@@ -29,7 +27,12 @@ from tvist_lab.metrics.table import (
     table_2,
     table_notes,
 )
-from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration, tool_acceleration
+from tvist_lab.metrics.vibration import (
+    NotMeasurableError,
+    amplitude,
+    best_tool_acceleration,
+    tool_acceleration,
+)
 
 __all__ = [
     "COLUMNS",

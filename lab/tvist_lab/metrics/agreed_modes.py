@@ -25,8 +25,7 @@ from tvist_lab.recordings import Floats
 STARTS = 5  # number of moments at which a fit starts
 MAX_SPACING = 0.04  # longest time between these moments [s]; the vibration must be audible at all of them
 ORDERS = (1, 2, 3, 4)  # numbers of modes to try
-LONGEST = 0.6
-"""Duration of a fit [s]; over a longer one, f_d rises too much."""
+LONGEST = 0.6  # duration of a fit [s]; over a longer one, f_d rises too much
 AUDIBLE = 2.5  # smallest amplitude of a mode at the start of its fit, over the rms of the residual [-]
 SAME_MODE = 0.07  # largest difference of f_d between fits of one mode, and smallest one between two modes [-]
 FOUND_IN = 0.7  # smallest share of the fits that must have found a mode [-]

@@ -71,10 +71,9 @@ def _by_model(
     for number, motion in enumerate(found, 1):
         first = motion.shaped_stop + 1
         rest = slice(first, min(motion.end, first + LISTENED))
-        if rest.stop - first < SHORTEST:
+        gaps = np.any(np.diff(recording["tick"][motion.shaped_stop : motion.end]) != 1.0)
+        if gaps or rest.stop - first < SHORTEST:
             continue
-        if np.any(np.diff(recording["tick"][motion.shaped_stop : motion.end]) != 1.0):
-            continue  # of a rest with gaps nothing is known
         changed = arm.stop(target[rest.stop - 1], *(column[rest] for column in measured))
         yield from (f"After motion {number}, {why}." for why in changed)
 
@@ -159,9 +158,8 @@ def _weight(model: pin.Model, q: Floats) -> Floats:
     return np.asarray(pin.computeGeneralizedGravity(model, model.createData(), q))
 
 
-def _told(change: DetectedChange | None, why: Callable[[DetectedChange], str]) -> Iterator[str]:
-    if change is not None:
-        yield why(change)
+def _told(change: DetectedChange | None, why: Callable[[DetectedChange], str]) -> list[str]:
+    return [] if change is None else [why(change)]
 
 
 def _of_mass(change: DetectedChange) -> str:

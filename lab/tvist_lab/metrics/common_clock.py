@@ -1,19 +1,25 @@
-"""Metrics with all times counted from the start of the reference before shaping."""
+"""Acceleration of the tool in a motion, and metrics with times from the start of the reference before shaping."""
 
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import hilbert
 
-from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.felt import acceleration_of
 from tvist_lab.metrics.motion import DIFFERENTIATOR_TICKS, MotionRows
 from tvist_lab.metrics.ring_down import fit_ring_down
-from tvist_lab.metrics.vibration import amplitude, band_pass, best_tool_acceleration, tool_acceleration
+from tvist_lab.metrics.vibration import (
+    SENSOR,
+    NotMeasurableError,
+    amplitude,
+    band_pass,
+    best_tool_acceleration,
+    low_pass_at,
+    tool_acceleration,
+)
 from tvist_lab.recordings import Floats, Recording
 
-STILL = 0.1
-"""|α| below which an arm counts as at rest [m/s²]."""
+STILL = 0.1  # |α| below which an arm counts as at rest [m/s²]
 AFTER_STOP = 0.010
 """Time after the stop from which `evaluate` searches for the peak, when the last ramp has passed [s]."""
 
@@ -21,8 +27,52 @@ NOISE_PEAK = 5.0  # largest |α| of noise within some seconds, relative to its r
 NOISE_TAIL = 0.2  # time at the end of a rest in which the sensor shows its noise [s]
 RINGS = 0.5  # share of a signal's energy explained by one mode from which it is vibration, not noise [-]
 
+REST = (0.2, 1.0)  # shortest and longest time at the end of a rest from which gravity is found [s]
+
 Kinematics = Callable[[Floats], tuple[Floats, Floats]]
 """Converts joint angles, shape (n,) [rad], to the flange's position, shape (3,) [m], and rotation, shape (3, 3)."""
+
+
+def acceleration_of(
+    recording: Recording, motion: MotionRows, rows: slice, *, smooth: bool = False
+) -> tuple[Floats, Floats]:
+    """Return times, shape (T,) [s], and the tool's acceleration without gravity, shape (T, 3) [m/s²], in some rows.
+
+    In a log of another controller, the tool's mounting is unknown, so gravity is the sensor's mean at the end
+    of the rest; rows without sensor values are left out. `smooth` uses the truth channel if there is one,
+    else the sensor below 60 Hz.
+    """
+    if not recording.foreign:
+        if smooth:
+            return recording.time[rows], best_tool_acceleration(recording, rows)
+        return recording.time[rows], tool_acceleration(recording, rows=rows)
+    if SENSOR not in recording:
+        raise NotMeasurableError(f"the log has no {SENSOR}")
+    shown = np.asarray(np.isfinite(recording[SENSOR]).all(axis=1))
+    gravity = _gravity(recording, motion, shown)
+    if not smooth:
+        kept = shown[rows]
+        return recording.time[rows][kept], (recording[SENSOR][rows] - gravity)[kept]
+    whole = np.flatnonzero(shown[motion.start : motion.end]) + motion.start
+    alpha = low_pass_at(recording.time[whole], recording[SENSOR][whole] - gravity, recording.period)
+    chosen = (whole >= rows.start) & (whole < rows.stop)
+    return recording.time[whole[chosen]], alpha[chosen]
+
+
+def _gravity(recording: Recording, motion: MotionRows, shown: NDArray[np.bool_]) -> Floats:
+    """Return the sensor's mean in the last half of a rest, at most a second [m/s²], shape (3,)."""
+    end = float(recording.time[motion.end - 1])
+    rest = end - float(recording.time[motion.arm_stop(recording)])
+    if rest < 1.5 * REST[0]:
+        raise NotMeasurableError(
+            f"only {rest:.3f} s of rest were recorded after the stop; {1.5 * REST[0]:g} s show gravity"
+        )
+    length = min(max(0.5 * rest, REST[0]), REST[1])
+    first = int(np.searchsorted(recording.time, end - length))
+    at_rest = recording[SENSOR][first : motion.end][shown[first : motion.end]]
+    if not len(at_rest):
+        raise NotMeasurableError(f"{SENSOR} is empty in the rest after the stop")
+    return np.asarray(at_rest.mean(axis=0))
 
 
 def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[float, float]:
@@ -99,8 +149,7 @@ def rigid_acceleration(recording: Recording, motion: MotionRows, kinematics: Kin
     its shaped stop, shape (N, 3).
     """
     first, past = max(motion.start, 1), min(motion.shaped_stop + 1, len(recording) - 1)
-    ticks = recording["tick"][first - 1 : past + 1]
-    if np.any(np.diff(ticks) != 1.0):
+    if np.any(np.diff(recording["tick"][first - 1 : past + 1]) != 1.0):
         raise NotMeasurableError("ticks are missing in the motion")
     poses = [kinematics(q) for q in recording["target_q"][first - 1 : past + 1]]
     position = np.array([pose[0] for pose in poses])

@@ -8,10 +8,9 @@ import numpy as np
 
 from tvist_lab.change import MotionChange
 from tvist_lab.metrics.common_clock import peak_after_stop
-from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.table import IMPACTS, MeasuredRecording, MotionResult, impact_percent
-from tvist_lab.metrics.vibration import TRUTH
+from tvist_lab.metrics.vibration import TRUTH, NotMeasurableError
 from tvist_lab.recordings import Floats, Recording
 
 SAME = 0.02  # largest difference of a joint angle at start and end between motions that correspond [rad]
@@ -46,7 +45,7 @@ class ComparedMotion:
 
     @property
     def change(self) -> MotionChange:
-        """MotionChange of the vibration after the stop."""
+        """Change of the vibration after the stop."""
         both = self.first, self.second
         return MotionChange(*(one.peak_m_s2 for one in both), *(one.still_after_ms for one in both))
 
@@ -72,7 +71,7 @@ class Comparison:
 
 
 def compare(first: MeasuredRecording, second: MeasuredRecording) -> Comparison:
-    """MotionPair as many motions of two recordings as possible, in order."""
+    """Pair as many motions of two recordings as possible, in order."""
     # Motions correspond if they start and end at the same joint angles within 0.02 rad.
     ways = [[MotionEnds.of(one.recording, motion) for motion in one.motions] for one in (first, second)]
     pairs = _pairs(*ways)
@@ -142,7 +141,7 @@ class MotionPair:
 
 
 def pairs(measured: MeasuredRecording) -> list[MotionPair]:
-    """MotionPair each unshaped motion with the same one by each shaper, in the order in which they were made."""
+    """Pair each unshaped motion with the same one by each shaper, in the order in which they were made."""
     # Motions are the same if their references before shaping start and end at the same joint angles within
     # 0.02 rad, and last equally long within 2 %. Events tell whether a motion was shaped, else its delay
     # does.

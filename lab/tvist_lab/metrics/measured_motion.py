@@ -58,11 +58,8 @@ def still_driven(recording: Recording, start: int, stop: int) -> float:
     """Return the time after a stop in which measured joints are faster than 2 % of the motion's speed [s]."""
     past = int(np.searchsorted(recording.time, recording.time[stop] + DRIVEN + PAUSE))
     rows = slice(start, past)
-    if (
-        "actual_q" not in recording
-        or not np.isfinite(recording["actual_q"][rows]).all()
-        or past - start < FEWEST
-    ):
+    known = "actual_q" in recording and np.isfinite(recording["actual_q"][rows]).all()
+    if not known or past - start < FEWEST:
         return 0.0
     time = recording.time[rows]
     q = low_pass_at(time, recording["actual_q"][rows], recording.period, SMOOTHED)

@@ -47,13 +47,8 @@ class MotionRows:
 
     def later(self, rows: int) -> "MotionRows":
         """Return the same motion in a recording with more rows before it."""
-        return replace(
-            self,
-            start=self.start + rows,
-            reference_stop=self.reference_stop + rows,
-            shaped_stop=self.shaped_stop + rows,
-            end=self.end + rows,
-        )
+        places = ("start", "reference_stop", "shaped_stop", "end")
+        return replace(self, **{name: getattr(self, name) + rows for name in places})
 
     def arm_stop(self, recording: Recording) -> int:
         """Return the first row from which the arm is no longer driven, but only vibrates."""

@@ -7,7 +7,6 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares
 
-from tvist_lab.metrics.coloured import widening
 from tvist_lab.recordings import Floats
 
 FREQUENCIES = (3.0, 45.0)
@@ -26,6 +25,7 @@ SIGNIFICANT = 36.0
 """Gain of n ln SSE that noise exceeds in less than one fit of a hundred, at 100 to 500 Hz [-]."""
 CORRELATED = 0.02
 """Time over which the residual of a fit may be correlated, for example by an unmodelled mode [s]."""
+MAX_CORRELATION = 0.97  # largest assumed correlation; beyond it, a residual is a drift [-]
 COLOURS = 4  # order of the autoregression that describes the spectrum of a residual
 
 
@@ -56,7 +56,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class RingDown(Mode):
-    """The mode selected in a ring-down; if `ok` is false, its values must not be used."""
+    """The strongest mode of a ring-down; if `ok` is false, its values must not be used."""
 
     rms: float
     """rms of the residual of the fit, over all axes [m/s²]."""
@@ -82,7 +82,6 @@ def fit_ring_down(
     offset: bool = False,
     skip: float = SKIP,
     window: float | None = None,
-    share: float = 1.0,
     evidence: float | None = None,
 ) -> RingDown:
     """Fit damped sines to a ring-down by vector nonlinear least squares.
@@ -102,11 +101,10 @@ def fit_ring_down(
         offset: Whether to include a constant, for example if gravity is not known exactly.
         skip: Time after the stop that is ignored [s].
         window: Duration of the fit [s]; None to choose it automatically.
-        share: Select the lowest mode with at least this share of the largest amplitude [-]; 1 for the strongest.
         evidence: Smallest n ln(SSE before/SSE after) for another mode [-]; None for the Bayesian information
             criterion, which grows with the number of samples.
 
-    Returns: The selected mode. `ok` is false, with a `reason`, if no mode is measurable.
+    Returns: The strongest mode. `ok` is false, with a `reason`, if no mode is measurable.
     """
     first = round(skip / period)
     if time is None:
@@ -114,7 +112,7 @@ def fit_ring_down(
     else:
         first = int(np.searchsorted(time, skip - 1e-9))
         late = time[first:]
-    ring = Ring(alpha[first:], late, period, (*slow_poles, 0.0) if offset else slow_poles, share, evidence)
+    ring = Ring(alpha[first:], late, period, (*slow_poles, 0.0) if offset else slow_poles, evidence)
     if window is not None:
         return ring.cut(window).fit(modes)
     if ring.length < WINDOWS[0]:
@@ -122,8 +120,7 @@ def fit_ring_down(
             f"only {ring.length:.3f} s were recorded after the stop, {WINDOWS[0]} s are needed"
         )
     fit = ring.cut(WINDOW).fit(modes)
-    sigma = decay_rate(fit.f_d, fit.zeta)
-    audible = math.log(max(fit.amplitude / max(fit.rms, 1e-12), 2.0)) / sigma
+    audible = math.log(max(fit.amplitude / max(fit.rms, 1e-12), 2.0)) / decay_rate(fit.f_d, fit.zeta)
     chosen = min(max(audible, WINDOWS[0]), WINDOWS[1])
     return ring.cut(chosen).fit(modes) if chosen != fit.window else fit
 
@@ -137,13 +134,10 @@ class Ring:
         time: Floats,
         period: float,
         slow_poles: tuple[float, ...],
-        share: float = 1.0,
         evidence: float | None = None,
     ) -> None:
-        self.alpha, self.time = alpha, time
-        self.share, self.evidence = share, evidence
-        self.period = period
-        self.slow_poles = slow_poles
+        self.alpha, self.time, self.period = alpha, time, period
+        self.slow_poles, self.evidence = slow_poles, evidence
         self.length = float(time[-1] - time[0]) + period if len(time) else 0.0
         self.highest = min(FREQUENCIES[1], 0.45 / period)
         self._slow = [np.exp(-pole * time) for pole in slow_poles]
@@ -151,9 +145,7 @@ class Ring:
     def cut(self, window: float) -> "Ring":
         """Return the first part of the ring-down."""
         past = int(np.searchsorted(self.time, self.time[0] + window - 0.5 * self.period))
-        return Ring(
-            self.alpha[:past], self.time[:past], self.period, self.slow_poles, self.share, self.evidence
-        )
+        return Ring(self.alpha[:past], self.time[:past], self.period, self.slow_poles, self.evidence)
 
     def basis(self, parameters: Floats) -> Floats:
         """Return the columns of the linear part for (f_d, ζ) of each mode, shape (T, 2 modes + slow poles)."""
@@ -187,8 +179,7 @@ class Ring:
             for f_d in np.geomspace(1.1 * FREQUENCIES[0], 0.9 * self.highest, 28)
             for zeta in (0.04, 0.12, 0.3)
         ]
-        starts = sorted(grid)[:3]
-        fits = [self.refine(np.append(parameters, [f_d, zeta])) for _, f_d, zeta in starts]
+        fits = [self.refine(np.append(parameters, [f_d, zeta])) for _, f_d, zeta in sorted(grid)[:3]]
         return min(fits, key=lambda fit: fit[0])[1]
 
     def refine(self, start: Floats) -> tuple[float, Floats]:
@@ -246,19 +237,18 @@ class Ring:
         return modes, left.reshape(self.alpha.shape)
 
     def _judge(self, parameters: Floats) -> RingDown:
-        """Return the selected mode with its standard errors, `ok` if they are small enough."""
+        """Return the strongest mode with its standard errors, `ok` if they are small enough."""
         modes, left = self.modes_at(parameters)
-        loudest = max(mode.amplitude for mode in modes)
-        mode = min((m for m in modes if m.amplitude >= self.share * loudest), key=lambda m: m.f_d)
+        found = tuple(sorted(modes, key=lambda one: -one.amplitude))
         energy = float(np.sum(self.alpha**2))
         fit = RingDown(
-            **vars(mode),
+            **vars(found[0]),
             rms=float(np.sqrt(np.mean(left**2))),
             r_squared=1.0 - float(np.sum(left**2)) / energy if energy > 0.0 else 0.0,
             window=self.length,
             modes=len(modes),
             ok=True,
-            found=tuple(sorted(modes, key=lambda one: -one.amplitude)),
+            found=found,
         )
         reason = _objection(fit, self.highest)
         return replace(fit, ok=not reason, reason=reason)
@@ -295,8 +285,7 @@ class Ring:
 
     def _coloured(self, left: Floats, frequencies: Floats) -> Floats:
         """Return the same, at least the value from successive samples, which no missing mode hides."""
-        slow = widening(left.reshape(self.alpha.shape)) ** 2
-        return np.maximum(self.colour(left, frequencies), slow)
+        return np.maximum(self.colour(left, frequencies), widening(left.reshape(self.alpha.shape)) ** 2)
 
     def _score_covariance(self, jacobian: Floats, left: Floats) -> Floats:
         """Return the covariance of the residual's part in the direction of each parameter, shape (P, P)."""
@@ -308,6 +297,21 @@ class Ring:
             product = scores[lag:].T @ scores[:-lag]
             total += (1.0 - lag / (lags + 1.0)) * (product + product.T)
         return np.asarray(total)
+
+
+def widening(residual: Floats, fitted: int = 0) -> float:
+    """Return the factor on standard errors for a coloured residual, sqrt((1 + r)/(1 - r)), at least 1.
+
+    r is the correlation of successive samples, as of a first-order autoregression. `residual` has shape (T,)
+    or (T, axes), in the order of time. For each of the `fitted` slow functions of time, (1 + 3 r)/T is added
+    to the correlation found (Marriott and Pope, Biometrika 41, 1954, for the mean).
+    """
+    energy = float(np.sum(residual**2))
+    if energy <= 0.0:
+        return 1.0
+    r = float(np.sum(residual[1:] * residual[:-1])) / energy
+    r = min(max(r + fitted * (1.0 + 3.0 * r) / len(residual), 0.0), MAX_CORRELATION)
+    return float(np.sqrt((1.0 + r) / (1.0 - r)))
 
 
 def decay_rate(f_d: float, zeta: float) -> float:

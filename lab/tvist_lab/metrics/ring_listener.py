@@ -6,6 +6,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from tvist_controller.api.line import mass_matrix
+from tvist_lab.metrics.ring_down import SLOW_POLE
 from tvist_lab.recordings import Floats
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.imperfections import YieldingBase, on_base
@@ -17,8 +18,6 @@ from tvist_shaping.estimators.modal import Modal
 
 MODES = 4  # number of modes that may ring, from the lowest
 HIGHEST = 100.0  # largest frequency of a mode [Hz]
-SLOW_POLE = 17.5
-"""Rate of the non-oscillatory tail that a position loop adds [1/s]."""
 SKIP = 3  # ticks after the stop that are ignored, since the end of the deceleration is no ring-down
 SCALES = np.linspace(-0.4, 0.3, 29)  # logarithms of the common frequency factors to try
 BASES = np.geomspace(1e6, 3e4, 20)
@@ -132,6 +131,5 @@ def _of_file(description: RobotDescription, joints: Integers, size: int) -> Floa
 
 def _standing(rows: Floats, base: float) -> Drivetrain:
     """Return springs and drives of an arm on a base that yields about two axes."""
-    foot = np.zeros((5, 2))
-    foot[0], foot[4] = base, base * YieldingBase().damping_time
+    foot = np.outer([base, 0.0, 0.0, 0.0, base * YieldingBase().damping_time], [1.0, 1.0])
     return Drivetrain(*(tuple(row.tolist()) for row in np.hstack([foot, rows])))

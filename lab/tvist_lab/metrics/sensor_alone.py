@@ -8,9 +8,8 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import correlate
 from scipy.stats import spearmanr
 
-from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.ring_down import FREQUENCIES, fit_ring_down
-from tvist_lab.metrics.vibration import SENSOR, parts
+from tvist_lab.metrics.vibration import SENSOR, NotMeasurableError, parts
 from tvist_lab.recordings import Floats, Recording
 
 LEVEL = 0.05  # time over which the level of a vibration is averaged [s]

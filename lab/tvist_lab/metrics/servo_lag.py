@@ -5,8 +5,7 @@ import numpy as np
 from tvist_lab.metrics.vibration import SENSOR, low_pass_at
 from tvist_lab.recordings import Floats, Recording
 
-LONGEST = 0.2
-"""Longest lag in the search [s]."""
+LONGEST = 0.2  # longest lag in the search [s]
 FOLLOWS = 0.05
 """Largest remaining variance of the distance, relative to the target's, if the arm follows it [-]."""
 LONGEST_FELT = 0.08  # longest lag in the search with the accelerometer [s]

@@ -7,15 +7,18 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from tvist_lab.metrics.agreed_modes import agreed_modes, lighter_beside
-from tvist_lab.metrics.common_clock import peak_acceleration, still_after, vibration_after_stop
-from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.felt import acceleration_of
+from tvist_lab.metrics.common_clock import (
+    acceleration_of,
+    peak_acceleration,
+    still_after,
+    vibration_after_stop,
+)
 from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
-from tvist_lab.metrics.residual import Residual, residual
+from tvist_lab.metrics.paper import Residual, Settling, residual, settling
 from tvist_lab.metrics.ring_down import SIGNIFICANT, SKIP, SLOW_POLE, Mode, RingDown, fit_ring_down
 from tvist_lab.metrics.servo_lag import servo_lag
-from tvist_lab.metrics.settling import Settling, settling
+from tvist_lab.metrics.vibration import NotMeasurableError
 from tvist_lab.recordings import MissingColumnError, Recording
 
 COLUMNS = ("delay_ms", "stabilisation_ms", "cycle_ms", "overshoot_m", "residual_vibration_m_s2")
@@ -127,9 +130,8 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
     after = attempt(vibration_after_stop, "peak_m_s2", "envelope_m_s2")
     strongest = attempt(peak_acceleration, "peak_acceleration_rad_s2")
     ringing = attempt(_ring_down, "f_d_hz", "f_d_interval_hz", "zeta", "zeta_interval")
-    if ringing is not None:
-        doubts = filter(None, (_suspicion(mode, ringing.found) for mode in ringing.found))
-        notes |= dict.fromkeys(("zeta",) if (doubt := next(doubts, "")) else (), doubt)
+    if ringing is not None and (doubt := _suspicion(ringing.found)):
+        notes["zeta"] = doubt
     lag = motion.lag if recording.foreign else servo_lag(recording, motion.start, motion.shaped_stop)
     if lag is None:
         notes["servo_lag_ms"] = "no measured angles follow a target"
@@ -174,14 +176,15 @@ def _mode(mode: Mode) -> dict[str, Any]:
     }
 
 
-def _suspicion(mode: Mode, modes: Sequence[Mode]) -> str:
+def _suspicion(modes: Sequence[Mode]) -> str:
     """Return a note if a mode has suspiciously more damping than a lighter one near it."""
-    if (near := lighter_beside(mode, modes)) is None:
-        return ""
-    return (
-        f"the damping of {mode.zeta:.2f} at {mode.f_d:.1f} Hz is doubtful beside {near.zeta:.2f} at {near.f_d:.1f} Hz: "
-        "the arm may still have been driven, or two modes may have been taken for one"
-    )
+    for mode in modes:
+        if (near := lighter_beside(mode, modes)) is not None:
+            return (
+                f"the damping of {mode.zeta:.2f} at {mode.f_d:.1f} Hz is doubtful beside {near.zeta:.2f} at "
+                f"{near.f_d:.1f} Hz: the arm may still have been driven, or two modes may have been taken for one"
+            )
+    return ""
 
 
 def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:

@@ -7,7 +7,6 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.recordings.checks import LONG_GAP
 from tvist_plant.tool_acceleration import tool_acceleration as without_gravity
@@ -16,10 +15,12 @@ BAND = (3.0, 60.0)  # frequency range of an arm's vibrations [Hz]
 SENSOR = "actual_tool_accelerometer"
 TRUTH = "truth_tool_acceleration"
 TRUE_POSE = "truth_flange_pose"
-
-
 FILLED = 10  # largest factor by which filling gaps may extend a part of a log, to bound the memory
 ALL = slice(None)
+
+
+class NotMeasurableError(ValueError):
+    """A metric cannot be computed from this recording; the message gives the reason."""
 
 
 def tool_acceleration(recording: Recording, *, truth: bool = False, rows: slice = ALL) -> Floats:
@@ -81,9 +82,9 @@ def parts(time: Floats) -> list[slice]:
     return [slice(first, past) for first, past in pairwise(ends)]
 
 
-def band_pass(signal: Floats, period: float, band: tuple[float, float] = BAND) -> Floats:
+def band_pass(signal: Floats, period: float) -> Floats:
     """Band-pass filter a signal with zero phase (Butterworth, forwards and backwards)."""
-    band = (band[0], min(band[1], 0.45 / period))
+    band = (BAND[0], min(BAND[1], 0.45 / period))
     return _both_ways(_designed(2, band, "bandpass", 1.0 / period), signal)
 
 

@@ -98,11 +98,7 @@ def _move(move: ProgramMove) -> dict[str, Any]:
 
 
 def _fastest(fastest: Fastest, unit: str) -> dict[str, Any]:
-    return {
-        f"speed_{unit}": fastest.speed,
-        "timestamp": seconds(fastest.tick),
-        "line": fastest.line or None,
-    }
+    return {f"speed_{unit}": fastest.speed, "timestamp": seconds(fastest.tick), "line": fastest.line or None}
 
 
 def junit(results: Sequence[Mapping[str, Any]]) -> bytes:

@@ -18,7 +18,7 @@ from tvist_protocol.io import SetRegisters, SimulationSetInputs
 from tvist_protocol.programs import ProgramClosePopup, ProgramRun
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_server.config import ServeConfig
-from tvist_server.gateways.starting import Prepare
+from tvist_server.gateways.base import Prepare
 from tvist_server.option_values import StartError
 from tvist_server.recording.recorder import Recorder
 from tvist_server.server import Server

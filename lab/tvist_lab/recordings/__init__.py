@@ -9,11 +9,4 @@ from tvist_lab.recordings.recording import (
     RecordingError,
 )
 
-__all__ = [
-    "STATE_COLUMNS",
-    "Floats",
-    "MissingColumnError",
-    "Recording",
-    "RecordingError",
-    "read",
-]
+__all__ = ["STATE_COLUMNS", "Floats", "MissingColumnError", "Recording", "RecordingError", "read"]

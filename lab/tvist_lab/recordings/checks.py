@@ -1,6 +1,7 @@
-"""Check recordings from files once, on reading: names, numbers, shapes, times."""
+"""Check recordings from files once, on reading: size, names, numbers, shapes, times."""
 
 import re
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -30,12 +31,36 @@ MAX_VALUE = 1e6  # largest number in such a column; more is damage
 LONG_GAP = 1.0  # longest gap between rows that is filled with straight lines [s]; a longer one splits the log
 Places = tuple[str, Floats]
 """Position of rows in a file: what is counted, such as "line", and the number of each row, shape (T,)."""
+GZIP = b"\x1f\x8b"
+DENSEST = (
+    100  # largest ratio of the content of a packed log to its size; logs reach 30, a malicious file 1000
+)
+MIN_CONTENT = 1 << 20  # size of the content that any file may have [bytes]
 PERIODS = (1e-4, 0.1)
 """Shortest and longest time between rows [s]; others are not in seconds, or too slow for vibration."""
 
 
 class LogError(RecordingError):
     """A file is no measurable log; the message names the file and, if there is one, the line."""
+
+
+def content(path: Path) -> bytes:
+    """Return a file's content, decompressed if it is gzip; of a truncated file, the available part."""
+    data = path.read_bytes()
+    if not data.startswith(GZIP):
+        return data
+    room, parts = MIN_CONTENT + DENSEST * len(data), list[bytes]()
+    while data.startswith(GZIP):
+        unpacker = zlib.decompressobj(wbits=31)
+        try:
+            parts.append(unpacker.decompress(data, room))
+        except zlib.error as error:
+            raise LogError(f"{path} is compressed by gzip and damaged: {error}") from None
+        if unpacker.unconsumed_tail:
+            raise LogError(f"{path} grows beyond {DENSEST} times its size: decompress it with gunzip")
+        room -= len(parts[-1])
+        data = unpacker.unused_data if room > 0 else b""
+    return b"".join(parts)
 
 
 def is_measured(name: str) -> bool:

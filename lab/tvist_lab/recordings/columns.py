@@ -80,12 +80,12 @@ def rtde_names(
     if columns is not None:
         return *_given(path, columns, header), ()
     own = [_own_name(name, header) for name in header]
-    vendor = _vendor_of(header)
-    if vendor is None:
+    if (known := _vendor_of(header)) is None:
         return own, {}, ()
-    names, units = _given(path, vendor[1], header)
+    vendor, there = known
+    names, units = _given(path, there, header)
     names = [name or ("" if other in names else other) for name, other in zip(names, own, strict=True)]
-    return names, units, (f"the columns have the names of {vendor[0]}",)
+    return names, units, (f"the columns have the names of {vendor}",)
 
 
 def found_columns(names: Sequence[str], but: int | None = None) -> str:
@@ -104,13 +104,8 @@ def _own_name(name: str, names: Sequence[str]) -> str:
 def _vendor_of(header: Sequence[str]) -> tuple[str, str] | None:
     """Return a header's vendor, and the map of its columns that exist; None if unknown."""
     for vendor, columns in VENDORS.items():
-        items = columns.split(",")
-        patterns = (item.partition("=")[2].partition(":")[0] for item in items)
-        there = [
-            item
-            for item, pattern in zip(items, patterns, strict=True)
-            if any(map(_entry_of(pattern).fullmatch, header))
-        ]
+        entries = {one: _entry_of(one.partition("=")[2].partition(":")[0]) for one in columns.split(",")}
+        there = [item for item, entry in entries.items() if any(map(entry.fullmatch, header))]
         if any(item.startswith(("q=", "accelerometer=")) for item in there):
             return vendor, ",".join(there)
     return None

@@ -34,25 +34,23 @@ class ColumnMeaning:
     """Its SI unit, or one for each half of a vector of six; "-" for a ratio; empty without a unit."""
     whole: bool = False
 
+    @property
     def unit(self) -> str:
-        """Return the unit or units as text, such as `m, rad` for a pose."""
+        """The unit or units as text, such as `m, rad` for a pose."""
         return ", ".join(self.units)
-
-    def unit_of_entry(self, index: int, width: int) -> str:
-        """Return the unit of one entry of a vector of `width` entries."""
-        if not self.units:
-            return ""
-        return self.units[index * len(self.units) // width]
 
 
 @cache
 def meaning_of(column: str) -> ColumnMeaning:
     """Describe a column: a field of `state`, of `truth` (with its prefix) or of `io`, or RTDE's variable."""
+    from tvist_server.gateways.ur.rtde.table import describe
+
     if column == GYROSCOPE:
         return ColumnMeaning("Angular velocity of the tool, in the axes of its sensor", ("rad/s",))
     if column.startswith(TRUTH_PREFIX):
         return _of_fields(Truth).get(column.removeprefix(TRUTH_PREFIX), ColumnMeaning(""))
-    return _of_fields(State).get(column) or _of_fields(Io).get(column) or _of_rtde(column)
+    own = _of_fields(State).get(column) or _of_fields(Io).get(column)
+    return own or _described(describe(column), whole=False)
 
 
 @cache
@@ -65,17 +63,10 @@ def _of_fields(kind: type[msgspec.Struct]) -> dict[str, ColumnMeaning]:
     }
 
 
-def _of_rtde(column: str) -> ColumnMeaning:
-    from tvist_server.gateways.ur.rtde.table import describe
-
-    return _described(describe(column), whole=False)
-
-
 def _described(text: str, whole: bool) -> ColumnMeaning:
     """Split a description into words and the units in its brackets; `[N, N m]` are two."""
-    units = [
-        unit for found in _UNIT.findall(text) for unit in found.split(", ") if not unit.startswith("by ")
-    ]
+    every = (unit for found in _UNIT.findall(text) for unit in found.split(", "))
+    units = [unit for unit in every if not unit.startswith("by ")]
     return ColumnMeaning(_UNIT.sub("", text).rstrip(".").strip(), tuple(units), whole)
 
 
@@ -102,7 +93,7 @@ class Description(msgspec.Struct, frozen=True):
         """Return the recording of a table, shape (T, columns); None if it has other columns than described."""
         places, columns = {name: at for at, name in enumerate(names)}, dict[str, Floats]()
         for name, about in self.columns.items():
-            flat = [name] if about.width is None else [f"{name}_{index}" for index in range(about.width)]
+            flat = flat_names(name, about.width)
             if not places.keys() >= set(flat):
                 return None
             found = values[:, [places.pop(one) for one in flat]]
@@ -110,6 +101,16 @@ class Description(msgspec.Struct, frozen=True):
         if places:
             return None
         return Recording(columns, tuple(self.events), self.info, tuple(self.notes), foreign=self.foreign)
+
+
+def flat_names(name: str, width: int | None) -> list[str]:
+    """Return the names of a column's entries in a table; `width` is None for a column of numbers."""
+    return [name] if width is None else [f"{name}_{index}" for index in range(width)]
+
+
+def width_of(values: Floats) -> int | None:
+    """Return the number of entries in a row of a column; None for a column of numbers."""
+    return None if values.ndim == 1 else values.shape[1]
 
 
 def ordered(recording: Recording) -> dict[str, Floats]:
@@ -122,9 +123,7 @@ def ordered(recording: Recording) -> dict[str, Floats]:
 def describe(recording: Recording) -> bytes:
     """Return the description of a recording as JSON in ASCII."""
     columns = {
-        name: ColumnDescription(
-            None if values.ndim == 1 else values.shape[1], meaning_of(name).unit(), meaning_of(name).meaning
-        )
+        name: ColumnDescription(width_of(values), meaning_of(name).unit, meaning_of(name).meaning)
         for name, values in ordered(recording).items()
     }
     described = Description(

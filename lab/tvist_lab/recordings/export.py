@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import polars as pl
 
-from tvist_lab.recordings.description import KEY, describe, meaning_of, ordered, sidecar
+from tvist_lab.recordings.description import KEY, describe, flat_names, meaning_of, ordered, sidecar, width_of
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.whole_file import whole_file
 
@@ -53,14 +53,12 @@ def flat(recording: Recording) -> pl.DataFrame:
     columns: list[pl.Series] = []
     for name, values in ordered(recording).items():
         whole = meaning_of(name).whole and _exact(values)
-        for flat_name, entries in [(name, values)] if values.ndim == 1 else _entries(name, values):
+        for flat_name, entries in zip(
+            flat_names(name, width_of(values)), np.atleast_2d(values.T), strict=True
+        ):
             column = pl.Series(flat_name, np.ascontiguousarray(entries))
             columns.append(column.fill_nan(None).cast(pl.Int64) if whole else column)
     return pl.DataFrame(columns)
-
-
-def _entries(name: str, values: Floats) -> list[tuple[str, Floats]]:
-    return [(f"{name}_{index}", values[:, index]) for index in range(values.shape[1])]
 
 
 def _exact(values: Floats) -> bool:
@@ -85,16 +83,17 @@ def _csv_on_the_web(recording: Recording, path: Path) -> bytes:
     """Describe a CSV as in the W3C's "CSV on the Web"; further content is a note."""
     columns = []
     for name, values in ordered(recording).items():
-        found = meaning_of(name)
-        width = 1 if values.ndim == 1 else values.shape[1]
+        found, flat_name = meaning_of(name), flat_names(name, width_of(values))
         columns += [
             {
-                "name": name if values.ndim == 1 else f"{name}_{index}",
+                "name": one,
                 "datatype": "integer" if found.whole and _exact(values) else "double",
-                "schema:unitText": found.unit_of_entry(index, width),
+                "schema:unitText": found.units[index * len(found.units) // len(flat_name)]
+                if found.units
+                else "",
                 "dc:description": found.meaning,
             }
-            for index in range(width)
+            for index, one in enumerate(flat_name)
         ]
     content = {
         "@context": "http://www.w3.org/ns/csvw",
@@ -106,14 +105,9 @@ def _csv_on_the_web(recording: Recording, path: Path) -> bytes:
 
 
 def _reason(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
     found = _SYSTEM.search(str(error))
-    return found[1] if found else str(error)
+    return getattr(error, "strerror", None) or (found[1] if found else str(error))
 
 
-FORMATS: dict[str, Callable[[Recording, IO[bytes]], None]] = {
-    "csv": _write_csv,
-    "parquet": _write_parquet,
-}
+FORMATS: dict[str, Callable[[Recording, IO[bytes]], None]] = {"csv": _write_csv, "parquet": _write_parquet}
 """Function that writes each format; a file's ending is the format's name."""

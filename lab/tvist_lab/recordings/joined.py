@@ -64,12 +64,8 @@ def joined(
     if not force:
         columns[GYROSCOPE] = size * sensor[GYROSCOPE][kept]
     columns["tick"], gaps = ticks_of(at[kept])
-    notes = [
-        *recording.notes,
-        *(f"{imu}: {note}" for note in sensor.notes),
-        _said(imu, clocks, force=force),
-        *assumed,
-    ]
+    own = (f"{imu}: {note}" for note in sensor.notes)
+    notes = [*recording.notes, *own, _said(imu, clocks, force=force), *assumed]
     if size != 1.0:
         notes.append(f"{imu}: {GYROSCOPE} is taken as deg/s")
     if name == "target_q":

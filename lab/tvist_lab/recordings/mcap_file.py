@@ -62,35 +62,36 @@ class RecordingFile:
     @cached_property
     def states(self) -> tuple[State, ...]:
         """Recorded states, read from the file again; NaN for numbers that were not finite."""
-        return tuple(self.messages(State))
+        return tuple(self.again(State))
 
     @cached_property
     def truths(self) -> tuple[Truth, ...]:
         """Recorded truth; empty unless the robot published it."""
-        return tuple(self.messages(Truth))
+        return tuple(self.again(Truth))
 
-    @cached_property
-    def io(self) -> tuple[Io, ...]:
-        """Recorded inputs, outputs and registers; empty in older files."""
-        return tuple(self.messages(Io))
-
-    def messages(self, kind: type[_Kind]) -> Iterator[_Kind]:
-        """Read messages of a kind again, one by one."""
-        for message in self._again((kind,), kind):
-            assert isinstance(message, kind)
-            yield message
-
-    def published(self) -> Iterator[Published]:
-        """Read all that the robot published again, in order, up to the last state."""
-        return self._again((State, Truth, Event, Io), State)
-
-    def _again(self, kinds: Sequence[type[Published]], counted: type[Published]) -> Iterator[Published]:
-        left = self.counts[tag(counted)]
-        for message in _again(self.files, kinds):
-            left -= isinstance(message, counted)
-            if left < 0:
-                return
-            yield message
+    def again(self, kind: type[_Kind], *others: type[Published]) -> Iterator[Any]:
+        """Read messages of some kinds again, in order, up to the last one of the first kind."""
+        left = self.counts[tag(kind)]
+        readers: dict[str, JsonReader[Any]] = {tag(one): JsonReader(one) for one in (kind, *others)}
+        channels: dict[int, JsonReader[Any]] = {}
+        try:
+            with opened(self.files) as streams:
+                for record in all_records(streams):
+                    match record:
+                        case Message(channel_id=channel, data=data) if channel in channels:
+                            message = channels[channel].read(data)
+                            left -= isinstance(message, kind)
+                            if left < 0:
+                                return
+                            yield message
+                        case Channel(topic=topic, message_encoding="json"):
+                            found = TOPIC.fullmatch(topic)
+                            if found is not None and found["kind"] in readers:
+                                channels[record.id] = readers[found["kind"]]
+        except OSError as error:
+            raise RecordingFileError(f"{error.filename} cannot be read: {error.strerror}") from error
+        except (*DAMAGE, ProtocolError):  # up to there it was read the first time
+            pass
         if left > 0:
             raise RecordingFileError(f"{self.path} has changed since it was read")
 
@@ -122,26 +123,6 @@ def read_checked(path: str | os.PathLike[str]) -> RecordingFile:
     return content
 
 
-def _again(files: Sequence[Path], kinds: Sequence[type[Published]]) -> Iterator[Published]:
-    """Read messages of some kinds up to the end or damage of the files."""
-    readers: dict[str, JsonReader[Published]] = {tag(kind): JsonReader(kind) for kind in kinds}
-    channels: dict[int, JsonReader[Published]] = {}
-    try:
-        with opened(files) as streams:
-            for record in all_records(streams):
-                match record:
-                    case Message(channel_id=channel, data=data) if channel in channels:
-                        yield channels[channel].read(data)
-                    case Channel(topic=topic, message_encoding="json"):
-                        found = TOPIC.fullmatch(topic)
-                        if found is not None and found["kind"] in readers:
-                            channels[record.id] = readers[found["kind"]]
-    except OSError as error:
-        raise RecordingFileError(f"{error.filename} cannot be read: {error.strerror}") from error
-    except (*DAMAGE, ProtocolError):
-        return
-
-
 @dataclass
 class _Content:
     """The content that has been read."""
@@ -165,21 +146,18 @@ class _Content:
 
     def read(self, streams: Sequence[IO[bytes]]) -> None:
         try:
-            self._read(streams)
+            try:
+                for record in all_records(streams):
+                    self._take(record)
+            except RecordingFileError:
+                raise
+            except CUT:
+                self.damage = "was not closed"
+            except DAMAGE as error:
+                self.damage = f"is damaged ({error or type(error).__name__})"
             self._decode()
         except ProtocolError as error:
             self.damage = f"contains an invalid message ({error.why})"
-
-    def _read(self, streams: Sequence[IO[bytes]]) -> None:
-        try:
-            for record in all_records(streams):
-                self._take(record)
-        except RecordingFileError:
-            raise
-        except CUT:
-            self.damage = "was not closed"
-        except DAMAGE as error:
-            self.damage = f"is damaged ({error or type(error).__name__})"
 
     def file(self) -> RecordingFile:
         if self.robot is None:
@@ -214,8 +192,7 @@ class _Content:
     def _take(self, record: McapRecord) -> None:
         match record:
             case Message():
-                kind = self.channels.get(record.channel_id)
-                if kind is not None:
+                if (kind := self.channels.get(record.channel_id)) is not None:
                     self.waiting.append((kind, record.data))
                     if len(self.waiting) >= BLOCK:
                         self._decode()
@@ -255,7 +232,7 @@ class _Content:
             if kind in by_kind
         }
         for kind, block in blocks.items():
-            self.tables[kind].add(block)
+            self.tables[kind].blocks.append(block)
         for kind, found in objects.items():
             self.objects[kind] += found
 

@@ -34,25 +34,20 @@ class JsonColumns:
         fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
         self._types = {name: one for name, field in fields.items() if (one := _type(field.type)) is not None}
         self._fields = {name: fields[name] for name in self._types}
-        self._blocks: list[dict[str, Floats]] = []
+        self.blocks: list[dict[str, Floats]] = []
 
     def __len__(self) -> int:
-        return sum(len(block["tick"]) for block in self._blocks)
+        return sum(len(block["tick"]) for block in self.blocks)
 
     def decode(self, messages: Sequence[bytes]) -> dict[str, Floats]:
         """Decode messages, at least one."""
-        block = self._at_once(messages)
-        if block is None:
-            return block_of([self._reader.read(message) for message in messages], self._fields)
-        return block
-
-    def add(self, block: dict[str, Floats]) -> None:
-        """Keep a block."""
-        self._blocks.append(block)
+        if (block := self._at_once(messages)) is not None:
+            return block
+        return block_of([self._reader.read(message) for message in messages], self._fields)
 
     def all(self) -> dict[str, Floats]:
         """Return all messages as one block, only once; column by column, which halves the memory."""
-        blocks, self._blocks = self._blocks, []
+        blocks, self.blocks = self.blocks, []
         return {name: _joined([block.pop(name) for block in blocks]) for name in self._fields}
 
     def _at_once(self, messages: Sequence[bytes]) -> dict[str, Floats] | None:

@@ -6,8 +6,8 @@ from pathlib import Path
 from pkgutil import iter_modules
 
 from tvist_lab.recordings import formats
+from tvist_lab.recordings.checks import GZIP, content
 from tvist_lab.recordings.mcap_records import files_of
-from tvist_lab.recordings.packed import GZIP, content
 from tvist_lab.recordings.recording import Recording, RecordingError
 from tvist_lab.recordings.table import BINARY, READERS, ROBOT, TEXT, Needs, Reader, to_recording
 from tvist_plant.user_file import UserFileError, check_is_file

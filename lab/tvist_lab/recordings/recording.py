@@ -57,13 +57,11 @@ class Recording:
     tool rotated against the flange, and the arm may follow its target late."""
 
     def __post_init__(self) -> None:
-        lengths = {name: len(column) for name, column in self.columns.items()}
-        if "tick" not in lengths:
+        if "tick" not in self.columns:
             raise RecordingError("a recording needs the column tick")
-        length = lengths["tick"]
-        for name, other in lengths.items():
-            if other != length:
-                raise RecordingError(f"column {name} has {other} rows, column tick {length}")
+        for name, column in self.columns.items():
+            if len(column) != len(self):
+                raise RecordingError(f"column {name} has {len(column)} rows, column tick {len(self)}")
         if np.any(np.diff(self.columns["tick"]) <= 0):
             raise RecordingError("tick must increase from row to row")
         object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))

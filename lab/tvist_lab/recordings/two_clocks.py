@@ -13,7 +13,6 @@ from scipy.signal import correlate, find_peaks
 from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
-from tvist_lab.recordings import kabsch
 from tvist_lab.recordings.flange_motion import RATE, Felt
 from tvist_lab.recordings.recording import Floats
 
@@ -103,7 +102,7 @@ def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | No
         w, moved, since = first.vector[both], rate[both], t[both] - middle
         u = np.column_stack([np.interp(then[both], other.time, axis) for axis in other.vector.T])
         if rotation is None:
-            rotation = Rotation.from_matrix(kabsch.rotation((w - w.mean(0)).T @ (u - u.mean(0))))
+            rotation = Rotation.from_matrix(closest_rotation((w - w.mean(0)).T @ (u - u.mean(0))))
         u = rotation.apply(u)
         X = np.concatenate(
             [np.stack([moved, moved * since[:, None]], axis=2), _turns(u),
@@ -130,6 +129,13 @@ def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | No
         explained=max(0.0, energy - lost) / RATE,
         span=(float(first.time[both][0]), float(first.time[both][-1])),
     )
+
+
+def closest_rotation(products: Floats) -> Floats:
+    """Return the R that minimizes Σ |a_i - R b_i|², shape (3, 3); `products` is Σ a_i b_iᵀ."""
+    # Kabsch, Acta Crystallographica A32, 1976.
+    left, _, right = np.linalg.svd(products)
+    return np.asarray(left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right)
 
 
 def _turns(u: Floats) -> Floats:

@@ -6,8 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from tvist_lab.figures.after_stop import ComparedPanel, compared_figure
-from tvist_lab.figures.ring_down import ring_down_figure
+from tvist_lab.figures.after_stop import ComparedPanel, compared_figure, ring_down_figure
 from tvist_lab.figures.sheets import house_style
 from tvist_lab.figures.style import SERIES, literal
 from tvist_lab.metrics import (
@@ -71,7 +70,9 @@ def recordings_page(
         sections.append(Section("Comparison", tables=[_changes(base, *pair) for pair in compared]))
     panels = _panels(files, [comparison for _, comparison in compared])
     sections.append(Section("Vibration after the stop", pictures=list(_pictures(files, panels))))
-    sections.append(Section("Motions", tables=[_table(file) for file in files]))
+    measured = [(file.measured, file.name) for file in files]
+    cells = ((motion_cells(one.results, one.recording.origin), name) for one, name in measured)
+    sections.append(Section("Motions", tables=[PageTable(tuple(COLUMNS), *own) for own in cells]))
     if missing := _missing(files, panels):
         sections.append(Section("What could not be measured, and why", points=missing))
     meanings = COLUMNS | (OF_PAIRS if paired else {})
@@ -110,11 +111,6 @@ def _names(paths: Sequence[Path]) -> list[str]:
     """Return the names of the files, with their folders if two are equal."""
     names = [path.name or str(path) for path in paths]
     return [str(path) if names.count(name) > 1 else name for path, name in zip(paths, names, strict=True)]
-
-
-def _table(file: _File) -> PageTable:
-    rows = motion_cells(file.measured.results, file.measured.recording.origin)
-    return PageTable(tuple(COLUMNS), rows, file.name)
 
 
 def _pairs(file: _File) -> PageTable:
@@ -222,11 +218,10 @@ def _provenance(file: _File) -> Mapping[str, str]:
     )
     info = recording.info
     if info is not None:
-        payload = info.payload
         facts |= {
             "Robot": f"{info.name}, model {info.model}, tvist {info.version}",
             "Shaper when the recording began": f"{info.shaper}, {counted(info.modes, 'mode')}",
-            "Declared payload": f"{payload.mass:g} kg",
+            "Declared payload": f"{info.payload.mass:g} kg",
         }
     if recording.foreign:
         facts["Recorded by"] = "another controller; gravity is what the sensor shows at rest"

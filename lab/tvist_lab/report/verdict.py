@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from operator import attrgetter
 from statistics import median
 
 from tvist_lab.metrics import Comparison, MotionPair, MotionResult
@@ -68,16 +69,13 @@ def verdict_on_one(results: Sequence[MotionResult], name: str) -> list[str]:
 
 def verdict_on_pairs(pairs: Sequence[MotionPair], results: Sequence[MotionResult], name: str) -> list[str]:
     """Return what each shaper of one recording changed, the best first, in the words of `tvist demo`."""
-    of_shaper = [list(group) for _, group in groupby(sorted(pairs, key=_shaper), _shaper)]
+    shaper = attrgetter("shaper")
+    of_shaper = [list(group) for _, group in groupby(sorted(pairs, key=shaper), shaper)]
     of_shaper.sort(key=lambda group: -median(one.change.less_percent or 0.0 for one in group))
     said = [sentence for group in of_shaper for sentence in _on_shaper(group, results, name)]
     if alone := len(results) - len({place for one in pairs for place in (one.unshaped, one.shaped)}):
         said.append(f"Made only with or only without a shaper: {counted(alone, 'motion')} of {name}.")
     return said
-
-
-def _shaper(pair: MotionPair) -> str:
-    return pair.shaper
 
 
 def _on_shaper(pairs: Sequence[MotionPair], results: Sequence[MotionResult], name: str) -> Iterator[str]:

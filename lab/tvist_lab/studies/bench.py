@@ -19,11 +19,11 @@ from tvist_lab.study.held_out import MIN_MOVES
 from tvist_lab.study.line import round_a_corner
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.menus import UNSHAPED
-from tvist_lab.study.method import Method, Named, Task
+from tvist_lab.study.method import Method, Named, Planned, Task
 from tvist_lab.study.moves import Move
 from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.shaping import ShaperFaultError
-from tvist_lab.study.study import Figures, Result, Study
+from tvist_lab.study.study import Figures, Result, Study, described
 from tvist_lab.study.work import MEASURED
 from tvist_plant.description import RobotDescription
 from tvist_plant.variants import HEAVIER, Variant, rubbed
@@ -151,9 +151,7 @@ def ranked(values: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _rank(result: Result, asked: StudyRequest, faults: Mapping[str, str]) -> None:
     """Order the summary by settling time; those that cannot be ranked come last."""
     values, labels = result.values, {one.name: one for one in asked.methods}
-    values["methods"] = [
-        {"name": one.name, "label": one.label, "told_target": one.told_target} for one in labels.values()
-    ]
+    values["methods"] = described(labels.values())
     values["arms"] = {arm.name: arm.label for case in result.study.cases for arm in case.arms}
     found = {one["shaper"]: one for one in values["summary"]}
     wrong = dict(faults)
@@ -164,10 +162,8 @@ def _rank(result: Result, asked: StudyRequest, faults: Mapping[str, str]) -> Non
         wrong.setdefault(row["shaper"], why)
     entries = [found[name] | {"ranked": True} for name in labels if name in found and name not in wrong]
     for entry in entries:
-        name, peaks = (
-            entry["shaper"],
-            [entry[f"reference_{kind}_ratio_max"] for kind in ("acceleration", "velocity")],
-        )
+        name = entry["shaper"]
+        peaks = [entry[f"reference_{kind}_ratio_max"] for kind in ("acceleration", "velocity")]
         entry["keeps_limits"] = max(peaks) <= KEPT
         entry["path_error_mrad"] = bend(labels[name], asked.description, asked.moves)
         arms = [
@@ -241,13 +237,15 @@ def bend(method: Method, description: RobotDescription, moves: Sequence[Move]) -
 
     None for methods that plan motions, or cannot shape the paths.
     """
-    found = []
+    if isinstance(method, Planned):
+        return None
+    found: list[float] = []
     for first, second in zip(moves[:CORNERS], [*moves[1:], moves[0]], strict=False):
         start, corner, target = (np.array(q) for q in (first.start, first.target, second.start))
         reference = round_a_corner(start, corner, target)
         task = Task(description, Move(first.start, second.start, first.mass), reference)
         with suppress(ShaperFaultError):
-            found += [path_error(reference, method.shaped(task).q)] if method.shapes else []
+            found.append(path_error(reference, method.shaped(task).q))
     return 1e3 * max(found) if found else None
 
 
@@ -265,9 +263,4 @@ def path_error(path: Floats, q: Floats) -> float:
     return math.sqrt(largest)
 
 
-PRESET = Preset(
-    study,
-    always=(UNSHAPED,),
-    menu="bench",
-    options=frozenset(("quick",)),
-)  # fmt: skip
+PRESET = Preset(study, always=(UNSHAPED,), menu="bench", options=frozenset(("quick",)))

@@ -115,8 +115,4 @@ def _of_p5(first: Floats, second: Floats) -> list[float] | None:
     return bootstrap(np.column_stack([first, second]), between) if len(first) >= MIN_MOVES else None
 
 
-PRESET = Preset(
-    study,
-    options=frozenset(("plants", "limits", "modes")),
-    least=MIN_MOVES,
-)  # fmt: skip
+PRESET = Preset(study, options=frozenset(("plants", "limits", "modes")), least=MIN_MOVES)

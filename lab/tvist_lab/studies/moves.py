@@ -158,7 +158,7 @@ def _draw(result: Result) -> Figures:
     caption = f"Move {middle}, the middle one by how much it vibrates unshaped."
     return {
         "moves": (residual_by_move_figure(moves), "Vibration after each move, unshaped and shaped."),
-        "one_move": (vibration_figure(*record(result.study.jobs[middle - 1]), middle), caption),
+        "one_move": (vibration_figure(*record(next(result.study.jobs([middle - 1]))), middle), caption),
     }
 
 

@@ -22,7 +22,7 @@ from tvist_lab.study.arms import scattered
 from tvist_lab.study.case import LIMITS, Case, arm_seed
 from tvist_lab.study.columns import Column, ResultTable, highest
 from tvist_lab.study.method import Named
-from tvist_lab.study.moves import Move, draw_moves
+from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.study import Figures, Result, Study
 from tvist_plant.description import RobotDescription
@@ -153,7 +153,13 @@ class Axes(Sequence[Case]):
 
     def __init__(self, spec: Spec, robots: Sequence[SweptRobot]) -> None:
         self.spec, self.robots = spec, tuple(robots)
-        self._moves = [_drawn(spec, robot.description) for robot in robots]
+        # Moves do not depend on the payload axis: they are those of `tvist study moves` with this seed.
+        self._moves = [
+            draw_moves(
+                arm, spec.moves, spec.seed, (0.0, arm.limits.payload), wrists=spec.wrists, stroke=spec.stroke
+            ).moves
+            for arm in (robot.description for robot in robots)
+        ]
         self._settings = list(product(range(len(robots)), spec.payloads, spec.errors))
 
     def __len__(self) -> int:
@@ -189,8 +195,8 @@ def study(spec: Spec, robots: Sequence[SweptRobot]) -> Study:
     contents = [
         {
             "model": robot.description.robot.model,
-            "sha256": _digest(robot.description),
-            "calibration": robot.recipes[0].calibration and _digest(robot.recipes[0].calibration),
+            "sha256": digest(robot.description),
+            "calibration": robot.recipes[0].calibration and digest(robot.recipes[0].calibration),
         }
         for robot in robots
     ]
@@ -213,15 +219,9 @@ def study(spec: Spec, robots: Sequence[SweptRobot]) -> Study:
     )
 
 
-def _digest(content: object) -> str:
+def digest(content: object) -> str:
+    """Return a short digest of a robot, a calibration or moves, by which a change is noticed."""
     return sha256(msgspec.json.encode(content, order="sorted")).hexdigest()[:16]
-
-
-def _drawn(spec: Spec, description: RobotDescription) -> list[Move]:
-    """Draw moves independent of the payload axis: those of `tvist study moves` with this seed."""
-    masses = (0.0, description.limits.payload)
-    drawn = draw_moves(description, spec.moves, spec.seed, masses, wrists=spec.wrists, stroke=spec.stroke)
-    return drawn.moves
 
 
 def setting_name(entry: Mapping[str, Any]) -> str:

@@ -20,16 +20,14 @@ __all__ = [
 
 PERTURBED = ("stribeck", "hysteresis", "torsion", "base", "backlash", "combined")
 """Plants for judging robustness, besides wrong springs and payloads."""
-JUDGED = ("calibrated", *PERTURBED, "springs-30", "springs+30")
-"""Plants on which two methods are compared."""
+JUDGED = ("calibrated", *PERTURBED, "springs-30", "springs+30")  # plants on which two methods are compared
 
 
 @dataclass(frozen=True)
 class ArmVariant(Variant):
     """One of the arms of a study."""
 
-    in_mujoco: bool = False
-    """Whether MuJoCo simulates it, without gear error."""
+    in_mujoco: bool = False  # whether MuJoCo simulates it, without gear error
 
     def make(self, description: RobotDescription, carried: Payload, seed: int) -> SimulatedArm:
         """Create a plant that provides the truth; see `Variant.make`."""

@@ -6,14 +6,13 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import polars as pl
 
 from tvist_lab.runners import Failed, Here, outcomes, processes
 from tvist_lab.study.store import Store
 from tvist_lab.study.study import Study
-from tvist_lab.study.work import FAILED, Job, Row, failed, measure_each, why
+from tvist_lab.study.work import FAILED, Row, failed, measure_each, why
 
 PART = 32  # number of jobs in a part, and the most that are lost if the program is killed
 FEW_MOTIONS = 16  # largest number of motions that do not justify another process
@@ -42,36 +41,30 @@ def run(
     `executor` starts what runs the jobs, by default processes of this machine if there are enough jobs. Raises
     StoreError if the folder is in use, unwritable, or of another study; OSError if the executor cannot run.
     """
-    jobs = study.jobs
     with ExitStack() as stack:
         if folder is None:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tvist-own-")))
         store = stack.enter_context(Store(folder, study.determined_by(), study.schema))
         done = store.done()
-        missing = Missing(jobs, [place for place in range(len(jobs)) if place not in done])
+        missing = [place for place in range(len(study.cases)) if place not in done]
         if missing:
-            few = len(missing) * missing[0].motions <= FEW_MOTIONS
-            begin = executor or (Here if few else processes)
-            _run(
-                missing,
-                study,
-                store,
-                stack.enter_context(begin()),
-                stack.enter_context(progress(len(missing))),
-            )
+            few = len(missing) * next(study.jobs(missing)).motions <= FEW_MOTIONS
+            pool = stack.enter_context((executor or (Here if few else processes))())
+            _run(missing, study, store, pool, stack.enter_context(progress(len(missing))))
         return StudyRun(store.finish(), len(done), len(missing))
 
 
 def _run(
-    missing: "Missing", study: Study, store: Store, executor: Executor, advance: Callable[[int], None]
+    missing: Sequence[int], study: Study, store: Store, executor: Executor, advance: Callable[[int], None]
 ) -> None:
     kept: list[Row] = []
     pending = 0
     try:
-        for index, outcome in outcomes(executor, measure_each, missing):
+        for index, outcome in outcomes(executor, measure_each, study.jobs(missing)):
+            place = missing[index]
             if isinstance(outcome, Failed):
-                outcome = failed(missing[index], FAILED, why(outcome.error))  # noqa: PLW2901  its rows
-            kept += [{"case": missing.places[index], **row} for row in outcome]
+                outcome = failed(next(study.jobs([place])), FAILED, why(outcome.error))  # noqa: PLW2901
+            kept += [{"case": place, **row} for row in outcome]
             pending += 1
             if pending == PART:
                 part, kept, pending = kept, [], 0  # what cannot be written is not tried again below
@@ -80,16 +73,3 @@ def _run(
     finally:
         if kept:
             store.keep(study.frame(kept))
-
-
-class Missing(Sequence[Job]):
-    """Jobs that are still to be run, with their indices in the study."""
-
-    def __init__(self, jobs: Sequence[Job], places: Sequence[int]) -> None:
-        self._jobs, self.places = jobs, places
-
-    def __len__(self) -> int:
-        return len(self.places)
-
-    def __getitem__(self, place: Any) -> Any:
-        return self._jobs[self.places[place]]

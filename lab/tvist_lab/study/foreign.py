@@ -5,6 +5,7 @@ import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -124,37 +125,13 @@ class Foreign:
         return q_star.copy()
 
 
-_loaded: dict[Path, Callable[[], Any]] = {}
-
-
+@cache
 def load_shaper(path: Path) -> Callable[[], Any]:
     """Return a function that creates the file's shaper: its class with `step`, or one that returns its module.
 
     The file is run once in each process, so its module's state persists from motion to motion. Raises
     CandidateError if the file cannot be run, or does not contain exactly one shaper.
     """
-    file = path.resolve()
-    if file not in _loaded:
-        _loaded[file] = _load(path)
-    return _loaded[file]
-
-
-def run_file(path: Path, kind: str, wrong: type[ValueError]) -> ModuleType:
-    """Run a user's Python file, and return its module; raise an error of type `wrong` if that fails."""
-    name = f"tvist_{kind}_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path.resolve())
-    if spec is None or spec.loader is None:
-        raise wrong(f"{kind} {path}: must be a Python file, *.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        raise wrong(f"{kind} {path}: running it raises {named(error)}") from error
-    return module
-
-
-def _load(path: Path) -> Callable[[], Any]:
     if not path.is_file():
         raise CandidateError(f"shaper {path}: there is no such file")
     module = run_file(path, "shaper", CandidateError)
@@ -183,3 +160,18 @@ def _load(path: Path) -> Callable[[], Any]:
     raise CandidateError(
         f"shaper {path}: contains neither a class with a method step(q_ref, info) nor a function step"
     )
+
+
+def run_file(path: Path, kind: str, wrong: type[ValueError]) -> ModuleType:
+    """Run a user's Python file, and return its module; raise an error of type `wrong` if that fails."""
+    name = f"tvist_{kind}_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path.resolve())
+    if spec is None or spec.loader is None:
+        raise wrong(f"{kind} {path}: must be a Python file, *.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        raise wrong(f"{kind} {path}: running it raises {named(error)}") from error
+    return module

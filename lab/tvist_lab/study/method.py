@@ -47,11 +47,6 @@ class Method(ABC):
         """Whether it needs a motion's end in advance, and therefore cannot shape a stream."""
         return False
 
-    @property
-    def shapes(self) -> bool:
-        """Whether it shapes any reference, instead of planning the motion."""
-        return True
-
     @abstractmethod
     def shaped(self, task: Task) -> Shaped:
         """Return the whole motion."""
@@ -173,17 +168,9 @@ class ConstantMeanDelay(SampleMethod):
 
 
 class Planned(Method):
-    """A method that plans the motion and shapes no reference."""
+    """A method that plans the motion, but no stream or curved path, and shapes no reference."""
 
-    @property
-    def told_target(self) -> bool:
-        """True, since it plans the motion."""
-        return True
-
-    @property
-    def shapes(self) -> bool:
-        """False: it cannot plan a stream or a curved path."""
-        return False
+    told_target = True
 
 
 @dataclass(frozen=True)
@@ -220,9 +207,8 @@ class PeriodOfJerk(Planned):
         """Return a double S with that jerk."""
         start, target = np.array(task.move.start), np.array(task.move.target)
         f_d = float(self.recipe.estimator(task.description, task.move.mass, 1).estimate(target)[0][0])
-        return Shaped(
-            point_to_point(start, target, replace(task.limits, jerk=task.limits.acceleration * f_d))
-        )
+        limits = replace(task.limits, jerk=task.limits.acceleration * f_d)
+        return Shaped(point_to_point(start, target, limits))
 
 
 def _from_rest(tvist: Filter, task: Task) -> RunningFilter:

@@ -167,15 +167,14 @@ def stopped_stream(
 
 def is_free(collision: CollisionModel, move: Move) -> bool:
     """Whether the straight line in joint space is free of collision with arm and floor."""
-    start, target = np.array(move.start), np.array(move.target)
-    if collision.meeting(start) or collision.meeting(target):
-        return False
-    return meeting(collision, move) is None
+    return collision.meeting(np.array(move.target)) is None and meeting(collision, move) is None
 
 
 def meeting(collision: CollisionModel, move: Move) -> str | None:
     """Return which bodies meet on a move, as text; None if none do."""
     start, target = np.array(move.start), np.array(move.target)
+    if (nearest := collision.meeting(start)) is not None:
+        return f"{nearest.first} meets {nearest.second} at the start"
     found = collision.on_way(JointLine(start, target).whole)
     if found is None:
         return None
@@ -189,9 +188,7 @@ def collisions(description: RobotDescription, moves: Sequence[Move]) -> list[str
     found = []
     for move in moves:
         collision.declare(body(paper_payload(description, move.mass)))
-        nearest = collision.meeting(np.array(move.start))
-        words = None if nearest is None else f"{nearest.first} meets {nearest.second} at the start"
-        found.append(words or meeting(collision, move))
+        found.append(meeting(collision, move))
     return found
 
 

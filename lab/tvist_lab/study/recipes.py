@@ -54,9 +54,6 @@ class FrequencyError(Estimator):
     def __repr__(self) -> str:
         return f"{self._right!r} with frequencies times {self._factor:g}"
 
-    def _unshare(self) -> None:
-        self._right = self._right.fork()
-
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Return the modes at a configuration; see `Estimator.estimate`."""
         return self._wrong(self._right.estimate(q))
@@ -139,17 +136,12 @@ def own_move(
 
 def robust(name: str, recipe: Recipe, description: RobotDescription, masses: Range) -> Range:
     """Return design frequency [Hz] and damping ratio of a fixed shaper for the lowest mode over the workspace."""
-    f_d, zeta = workspace_range(recipe, description, masses)
-    return robust_over(name, f_d, (zeta[0], min(zeta[1], 0.999 * shaper(name).zeta_max)))
-
-
-def workspace_range(recipe: Recipe, description: RobotDescription, masses: Range) -> tuple[Range, Range]:
-    """Return the range of estimated damped frequency [Hz] and damping ratio [-] of the lowest mode."""
-    found = [
-        (f_d[0], zeta[0]) for f_d, zeta in _over_workspace(recipe, description, masses, 1, CONFIGURATIONS)
-    ]
-    low, high = np.min(found, axis=0), np.max(found, axis=0)
-    return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
+    modes = _over_workspace(recipe, description, masses, 1, CONFIGURATIONS)
+    f_d, zeta = np.array([(f_d[0], zeta[0]) for f_d, zeta in modes]).T
+    most = 0.999 * shaper(name).zeta_max
+    return robust_over(
+        name, (float(f_d.min()), float(f_d.max())), (float(zeta.min()), min(float(zeta.max()), most))
+    )
 
 
 def longest_mean_delay(recipe: Recipe, description: RobotDescription, masses: Range, modes: int) -> float:

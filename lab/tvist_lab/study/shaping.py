@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 
@@ -11,8 +11,7 @@ from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
-LONGEST = 3.0
-"""Time after the reference's end within which a shaped reference must end [s]."""
+LONGEST = 3.0  # time after the reference's end within which a shaped reference must end [s]
 ENDED = 10  # number of ticks at the target after which the output has ended
 WATCHED = 0.5  # time for which the output is checked for a tail after it has ended [s]
 TAIL = 1e-6  # largest motion in that time, and largest distance from the target [rad]
@@ -49,14 +48,6 @@ class RunningShaper(Protocol):
         """Time over which the last output depends on the past [s]; None if not declared."""
 
 
-@runtime_checkable
-class InOneGo(Protocol):
-    """A shaper that can process many samples at once, faster than one by one."""
-
-    def all(self, q: Floats) -> Floats:
-        """Return the next samples, shape (T, n) [rad], equal to those one by one."""
-
-
 class RunningFilter:
     """A filter in operation; it fails if its shaper's function does, so that no result has old weights."""
 
@@ -73,7 +64,7 @@ class RunningFilter:
         return self._checked(self._tvist.filter(q))
 
     def all(self, q: Floats) -> Floats:
-        """Return the next shaped samples, shape (T, n) [rad]."""
+        """Return the next shaped samples, shape (T, n) [rad]: those of `step`, but faster."""
         return self._checked(self._tvist.filter_all(q))
 
     def _checked(self, shaped: Floats) -> Floats:
@@ -97,7 +88,11 @@ def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped
         quiet = quiet + 1 if max(moved, np.abs(q[-1] - target).max()) <= STILL else 0
     own = max(len(q) - ENDED - 1 - stop, 0) * PERIOD
     if watched:
-        _check_end(q[-1], target, ended=quiet >= ENDED)
+        if quiet < ENDED:
+            away = float(np.abs(q[-1] - target).max())
+            raise ShaperFaultError(
+                f"does not end: {1e3 * LONGEST:.0f} ms after the reference it is {away:.2g} rad from the target"
+            )
         _check_tail(stepper, target)
         _check_word(q, stop, declared, own)
     said = declared[0]
@@ -107,21 +102,13 @@ def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped
 
 def _through(stepper: RunningShaper, reference: Floats, *, timed: bool) -> tuple[list[Floats], float | None]:
     """Shape a reference; return the samples and, if `timed`, the processor time per tick [s]."""
-    if not timed and isinstance(stepper, InOneGo):
+    if not timed and isinstance(stepper, RunningFilter):
         return list(stepper.all(reference)), None
     warm = min(WARM, len(reference) - 1)
     q = [stepper.step(sample) for sample in reference[:warm]]
     began = time.thread_time()
     q += [stepper.step(sample) for sample in reference[warm:]]
     return q, (time.thread_time() - began) / (len(reference) - warm)
-
-
-def _check_end(last: Floats, target: Floats, *, ended: bool) -> None:
-    if not ended:
-        away = float(np.abs(last - target).max())
-        raise ShaperFaultError(
-            f"does not end: {1e3 * LONGEST:.0f} ms after the reference it is {away:.2g} rad from the target"
-        )
 
 
 def _check_tail(stepper: RunningShaper, target: Floats) -> None:

@@ -3,7 +3,6 @@
 import fcntl
 import io
 import os
-from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -52,7 +51,7 @@ class Store:
             _check_same(self.folder, manifest, identity)
         else:
             content = msgspec.json.format(msgspec.json.encode(identity), indent=1) + b"\n"
-            _write(manifest, content, self.folder)
+            self._write(manifest, content)
         unfinished = f".*{UNFINISHED}"
         for forgotten in (*self.folder.glob(unfinished), *self._parts.glob(unfinished)):
             forgotten.unlink()
@@ -70,6 +69,18 @@ class Store:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         os.close(self._lock)
+
+    def _write(self, file: Path, content: bytes) -> None:
+        try:
+            with whole_file(file) as stream:
+                stream.write(content)
+        except OSError as error:
+            raise _told(error, self.folder) from error
+
+    def _write_rows(self, file: Path, rows: pl.DataFrame) -> None:
+        content = io.BytesIO()
+        rows.write_parquet(content)
+        self._write(file, content.getvalue())
 
     def rows(self) -> pl.DataFrame:
         """Return all available rows, each once, in the order of their cases."""
@@ -92,15 +103,16 @@ class Store:
 
     def keep(self, rows: pl.DataFrame) -> None:
         """Write rows as a part."""
-        _write_frame(self._parts / f"{self._next:06d}.parquet", rows, self.folder)
+        self._write_rows(self._parts / f"{self._next:06d}.parquet", rows)
         self._next += 1
 
     def finish(self) -> pl.DataFrame:
         """Write all rows to one file, remove the parts, and return the rows."""
         found, parts = self.rows(), list(self._parts.glob("*.parquet"))
         if parts:
-            _write_frame(self.folder / ROWS, found, self.folder)
-            _remove(parts)
+            self._write_rows(self.folder / ROWS, found)
+            for part in parts:
+                part.unlink()
         return found
 
 
@@ -115,25 +127,6 @@ def _check_same(folder: Path, manifest: Path, identity: dict[str, Any]) -> None:
         raise StoreError(
             f"{folder} holds a study with other {', '.join(changed)}: give another --output, or remove the folder"
         )
-
-
-def _write_frame(file: Path, rows: pl.DataFrame, folder: Path) -> None:
-    content = io.BytesIO()
-    rows.write_parquet(content)
-    _write(file, content.getvalue(), folder)
-
-
-def _write(file: Path, content: bytes, folder: Path) -> None:
-    try:
-        with whole_file(file) as stream:
-            stream.write(content)
-    except OSError as error:
-        raise _told(error, folder) from error
-
-
-def _remove(files: Iterable[Path]) -> None:
-    for file in files:
-        file.unlink()
 
 
 def _told(error: OSError, folder: Path) -> StoreError:

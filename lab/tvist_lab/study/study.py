@@ -1,6 +1,6 @@
 """A study: cases by methods, computed values, and the content of tables, page and figures."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from importlib.metadata import version
@@ -19,19 +19,11 @@ from tvist_lab.study.work import FAILED, MEASURED, TOO_WEAK, Job, Row
 from tvist_lab.words import QUANTILES_FROM
 
 KINDS: Mapping[type, Any] = {
-    bool: pl.Boolean,
-    int: pl.Int64,
-    float: pl.Float64,
-    str: pl.String,
-    list: pl.List(pl.Float64),
-}
+    bool: pl.Boolean, int: pl.Int64, float: pl.Float64, str: pl.String, list: pl.List(pl.Float64),
+}  # fmt: skip
 """Column types by the type of an axis's values."""
-COUNTS = {
-    "rows": pl.len(),
-    **{
-        status.replace(" ", "_"): (pl.col("status") == status).sum()
-        for status in (MEASURED, TOO_WEAK, FAILED)
-    },
+COUNTS = {"rows": pl.len()} | {
+    status.replace(" ", "_"): (pl.col("status") == status).sum() for status in (MEASURED, TOO_WEAK, FAILED)
 }
 """Counts in each group of rows."""
 DIGITS = 3
@@ -115,10 +107,11 @@ class Study:
         """Columns of its table, without those that distinguish the lines."""
         return self.columns or of_measures(*self.show)
 
-    @property
-    def jobs(self) -> Sequence[Job]:
-        """Jobs for workers, each created on access."""
-        return _Jobs(self)
+    def jobs(self, places: Iterable[int] | None = None) -> Iterator[Job]:
+        """Create the jobs of the cases at these places, by default of all."""
+        measures = self.measured
+        for case in self.cases if places is None else map(self.cases.__getitem__, places):
+            yield Job(case, case.methods or tuple(self.methods), measures, self.as_served)
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -209,9 +202,7 @@ class Study:
         methods = {one.name: one for one in (*self.cases[0].methods, *self.methods)}
         values = {
             "title": self.title, **self.facts, **about,
-            "methods": [
-                {"name": one.name, "label": one.label, "told_target": one.told_target} for one in methods.values()
-            ],
+            "methods": described(methods.values()),
             "arms": {arm.name: arm.label for arm in self.cases[0].arms},
             "summary": self.summary(rows),
             **{name: self.summary(rows, *axes) for name, axes in self.splits.items()},
@@ -234,16 +225,9 @@ class Study:
         return ResultTable(title, entries, [*(Column(name, name) for name in self.keys), *columns])
 
 
-class _Jobs(Sequence[Job]):
-    def __init__(self, study: Study) -> None:
-        self._study, self._measures = study, study.measured
-
-    def __len__(self) -> int:
-        return len(self._study.cases)
-
-    def __getitem__(self, place: Any) -> Any:
-        case, study = self._study.cases[place], self._study
-        return Job(case, case.methods or tuple(study.methods), self._measures, study.as_served)
+def described(methods: Iterable[Method]) -> list[dict[str, Any]]:
+    """Return the entry of each method for --json."""
+    return [{"name": one.name, "label": one.label, "told_target": one.told_target} for one in methods]
 
 
 def _kind_of(name: str, cases: Iterable[Case]) -> Any:

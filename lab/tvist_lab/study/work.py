@@ -1,6 +1,6 @@
 """The work of a job: make a case by some methods on its arms, and measure each motion as one flat row."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -48,9 +48,8 @@ class Bench:
 
     def __init__(self, job: Job) -> None:
         self.job, case = job, job.case
-        self.task = Task(
-            case.description, case.declared, case.reference(), case.limits, job.as_served, case.stream
-        )
+        reference = case.reference()
+        self.task = Task(case.description, case.declared, reference, case.limits, job.as_served, case.stream)
         """Task of the first method."""
         # The friction in the robot's calibration is fed forward for every method, shaped or not; a method with
         # another friction sets `Shaped.law`.
@@ -122,9 +121,9 @@ def measure_each(job: Job) -> tuple[Row, ...]:
         try:
             found += _rows(bench, method)
         except ShaperFaultError as fault:
-            found += _lost(job, method.name, FAILED, f"the shaper {fault}")
+            found += failed(job, FAILED, f"the shaper {fault}", [method])
         except Exception as error:  # noqa: BLE001  it costs these rows alone
-            found += _lost(job, method.name, FAILED, why(error))
+            found += failed(job, FAILED, why(error), [method])
     return tuple(found)
 
 
@@ -144,15 +143,15 @@ def record(job: Job) -> tuple[Recording, Recording]:
     return motion.unshaped.recording, motion.recording
 
 
-def failed(job: Job, status: str, error: str) -> tuple[Row, ...]:
-    """Return the rows of a job without measurements."""
-    return tuple(row for method in job.methods for row in _lost(job, method.name, status, error))
+def failed(job: Job, status: str, error: str, methods: Sequence[Method] = ()) -> tuple[Row, ...]:
+    """Return the rows of a job without measurements, of all methods or some."""
+    return tuple(
+        job.head(method.name, arm.name) | {"status": status, "error": error}
+        for method in methods or job.methods
+        for arm in job.case.arms
+    )
 
 
 def why(error: Exception) -> str:
     """Return an error as one line."""
     return str(error) if isinstance(error, TaskError) else named(error)
-
-
-def _lost(job: Job, method: str, status: str, error: str) -> list[Row]:
-    return [job.head(method, arm.name) | {"status": status, "error": error} for arm in job.case.arms]

@@ -22,10 +22,6 @@ MAX_TERMS = 1000
 class BasisFunctions:
     """A set of basis functions of selected joints."""
 
-    joints: tuple[int, ...]  # indices of the selected joints, from 0
-    degree: int  # highest total degree
-    centre: Floats  # angles that are subtracted [rad], shape (len(joints),), read-only
-
     def __init__(self, joints: Sequence[int], degree: int, centre: npt.ArrayLike | None = None) -> None:
         """Create the basis for up to 7 different joints; raise EstimatorError if an argument is invalid."""
         n = len(joints)
@@ -33,11 +29,12 @@ class BasisFunctions:
             raise EstimatorError("joints", joints, f"1 to {MAX_JOINTS} different indices below {MAX_JOINTS}")
         if degree not in range(MAX_TERMS):
             raise EstimatorError("degree", degree, "a whole number of at least 0")
-        self.joints = tuple(int(j) for j in joints)
-        self.degree = int(degree)
+        self.joints = tuple(int(j) for j in joints)  # indices of the selected joints, from 0
+        self.degree = int(degree)  # highest total degree
         if len(self) > MAX_TERMS:
             raise EstimatorError("degree", degree, f"lower: {len(self)} terms, but {MAX_TERMS} are the most")
-        self.centre = np.zeros(n) if centre is None else np.array(centre, dtype=float)
+        self.centre: Floats = np.zeros(n) if centre is None else np.array(centre, dtype=float)
+        """Angles that are subtracted [rad], shape (len(joints),), read-only."""
         if self.centre.shape != (n,) or not np.isfinite(self.centre).all():
             raise EstimatorError("centre", centre, f"{n} finite angles")
         self.centre.setflags(write=False)

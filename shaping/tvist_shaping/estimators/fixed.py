@@ -1,7 +1,6 @@
 """Modes that do not depend on the configuration, for classic time-invariant input shaping."""
 
 from collections.abc import Sequence
-from typing import Self
 
 import numpy as np
 
@@ -48,7 +47,3 @@ class Fixed(Estimator):
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:  # noqa: ARG002  the same at every q
         """Return the modes, f_d [Hz] and ζ [-], each of shape (modes,), read-only."""
         return self._f_d, self._zeta
-
-    def fork(self) -> Self:
-        """Return this estimator itself, since it has no state."""
-        return self

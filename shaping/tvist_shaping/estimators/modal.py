@@ -22,10 +22,8 @@ from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.poles import Complex, follow
 
-JUMP = 0.1
-"""Change of a joint between two estimates that is too large for a motion [rad]."""
-RESTING, MOVING, JUMPED = range(3)
-"""Relation of a configuration to the previous one."""
+JUMP = 0.1  # change of a joint between two estimates that is too large for a motion [rad]
+RESTING, MOVING, JUMPED = range(3)  # relation of a configuration to the previous one
 
 
 @compiled
@@ -67,7 +65,6 @@ class Modal(Estimator):
         clipped: Whether a mode of the last estimate was clamped to `f_d_min` or `zeta_max`, or was lost.
     """
 
-    drivetrain: Drivetrain
     abrupt = True
 
     def __init__(
@@ -132,10 +129,6 @@ class Modal(Estimator):
         """Poles at a configuration [1/s], shape (modes,); as in `estimate`, but not clamped."""
         self._go_to(q)
         return self._poles.copy()
-
-    def _unshare(self) -> None:
-        self._poles, self._shapes = self._poles.copy(), self._shapes.copy()
-        self._scratch, self._q = np.empty_like(self._scratch), self._q.copy()
 
     def _describe(self) -> tuple[Floats, Floats]:
         f_d, zeta = np.empty(self.modes), np.empty(self.modes)

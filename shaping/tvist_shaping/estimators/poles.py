@@ -9,18 +9,13 @@ from tvist_shaping._types import Floats
 
 Complex = npt.NDArray[np.complex128]
 
-LOWEST = 0.5
-"""Frequency below which a pole does not count as a vibration [Hz]."""
-DAMPED = 0.9
-"""Damping ratio above which a pole does not count as a vibration [-]."""
-STEPS = 12
-"""Largest number of Newton steps for a mode; two or three are enough between ticks."""
-TURNED = 0.01
-"""Squared change of a shape with largest entry 1 above which another step is needed [-]."""
+LOWEST = 0.5  # frequency below which a pole does not count as a vibration [Hz]
+DAMPED = 0.9  # damping ratio above which a pole does not count as a vibration [-]
+STEPS = 12  # largest number of Newton steps for a mode; two or three are enough between ticks
+TURNED = 0.01  # squared change of a shape with largest entry 1 above which another step is needed [-]
 CONVERGED = 1e-5
 """Largest relative last Newton step of a converged pole; the remaining error is its square [-]."""
-APART = 1e-7
-"""Relative distance below which two poles may be the same one [-]."""
+APART = 1e-7  # relative distance below which two poles may be the same one [-]
 
 
 @compiled

@@ -14,8 +14,7 @@ from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.basis import BasisFunctions
 from tvist_shaping.impulse_train import F_D_RANGE
 
-MARGIN = 0.1
-"""Share of a range, at each end, in which the saturation is curved [-]."""
+MARGIN = 0.1  # share of a range, at each end, in which the saturation is curved [-]
 
 
 @compiled
@@ -87,9 +86,6 @@ class Polynomial(Estimator):
         basis: The functions φ_i.
         saturating: Whether the last estimate's f_d or ζ was outside its range before it was clamped.
     """
-
-    basis: BasisFunctions
-    saturating: bool
 
     def __init__(
         self,

@@ -10,10 +10,8 @@ from tvist_controller.instruments.report import Sink
 from tvist_protocol.codec import encode
 from tvist_server.ur_ports import UrPorts
 
-EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)
-"""A port that is free, for each."""
-PATIENCE = 60.0
-"""After how long something is taken to hang [s]."""
+EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)  # a port that is free, for each
+PATIENCE = 60.0  # after how long something is taken to hang [s]
 
 
 class ControllerThread(Sink):

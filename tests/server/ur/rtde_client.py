@@ -62,8 +62,7 @@ INPUT_TYPES = {
     **{f"input_int_register_{k}": "INT32" for k in range(48)},
     **{f"input_double_register_{k}": "DOUBLE" for k in range(48)},
 }
-OWN = dict.fromkeys(("shaped_q", "shaped_qd", "shaped_qdd"), "VECTOR6D")
-"""Outputs that no robot of UR's has."""
+OWN = dict.fromkeys(("shaped_q", "shaped_qd", "shaped_qdd"), "VECTOR6D")  # outputs that no robot of UR's has
 
 
 def package(letter, payload=b""):

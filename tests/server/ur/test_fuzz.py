@@ -33,10 +33,8 @@ INTERFACES = {
     "realtime": RealtimeSession,
     "dashboard": DashboardSession,
 }
-CLIENTS = 4
-"""That send anything, of two hosts."""
-LIVES = 60
-"""Packages that a client sends before it goes, on the average."""
+CLIENTS = 4  # that send anything, of two hosts
+LIVES = 60  # packages that a client sends before it goes, on the average
 READ = ["timestamp", "actual_q"]
 
 

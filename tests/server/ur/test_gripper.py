@@ -12,8 +12,7 @@ from tvist_server.gateways.ur.interfaces import UrInterfaces
 
 from .desks import Desk, connect, until
 
-MANY = 300
-"""Requests at once: more than may wait for their answers."""
+MANY = 300  # requests at once: more than may wait for their answers
 
 
 async def test_requests_are_answered_in_their_order_even_if_many_come_at_once():

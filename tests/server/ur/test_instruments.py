@@ -21,10 +21,8 @@ from .rtde_client import OUTPUT_TYPES
 FOLLOWED = ("target_q", "target_qd", "target_qdd")
 UNSHAPED = dict.fromkeys(("unshaped_q", "unshaped_qd", "unshaped_qdd"))
 MOVED = (1.5, -0.8, 1.0, -1.0, 0.5, 1.0)
-ELBOW_UP = (0.3, -1.3, 1.6, -1.9, -1.4, 0.2)
-"""A posture far from singular ones."""
-FAR = (0.8, -1.1, 1.3, -1.8, -1.3, 0.2)
-"""Another one."""
+ELBOW_UP = (0.3, -1.3, 1.6, -1.9, -1.4, 0.2)  # a posture far from singular ones
+FAR = (0.8, -1.1, 1.3, -1.8, -1.3, 0.2)  # another one
 NOTHING, KILOGRAM = (Payload(mass=mass, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6) for mass in (0.0, 1.0))
 OFFSET = [0.03, -0.05, 0.15, 0.2, -0.4, 0.7]
 PERIOD = 0.002

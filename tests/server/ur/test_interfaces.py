@@ -129,7 +129,7 @@ async def test_a_client_that_asks_and_does_not_read_is_not_asked_for_more(desk):
         assert await asyncio.wait_for(reader.readline(), PATIENCE)
 
 
-async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them(desk):
+async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them_and_are_few_lines(desk, caplog):
     (listener, _), (_, writer) = await connect(desk, "primary"), await connect(desk, "realtime")
     await until(lambda: len(desk.interfaces._connections) == 2)
     writer.write(b"nothing_of_that_name()\n" * 3000)
@@ -139,6 +139,7 @@ async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them(desk):
         assert data
         heard += data.count(b"compile_error_name_not_found:nothing_of_that_name:")
     assert len(desk.interfaces._connections) == 2
+    assert 1 < sum("nothing_of_that_name" in line for line in caplog.messages) < 100
 
 
 async def test_what_a_client_sends_waits_with_the_client_until_the_controller_has_done_what_came_before(

@@ -30,17 +30,10 @@ def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: 
     rules_of: dict[Role, list[dict[str, Any]]] = {"viewer": viewing, "operator": [*viewing, *operating]}
     named = {role: [name for name, its in roles.items() if its == role] for role in rules_of}
     # Zenoh rejects an empty list of names, because it would apply to everyone.
-    there = [role for role in rules_of if named[role]]
-    return {
-        "enabled": True,
-        "default_permission": "deny",
-        "rules": [*viewing, *operating],
-        "subjects": [{"id": role, "cert_common_names": named[role]} for role in there],
-        "policies": [
-            {"id": role, "rules": [rule["id"] for rule in rules_of[role]], "subjects": [role]}
-            for role in there
-        ],
-    }
+    allowed = [
+        ({"id": role, "cert_common_names": names}, rules_of[role]) for role, names in named.items() if names
+    ]
+    return _settings([*viewing, *operating], allowed)
 
 
 def open_access(robots: Sequence[str], namespace: str = "") -> dict[str, Any]:
@@ -53,13 +46,7 @@ def open_access(robots: Sequence[str], namespace: str = "") -> dict[str, Any]:
     # Keys with wildcards are allowed because egress is restricted below, and only the server answers queries.
     asking = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query", "query"]
     rules = [*_viewing(robots), *_operating(robots), _rule("ask for anything", "ingress", asking, ["**"])]
-    return {
-        "enabled": True,
-        "default_permission": "deny",
-        "rules": rules,
-        "subjects": [{"id": "anybody"}],
-        "policies": [{"id": "anybody", "rules": [rule["id"] for rule in rules], "subjects": ["anybody"]}],
-    }
+    return _settings(rules, [({"id": "anybody"}, rules)])
 
 
 def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
@@ -70,50 +57,52 @@ def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
     """
     everywhere = [keys.ANYWHERE]
     viewing, operating = _viewing(everywhere), _operating(everywhere)
-    rules, policies = [*viewing, *operating], list[dict[str, Any]]()
-    subjects = [{"id": name, "cert_common_names": [name]} for name in roles]
+    rules, allowed = [*viewing, *operating], list[tuple[dict[str, Any], list[dict[str, Any]]]]()
     for name, role in roles.items():
         own: list[dict[str, Any]] = []
         if role == "robot":
-            places = [f"**/{keys.PREFIX}/{name}", f"**/{name}/{keys.PREFIX}/*"]
-            # Egress to a client is ingress from its robot, and vice versa.
-            own = [_turned(rule, name) for rule in (*_viewing(places), *_operating(places))]
+            own = _turned([f"**/{keys.PREFIX}/{name}", f"**/{name}/{keys.PREFIX}/*"], name)
             own[0]["key_exprs"] = [f"{keys.ANYWHERE}/{leaf}" for leaf in STREAMS]
         elif role == "router":
             own = [{**_rule(f"all {name}", "ingress", MESSAGES, ["**"]), "flows": ["ingress", "egress"]}]
         rules += own
-        allowed = own or [*viewing, *(operating if role == "operator" else [])]
-        policies.append({"id": name, "rules": [rule["id"] for rule in allowed], "subjects": [name]})
-    return {
-        "enabled": True,
-        "default_permission": "deny",
-        "rules": rules,
-        "subjects": subjects,
-        "policies": policies,
-    }
+        its = own or [*viewing, *(operating if role == "operator" else [])]
+        allowed.append(({"id": name, "cert_common_names": [name]}, its))
+    return _settings(rules, allowed)
 
 
 def with_robots_behind(
     access: Mapping[str, Any], robots: Sequence[str], namespace: str, protocol: str
 ) -> dict[str, Any]:
     """Return `access_control` settings that also admit the robots' own processes, over a protocol only they can use."""
-    places = [_at(namespace, robot) for robot in robots]
-    # Egress to a client is ingress from its robot, and vice versa.
-    own = [_turned(rule, "robots") for rule in (*_viewing(places), *_operating(places))]
+    own = _turned([_at(namespace, robot) for robot in robots], "robots")
+    more = _settings(own, [({"id": "robots", "link_protocols": [protocol]}, own)])
+    return {**access, **{key: [*access[key], *more[key]] for key in ("rules", "subjects", "policies")}}
+
+
+def _settings(
+    rules: Sequence[dict[str, Any]], allowed: Sequence[tuple[dict[str, Any], Sequence[dict[str, Any]]]]
+) -> dict[str, Any]:
+    """Return settings that deny everything but the rules of each subject."""
     return {
-        **access,
-        "rules": [*access["rules"], *own],
-        "subjects": [*access["subjects"], {"id": "robots", "link_protocols": [protocol]}],
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": [subject for subject, _ in allowed],
         "policies": [
-            *access["policies"],
-            {"id": "robots", "rules": [rule["id"] for rule in own], "subjects": ["robots"]},
+            {"id": subject["id"], "rules": [rule["id"] for rule in own], "subjects": [subject["id"]]}
+            for subject, own in allowed
         ],
     }
 
 
-def _turned(rule: dict[str, Any], name: str) -> dict[str, Any]:
-    flow = "egress" if rule["flows"] == ["ingress"] else "ingress"
-    return {**rule, "id": f"{rule['id']} of {name}", "flows": [flow]}
+def _turned(places: Sequence[str], name: str) -> list[dict[str, Any]]:
+    """Return the rights of robots: egress to a client is ingress from its robot, and vice versa."""
+    turn = {"ingress": "egress", "egress": "ingress"}
+    return [
+        {**rule, "id": f"{rule['id']} of {name}", "flows": [turn[rule["flows"][0]]]}
+        for rule in (*_viewing(places), *_operating(places))
+    ]
 
 
 def _viewing(robots: Sequence[str]) -> list[dict[str, Any]]:

@@ -1,18 +1,21 @@
 """Gateways, through which clients reach a robot, and their interface to the robot."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
-from typing import Protocol, cast, get_args
+from functools import partial
+from typing import cast, get_args
 
 from tvist_controller.instruments.report import Report, Topic
 from tvist_protocol.channels import tag
+from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
-from tvist_protocol.replies import Reply
+from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 Message = State | Event | Truth | Telemetry | Io
 Answer = Callable[[Reply], None]  # takes the reply to a command; called once, from any thread
+Tell = Callable[[int, int], None]  # takes the number of compiled kernels and of all kernels
+Prepare = Callable[[Tell], None]  # does the slow work that precedes the creation of robots
 
 
 def topic_of(message: Message) -> Topic:
@@ -24,41 +27,29 @@ class GatewayError(Exception):
     """A gateway cannot open; the message gives the reason and the remedy."""
 
 
-class QueryHandler(Protocol):
-    """Answers the queries that arrive at a gateway. The methods may be called from any thread and do not block."""
+class CommandIntake:
+    """Receives what arrives at a gateway, from any thread, without blocking; by default ignores what has no answer."""
 
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; `answer` is called once, at once if it is rejected, else from another thread."""
+        raise NotImplementedError
 
     def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
         """Answer a request for `info`: call `answer` once, from any thread, with a function that encodes the message.
 
         Only the answering thread may call that function, since it may read files.
         """
-
-
-class CommandIntake(QueryHandler, Protocol):
-    """Receives all messages that arrive at a gateway; threads as for `QueryHandler`."""
+        raise NotImplementedError
 
     def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
-        """Take a command that the gateway itself has made.
-
-        Args:
-            command: The command.
-            answer: As for `request`.
-            origin: IP address of the machine that caused it, if known.
-        """
+        """Take a command of the gateway itself, caused by the machine with the IP address `origin`, if known."""
+        raise NotImplementedError
 
     def setpoint(self, data: bytes) -> None:
         """Take an encoded set-point."""
 
     def client_seen(self, client: str, session: str = "") -> None:
-        """Note that a client's liveliness token has appeared.
-
-        Args:
-            client: Name of the client.
-            session: Session that declared the token; empty if the token does not name it.
-        """
+        """Note that a client's liveliness token has appeared; it may name the session that declared it."""
 
     def client_gone(self, client: str, session: str = "") -> None:
         """Note that a client's liveliness token, or the session that declared it, has disappeared."""
@@ -68,12 +59,32 @@ class CommandIntake(QueryHandler, Protocol):
 
     def holder(self) -> str | None:
         """Return the client that has control; None: no client."""
+        return None
 
 
-class Gateway(ABC):
-    """A way for clients to reach a robot and for the robot's messages to reach them."""
+class Starting(CommandIntake):
+    """Refuses every query to robots that are starting, and reports the progress."""
 
-    setpoints_refused: int
+    def __init__(self) -> None:
+        self._how_far = ""
+
+    def note(self, done: int, total: int) -> None:
+        self._how_far = f"{done} of {total} kernels are compiled; "
+
+    def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  whatever it is
+        answer(self._refused())
+
+    def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
+        answer(partial(encode, self._refused()))
+
+    def _refused(self) -> Refused:
+        return Refused(code="starting", where="", why=f"the robot is starting: {self._how_far}try again")
+
+
+class Gateway:
+    """A way for clients to reach a robot and for the robot's messages to reach them; by default does nothing."""
+
+    setpoints_refused = 0
     """Number of set-points rejected before the desk: on a key with a wildcard, or too large."""
     dropped = 0  # number of states dropped because too many were queued
     wanted_topics: Collection[Topic] = frozenset(get_args(Topic))
@@ -82,16 +93,14 @@ class Gateway(ABC):
     def report(self, report: Report) -> None:
         self.publish("state", report.state, report.encoded)
 
-    @abstractmethod
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
         """Publish a message, given both decoded and encoded. Called from one thread; network errors raise nothing."""
 
-    async def open(self) -> None:  # noqa: B027  not every gateway has to wait for something
+    async def open(self) -> None:
         """Admit clients. Called when the robot ticks."""
 
-    async def shut(self) -> None:  # noqa: B027  likewise
+    async def shut(self) -> None:
         """Admit no more clients, and disconnect the present ones."""
 
-    @abstractmethod
     def close(self) -> None:
         """Stop listening. Messages that arrive from now on are not answered; a second call does nothing."""

@@ -92,7 +92,6 @@ class Console:
 class ConsoleGateway(Gateway):
     """Passes the events of the robot `name` to the console; `command_line` builds its commands."""
 
-    setpoints_refused = 0
     wanted_topics: Collection[Topic] = frozenset[Topic]({"event"})
 
     def __init__(self, console: Console, name: str, command_line: Callable[[str], str]) -> None:
@@ -107,9 +106,6 @@ class ConsoleGateway(Gateway):
         then = "" if command is None else f". Next: {self._command_line(command)}"
         what = _TOLD[message.kind]
         self._console.say(f"{self._name}: {what} at tick {message.tick}: {message.why}{then}", stop=stop)
-
-    def close(self) -> None:
-        """Do nothing, since several robots share the console."""
 
 
 _TOLD: dict[EventKind, str] = {

@@ -10,6 +10,7 @@
 
 import contextlib
 import ipaddress
+import socket
 import ssl
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,7 +19,6 @@ from typing import Any
 from tvist_plant.user_file import read_bytes
 from tvist_protocol.codec import MAX_BYTES
 from tvist_server.gateways.access import Role, access_control, open_access, router_access
-from tvist_server.gateways.endpoints import is_endpoint, is_local, options, protocol
 from tvist_server.option_values import StartError, read_start_file
 
 AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key", "clients.toml"
@@ -28,6 +28,8 @@ HANDSHAKE_MS = 60_000
 """Longest TLS handshake [ms]. After a failed handshake Zenoh accepts no client for 100 ms (its issue 2685),
 so a hundred failures at once delay the next client by 10 s, which a handshake must outlast. At most ten
 handshakes fail per second, so at most 600 are in progress."""
+
+IP_PROTOCOLS = frozenset({"tcp", "udp", "ws", "tls", "quic"})
 
 LIMITS: Mapping[str, Any] = {
     # Largest message assembled from fragments; the gateway refuses messages above MAX_BYTES.
@@ -75,8 +77,25 @@ def _protected(
     if security is not None:
         if insecure:
             raise StartError("security and insecure exclude each other: leave one out")
-        secured, roles = [_secured(endpoint) for endpoint in listen], _roles(security)
-        return secured, {**LIMITS, **_settings(security)}, roles
+        secured, folder = [_secured(endpoint) for endpoint in listen], Path(security).absolute()
+        roles = roles_in(folder)
+        if not roles:
+            raise StartError(
+                f"{folder / CLIENTS} lists no clients: add one with `tvist keys {security} --operator NAME`"
+            )
+        _check_pair(folder)
+        settings = {
+            "enable_mtls": True,
+            "root_ca_certificate": str(folder / AUTHORITY),
+            "listen_certificate": str(folder / CERTIFICATE),
+            "listen_private_key": str(folder / KEY),
+            "close_link_on_expiration": True,
+        }
+        return (
+            secured,
+            {**LIMITS, **{f"transport/link/tls/{key}": value for key, value in settings.items()}},
+            roles,
+        )
     for endpoint in listen:
         if protocol(endpoint) in {"tls", "quic"} and not options(endpoint):
             raise StartError(
@@ -124,28 +143,6 @@ def _secured(endpoint: str) -> str:
     return f"{endpoint}#tls_handshake_timeout_ms={HANDSHAKE_MS}"
 
 
-def _roles(security: str) -> dict[str, Role]:
-    folder = Path(security).absolute()
-    roles = roles_in(folder)
-    if not roles:
-        raise StartError(
-            f"{folder / CLIENTS} lists no clients: add one with `tvist keys {security} --operator NAME`"
-        )
-    return roles
-
-
-def _settings(security: str) -> dict[str, Any]:
-    folder = Path(security).absolute()
-    _check_pair(folder)
-    return {
-        "transport/link/tls/enable_mtls": True,
-        "transport/link/tls/root_ca_certificate": str(folder / AUTHORITY),
-        "transport/link/tls/listen_certificate": str(folder / CERTIFICATE),
-        "transport/link/tls/listen_private_key": str(folder / KEY),
-        "transport/link/tls/close_link_on_expiration": True,
-    }
-
-
 def _check_pair(folder: Path) -> None:
     """Attempt a TLS handshake with itself, because Zenoh's errors do not say what is wrong with the files."""
     for name in (AUTHORITY, CERTIFICATE, KEY):
@@ -173,3 +170,42 @@ def _shake_hands(server: ssl.SSLContext, client: ssl.SSLContext) -> None:
     for side in (*sides, sides[0]):
         with contextlib.suppress(ssl.SSLWantReadError):
             side.do_handshake()
+
+
+def protocol(endpoint: str) -> str:
+    """Return the protocol, such as `tcp` of `tcp/127.0.0.1:7447`; empty if there is none."""
+    before, slash, _ = endpoint.partition("/")
+    return before if slash else ""
+
+
+def is_endpoint(endpoint: str) -> bool:
+    """Return whether a text has the form of an endpoint: a word, a slash and an address."""
+    word, slash, address = endpoint.partition("/")
+    return bool(slash and address) and word.replace("-", "").isalnum()
+
+
+def options(endpoint: str) -> str:
+    """Return the part after `#`, which overrides the session's settings; empty if there is none."""
+    return endpoint.partition("#")[2]
+
+
+def is_local(endpoint: str) -> bool:
+    """Return whether only this machine can reach an endpoint; False if in doubt, as for an unknown protocol or host."""
+    if protocol(endpoint) == "unixsock-stream":
+        return True
+    if protocol(endpoint) not in IP_PROTOCOLS:
+        return False
+    address = endpoint.partition("/")[2].partition("#")[0].partition("?")[0]
+    host = address.rpartition(":")[0].removeprefix("[").removesuffix("]")
+    addresses = _addresses(host)
+    return bool(addresses) and all(address.is_loopback for address in addresses)
+
+
+def _addresses(host: str) -> list[ipaddress.IPv4Address | ipaddress.IPv6Address]:
+    if not host:
+        return []
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+        return [ipaddress.ip_address(str(where[0]).partition("%")[0]) for *_, where in found]
+    except (OSError, ValueError):
+        return []

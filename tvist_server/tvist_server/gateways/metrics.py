@@ -26,7 +26,6 @@ MICRO = 1e-6
 class MetricsGateway(Gateway):
     """Keeps a robot's newest messages for Prometheus; `newest` returns the newest state, from any thread."""
 
-    setpoints_refused = 0
     wanted_topics: Collection[Topic] = frozenset[Topic]({"event", "telemetry"})
 
     def __init__(self, namespace: str, robot: str, newest: Callable[[], State | None]) -> None:
@@ -52,9 +51,6 @@ class MetricsGateway(Gateway):
         """Fetch the newest state, before the figures are read."""
         self.state = self._newest() or self.state
 
-    def close(self) -> None:
-        """Do nothing, since the figures of the last second may still be read."""
-
 
 class Metrics(Collector):
     """HTTP server for Prometheus, which computes figures on request; GatewayError if it cannot listen at `address`."""
@@ -77,14 +73,10 @@ class Metrics(Collector):
         self.page = f"http://{f'[{host}]' if ':' in host else host}:{self._server.server_port}/metrics"
         """URL of the page with the figures."""
 
-    def gateway(self, namespace: str, robot: str, newest: Callable[[], State | None]) -> MetricsGateway:
-        """Create the gateway of a robot; arguments as for `MetricsGateway`."""
-        gateway = MetricsGateway(namespace, robot, newest)
-        self.add(gateway)
-        return gateway
-
-    def add(self, gateway: MetricsGateway) -> None:
+    def add(self, gateway: MetricsGateway) -> MetricsGateway:
+        """Publish the figures of a robot, too."""
         self._robots.append(gateway)
+        return gateway
 
     def close(self) -> None:
         with contextlib.suppress(OSError):
@@ -97,104 +89,121 @@ class Metrics(Collector):
 
         for robot in self._robots:
             robot.look()
-        states = [(robot.labels, robot.state) for robot in self._robots if robot.state is not None]
-        told = [(robot.labels, robot.telemetry) for robot in self._robots if robot.telemetry is not None]
-        ticks = CounterMetricFamily(
-            "tvist_ticks", "Control periods begun. If it stands still, the robot does.", labels=LABELS
-        )
-        robot_mode = GaugeMetricFamily(
-            "tvist_robot_mode", "Robot mode as in RTDE: 7 is RUNNING.", labels=LABELS
-        )
-        safety = GaugeMetricFamily(
-            "tvist_safety_mode", "Safety mode as in RTDE: 1 is NORMAL, 3 is PROTECTIVE_STOP.", labels=LABELS
-        )
-        for labels, state in states:
-            ticks.add_metric(labels, state.tick)
-            robot_mode.add_metric(labels, state.robot_mode)
-            safety.add_metric(labels, state.safety_mode)
-        yield from (ticks, robot_mode, safety)
+        families = {"counter": CounterMetricFamily, "gauge": GaugeMetricFamily}
+        for kind, name, what, source, field in FIGURES:
+            family = families[kind](name, what, labels=LABELS)
+            for robot in self._robots:
+                value = getattr(getattr(robot, source), field, None)
+                if value is not None:
+                    family.add_metric(robot.labels, value)
+            yield family
         late = GaugeMetricFamily(
             "tvist_tick_lateness_seconds",
             "Lateness of the ticks of the last second, by `quantile`: 0.5, 0.99, and 1 for the largest.",
             labels=(*LABELS, "quantile"),
         )
-        for labels, telemetry in told:
-            lateness = {
-                "0.5": telemetry.late_p50_us,
-                "0.99": telemetry.late_p99_us,
-                "1": telemetry.late_max_us,
-            }
-            for quantile, value in lateness.items():
-                late.add_metric((*labels, quantile), value * MICRO)
+        for robot in [robot for robot in self._robots if robot.telemetry is not None]:
+            for quantile, field in QUANTILES.items():
+                late.add_metric((*robot.labels, quantile), getattr(robot.telemetry, field) * MICRO)
         yield late
-        for make, figures in ((GaugeMetricFamily, GAUGES), (CounterMetricFamily, COUNTERS)):
-            for name, what, field in figures:
-                family = make(name, what, labels=LABELS)
-                values = [(labels, getattr(telemetry, field)) for labels, telemetry in told]
-                for labels, value in [one for one in values if one[1] is not None]:
-                    family.add_metric(labels, value)
-                yield family
-        yield self._counted("tvist_events", "Events, by `kind`.", "kind")
-        yield self._counted(
-            "tvist_warnings", "Warnings, by `code`, which is empty for those without one.", "code"
-        )
-
-    def _counted(self, name: str, what: str, label: str) -> "Metric":
-        """Return the number of events or warnings for each kind or code."""
-        from prometheus_client.core import CounterMetricFamily
-
-        family = CounterMetricFamily(name, what, labels=(*LABELS, label))
-        for robot in self._robots:
-            counted = robot.events if label == "kind" else robot.warnings
-            for value, count in counted.copy().items():
-                family.add_metric((*robot.labels, value), count)
-        return family
+        for name, what, label in (
+            ("tvist_events", "Events, by `kind`.", "kind"),
+            ("tvist_warnings", "Warnings, by `code`, which is empty for those without one.", "code"),
+        ):
+            counted = CounterMetricFamily(name, what, labels=(*LABELS, label))
+            for robot in self._robots:
+                for value, count in (robot.events if label == "kind" else robot.warnings).copy().items():
+                    counted.add_metric((*robot.labels, value), count)
+            yield counted
 
 
-GAUGES = (
+FIGURES = (
+    ("counter", "tvist_ticks", "Control periods begun. If it stands still, the robot does.", "state", "tick"),
+    ("gauge", "tvist_robot_mode", "Robot mode as in RTDE: 7 is RUNNING.", "state", "robot_mode"),
     (
+        "gauge",
+        "tvist_safety_mode",
+        "Safety mode as in RTDE: 1 is NORMAL, 3 is PROTECTIVE_STOP.",
+        "state",
+        "safety_mode",
+    ),
+    (
+        "gauge",
         "tvist_ticks_per_second",
         "Control periods begun in the last second: 500 at full rate.",
+        "telemetry",
         "ticks_per_second",
     ),
     (
+        "gauge",
         "tvist_load_ratio",
         "Share of the last second that the ticks of this robot took; missing in lockstep.",
+        "telemetry",
         "load",
     ),
-    ("tvist_overloaded", "1 while the robot is overloaded, otherwise 0.", "overloaded"),
-)
-"""Gauges of the telemetry: name, meaning, field."""
-COUNTERS = (
+    ("gauge", "tvist_overloaded", "1 while the robot is overloaded, otherwise 0.", "telemetry", "overloaded"),
     (
+        "counter",
         "tvist_due_ticks",
         "Control periods that were due: those begun and those left out; missing in lockstep.",
+        "telemetry",
         "due_ticks",
     ),
     (
+        "counter",
         "tvist_missed_ticks",
         "Of the due control periods, those that began a period late or more, or were left out.",
+        "telemetry",
         "missed_ticks",
     ),
-    ("tvist_commands", "Commands received.", "commands"),
-    ("tvist_commands_refused", "Commands refused.", "refused"),
-    ("tvist_setpoints_received", "Set-points received.", "setpoints_received"),
+    ("counter", "tvist_commands", "Commands received.", "telemetry", "commands"),
+    ("counter", "tvist_commands_refused", "Commands refused.", "telemetry", "refused"),
+    ("counter", "tvist_setpoints_received", "Set-points received.", "telemetry", "setpoints_received"),
     (
+        "counter",
         "tvist_setpoints_refused",
         "Set-points that belonged to no stream or were no posture of the arm.",
+        "telemetry",
         "setpoints_refused",
     ),
-    ("tvist_setpoints_late", "Set-points dropped because a newer one had been played.", "setpoints_late"),
-    ("tvist_setpoints_lost", "Set-points that had not arrived when they were due.", "setpoints_lost"),
-    ("tvist_setpoints_limited", "Set-points that exceeded a limit and were limited.", "setpoints_limited"),
     (
+        "counter",
+        "tvist_setpoints_late",
+        "Set-points dropped because a newer one had been played.",
+        "telemetry",
+        "setpoints_late",
+    ),
+    (
+        "counter",
+        "tvist_setpoints_lost",
+        "Set-points that had not arrived when they were due.",
+        "telemetry",
+        "setpoints_lost",
+    ),
+    (
+        "counter",
+        "tvist_setpoints_limited",
+        "Set-points that exceeded a limit and were limited.",
+        "telemetry",
+        "setpoints_limited",
+    ),
+    (
+        "counter",
         "tvist_states_dropped",
         "States dropped because the network did not take them in time.",
+        "telemetry",
         "dropped_states",
     ),
-    ("tvist_recorder_dropped", "Messages dropped because the recorder's queue was full.", "recorder_dropped"),
+    (
+        "counter",
+        "tvist_recorder_dropped",
+        "Messages dropped because the recorder's queue was full.",
+        "telemetry",
+        "recorder_dropped",
+    ),
 )
-"""Counters of the telemetry: name, meaning, field."""
+"""Type, name and meaning of each figure, the message that has it, and its field there."""
+QUANTILES = {"0.5": "late_p50_us", "0.99": "late_p99_us", "1": "late_max_us"}
 
 
 def place(address: str) -> tuple[str, int]:

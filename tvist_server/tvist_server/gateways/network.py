@@ -12,7 +12,7 @@ from zenoh.handlers import Callback
 from tvist_client.errors import NotConnectedError
 from tvist_client.transports.certificates import settings as certificate_for
 from tvist_client.transports.certificates import why_refused
-from tvist_server.gateways.base import CommandIntake, GatewayError, QueryHandler
+from tvist_server.gateways.base import CommandIntake, GatewayError
 from tvist_server.gateways.zenoh import ZenohGateway
 
 CONFIG: Mapping[str, Any] = {
@@ -100,7 +100,7 @@ class Network:
         gateway.serve(desk, lockstep=lockstep, truth=truth, wanted=wanted)
         return gateway
 
-    def expect(self, robots: Sequence[str], starting: QueryHandler, *, here: bool = True) -> None:
+    def expect(self, robots: Sequence[str], starting: CommandIntake, *, here: bool = True) -> None:
         """Let `starting` answer queries for robots until `gateway`, or another session (`here` False), serves them."""
         for robot in robots:
             self._expected[robot] = self._added(robot, starting, complete=here)
@@ -110,7 +110,7 @@ class Network:
         for gateway in self._expected.values():
             gateway.withdraw()
 
-    def _added(self, robot: str, starting: QueryHandler, *, complete: bool = True) -> ZenohGateway:
+    def _added(self, robot: str, starting: CommandIntake, *, complete: bool = True) -> ZenohGateway:
         gateway = ZenohGateway(self.session, robot, starting, complete=complete)
         self._gateways.append(gateway)
         return gateway

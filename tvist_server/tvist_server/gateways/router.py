@@ -5,8 +5,9 @@ import resource
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Self
 
+import zenoh
+
 from tvist_client.across import RobotPlace, place_of
-from tvist_client.transports.session import close_session
 from tvist_protocol import keys
 from tvist_server.gateways.exposure import check_endpoints, guarded_router
 from tvist_server.gateways.network import REALTIME, open_router
@@ -36,35 +37,25 @@ class Rate(NamedTuple):
         return cls(float(found[1]), found[2])
 
 
-class Router:
-    """A running router; `rates` limit the outgoing states of each robot in `robots`, and of all others together.
+def started(
+    listen: Sequence[str],
+    connect: Sequence[str],
+    rates: Sequence[Rate],
+    robots: Sequence[RobotPlace],
+    *,
+    security: str | None,
+    insecure: bool,
+) -> zenoh.Session:
+    """Start a router; `rates` limit the outgoing states of each robot in `robots`, and of all others together.
 
     May raise StartError or GatewayError.
     """
-
-    def __init__(
-        self,
-        listen: Sequence[str],
-        connect: Sequence[str],
-        rates: Sequence[Rate],
-        robots: Sequence[RobotPlace],
-        *,
-        security: str | None,
-        insecure: bool,
-    ) -> None:
-        check_endpoints("connect", connect)
-        endpoints, guard = guarded_router(listen, security=security, insecure=insecure)
-        _allow_files()
-        settings = {
-            **REALTIME,
-            "transport/unicast/max_sessions": SESSIONS,
-            **guard,
-            **({"downsampling": downsampling(rates, robots)} if rates else {}),
-        }
-        self._session = open_router(endpoints, connect, settings, security)
-
-    def close(self) -> None:
-        close_session(self._session)
+    check_endpoints("connect", connect)
+    endpoints, guard = guarded_router(listen, security=security, insecure=insecure)
+    _allow_files()
+    limits = {"downsampling": downsampling(rates, robots)} if rates else {}
+    settings = {**REALTIME, "transport/unicast/max_sessions": SESSIONS, **guard, **limits}
+    return open_router(endpoints, connect, settings, security)
 
 
 def robots_of(text: str) -> list[RobotPlace]:

@@ -5,6 +5,7 @@ import contextlib
 import logging
 import time
 from collections.abc import Callable, Collection, Sequence
+from functools import partial
 from typing import Final
 
 from tvist_controller.instruments.report import Topic
@@ -22,7 +23,7 @@ from tvist_controller.programs.sockets import (
 )
 from tvist_protocol.journal import SocketChange
 from tvist_server.allowed_hosts import AllowedHosts
-from tvist_server.gateways.base import Gateway, Message
+from tvist_server.gateways.base import Gateway
 
 log = logging.getLogger(__name__)
 
@@ -107,7 +108,6 @@ class ProgramSockets(Gateway, SocketPorts):
     def __init__(
         self, tell: Callable[[SocketNews], None], warn: Callable[[str], None], allowed: AllowedHosts
     ) -> None:
-        self.setpoints_refused = 0
         self._tell_controller, self._warn, self._allowed = tell, warn, allowed
         self._loop: asyncio.AbstractEventLoop | None = None
         self._early: list[Callable[[], object]] | None = []
@@ -127,9 +127,9 @@ class ProgramSockets(Gateway, SocketPorts):
             match order:
                 case Open():
                     link = self._links[order.socket] = _Link(order.socket, self._tell_controller)
-                    self._soon(lambda order=order, link=link: self._begin(order, link))  # type: ignore[misc]
+                    self._soon(partial(self._begin, order, link))
                 case Send():
-                    self._soon(lambda link=self._links[order.socket], data=order.data: link.send(data))  # type: ignore[misc]
+                    self._soon(partial(self._links[order.socket].send, order.data))
                 case Close():
                     self._silent.discard(order.socket)
                     self._soon(self._links.pop(order.socket).end)
@@ -144,7 +144,8 @@ class ProgramSockets(Gateway, SocketPorts):
                     del self._waits[order.wait]
                 case Expire():
                     left = self._waits[order.wait][1] + order.seconds - now
-                    self._after(left, SocketNews(order.wait, "expired"))
+                    # Through the network's thread, so that data that came earlier is reported first.
+                    self._soon(partial(self._later, left, SocketNews(order.wait, "expired")))
         return ()
 
     def note(self, news: SocketNews) -> None:
@@ -166,12 +167,6 @@ class ProgramSockets(Gateway, SocketPorts):
         self._silent.update(socket for socket, begun in waits if begun + PATIENCE <= now)
         return max(0.0, max(begun for _, begun in waits) + PATIENCE - now)
 
-    def _after(self, seconds: float, news: SocketNews) -> None:
-        """Report news after a delay from the network thread, so that data that came earlier is reported first."""
-        self._soon(
-            lambda: asyncio.get_running_loop().call_later(max(0.0, seconds), self._tell_controller, news)
-        )
-
     def _soon(self, action: Callable[[], object]) -> None:
         if self._loop is not None:
             with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
@@ -180,9 +175,6 @@ class ProgramSockets(Gateway, SocketPorts):
             self._early.append(action)
 
     # The following methods run in the network's thread.
-
-    def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
-        """Ignore the messages of the robot."""
 
     async def open(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -198,6 +190,9 @@ class ProgramSockets(Gateway, SocketPorts):
 
     def close(self) -> None:
         self._loop = self._early = None
+
+    def _later(self, seconds: float, news: SocketNews) -> None:
+        asyncio.get_running_loop().call_later(max(0.0, seconds), self._tell_controller, news)
 
     def _begin(self, order: Open, link: _Link) -> None:
         link.connecting = asyncio.ensure_future(self._connect(order, link))

@@ -5,19 +5,25 @@ token before the command that follows it. One may still be running when the sess
 """
 
 import contextlib
+import logging
+import threading
 from collections.abc import Callable
 from functools import partial
+from queue import SimpleQueue
 
 import zenoh
 from zenoh.handlers import Callback
 
 from tvist_controller.instruments.report import Report, Topic
 from tvist_protocol import keys
-from tvist_protocol.codec import MAX_BYTES
+from tvist_protocol.codec import MAX_BYTES, encode
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.base import CommandIntake, Gateway, Message, QueryHandler
-from tvist_server.gateways.replies import ENCODING, Answers
+from tvist_server.gateways.base import CommandIntake, Gateway, Message
 
+log = logging.getLogger(__name__)
+
+ENCODING = zenoh.Encoding("application/msgpack")
+CLOSE_WAIT = 0.2  # longest time to send the last answers at close [s]
 EVERY_TICK: frozenset[Topic] = frozenset({"state", "truth"})
 """Topics published every tick; their messages are made only for subscribers."""
 
@@ -29,13 +35,11 @@ class ZenohGateway(Gateway):
     """
 
     def __init__(
-        self, session: zenoh.Session, robot: str, starting: QueryHandler, *, complete: bool = True
+        self, session: zenoh.Session, robot: str, starting: CommandIntake, *, complete: bool = True
     ) -> None:
-        self.setpoints_refused = 0
         self._session = session
         self._robot = robot
-        self._desk: CommandIntake | None = None
-        self._queried = starting
+        self._desk = self._queried = starting
         self._closed = False
         self.wanted_topics: set[Topic] = set()
         self._answers = Answers()
@@ -143,7 +147,7 @@ class ZenohGateway(Gateway):
         return answer
 
     def _on_setpoint(self, key: str, sample: zenoh.Sample) -> None:
-        if self._closed or self._desk is None:
+        if self._closed:
             return
         if str(sample.key_expr) != key or len(sample.payload) > MAX_BYTES:
             self.setpoints_refused += 1
@@ -151,19 +155,54 @@ class ZenohGateway(Gateway):
             self._desk.setpoint(sample.payload.to_bytes())
 
     def _on_client(self, sample: zenoh.Sample) -> None:
-        key = str(sample.key_expr)
-        name, session = keys.client_name(self._robot, key), keys.client_session(self._robot, key)
-        if self._closed or self._desk is None or name is None:
+        client = keys.client_of(self._robot, str(sample.key_expr))
+        if self._closed or client is None:
             return
         if sample.kind == zenoh.SampleKind.PUT:
-            self._desk.client_seen(name, session)
+            self._desk.client_seen(*client)
         else:
-            self._desk.client_gone(name, session)
+            self._desk.client_gone(*client)
 
     def session_gone(self, session: str) -> None:
         """Note that a session has ended. Its liveliness tokens may outlast it while another session holds a copy."""
-        if not self._closed and self._desk is not None:
+        if not self._closed:
             self._desk.session_gone(session)
+
+
+class Answers:
+    """Sends replies to queries from its own thread, because a client that does not read blocks it.
+
+    It blocks until its link is closed, after 1 s in real time and 5 s in lockstep: by default, replies use BLOCK.
+    """
+
+    def __init__(self) -> None:
+        self._queue: SimpleQueue[tuple[zenoh.Query, str, Reply | Callable[[], bytes]] | None] = SimpleQueue()
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="zenoh-answers", daemon=True)
+        self._thread.start()
+
+    def to(self, query: zenoh.Query, key: str) -> Callable[[Reply | Callable[[], bytes]], None]:
+        """Return a function that answers a query with a reply, or with a function that returns an encoded one."""
+        return lambda reply: self._queue.put((query, key, reply))
+
+    def close(self) -> None:
+        """Send the queued answers, for at most `CLOSE_WAIT`."""
+        self._queue.put(None)
+        self._thread.join(CLOSE_WAIT)
+        self._closed = True
+
+    def _run(self) -> None:
+        while not self._closed and (answer := self._queue.get()) is not None:
+            try:
+                _send(*answer)
+            except Exception:
+                log.exception("a query is not answered")
+
+
+def _send(query: zenoh.Query, key: str, reply: Reply | Callable[[], bytes]) -> None:
+    # Leaving this block ends the query; if the client has left, the answer is not needed.
+    with contextlib.suppress(zenoh.ZError), query:
+        query.reply(key, reply() if callable(reply) else encode(reply), encoding=ENCODING)
 
 
 def _publishers(
@@ -171,18 +210,11 @@ def _publishers(
 ) -> dict[Topic, zenoh.Publisher]:
     """Declare one publisher for each topic.
 
-    In real time nothing may block the publisher, so all publishers use DROP, and none is express. Messages
-    for a busy link then share batches of 64 KiB, two of which may wait; an express message takes a whole
-    batch, so only two states could wait. Measured on two cores with eight busy processes, a client got 2330
-    of 3000 states with express, and all of them, on time, without.
-
-    Messages of every tick have a low priority, so that on a slow link answers, events and telemetry come
-    first. With real-time priority and a link fast enough for a fifth of the states, no answer arrived.
-
-    Events must not be lost, so they have a priority, and hence queues, of their own: about a thousand can
-    wait for a client that has stopped reading, besides its socket's buffers. With a reader that stopped for
-    7.5 s, 3300 of 6000 states were dropped but none of 240 events; with the states' priority, half of the
-    events were lost. BLOCK would have blocked the publisher, and with it all other clients, for 5 s.
+    In real time nothing may block the publisher, so all publishers use DROP, and none is express: of messages
+    that share batches of 64 KiB more can wait for a busy link. Messages of every tick have a low priority, so that
+    on a slow link answers, events and telemetry come first: with real-time priority, no answer arrived. Events must
+    not be lost, so they have a priority, and hence queues, of their own: about a thousand can wait for a client that
+    has stopped reading, besides its socket's buffers.
 
     In lockstep all publishers use BLOCK, as the protocol requires, and events share the states' queue: a
     client that reads state `n` has read all events up to tick `n`.

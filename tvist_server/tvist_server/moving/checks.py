@@ -27,7 +27,7 @@ STILL = 1e-3
 LEANING = 0.15  # largest angle between the measured and the expected direction of gravity [rad]
 PLAUSIBLE = 2.0  # largest error of the measured gravity for which the accelerometer is used [m/s²]
 _AGAIN = "then power on here"
-_SAFETY = {
+_SAFETY: dict[int, str] = {
     SafetyMode.PROTECTIVE_STOP: "it has made a protective stop: remove the cause, unlock it at the robot, then here",
     SafetyMode.SAFEGUARD_STOP: f"a safeguard has stopped it: reset it, stop the program at the robot, {_AGAIN}",
     SafetyMode.SYSTEM_EMERGENCY_STOP: "the system's emergency stop was pressed: release it, switch the robot on at its "
@@ -35,7 +35,7 @@ _SAFETY = {
     SafetyMode.ROBOT_EMERGENCY_STOP: "its emergency stop was pressed: release it, switch the robot on at its teach "
     f"pendant, {_AGAIN}",
 }
-_ENDED = {
+_ENDED: dict[int, str] = {
     ProgramEnded.ORDERED: f"another client has ended its program: find the client that writes its registers, {_AGAIN}",
     ProgramEnded.SILENCE: "no set-point reached it for 40 ms, so it braked: check the network and the load of this "
     f"machine, {_AGAIN}",
@@ -182,20 +182,19 @@ def halt_by_modes(modes: tuple[int, int, int]) -> Halt | None:
     """Return why the robot's modes prevent it from following any program; None if they do not."""
     mode, safety, _ = modes
     if safety not in _MOVABLE:
-        name = SafetyMode(safety).name if safety in {*SafetyMode} else str(safety)
-        why = _SAFETY.get(SafetyMode(safety)) if safety in {*SafetyMode} else None
-        return Halt(why or f"its safety mode is {name}: clear that at the robot, {_AGAIN}", safety)
+        other = f"its safety mode is {_name(SafetyMode, safety)}: clear that at the robot, {_AGAIN}"
+        return Halt(_SAFETY.get(safety, other), safety)
     if mode != RobotMode.RUNNING:
-        name = RobotMode(mode).name if mode in {*RobotMode} else str(mode)
-        return Halt(f"its mode is {name}: switch it on and release its brakes at the robot, {_AGAIN}", safety)
+        why = f"its mode is {_name(RobotMode, mode)}: switch it on and release its brakes at the robot, {_AGAIN}"
+        return Halt(why, safety)
     return None
 
 
 def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
     """Return why the running program no longer follows; None if it does. `ended` is its register."""
     _, safety, runtime = modes
-    if ended in {*ProgramEnded} and ended != ProgramEnded.NOT:
-        return Halt(_ENDED[ProgramEnded(ended)], safety)
+    if ended in _ENDED:
+        return Halt(_ENDED[ended], safety)
     if runtime in _PAUSED:
         return Halt(f"its program was paused: stop it at the robot, {_AGAIN}", safety)
     if runtime != RuntimeState.PLAYING:
@@ -215,4 +214,4 @@ def _listed(numbers: Sequence[float]) -> str:
 
 
 def _name(kind: type[RobotMode | SafetyMode], number: int) -> str:
-    return kind(number).name if number in {member.value for member in kind} else str(number)
+    return kind(number).name if number in {*kind} else str(number)

@@ -88,7 +88,6 @@ class MovedRobot(RealArm):
         return self._robot.payload
 
     def described(self) -> RobotDescription:
-        """Return the robot file with limits no wider than the robot's own and the speed cap."""
         return self._wanted.description
 
     def measure(self) -> Measurement:
@@ -164,7 +163,6 @@ class MovedRobot(RealArm):
 
     @property
     def condition(self) -> Condition:
-        """Whether the program follows."""
         return Condition(self._run is not None and self._run.ready, halt=self._halt)
 
     def switch(self, *, power: bool, brakes: bool) -> None:
@@ -179,7 +177,6 @@ class MovedRobot(RealArm):
         self._run, self._held, self._halt = None, False, None
 
     def close(self) -> None:
-        """Release the robot."""
         self.stop()
         self._robot.close()
 

@@ -17,6 +17,9 @@ CLOSE = 3e-4  # distance from the set-points, and from their path, that is corre
 AFTER_SHIFT = 1e-5
 """The same after the program has shifted the motion in time, an error that does not vanish by itself [rad]."""
 FADE = 0.05  # time constant of the correction of larger distances [s]
+LOOKAHEAD = 0.03
+"""`lookahead_time` of `servoj` [s]: the smallest, since a larger lag only increases the lead that is sent."""
+GAIN = 2000.0  # `gain` of `servoj` [1/s²]: the largest, for the same reason
 MARGIN = 1.05  # largest ratio of the arm's speed to that of the fastest set-points [-]
 
 JOINTS = 6
@@ -76,28 +79,24 @@ OUTPUTS: dict[str, Field] = dict.fromkeys(
 """Registers that tvist reads."""
 
 
-def program(run: int, *, speed: float, deceleration: float, lookahead: float, gain: float) -> str:
+def program(run: int, *, speed: float, deceleration: float) -> str:
     """Return the text of the program, which only uses functions of e-Series (5.9 or later) and CB3 (3.14 or later).
 
     Args:
         run: Number of this run, 1 to `MAX_NUMBER`, which the program reports.
         speed: Fastest set-points; faster ones end the program [rad/s].
         deceleration: Deceleration of the fastest joint when it ends [rad/s²].
-        lookahead: `lookahead_time` of `servoj`, 0.03 to 0.2 [s].
-        gain: `gain` of `servoj`, 100 to 2000.
     """
     for name, value, least, most in (
         ("run", run, 1, MAX_NUMBER),
         ("speed", speed, 0.01, 10.0),
         ("deceleration", deceleration, 0.1, 100.0),
-        ("lookahead", lookahead, 0.03, 0.2),
-        ("gain", gain, 100.0, 2000.0),
     ):
         if not least <= value <= most:
             raise ValueError(f"{name} is {value:g}: must be {least:g} to {most:g}")
     given = {
         "name": NAME, "run": run, "speed": float(MARGIN * speed), "deceleration": float(deceleration),
-        "lookahead": float(lookahead), "gain": float(gain), "silence": SILENCE, "first": FIRST, "away": AWAY,
+        "lookahead": LOOKAHEAD, "gain": GAIN, "silence": SILENCE, "first": FIRST, "away": AWAY,
         "fade": FADE, "again": AGAIN, "close": CLOSE, "after_shift": AFTER_SHIFT, "NUMBER": NUMBER, "ORDER": ORDER,
         "SETPOINTS": SETPOINTS, "STATE": STATE, "PLAYED": PLAYED, "ENDED": ENDED, "ALONE": ALONE,
         "LEFT_OUT": LEFT_OUT, "RUN": RUN, "MOST": MAX_NUMBER,

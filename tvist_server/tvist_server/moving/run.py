@@ -25,7 +25,7 @@ from tvist_server.moving.program import (
     Window,
     program,
 )
-from tvist_server.moving.servo_lag import GAIN, LOOKAHEAD, ServoLag, ServoSetpoints
+from tvist_server.moving.servo_lag import ServoLag, ServoSetpoints
 from tvist_server.watching.address import RobotAddress
 from tvist_server.watching.watched_robot import WatchedRobot
 
@@ -67,7 +67,7 @@ class ProgramRun:
         self._told, self._told_at = (0, 0, 0), 0.0
         robot.write(self._window.values(0))  # so that set-points of an earlier run are not played
         deceleration = min(max(DECELERATION, speed / BRAKES), *limits.acceleration)
-        text = program(number, speed=speed, deceleration=deceleration, lookahead=LOOKAHEAD, gain=GAIN)
+        text = program(number, speed=speed, deceleration=deceleration)
         self._upload = Upload(place, text, check)
 
     @property

@@ -9,10 +9,7 @@ from tvist_controller.trajectory.guided import DAMPED, DELAY
 from tvist_controller.trajectory.limits import Floats
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, PlantError
-
-LOOKAHEAD = 0.03
-"""`lookahead_time` of `servoj` [s]: the smallest, since a larger lag only increases the lead that is sent."""
-GAIN = 2000.0  # `gain` of `servoj` [1/s²]: the largest, for the same reason
+from tvist_server.moving.program import GAIN, LOOKAHEAD
 
 CUT = 1e-3  # smallest cut of a set-point that is counted [rad]
 

@@ -12,9 +12,7 @@ from typing import Any
 from tvist_controller.instruments.report import Report, Sink
 from tvist_plant.user_file import named
 from tvist_protocol.info import Info
-from tvist_protocol.io import Io
-from tvist_protocol.journal import Entry
-from tvist_protocol.stream import Event, Truth
+from tvist_protocol.stream import Event
 from tvist_server.recording import Kept, RecorderError
 
 log = logging.getLogger(__name__)
@@ -64,15 +62,10 @@ class BlackBox(Sink):
                 exc_info=error,
             )
 
-    def truth(self, truth: Truth) -> None:
-        self._kept.append(truth)
+    def _keep(self, message: Kept) -> None:
+        self._kept.append(message)
 
-    def io(self, io: Io) -> None:
-        self._kept.append(io)
-
-    def journal(self, entry: Entry) -> None:
-        """Keep an input of the controller."""
-        self._kept.append(entry)
+    truth = io = journal = _keep
 
     def _write(self, tick: int) -> None:
         if self._written < MAX_FILES:
@@ -90,17 +83,7 @@ class BlackBox(Sink):
         try:
             with Recorder(path, info, self._start, wait=True) as recorder:
                 for message in messages:
-                    match message:
-                        case Report():
-                            recorder.report(message)
-                        case Event():
-                            recorder.event(message)
-                        case Truth():
-                            recorder.truth(message)
-                        case Io():
-                            recorder.io(message)
-                        case Entry():
-                            recorder.journal(message)
+                    recorder.take(message)
         except RecorderError as error:
             log.error("the last second before the failure is lost: %s", error)  # noqa: TRY400  the sentence says it
         else:

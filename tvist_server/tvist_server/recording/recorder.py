@@ -9,7 +9,6 @@ from contextlib import suppress
 from pathlib import Path
 from threading import Event as Flag
 from threading import Thread, current_thread
-from types import TracebackType
 from typing import Any, Self
 
 import msgspec
@@ -48,20 +47,15 @@ class Recorder(Sink):
         info: Info,
         start: Mapping[str, Any],  # all that a replay needs besides the journal, as JSON types
         *,
-        overwrite: bool = False,  # whether to replace an existing file
         keep: int | None = None,  # least number of ticks kept, in segments; None: all
-        queue_size: int = QUEUE_SIZE,  # number of messages that may wait for the writer
         wait: bool = False,  # whether to wait when the queue is full (lockstep and free)
         on_error: Callable[[str], None] | None = None,  # called once in the writer's thread if it stops
         on_moved: Callable[[str], None] | None = None,  # called once when the file was moved
     ) -> None:
-        if queue_size < 1:
-            raise RecorderError(f"queue_size is {queue_size}: must be at least 1")
         self.path = Path(path)
         self.error: str | None = None  # why the recording stopped by itself
         self._dropped: dict[type[msgspec.Struct], int] = dict.fromkeys((State, Event, Truth, Io, Entry), 0)
         self._queue: deque[Kept | State] = deque()
-        self._queue_size = queue_size
         self._wait = wait
         self._on_error = on_error
         self._on_moved = on_moved
@@ -69,31 +63,23 @@ class Recorder(Sink):
         self._closing = False
         self._wake = Flag()
         self._room = Flag()
-        self._begin(info, start, overwrite, keep)
+        self._begin(info, start, keep)
         self.place: Path | None = self._file.whole
         """Where readers find the recording: the last known path of the file, or a pattern for all segments."""
         # A daemon thread does not keep a program alive that ends without `close`; the file stays readable.
         self._thread = Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
-    def report(self, report: Report) -> None:
-        self._offer(report)
+    def take(self, message: Kept | State) -> None:
+        """Take a message of any kind."""
+        if self._wait and len(self._queue) >= QUEUE_SIZE:
+            self._wait_for_room()
+        if self._stopped or len(self._queue) >= QUEUE_SIZE:
+            self._dropped[State if isinstance(message, Report) else type(message)] += 1
+        else:
+            self._queue.append(message)
 
-    def state(self, state: State) -> None:
-        """Take a state for which there is no report."""
-        self._offer(state)
-
-    def event(self, event: Event) -> None:
-        self._offer(event)
-
-    def truth(self, truth: Truth) -> None:
-        self._offer(truth)
-
-    def io(self, io: Io) -> None:
-        self._offer(io)
-
-    def journal(self, entry: Entry) -> None:
-        self._offer(entry)
+    report = state = event = truth = io = journal = take
 
     @property
     def dropped(self) -> int:
@@ -116,35 +102,22 @@ class Recorder(Sink):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
-
-    def _offer(self, message: Kept | State) -> None:
-        if self._wait and len(self._queue) >= self._queue_size:
-            self._wait_for_room()
-        if self._stopped or len(self._queue) >= self._queue_size:
-            self._dropped[State if isinstance(message, Report) else type(message)] += 1
-        else:
-            self._queue.append(message)
 
     def _wait_for_room(self) -> None:
         self._room.clear()
         self._wake.set()
-        while len(self._queue) >= self._queue_size and not self._stopped:
+        while len(self._queue) >= QUEUE_SIZE and not self._stopped:
             self._room.wait(PAUSE)
 
-    def _begin(self, info: Info, start: Mapping[str, Any], overwrite: bool, keep: int | None) -> None:
+    def _begin(self, info: Info, start: Mapping[str, Any], keep: int | None) -> None:
         try:
             topic_of, first = topics(info.name), heading(info, start)
         except (TypeError, ValueError, TvistError) as error:
             raise RecorderError(f"{self.path} cannot be started: {error}") from error
         try:
-            self._file = Segments(self.path, topic_of, first, self._dropped, overwrite=overwrite, keep=keep)
+            self._file = Segments(self.path, topic_of, first, self._dropped, keep)
         except FileExistsError as error:
             raise RecorderError(
                 f"{error.filename} exists already and is not overwritten: choose another file, or record with --keep "
@@ -198,14 +171,11 @@ class Recorder(Sink):
         self._stopped = True
         self._queue.clear()
         self._room.set()
-        self._abandon()
+        with suppress(OSError):
+            self._file.close()
         self.error = why
         if self._on_error is not None:
             self._on_error(self.error)
-
-    def _abandon(self) -> None:
-        with suppress(OSError):
-            self._file.close()
 
 
 def _reason(error: Exception) -> str:

@@ -39,8 +39,6 @@ class Segments:
         topic_of: Mapping[type[msgspec.Struct], str],
         heading: dict[str, str],  # metadata at the beginning of each file
         dropped: Mapping[type[msgspec.Struct], int],  # messages dropped by kind; the recorder updates it
-        *,
-        overwrite: bool,  # whether to replace a file; segments never do
         keep: int | None,  # least number of ticks in all segments; None: one file
     ) -> None:
         self.path = self.whole = path
@@ -52,12 +50,12 @@ class Segments:
         self._last = 0
         self._io: Io | None = None
         if keep is None:
-            self._begin({}, overwrite=overwrite)
+            self._begin({})
             return
         self._run, self._number = _new_run(path), 1
         self.path = path.with_name(segment_name(path.name, self._run, 1))
         self.whole = path.with_name(segment_name(path.name, self._run, None))
-        self._begin({}, overwrite=False)
+        self._begin({})
 
     def write(self, message: Recorded) -> None:
         """Add a message; start a new segment before a tick if the present one is full. May raise OSError."""
@@ -73,8 +71,8 @@ class Segments:
         self._writer.write(message)
 
     def flush(self) -> None:
-        """Pass complete chunks to the operating system."""
-        self._writer.flush()
+        """Pass complete chunks to the operating system, so that they survive the end of this process."""
+        self._stream.flush()
 
     def finish(self) -> None:
         """Write the last chunk, the numbers of dropped messages, and the index."""
@@ -104,14 +102,13 @@ class Segments:
         """Close the file; without `finish` before, it has no index."""
         self._stream.close()
 
-    def _begin(self, more: dict[str, str], *, overwrite: bool) -> None:
-        self._stream = self.path.open("wb" if overwrite else "xb")
+    def _begin(self, more: dict[str, str]) -> None:
+        self._stream = self.path.open("xb")
         try:
             _claim(self._stream)
             self._writer = RecordingWriter(self._stream, self._topic_of, self._heading | more)
         except OSError:
-            if not overwrite:
-                self.path.unlink()  # an incomplete heading would block the next start
+            self.path.unlink()  # an incomplete heading would block the next start
             with suppress(OSError):
                 self._stream.close()
             raise
@@ -122,7 +119,7 @@ class Segments:
         self._stream.close()
         self._number += 1
         self.path = self._name.with_name(segment_name(self._name.name, self._run, self._number))
-        self._begin({FROM_TICK: str(tick)}, overwrite=False)
+        self._begin({FROM_TICK: str(tick)})
         if self._io is not None:
             self._writer.write(self._io)
         self._first = tick

@@ -49,23 +49,19 @@ class RecordingWriter:
         self._writer.start(library=f"tvist {LIBRARY_IDENTIFIER}")
         self._writer.add_metadata(METADATA, heading)
         self._channels = {kind: self._channel(kind, topic) for kind, topic in topic_of.items()}
-        self.flush()
+        stream.flush()
 
     def write(self, message: Recorded) -> None:
         """Add a message; raise TypeError if it has a value that JSON cannot represent, such as a numpy number."""
         time = message.tick * TICK_NS
         self._writer.add_message(self._channels[type(message)], time, to_json(message), time)
 
-    def flush(self) -> None:
-        """Pass complete chunks to the operating system, so that they survive the end of this process."""
-        self._stream.flush()
-
     def finish(self, dropped: Mapping[type[msgspec.Struct], int]) -> None:
         """Write the last chunk, the numbers of dropped messages and the index. Nothing can be added afterwards."""
         counts = {tag(kind): str(dropped.get(kind, 0)) for kind in self._channels}
         self._writer.add_metadata(END_METADATA, counts)
         self._writer.finish()  # type: ignore[no-untyped-call]
-        self.flush()
+        self._stream.flush()
 
     def _channel(self, kind: type[msgspec.Struct], topic: str) -> int:
         schema = json.dumps(viewer_schema(kind)).encode()

@@ -66,11 +66,9 @@ class WatchedRobot(RealArm):
             raise PlantError(f"{error}. {_NEXT}") from error
 
     def measure(self) -> Measurement:
-        """Return the latest measurements."""
         return self._last.measured
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Return the latest measurements and ignore the command."""
         del command
         return self._last.measured
 
@@ -79,7 +77,6 @@ class WatchedRobot(RealArm):
         return self._last
 
     def interval(self) -> float:
-        """Return the time between two rows [s]."""
         return self._interval * PERIOD
 
     def sight(self) -> Sight:
@@ -108,7 +105,6 @@ class WatchedRobot(RealArm):
 
     @property
     def connected(self) -> bool:
-        """Whether the robot is connected."""
         return self._connection is not None
 
     def write(self, numbers: Sequence[float]) -> None:
@@ -117,7 +113,6 @@ class WatchedRobot(RealArm):
             self._connection.write(numbers)
 
     def close(self) -> None:
-        """Close the connection."""
         if self._connection is not None:
             self._connection.close()
             self._connection = None

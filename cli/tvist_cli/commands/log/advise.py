@@ -8,12 +8,7 @@ from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, progress, say, table, typed, write_report
 
 
-def advise(
-    *files: Path,
-    output: Path | None = None,
-    logs: LogOptions = AS_IT_IS,
-    json: bool = False,
-) -> None:
+def advise(*files: Path, output: Path | None = None, logs: LogOptions = AS_IT_IS, json: bool = False) -> None:
     """Find in a robot's logs what rings after its motions, predict what each shaper would leave, and recommend one.
 
     The prediction convolves the recorded acceleration with each shaper. Motions that were made with a shaper are

@@ -171,12 +171,14 @@ def _facts(found: dict[str, Any]) -> dict[str, str]:
     facts["rows"] = f"{found['rows']}, {missing or 'no'} tick{'' if missing == 1 else 's'} missing"
     if found["complete"] is not None:
         facts["closed"] = "yes" if found["complete"] else "no: cut off or damaged"
-        facts["replay"] = "yes" if found["replayable"] else f"no: it {_lack(found['from_tick'])}"
+        lack = "does not contain the robot's commands"
+        if found["from_tick"] is not None:
+            lack = f"has forgotten all before tick {found['from_tick']}"
+        facts["replay"] = "yes" if found["replayable"] else f"no: it {lack}"
         facts["messages"] = ", ".join(f"{count} {kind}" for kind, count in found["messages"].items())
     facts["events"] = ", ".join(f"{count} {kind}" for kind, count in found["events"].items()) or "none"
-    if found["bytes"] is not None:
-        size = found["bytes"]
-        facts["size"] = f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.1f} kB"
+    size = found["bytes"]
+    facts["size"] = f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.1f} kB"
     facts["columns"] = ", ".join(map(_column, found["columns"]))
     return facts
 
@@ -185,12 +187,6 @@ def _column(column: dict[str, Any]) -> str:
     _, *shape = column["shape"]
     words = (column["name"], " × ".join(map(str, shape)), column["unit"] and f"[{column['unit']}]")
     return " ".join(filter(None, words))
-
-
-def _lack(from_tick: int | None) -> str:
-    if from_tick is not None:
-        return f"has forgotten all before tick {from_tick}"
-    return "does not contain the robot's commands"
 
 
 def _compare(a: Path, b: Path, logs: LogOptions, *, json: bool) -> None:

@@ -9,12 +9,7 @@ from tvist_cli.output import default_output, print_json, say
 
 
 def export(
-    file: Path,
-    *,
-    to: str,
-    output: Path | None = None,
-    logs: LogOptions = AS_IT_IS,
-    json: bool = False,
+    file: Path, *, to: str, output: Path | None = None, logs: LogOptions = AS_IT_IS, json: bool = False
 ) -> None:
     """Write a recording or a log as CSV or Parquet, in full precision, or a recording for Foxglove.
 

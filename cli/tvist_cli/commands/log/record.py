@@ -2,6 +2,7 @@
 
 import asyncio
 from pathlib import Path
+from signal import SIGINT
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, failing_on, interrupted
@@ -74,7 +75,7 @@ def record(
         print_json({"file": place and str(place), "states": states, "lost": lost})
     else:
         say(f"{states} states recorded, {lost} lost")
-    if ending.interrupted:
+    if ending.signal == SIGINT:
         said = f"{states * 0.002:.1f} s recorded into {file}"
         if seconds is not None:  # without it, Control+C is how a recording ends
             raise interrupted(said)

@@ -7,12 +7,7 @@ from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import default_output, out, print_json, typed, write_report
 
 
-def report(
-    *files: Path,
-    output: Path | None = None,
-    logs: LogOptions = AS_IT_IS,
-    json: bool = False,
-) -> None:
+def report(*files: Path, output: Path | None = None, logs: LogOptions = AS_IT_IS, json: bool = False) -> None:
     """Write a report of recordings or logs as one web page that needs no network.
 
     Its verdict tells how much the tool vibrates and, for several files, whether the others vibrate less than

@@ -2,30 +2,21 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.instruments.variables import READERS
+from tvist_controller.instruments.variables import ORDER, READERS
+from tvist_controller.instruments.wrench import unshaped
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.programs import arguments
-from tvist_controller.programs.arguments import (
-    Joints,
-    Target,
-    Text,
-    a_list,
-    a_pose,
-    integer,
-    numbers,
-)
+from tvist_controller.programs.arguments import Joints, Target, Text, a_list, a_pose, integer, numbers
 from tvist_controller.programs.functions.family import Family, Parts, reads
-from tvist_controller.programs.functions.settings import ORDER, ToolPose
+from tvist_controller.programs.functions.settings import ToolPose
 from tvist_controller.refusal import RefusalError, check_joints
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
-from tvist_protocol.stream import State
 from tvist_urscript import Array, Fault, Pose, Value, costs
 from tvist_urscript.values import whole
 
@@ -34,19 +25,6 @@ INTEGRATED = {
     "actual_robot_braking_energy_dissipated",
 }  # fmt: skip
 """RTDE variables that depend on all earlier ticks."""
-
-
-class _Target(NamedTuple):
-    q: list[float]
-    qd: list[float]
-    qdd: list[float]
-
-
-def _target(state: State) -> _Target:
-    """Return the unshaped reference at the tick of the shaped one, as UR's interfaces report it."""
-    if state.unshaped_q is None or state.unshaped_qd is None or state.unshaped_qdd is None:
-        return _Target(state.target_q, state.target_qd, state.target_qdd)
-    return _Target(state.unshaped_q, state.unshaped_qd, state.unshaped_qdd)
 
 
 def _positions(on: Parts) -> Array:
@@ -62,12 +40,12 @@ def _speed(on: Parts, q: Sequence[float], qd: Sequence[float]) -> Array:
 
 
 def _target_pose(on: Parts) -> Pose:
-    return _pose(on, _target(on.access.latest()).q)
+    return _pose(on, unshaped(on.access.latest())[0])
 
 
 def _target_speed(on: Parts) -> Array:
-    target = _target(on.access.latest())
-    return _speed(on, target.q, target.qd)
+    q, qd, _ = unshaped(on.access.latest())
+    return _speed(on, q, qd)
 
 
 class StateFunctions(Family):
@@ -87,15 +65,15 @@ class StateFunctions(Family):
     )
     get_target_joint_positions = reads(
         "Return the target joint positions, before shaping [rad].",
-        lambda on: a_list(_target(on.access.latest()).q),
+        lambda on: a_list(unshaped(on.access.latest())[0]),
     )
     get_target_joint_speeds = reads(
         "Return the target joint velocities, before shaping [rad/s].",
-        lambda on: a_list(_target(on.access.latest()).qd),
+        lambda on: a_list(unshaped(on.access.latest())[1]),
     )
     get_target_joint_accelerations = reads(
         "Return the target joint accelerations, before shaping [rad/s^2].",
-        lambda on: a_list(_target(on.access.latest()).qdd),
+        lambda on: a_list(unshaped(on.access.latest())[2]),
     )
     get_actual_tcp_pose = reads(
         "Return the pose of the tool at the measured joint positions.",
@@ -108,9 +86,7 @@ class StateFunctions(Family):
     )
     get_target_tcp_pose = reads("Return the target pose of the tool, before shaping.", _target_pose, 50)
     get_target_tcp_speed = reads(
-        "Return the target velocity of the tool, before shaping [m/s, rad/s].",
-        _target_speed,
-        50,
+        "Return the target velocity of the tool, before shaping [m/s, rad/s].", _target_speed, 50
     )
     tool_pose = reads(
         "Return `get_target_tcp_pose`; exported PolyScope programs use it as the feature Tool.",

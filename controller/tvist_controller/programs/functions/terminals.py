@@ -33,10 +33,7 @@ FlagPlace = Annotated[int, whole(0, FLAGS - 1)]
 
 def _register(what: str, place: object, bank: Bank) -> Callable[[Family, int], bool | float]:
     def get(self: Family, address: int) -> bool | float:
-        registers = self._peripherals
-        if bank.endswith("bit"):
-            return registers.bit(bank, address)
-        return registers.integers(bank)[address] if bank.endswith("int") else registers.doubles(bank)[address]
+        return self._peripherals.read(bank, address)
 
     return described(get, what, address=place)
 
@@ -126,8 +123,7 @@ class TerminalFunctions(Family):
     # ------------------------------------------------------------------ digital
 
     set_digital_out = _sets(
-        "Set a digital output: 0 to 7 standard, 8 and 9 of the tool; cannot set configurable ones.",
-        Old,
+        "Set a digital output: 0 to 7 standard, 8 and 9 of the tool; cannot set configurable ones.", Old
     )
     set_standard_digital_out = _sets("Set one of the eight standard digital outputs.", Standard)
     set_configurable_digital_out = _sets("Set one of the eight configurable digital outputs.", Configurable)

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from tvist_lab.recordings.checks import LogError
+from tvist_lab.recordings.checks import LogError, content
 from tvist_lab.recordings.description import beside
-from tvist_lab.recordings.packed import content
 from tvist_lab.recordings.recording import Floats
 from tvist_lab.recordings.table import STRANGE, TEXT, LogTable, reader
 from tvist_lab.words import counted
@@ -55,7 +54,7 @@ def read_csv(path: Path) -> LogTable:
         whole[-1] = False
         notes.append(f"line {body[-1][0]} has no end and was left out")
     kept = [body[at] for at in np.flatnonzero(whole)]
-    text = b"\n".join(line for _, line in kept) + b"\n" if kept else b""
+    text = b"".join(line + b"\n" for _, line in kept)
     numbers = np.array([at for at, _ in kept], dtype=np.float64)
     values, texts = _numbers(text if separator == "," else text.replace(b",", b"."), separator, width)
     return LogTable(
@@ -93,9 +92,8 @@ def _header(path: Path, lines: list[bytes]) -> tuple[int, list[str], str]:
 
 def _top(lines: list[bytes]) -> int | None:
     """Return the index of the header: the first line without #, or a comment with names right above numbers."""
-    filled = [at for at, line in enumerate(lines) if line.strip()]
     above = None
-    for at in filled:
+    for at in (at for at, line in enumerate(lines) if line.strip()):
         if not lines[at].lstrip().startswith(b"#"):
             return at if above is None or re.search(rb"[A-DF-Za-df-z_]", lines[at]) else above
         above = at if re.match(rb"[#\s]*\"?[A-Za-z_]\w*[\s\",;]", lines[at]) else None
@@ -116,7 +114,7 @@ def _numbers(text: bytes, separator: str, width: int) -> tuple[Floats, dict[int,
         cells.select(pl.col(names).is_not_null() & ~pl.col(names).is_in(EMPTY)).to_numpy()
         & np.array([column.is_null().to_numpy() for column in frame]).T
     )
-    rows = {int(place): int(np.argmax(bad[:, place])) for place in np.flatnonzero(bad.any(axis=0))}
+    rows = {place: int(np.argmax(bad[:, place])) for place in np.flatnonzero(bad.any(axis=0)).tolist()}
     texts = {place: (row, str(cells[row, place])) for place, row in rows.items()}
     return np.asarray(frame.to_numpy().astype(np.float64)), texts
 

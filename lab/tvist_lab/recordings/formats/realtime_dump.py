@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tvist_lab.recordings.checks import LogError
-from tvist_lab.recordings.packed import content
+from tvist_lab.recordings.checks import LogError, content
 from tvist_lab.recordings.table import BINARY, STRANGE, LogTable, reader
 
 SIZES = (1044, 1060, 1108, 1116, 1140, 1220)

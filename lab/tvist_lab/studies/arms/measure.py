@@ -46,7 +46,7 @@ def measure(
     those `too_weak` for the drives, and of those `counted` because they vibrate enough; `reduction_percent`
     of the peak by `auto`; the median `delay_ms`; and `sag_error_percent`, see `sag_error`.
     """
-    arm = description if stiffness == 1.0 else stiffer(description, stiffness)
+    arm = description if stiffness == 1.0 else stiffer(stiffness, description)
     known = asyncio.run(_identified(arm, seed)) if calibration is None else calibration
     mass = arm.payload.mass
     drawn = draw_moves(arm, moves, seed, (mass, mass)).moves

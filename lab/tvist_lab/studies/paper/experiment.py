@@ -150,16 +150,16 @@ async def run(robot: Robot, arm: Arm, motion: str, method: PaperMethod, seed: in
 
 
 async def experiment(
-    robot: Robot, arm: Arm, *, runs: int, seed: int, baselines: bool, progress: Progress
+    robot: Robot, arm: Arm, *, runs: int, seed: int, baselines: bool, progress: Progress, judged: bool = True
 ) -> Experiment:
     """Run and repeat every motion with every method, each time with other noise and gear errors."""
     done = Experiment(info=await robot.info(), seed=seed, runs=runs, table_1=await table_1(robot, arm))
     for motion in MOTIONS:
         for method in (UNSHAPED, SHAPED):
-            await _repeat(robot, arm, done, motion, method, runs, progress)
+            await _repeat(robot, arm, done, motion, method, progress, judged=judged)
         if baselines:
             for method in fixed_baselines(done.info, done.delay(motion)):
-                await _repeat(robot, arm, done, motion, method, runs, progress)
+                await _repeat(robot, arm, done, motion, method, progress, judged=judged)
     return done
 
 
@@ -190,12 +190,20 @@ def count(runs: int, *, baselines: bool) -> int:
 
 
 async def _repeat(
-    robot: Robot, arm: Arm, done: Experiment, motion: str, method: PaperMethod, runs: int, progress: Progress
+    robot: Robot,
+    arm: Arm,
+    done: Experiment,
+    motion: str,
+    method: PaperMethod,
+    progress: Progress,
+    *,
+    judged: bool,
 ) -> None:
     key = (motion, method.name)
     done.labels[method.name] = method.label
-    for number in range(runs):
+    for number in range(done.runs):
         recording = await run(robot, arm, motion, method, seed=1000 * done.seed + number)
         done.first.setdefault(key, recording)
-        done.judged.setdefault(key, []).append(judge(recording))
+        if judged:
+            done.judged.setdefault(key, []).append(judge(recording))
         progress(f"{motion} {method.label}")

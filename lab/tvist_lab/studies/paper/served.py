@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from tvist_lab.recordings import Recording
 from tvist_lab.recordings.mcap_file import RecordingFile, read
 from tvist_lab.replay import replay_file
 from tvist_lab.served import served_robot
-from tvist_lab.studies.paper.experiment import SHAPED, UNSHAPED, Experiment, Progress, judge, run, table_1
-from tvist_lab.studies.paper.published import MOTIONS
+from tvist_lab.studies.paper.experiment import Experiment, Progress, experiment, judge
 from tvist_lab.studies.paper.report import as_dict
 
 
@@ -39,9 +37,9 @@ def serve(path: Path, seed: int, progress: Progress) -> ServedExperiment:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     path.unlink(missing_ok=True)
-    done, live = asyncio.run(_run(path, seed, progress))
+    done = asyncio.run(_run(path, seed, progress))
     content = read(path)
-    same, lost = _measure(done, live, content)
+    same, lost = _measure(done, content)
     again = replay_file(content)
     report = as_dict(done) | {
         "replayed_ticks": len(again.states),
@@ -53,29 +51,19 @@ def serve(path: Path, seed: int, progress: Progress) -> ServedExperiment:
     return ServedExperiment(done, report, again.first_difference)
 
 
-async def _run(
-    path: Path, seed: int, progress: Progress
-) -> tuple[Experiment, dict[tuple[str, str], Recording]]:
-    """Move the arm; return the experiment before measurement, and the client's recording of each motion."""
-    live = {}
+async def _run(path: Path, seed: int, progress: Progress) -> Experiment:
+    """Move the arm; return the experiment before measurement, with the client's recordings."""
     options = ["--record", str(path), "--truth", "--seed", str(seed)]
     async with served_robot(options) as (robot, _), robot.control("demo") as arm:
-        table = await table_1(robot, arm)
-        done = Experiment(info=await robot.info(), seed=seed, runs=1, table_1=table)
-        for motion in MOTIONS:
-            for method in (UNSHAPED, SHAPED):
-                live[motion, method.name] = await run(robot, arm, motion, method, seed=1000 * seed)
-                done.labels[method.name] = method.label
-                progress(f"{motion} {method.name}")
-    return done, live
+        return await experiment(
+            robot, arm, runs=1, seed=seed, baselines=False, progress=progress, judged=False
+        )
 
 
-def _measure(
-    done: Experiment, live: dict[tuple[str, str], Recording], content: RecordingFile
-) -> tuple[bool, int]:
+def _measure(done: Experiment, content: RecordingFile) -> tuple[bool, int]:
     """Measure each motion in the recording; return whether a complete live stream agrees, and the lost states."""
     same, lost = True, 0
-    for key, received in live.items():
+    for key, received in list(done.first.items()):
         ticks = received["tick"]
         cut = content.recording.between(int(ticks[0]), int(ticks[-1]))
         done.first[key], done.judged[key] = cut, [judge(cut)]

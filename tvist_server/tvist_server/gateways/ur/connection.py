@@ -1,18 +1,22 @@
-"""One client's socket with its session, and the limit of connections."""
+"""Listening sockets, the clients' sockets with their sessions, and the limit of connections."""
 
 import asyncio
 import contextlib
+import errno
 import ipaddress
 import logging
 import os
 import socket
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from typing import Final, cast
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
+from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
+from tvist_server.ur_ports import InterfaceName
 
 log = logging.getLogger(__name__)
 
@@ -34,6 +38,16 @@ LOCAL_PLACES: Final = 8
 """Number of places reserved for clients on this machine, so that a local user can always connect."""
 SCARCE: Final = 0.9  # share of places in use above which each new client displaces another [-]
 
+SEND_BUFFER = 32_768  # system's send buffer for a client [bytes]: 0.1 s of samples; more would only add delay
+PROBES = (10, 5, 3)
+"""TCP keepalive: idle time before the first probe [s], time between probes [s], and number of unanswered
+probes after which a client counts as disconnected and loses control, as when its machine has lost power."""
+REASONS = {
+    errno.EADDRINUSE: "the port is in use: stop the program that uses it, or choose another port with --ur-port",
+    errno.EADDRNOTAVAIL: "this machine does not have this address; it has 127.0.0.1 to 127.255.255.254",
+    errno.EACCES: "that is not permitted: choose a port above 1023",
+}
+
 MakeSession = Callable[[ConnectionControl, Send], PortSession]
 """Creates an interface's session from its access to the controller and its send function."""
 
@@ -54,43 +68,43 @@ class ClientConnection(asyncio.BufferedProtocol):
         self._limit = limit
         self._lossless = lossless
         self._most_unread = MAX_UNREAD_LOCKSTEP if lossless else MAX_UNREAD
-        self._transport: asyncio.Transport | None = None
+        self._transport: asyncio.Transport
         self._piece = bytearray(PIECE)
+        self._admitted = False  # whether the client has got a place
         self._behind = False  # whether the client has left many answers unread
         self._took = 0.0  # when the socket last accepted a sample [s of the loop's clock]
-        self.session: PortSession | None = None
+        self.session: PortSession  # of a client that has a place
         self.peer = "a client"  # description of the client and its interface, for messages
         self.heard = 0.0  # when the client last sent something, or connected [s of the loop's clock]
         self.dropped = 0  # number of samples dropped because the client is slow
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start a session, unless all places are taken."""
-        stream = cast("asyncio.Transport", transport)
+        self._transport = stream = cast("asyncio.Transport", transport)
         (host, port), (own, own_port) = (stream.get_extra_info(end)[:2] for end in ("peername", "sockname"))
         self.peer = f"the client {host}:{port} of port {own_port}"
         if not self._limit.make_room(self.peer, local=host == own or _is_loopback(host)):
             stream.abort()
             return
-        self._transport = stream
         stream.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if not self._lossless:
             stream.set_write_buffer_limits(ANSWERS)
         self._control = ConnectionControl(self._lease(host), self._hear, self.peer)
         self.session = self._make(self._control, self.send)
         self._limit.taken.add(self)
+        self._admitted = True
         self.heard = asyncio.get_running_loop().time()
-        self._guarded(self.session.opened)
+        with self._guard():
+            self.session.opened()
 
     def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002  the size is fixed
         return self._piece
 
     def buffer_updated(self, nbytes: int) -> None:
-        session = self.session
         self.heard = asyncio.get_running_loop().time()
-        if session is not None:
-            data = bytes(self._piece[:nbytes])
-            self._guarded(lambda: session.receive(data))
-            self._listen()
+        with self._guard():
+            self.session.receive(bytes(self._piece[:nbytes]))
+        self._listen()
 
     def pause_writing(self) -> None:
         self._behind = True
@@ -101,65 +115,61 @@ class ClientConnection(asyncio.BufferedProtocol):
         self._listen()
 
     def _hear(self, answer: Callable[[], None]) -> None:
-        self._guarded(answer)
+        with self._guard():
+            answer()
         self._listen()
 
     def _listen(self) -> None:
         """Pause or resume reading, or close the connection if its session is over."""
-        session, transport = self.session, self._transport
-        if session is None or transport is None or transport.is_closing():
+        if self._transport.is_closing():
             return
-        if session.over:
-            transport.close()
-        elif self._behind or self._control.unanswered + session.waiting >= MAX_COMMANDS:
-            transport.pause_reading()
+        if self.session.over:
+            self._transport.close()
+        elif self._behind or self._control.unanswered + self.session.waiting >= MAX_COMMANDS:
+            self._transport.pause_reading()
         else:
-            transport.resume_reading()
+            self._transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        session, transport = self.session, self._transport
-        if isinstance(exc, ConnectionError) and session is not None and transport is not None:
-            left = _left_in(transport)
-            self._guarded(lambda: session.receive(left))
-        self.session = self._transport = None
+        if not self._admitted:
+            return
+        if isinstance(exc, ConnectionError):
+            with self._guard():
+                self.session.receive(_left_in(self._transport))
         self._limit.taken.discard(self)
         if self.dropped:
             log.warning("a client of a UR interface read too slowly: %d samples were dropped", self.dropped)
-        if session is not None:
-            try:
-                session.closed()
-            except Exception:
-                log.exception("a UR interface could not close a session")
-                self._control.leave()
+        try:
+            self.session.closed()
+        except Exception:
+            log.exception("a UR interface could not close a session")
+            self._control.leave()
 
     def send(self, data: bytes) -> None:
         """Send an answer; disconnect a client that leaves too many bytes unread."""
-        transport = self._transport
-        if transport is not None and not transport.is_closing():
-            transport.write(data)
-            if transport.get_write_buffer_size() > self._most_unread:
+        if not self._transport.is_closing():
+            self._transport.write(data)
+            if self._transport.get_write_buffer_size() > self._most_unread:
                 log.warning("a client of a UR interface was disconnected because it does not read")
-                transport.abort()
+                self._transport.abort()
 
     def tell(self, message: bytes) -> None:
         """Send a message that goes to all clients; in real time, a client that does not read misses it."""
-        transport = self._transport
-        if transport is not None and (self._lossless or transport.get_write_buffer_size() < HEARS):
+        if self._lossless or self._transport.get_write_buffer_size() < HEARS:
             self.send(message)
 
     def sample(self, snapshot: Snapshot) -> bytes:
         """Return the sample of a tick for `put`; empty if there is none."""
-        session, transport = self.session, self._transport
-        if session is None or transport is None or transport.is_closing():
+        if self._transport.is_closing():
             return b""
         try:
-            data = session.sample(snapshot)
+            data = self.session.sample(snapshot)
         except Exception:
             log.exception("a UR interface failed and disconnected its client")
-            transport.abort()
+            self._transport.abort()
             return b""
-        if session.over:
-            transport.close()
+        if self.session.over:
+            self._transport.close()
         return data
 
     def put(self, sample: bytes) -> None:
@@ -167,42 +177,38 @@ class ClientConnection(asyncio.BufferedProtocol):
         transport, now = self._transport, asyncio.get_running_loop().time()
         if self._lossless:
             self.send(sample)
-        elif transport is not None and not transport.get_write_buffer_size():
+        elif not transport.get_write_buffer_size():
             self._took = now
             transport.write(sample)
         else:
             self.dropped += 1
-            if self.session is not None and self.session.served and now - self._took > UNREAD_FOR:
+            if self.session.served and now - self._took > UNREAD_FOR:
                 log.warning("%s was disconnected: it has not read for %.0f s", self.peer, UNREAD_FOR)
                 self.disconnect()
 
     def event(self, event: Event) -> None:
-        session = self.session
-        if session is not None:
-            self._guarded(lambda: session.event(event))
+        with self._guard():
+            self.session.event(event)
 
     @property
     def dispensable(self) -> bool:
-        session = self.session
-        return session is not None and session.client_begins and not session.served
+        return self.session.client_begins and not self.session.served
 
     def disconnect(self) -> None:
         """Close the connection at once, even if data is still unsent."""
-        if self._transport is not None:
-            self._transport.abort()
+        self._transport.abort()
 
     def close(self) -> None:
-        if self._transport is not None:
-            self._transport.close()
+        self._transport.close()
 
-    def _guarded(self, action: Callable[[], None]) -> None:
-        """Call a function; log an exception and end only this connection."""
+    @contextlib.contextmanager
+    def _guard(self) -> Iterator[None]:
+        """Log an exception and end only this connection."""
         try:
-            action()
+            yield
         except Exception:
             log.exception("a UR interface failed and disconnected its client")
-            if self._transport is not None:
-                self._transport.abort()
+            self._transport.abort()
 
 
 class ConnectionLimit:
@@ -268,3 +274,26 @@ def _is_loopback(host: str) -> bool:
     if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped is not None:
         address = address.ipv4_mapped
     return address.is_loopback
+
+
+def listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
+    """Return a socket that listens for clients of an interface; raise GatewayError if that is impossible."""
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    bound = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        # Accepted sockets inherit these options.
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        if sys.platform == "linux":
+            options = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
+            for option, value in zip(options, PROBES, strict=True):
+                bound.setsockopt(socket.IPPROTO_TCP, option, value)
+        bound.bind((address, port))
+        bound.listen(32)
+    except OSError as error:
+        bound.close()
+        reason = REASONS.get(error.errno or 0, error.strerror or str(error))
+        raise GatewayError(f"cannot listen on {address} port {port} for {interface}: {reason}") from error
+    bound.setblocking(False)
+    return bound

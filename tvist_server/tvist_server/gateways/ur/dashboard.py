@@ -1,16 +1,16 @@
 """UR's dashboard, port 29999: one command a line, and answers that clients compare word by word."""
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
-from tvist_protocol.replies import Refused
 from tvist_server.gateways.ur import messages, power, version
 from tvist_server.gateways.ur.base import InTurnSession, LineSplitter, Send
 from tvist_server.gateways.ur.deferred import Deferred
 from tvist_server.gateways.ur.lease import ConnectionControl
+from tvist_server.gateways.ur.power import Change
+from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
 from tvist_server.ur_model import series
 
@@ -29,8 +29,7 @@ TOO_SOON: Final = (
 """UR's answer. Here it means that the arm is still stopping; there is no wait of 5 s."""
 
 
-@dataclass(frozen=True)
-class Request:
+class Request(NamedTuple):
     """A command as a client sent it."""
 
     robot: UrRobot
@@ -39,23 +38,19 @@ class Request:
     at_rest: Callable[[], Awaitable[bool]]  # waits until the arm rests; returns whether it does in time
 
 
-@dataclass(frozen=True)
-class Command:
+Handler = Callable[[Request], str | Awaitable[str | None] | None]
+"""Carries out a command; returns the answer, possibly awaited, or None if the command failed."""
+
+
+class Command(NamedTuple):
     """A row of the table of commands."""
 
-    keyword: str
-    """Keyword in the manual's spelling; clients may use any case."""
-    carry_out: Callable[[Request], str | Awaitable[str | None] | None]
-    """Returns the answer, possibly awaited; None if the command failed."""
-    argument: bool = False
-    """Whether the command takes an argument."""
+    keyword: str  # in the manual's spelling; clients may use any case
+    carry_out: Handler
+    argument: bool = False  # whether the command takes an argument
 
 
-def _changing(
-    change: Callable[[UrRobot, ConnectionControl], Awaitable[Refused | None]],
-    done: str,
-    too_soon: str | None = None,
-) -> Callable[[Request], Awaitable[str | None]]:
+def _changing(change: Change, done: str, too_soon: str | None = None) -> Handler:
     """Return a handler that makes a change and answers `done`, or `too_soon` if the mode forbids the change."""
 
     async def carry_out(request: Request) -> str | None:
@@ -65,24 +60,23 @@ def _changing(
     return carry_out
 
 
-def _robot_mode(request: Request) -> str:
-    latest = request.robot.latest
-    mode = RobotMode.NO_CONTROLLER if latest is None else RobotMode(latest.robot_mode)
-    return f"Robotmode: {mode.name}"
+def _playing(change: Callable[[Programs, ConnectionControl], Awaitable[bool]], done: str) -> Handler:
+    """Return a handler that changes the program and answers `done`."""
+
+    async def carry_out(request: Request) -> str | None:
+        return done if await change(request.robot.programs, request.control) else None
+
+    return carry_out
 
 
-def _safety_mode(request: Request) -> str:
-    latest = request.robot.latest
-    return f"Safetymode: {_safety(None if latest is None else latest.safety_mode)}"
+def _mode(title: str, field: str, unknown: RobotMode | SafetyMode) -> Handler:
+    """Return a handler that answers with a mode of the last tick, or with `unknown` before the first."""
 
+    def carry_out(request: Request) -> str:
+        mode = type(unknown)(getattr(request.robot.latest, field, unknown))
+        return f"{title}: {mode.name}"
 
-def _safety_status(request: Request) -> str:
-    latest = request.robot.latest
-    return f"Safetystatus: {_safety(None if latest is None else latest.safety_status)}"
-
-
-def _safety(number: int | None) -> str:
-    return SafetyMode.UNDEFINED.name if number is None else SafetyMode(number).name
+    return carry_out
 
 
 async def _load(request: Request) -> str:
@@ -107,46 +101,15 @@ def _load_installation(request: Request) -> str:
     return f"Loading installation: {name}" if known else f"File not found: {name}"
 
 
-async def _play(request: Request) -> str | None:
-    return "Starting program" if await request.robot.programs.play(request.control) else None
-
-
-async def _pause(request: Request) -> str | None:
-    return "Pausing program" if await request.robot.programs.pause(request.control) else None
-
-
 async def _stop(request: Request) -> str | None:
     stopped = await request.robot.programs.stop(request.control) and await request.at_rest()
     return "Stopped" if stopped else None
-
-
-def _running(request: Request) -> str:
-    return f"Program running: {_bool(request.robot.programs.playing)}"
-
-
-def _program_state(request: Request) -> str:
-    programs = request.robot.programs
-    return f"{programs.state} {programs.name or UNNAMED}"
-
-
-def _loaded_program(request: Request) -> str:
-    path = request.robot.programs.path
-    return "No program loaded" if path is None else f"Loaded program: {path}"
-
-
-def _is_program_saved(request: Request) -> str:
-    programs = request.robot.programs
-    return f"{_bool(programs.saved)} {programs.name or UNNAMED}"
 
 
 def _popup(request: Request) -> str:
     stamp = messages.stamp(request.robot.latest)
     request.robot.tell(messages.popup(stamp, "Message", request.argument))
     return "showing popup"
-
-
-async def _close_popup(request: Request) -> str | None:
-    return "closing popup" if await request.robot.programs.close_popup(request.control) else None
 
 
 def _add_to_log(request: Request) -> str:
@@ -171,12 +134,21 @@ def _clear_operational_mode(request: Request) -> str | None:
     return f"No longer controlling the operational mode. Current operational mode: {NO_MODE}"
 
 
+def _loaded(request: Request) -> str:
+    path = request.robot.programs.path
+    return "No program loaded" if path is None else f"Loaded program: {path}"
+
+
+def _name(request: Request) -> str:
+    return request.robot.programs.name or UNNAMED
+
+
 def _model(request: Request) -> str:
     model = request.robot.description.robot.model
     return series(model) or model
 
 
-def _say(text: str) -> Callable[[Request], str]:
+def _say(text: str) -> Handler:
     return lambda _: text
 
 
@@ -193,20 +165,20 @@ COMMANDS: Final = (
     Command("unlock protective stop", _changing(power.unlock, "Protective stop releasing", TOO_SOON)),
     Command("restart safety", _changing(power.restart_safety, "Restarting safety")),
     Command("close safety popup", _say("closing safety popup")),
-    Command("robotmode", _robot_mode),
-    Command("safetymode", _safety_mode),
-    Command("safetystatus", _safety_status),
+    Command("robotmode", _mode("Robotmode", "robot_mode", RobotMode.NO_CONTROLLER)),
+    Command("safetymode", _mode("Safetymode", "safety_mode", SafetyMode.UNDEFINED)),
+    Command("safetystatus", _mode("Safetystatus", "safety_status", SafetyMode.UNDEFINED)),
     Command("load installation", _load_installation, argument=True),
     Command("load", _load, argument=True),
-    Command("play", _play),
-    Command("pause", _pause),
+    Command("play", _playing(Programs.play, "Starting program")),
+    Command("pause", _playing(Programs.pause, "Pausing program")),
     Command("stop", _stop),
-    Command("running", _running),
-    Command("programState", _program_state),
-    Command("get loaded program", _loaded_program),
-    Command("isProgramSaved", _is_program_saved),
+    Command("running", lambda request: f"Program running: {_bool(request.robot.programs.playing)}"),
+    Command("programState", lambda request: f"{request.robot.programs.state} {_name(request)}"),
+    Command("get loaded program", _loaded),
+    Command("isProgramSaved", lambda request: f"{_bool(request.robot.programs.saved)} {_name(request)}"),
     Command("popup", _popup, argument=True),
-    Command("close popup", _close_popup),
+    Command("close popup", _playing(Programs.close_popup, "closing popup")),
     Command("addToLog", _add_to_log, argument=True),
     Command("saveLog", _say("Log saved to disk")),
     Command("set operational mode", _set_operational_mode, argument=True),

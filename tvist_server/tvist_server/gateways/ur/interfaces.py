@@ -5,8 +5,9 @@ import contextlib
 import logging
 import socket
 import threading
+import time
 from collections import defaultdict, deque
-from collections.abc import Callable, Collection, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Collection, Coroutine, Iterable, Mapping, Sequence
 from functools import partial
 from weakref import WeakValueDictionary
 
@@ -17,22 +18,21 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event
 from tvist_server.gateways.base import CommandIntake, Gateway, Message
+from tvist_server.gateways.console import Throttle
 from tvist_server.gateways.ur.base import PortSession, Send
-from tvist_server.gateways.ur.connection import ClientConnection, ConnectionLimit
+from tvist_server.gateways.ur.connection import ClientConnection, ConnectionLimit, listen
 from tvist_server.gateways.ur.dashboard import DashboardSession
 from tvist_server.gateways.ur.deferred import Deferred
 from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.gripper import AskGripper, GripperSession
 from tvist_server.gateways.ur.interpreter import InterpreterSession
 from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
-from tvist_server.gateways.ur.listening import listen
 from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.program_request import program_of
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.session import RtdeSession
-from tvist_server.gateways.ur.throttled_log import ThrottledLog
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.ur_ports import InterfaceName
 
@@ -42,6 +42,7 @@ FIRST = 1000  # longest wait for the first tick [ticks]
 MAX_PENDING = 250  # largest number of states queued for the interfaces' thread: half a second
 LEAD = 20
 """Largest queue in lockstep: the further a step runs ahead of published states, the later clients get answers."""
+MOST_LINES = 10  # largest number of lines of each kind on the console, in each of its windows
 PAUSE = 0.02  # time between two checks for room in lockstep [s]
 UNREAD = 10
 """States handed over together while there is no client; only temperatures and energies need them then."""
@@ -65,14 +66,15 @@ class UrInterfaces(Gateway):
         programs: ProgramFolder | None = None,  # programs that clients load by name
         reserved: Sequence[str] = (),  # RTDE inputs that no client may own, as if a fieldbus owned them
     ) -> None:
-        self.setpoints_refused = 0
         self.address = address
         self._desk, self._gripper = desk, gripper
-        self._scripts, self._refusals, self._coming_and_going = (
-            ThrottledLog(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(3)
-        )
+        self._throttles = [
+            Throttle(MOST_LINES, f"lines about {what}") for what in ("scripts", "refusals", "clients")
+        ]
         external = ExternalControl(programs, self._fetch, self._aside)
-        self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
+        self.robot = UrRobot(
+            description, name, self._tell, external, partial(self._log, 0), partial(self._log, 1)
+        )
         self.robot.inputs.take(reserved, self)
         self._instruments, self._boards = (
             Instruments(description),
@@ -112,20 +114,16 @@ class UrInterfaces(Gateway):
     def clients(self) -> int:
         return len(self._connections)
 
-    async def _first_tick(self) -> None:
-        """Wait for the first tick if time passes by itself; earlier clients would find no controller."""
-        for _ in range(0 if self._lockstep else FIRST):
-            if self._early:
-                return
-            await asyncio.sleep(PERIOD)
-
     async def open(self) -> None:
         """Admit clients after the first tick; the running event loop serves them."""
-        await self._first_tick()
+        for _ in range(0 if self._lockstep else FIRST):  # earlier clients would find no controller
+            if self._early:
+                break
+            await asyncio.sleep(PERIOD)
         # One event loop serves all clients: another process would be a millisecond late and decode everything
         # twice, and a thread per client would compete with the tick.
         self._loop = asyncio.get_running_loop()
-        limit = ConnectionLimit(self._loop.time, self._coming_and_going.tell)
+        limit = ConnectionLimit(self._loop.time, partial(self._log, 2))
         self._connections = limit.taken
         if self._io is not None:
             self.robot.programs.io(self._io)
@@ -184,9 +182,7 @@ class UrInterfaces(Gateway):
         await asyncio.sleep(0)  # lets the connections end
         self._loop = None
         self._room.set()  # releases a thread that waits to pass on a state
-        self._scripts.flush()
-        self._refusals.flush()
-        self._coming_and_going.flush()
+        self._write(line for throttle in self._throttles for line in throttle.rest())
 
     def close(self) -> None:
         self._loop = None
@@ -204,9 +200,12 @@ class UrInterfaces(Gateway):
             if isinstance(message, Report):
                 self._see(message)
             elif isinstance(message, Io):
-                self._on_io(message)
+                self._io = message
+                self.robot.programs.io(message)
             elif isinstance(message, Event):
-                self._on_event(message)
+                self.robot.programs.event(message)
+                for connection in tuple(self._connections):
+                    connection.event(message)
         if self._unread is not None:
             self._read(self._unread)
 
@@ -228,15 +227,6 @@ class UrInterfaces(Gateway):
         self._unread = None
         self.robot.latest = self._instruments.snapshot(report.state, self._io)
         return self.robot.latest
-
-    def _on_io(self, io: Io) -> None:
-        self._io = io
-        self.robot.programs.io(io)
-
-    def _on_event(self, event: Event) -> None:
-        self.robot.programs.event(event)
-        for connection in tuple(self._connections):
-            connection.event(event)
 
     def _tell(self, message: bytes) -> None:
         for connection in tuple(self._connections):
@@ -312,6 +302,16 @@ class UrInterfaces(Gateway):
             await asyncio.sleep(ALIVE)
             for lease in self._leases.values():
                 lease.keep_alive()
+            now = time.monotonic()
+            self._write(line for throttle in self._throttles for line in throttle.due(now))
+
+    def _log(self, throttle: int, line: str) -> None:
+        """Write a line to the server's console, unless one of the throttles has let enough through."""
+        self._write(self._throttles[throttle].take(line, time.monotonic()))
+
+    def _write(self, lines: Iterable[str]) -> None:
+        for line in lines:
+            log.warning("robot %s: %s", self.robot.name, line)
 
     def _close_sockets(self) -> None:
         for bound in self._sockets.values():

@@ -38,14 +38,10 @@ class MessageKind(IntEnum):
 
 
 class ErrorLevel(IntEnum):
-    """UR's levels of severity of an error code."""
+    """UR's levels of severity of an error code that are sent here."""
 
-    DEBUG = 0
-    INFO = 1
     WARNING = 2
     VIOLATION = 3
-    FAULT = 4
-    CRITICAL = 5
 
 
 def stamp(snapshot: Snapshot | None) -> int:

@@ -1,6 +1,6 @@
 """Sessions of the primary and secondary interface, and their common base with the real-time interface."""
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from tvist_controller.instruments.snapshot import Snapshot
@@ -10,6 +10,7 @@ from tvist_server.gateways.ur import messages, power, version
 from tvist_server.gateways.ur.base import InTurnSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.messages import ErrorLevel
+from tvist_server.gateways.ur.power import Change
 from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake, Unit
 from tvist_server.gateways.ur.robot import UrRobot
@@ -21,7 +22,7 @@ READ_ONLY: Final = (
     "this interface is read-only: somebody else controls the robot, or the port takes no commands"
 )
 STOP: Final = "stop program"
-CHANGES: Final[Mapping[str, Callable[[UrRobot, ConnectionControl], Awaitable[Refused | None]]]] = {
+CHANGES: Final[Mapping[str, Change]] = {
     "power on": power.power_on,
     "power off": power.power_off,
     "set robotmode run": power.release_brakes,

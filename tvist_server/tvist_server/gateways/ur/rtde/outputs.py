@@ -43,7 +43,7 @@ def _parts() -> Iterator[tuple[str, tuple[OutputSource, int]]]:
         yield name, (OutputSource(read, WireType[one.type].value[-1], of_io=one.source == "io"), 0)
     joints = OutputSource(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
     yield from ((name, (joints, row)) for row, name in enumerate(JOINT_LISTS))
-    tool = OutputSource(attrgetter("target_tool"), "d", 3)
+    tool = OutputSource(lambda snapshot: snapshot.target.tobytes(), "d", 3)
     yield from (
         (f"target_TCP_{name}", (tool, row)) for row, name in enumerate(("pose", "speed", "acceleration"))
     )

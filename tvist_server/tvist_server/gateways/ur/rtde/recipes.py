@@ -1,11 +1,11 @@
 """Recipes: lists of variables that are sent in one data package."""
 
+from itertools import accumulate, islice
 from struct import Struct
 
 from tvist_server.gateways.ur.rtde.inputs import INPUTS
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
 from tvist_server.rtde.codec import HEADER, LARGEST
-from tvist_server.rtde.wire import WireType
 
 Value = int | float | tuple[float, ...]
 
@@ -36,30 +36,17 @@ class InputRecipe:
     """Variables that a client writes, all of which exist."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
-        self._fields = [(name, INPUTS[name]) for name in names]
-        self._all = Struct(">" + "".join(wire.value for _, wire in self._fields))
+        wires = [INPUTS[name] for name in names]
+        ends = accumulate(wire.size for wire in wires)
+        self._fields = [(name, wire.length, end) for name, wire, end in zip(names, wires, ends, strict=True)]
+        self._layout = Struct(">" + "".join(wire.value for wire in wires))
 
     def values(self, data: bytes) -> dict[str, Value]:
         """Return the values in a data package, without variables that a short payload lacks."""
-        if len(data) >= self._all.size:
-            numbers, fields = self._all.unpack_from(data), self._fields
-        else:
-            fields, size = [], 0
-            for name, wire in self._fields:
-                if size + wire.size > len(data):
-                    break
-                size += wire.size
-                fields.append((name, wire))
-            whole = Struct(">" + "".join(wire.value for _, wire in fields))
-            numbers = whole.unpack_from(data)
-        return _collect(fields, numbers)
-
-
-def _collect(fields: list[tuple[str, WireType]], numbers: tuple[int | float, ...]) -> dict[str, Value]:
-    values: dict[str, Value] = {}
-    at = 0
-    for name, wire in fields:
-        length = wire.length
-        values[name] = numbers[at] if length == 1 else numbers[at : at + length]
-        at += length
-    return values
+        numbers = iter(self._layout.unpack_from(data.ljust(self._layout.size, b"\0")))
+        values: dict[str, Value] = {}
+        for name, length, end in self._fields:
+            if end > len(data):
+                break
+            values[name] = next(numbers) if length == 1 else tuple(islice(numbers, length))
+        return values

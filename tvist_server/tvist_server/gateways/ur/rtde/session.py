@@ -64,7 +64,7 @@ class RtdeSession(PortSession):
         self._handlers: dict[int, Callable[[bytes], None]] = {
             PackageKind.REQUEST_PROTOCOL_VERSION: self._request_version,
             PackageKind.GET_URCONTROL_VERSION: self._tell_version,
-            PackageKind.TEXT_MESSAGE: self._take_text,
+            PackageKind.TEXT_MESSAGE: lambda _: None,  # a UR robot would show it on the teach pendant
             PackageKind.DATA: self._take_data,
             PackageKind.SETUP_OUTPUTS: self._set_up_outputs,
             PackageKind.SETUP_INPUTS: self._set_up_inputs,
@@ -171,9 +171,6 @@ class RtdeSession(PortSession):
         if self.served and self._outputs is not None:
             self._board = self._boards[self._every]
             self._board.begin(self, self._outputs)
-
-    def _take_text(self, _payload: bytes) -> None:
-        """Ignore a text message: a UR robot would show it in the log of the teach pendant."""
 
     def _complain(self, sentence: str) -> None:
         """Send the client a warning once per start; before, clients would mistake it for the answer to a recipe."""

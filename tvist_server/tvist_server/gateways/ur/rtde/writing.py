@@ -2,6 +2,7 @@
 
 from collections.abc import Awaitable, Callable, Hashable, Iterable, Iterator
 from math import isclose
+from typing import Any
 
 from tvist_controller.instruments.peripherals import analog_share
 from tvist_protocol.commands import SetSpeed
@@ -106,61 +107,57 @@ class InputWriter:
     def _set_outputs(self, values: Iterable[str]) -> None:
         """Set, in one command, the digital and analogue outputs that the variables of a package refer to."""
         groups = {name.partition("_output")[0] for name in values}
-        digital = {bit: on for bit, on in self._digital(groups) if self._is_digital_news(bit, on)}
-        analog: dict[int, tuple[int, float]] = {}
-        if "standard_analog" in groups:
-            analog = {number: kind for number, kind in self._analog() if self._is_analog_news(number, *kind)}
-        if not digital and not analog:
+        news = {
+            output: value
+            for output, value, present in self._outputs(groups)
+            if self._pending.changed(output, value, present)
+        }
+        if not news:
             return
-        ratios = [analog[number][1] if number in analog else 0.0 for number in range(2)]
-        news: dict[Hashable, object] = {("digital", bit): on for bit, on in digital.items()}
-        news |= {("analog", number): kind for number, kind in analog.items()}
+        digital = {bit: on for (kind, bit), on in news.items() if kind == "digital"}
+        analog = {number: value for (kind, number), value in news.items() if kind == "analog"}
+        shares = [analog[number][1] if number in analog else 0.0 for number in range(2)]
         self._change(
-            news,
+            dict(news),
             lambda token: SetIo(
                 token=token,
                 digital_output_mask=sum(1 << bit for bit in digital),
                 digital_outputs=sum(1 << bit for bit, on in digital.items() if on),
                 standard_analog_output_mask=sum(1 << number for number in analog),
-                standard_analog_output_type=sum(kind << number for number, (kind, _) in analog.items()),
-                standard_analog_output_0=ratios[0],
-                standard_analog_output_1=ratios[1],
+                standard_analog_output_type=sum(voltage << number for number, (voltage, _) in analog.items()),
+                standard_analog_output_0=shares[0],
+                standard_analog_output_1=shares[1],
             ),
         )
 
-    def _digital(self, groups: set[str]) -> Iterator[tuple[int, bool]]:
-        """Yield number and value of each digital output in these groups that the mask selects."""
+    def _outputs(self, groups: set[str]) -> Iterator[tuple[tuple[str, int], Any, Any]]:
+        """Yield each output in these groups that a mask selects: kind and number, wanted and present value.
+
+        The value of an analogue output is its type and the share of its range.
+        """
+        io = self._io
         for group, (first, count) in DIGITAL.items():
             if f"{group}_digital" not in groups or f"{group}_digital_output" not in self._held:
                 continue
-            mask = int(self._number(f"{group}_digital_output_mask"))
-            wanted = int(self._number(f"{group}_digital_output"))
+            mask, wanted = (int(self._number(f"{group}_digital_output{part}")) for part in ("_mask", ""))
             for bit in range(count):
                 if mask >> bit & 1:
-                    yield first + bit, bool(wanted >> bit & 1)
-
-    def _is_digital_news(self, bit: int, on: bool) -> bool:
-        io = self._io
-        present = None if io is None else bool(io.actual_digital_output_bits >> bit & 1)
-        return self._pending.changed(("digital", bit), on, present)
-
-    def _analog(self) -> Iterator[tuple[int, tuple[int, float]]]:
-        """Yield number, type and share of the range of each analogue output that the mask selects."""
+                    on = None if io is None else bool(io.actual_digital_output_bits >> (first + bit) & 1)
+                    yield ("digital", first + bit), bool(wanted >> bit & 1), on
+        if "standard_analog" not in groups:
+            return
         mask, types = (int(self._number(f"standard_analog_output_{part}")) for part in ("mask", "type"))
         for number in range(2):
-            name = f"standard_analog_output_{number}"
-            if mask >> number & 1 and self._is_share(name):
-                yield number, (types >> number & 1, float(self._number(name)))
-
-    def _is_analog_news(self, number: int, kind: int, ratio: float) -> bool:
-        io = self._io
-        present: tuple[int, float] | None = None
-        if io is not None:
-            value, voltage = io.standard_analog_output[number], io.analog_io_types >> (2 + number) & 1
-            # The robot publishes volts or amperes; the share computed from them has rounding errors.
-            shown = analog_share(value, voltage=bool(voltage))
-            present = voltage, ratio if isclose(shown, ratio, abs_tol=1e-9) else shown
-        return self._pending.changed(("analog", number), (kind, ratio), present)
+            name, present = f"standard_analog_output_{number}", None
+            if not mask >> number & 1 or not self._is_share(name):
+                continue
+            share = float(self._number(name))
+            if io is not None:
+                voltage = io.analog_io_types >> (2 + number) & 1
+                # The robot publishes volts or amperes; the share computed from them has rounding errors.
+                shown = analog_share(io.standard_analog_output[number], voltage=bool(voltage))
+                present = voltage, share if isclose(shown, share, abs_tol=1e-9) else shown
+            yield ("analog", number), (types >> number & 1, share), present
 
     def _is_share(self, name: str) -> bool:
         if name not in self._held:
