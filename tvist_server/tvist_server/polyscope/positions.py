@@ -4,13 +4,9 @@ from math import cos, sin
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from tvist_controller.paths.poses import Placement, placement
 from tvist_server.polyscope.installation import Pose, numbers
-
-Matrix = NDArray[np.float64]
-"""Homogeneous transformation, shape (4, 4)."""
 
 
 def joint_angles(position: Element) -> Pose:
@@ -20,29 +16,20 @@ def joint_angles(position: Element) -> Pose:
 
 
 def tool_pose(position: Element) -> Pose:
-    """Return the pose of the TCP in the base frame [m, rotation vector in rad], of Denavit-Hartenberg parameters."""
+    """Return the pose of the TCP in the base frame [m, rotation vector in rad], by Denavit-Hartenberg parameters."""
     q, kinematics, offset = joint_angles(position), position.find("Kinematics"), position.find("TCPOffset")
     if kinematics is None:
         raise ValueError("a position without kinematics")
     parts = (kinematics.find(name) for name in ("deltaTheta", "a", "d", "alpha"))
     theta, a, d, alpha = (numbers(None if part is None else part.get("value"), 6) for part in parts)
-    at = np.eye(4)
-    for link in zip(np.add(q, theta), a, d, alpha, strict=True):
-        at = at @ _link(*link)
-    if offset is not None:
-        at = at @ _transformation(numbers(offset.get("pose"), 6))
-    return (*map(float, at[:3, 3]), *map(float, Rotation.from_matrix(at[:3, :3]).as_rotvec()))
+    at = placement(None)
+    for link in zip(np.add(q, theta).tolist(), a, d, alpha, strict=True):
+        at @= _link(*link)
+    return (at @ placement(None if offset is None else numbers(offset.get("pose"), 6))).vector
 
 
-def _link(theta: float, a: float, d: float, alpha: float) -> Matrix:
-    """Return a link's transformation (Denavit and Hartenberg, 1955; UR's article on DH parameters)."""
+def _link(theta: float, a: float, d: float, alpha: float) -> Placement:
+    """Return a link's placement (Denavit and Hartenberg, 1955; UR's article on DH parameters)."""
     ct, st, ca, sa = cos(theta), sin(theta), cos(alpha), sin(alpha)
-    return np.array(
-        [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1.0]]
-    )
-
-
-def _transformation(pose: Pose) -> Matrix:
-    found = np.eye(4)
-    found[:3, :3], found[:3, 3] = Rotation.from_rotvec(pose[3:]).as_matrix(), pose[:3]
-    return found
+    rotation = np.array([[ct, -st * ca, st * sa], [st, ct * ca, -ct * sa], [0.0, sa, ca]])
+    return Placement(rotation, np.array([a * ct, a * st, d]))
