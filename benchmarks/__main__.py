@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def measure(seconds: float, tell: Tell, only: Sequence[str]) -> dict[str, Any]:
     """Run some parts; those that serve robots take this many seconds each."""
     found: dict[str, Any] = {}
-    machine = msgspec.to_builtins(this_machine())
+    machine = this_machine()
     for name in only:
         if name in COMPUTED:
             found |= COMPUTED[name](tell)

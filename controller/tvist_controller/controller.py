@@ -13,8 +13,7 @@ from tvist_controller.dispatch.table import COMMANDS, HARMLESS
 from tvist_controller.instruments.report import TRUE_MODES_EVERY, Report, true_modes, truth_message
 from tvist_controller.line.sample import Sample
 from tvist_controller.motion.setpoints import Unreadable
-from tvist_controller.planning.command_row import CommandCall
-from tvist_controller.planning.plan import Order, Plan
+from tvist_controller.planning.plan import CommandCall, Order, Plan
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety.own_controller import REFUSED
 from tvist_controller.setup import Setup

@@ -75,7 +75,7 @@ def any_client(robot: str) -> str:
 
 
 def client_of(robot: str, own: str) -> tuple[str, str] | None:
-    """Return name and session (empty if there is none) in the key of a client of this robot; None for other keys."""
+    """Return name and session (or empty) in the key of a client of this robot; None for other keys."""
     prefix = f"{key(robot, 'client')}/"
     name, slash, session = own.removeprefix(prefix).partition("/")
     sound = _CLIENT.match(name) and bool(_SESSION.match(session)) == bool(slash)

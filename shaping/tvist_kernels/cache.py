@@ -24,7 +24,7 @@ from typing import Any
 import llvmlite
 import numba
 from numba.core import config
-from numba.core.caching import CompileResultCacheImpl, _Cache, _cache_log
+from numba.core.caching import CompileResultCacheImpl, _cache_log
 from numba.core.registry import cpu_target
 from numba.misc.appdirs import AppDirs
 
@@ -48,7 +48,7 @@ class DistrustWarning(UserWarning):
     """Machine code on disk is not used, since somebody else may have put it there."""
 
 
-class KernelCache(_Cache):
+class KernelCache:
     """Machine code of one kernel, in the form that numba's dispatcher expects."""
 
     def __init__(self, function: Callable[..., Any], dispatcher: Any = None) -> None:
@@ -56,7 +56,6 @@ class KernelCache(_Cache):
         self.name = f"{function.__module__}.{function.__qualname__}".replace("<locals>", "_")
         """Module and name of the function."""
         self._content = _Content(function)
-        self._enabled = True
         kernels.append(self)
 
     @cached_property
@@ -75,7 +74,7 @@ class KernelCache(_Cache):
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Return the kernel for these argument types; None if there is no file on disk, or it is damaged."""
-        for machine in _machines(target_context) if self._enabled else ():
+        for machine in _machines(target_context):
             name = self._file(sig, machine)
             for folder in places():
                 if (code := _code(folder / name)) is not None:
@@ -85,7 +84,7 @@ class KernelCache(_Cache):
     def load_file(self, file: Path) -> bool:
         """Add a file's kernel to the dispatcher if its argument types are new; return False if damaged."""
         code, context = _code(file), cpu_target.target_context
-        if not self._enabled or code is None:
+        if code is None:
             return False
         found = from_bytes(context, code)
         if tuple(found.signature.args) not in self._dispatcher.overloads:
@@ -95,7 +94,7 @@ class KernelCache(_Cache):
 
     def save_overload(self, sig: object, data: Any) -> None:
         """Write a kernel to the folder; if that is impossible, note it in `unkept`."""
-        if not self._enabled or not self._content.check_cachable(data):
+        if not self._content.check_cachable(data):
             return
         code = to_bytes(data)
         file = own_folder() / self._file(sig, _machines(data.target_context)[0])
@@ -106,14 +105,6 @@ class KernelCache(_Cache):
             return
         _cache_log("[cache] data saved to %r", str(file))
         self._forget_older(file)
-
-    def enable(self) -> None:
-        """Use the disk again."""
-        self._enabled = True
-
-    def disable(self) -> None:
-        """Do not use the disk."""
-        self._enabled = False
 
     def flush(self) -> None:
         """Remove this kernel's machine code for all sources, processors and types."""
@@ -211,21 +202,16 @@ def _machines(target_context: Any) -> list[str]:
 
 
 def _code(file: Path) -> bytes | None:
-    """Return the machine code in a file; None if there is none, or it is damaged."""
-    content = _read(file) or b""
+    """Return the machine code in a file; None if it is missing, damaged, or not to be trusted."""
+    content = b""
+    with _trusting(file.parent):
+        file.lstat()
+        content = trust.read_file(trust.real_folder(file.parent) / file.name)
     checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
     if hashlib.sha256(code).digest() != checksum:
         return None
     _cache_log("[cache] data loaded from %r", str(file))  # with NUMBA_DEBUG_CACHE=1
     return code
-
-
-def _read(file: Path) -> bytes | None:
-    """Return a file's content; None if there is none, or somebody else may have written it."""
-    with _trusting(file.parent):
-        file.lstat()
-        return trust.read_file(trust.real_folder(file.parent) / file.name)
-    return None
 
 
 @contextlib.contextmanager

@@ -15,12 +15,12 @@ class Forked:
     def fork(self) -> Self:
         """Return an independent copy of the present state, whose outputs for equal inputs have the same bits.
 
-        Use it in the thread of the original. All arrays and all attributes that have a `fork` are copied.
+        Use it in the thread of the original. All its arrays and `Forked` attributes are copied.
         """
         other = copy.copy(self)
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray):
                 vars(other)[name] = value.copy()
-            elif hasattr(value, "fork"):
+            elif isinstance(value, Forked):
                 vars(other)[name] = value.fork()
         return other

@@ -11,6 +11,7 @@ tap vectors with equal sum and mean delay has the same sum and mean delay.
 
 import math
 from abc import ABC, abstractmethod
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -158,6 +159,12 @@ class ShortDesign(Design):
         change = seconds * min(max(GAIN * excess, -QUICKEST), QUICKEST)
         self._length = min(max(self._length + change, self.wanted.shortest), self.wanted.longest)
         return self._solved and (self._length < self.wanted.longest or excess <= 0.0)
+
+    def fork(self) -> Self:
+        """Return an independent copy; see `Filter.fork`."""
+        other = super().fork()
+        other._programme = self._programme.fork()  # noqa: SLF001  one of its own kind
+        return other
 
     def _solve(self, f_d: Floats, zeta: Floats, taps: Floats) -> None:
         """Compute new taps; if none are found, keep the old ones, which have the right mean delay."""

@@ -29,7 +29,7 @@ def missing(uv, what, python, platform):
         [
             uv, "pip", "compile", "--quiet", "--python-version", python, "--python-platform", platform,
             "--only-binary", ":all:", *(word for name in PURE for word in ("--no-binary", name)),
-            *(("--extra", extra) if extra else ()), "--constraint", "requirements.lock", "pyproject.toml",
+            *(("--extra", extra) if extra else ()), "--constraint", "requirements.lock", "pyproject.toml"
         ],
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip

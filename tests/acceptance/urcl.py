@@ -50,12 +50,7 @@ HEADLESS = (
     "instruction_executor_test_headless",
 )
 """Programs of tests that need a robot; `dashboard_client_x_tests` needs one with PolyScope X."""
-BOTH = (
-    "ur_driver_tests",
-    "external_control_program_tests",
-    "spline_tests",
-    "instruction_executor_test",
-)
+BOTH = ("ur_driver_tests", "external_control_program_tests", "spline_tests", "instruction_executor_test")
 """Programs that exist twice, with the endings _headless and _urcap, of the same source."""
 TAKES_MODE = (*(f"{name}_headless" for name in BOTH), "trajectory_streaming_tests_headless")
 

@@ -66,7 +66,7 @@ class Host(LoopbackHost):
 
     def put(self, topic, message):
         """Tell clients a message of the test's own."""
-        self._put(topic, message)
+        self._put(topic, lambda: encode(message))
 
     def tick(self):
         self._host.tick()

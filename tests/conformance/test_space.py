@@ -1,11 +1,11 @@
-"""Lines, paths and their refusals over the wire."""
+"""Lines, postures and poses over the wire."""
 
 import math
 
 import pytest
 
 from .test_wire import validate
-from .wire import Q1, STOPPED
+from .wire import STOPPED
 
 BENT = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 
@@ -62,47 +62,6 @@ def test_a_line_is_straight_and_ends_at_its_pose(bent):
         there, left = math.dist(at[:3], start[:3]), math.dist(at[:3], goal[:3])
         assert there + left == pytest.approx(way, abs=1e-5)
         assert at[3:] == pytest.approx(start[3:], abs=1e-5)
-
-
-def test_a_blended_path_does_not_stop_and_keeps_to_its_corners(bent):
-    wire, token, start = bent
-    corner, goal = after(start, 0.1), after(start, 0.1, 0.1)
-    parts = [{"type": "line", "pose": corner, "blend": 0.03}, {"type": "line", "pose": goal}]
-    events, states = played(wire, token, type="move_path", segments=parts)
-    assert [event["kind"] for event in events] == ["motion_started", "motion_done"]
-    places = [pose_at(wire, state["target_q"])[:3] for state in states[::5]]
-    nearest = min(places, key=lambda place: math.dist(place, corner[:3]))
-    assert 1e-3 < math.dist(nearest, corner[:3]) < 0.03
-    first, last = (next(at for at, state in enumerate(one) if moves(state)) for one in (states, states[::-1]))
-    assert all(moves(state) for state in states[first : len(states) - last])
-
-
-def moves(state):
-    return max(map(abs, state["target_qd"])) > 1e-3
-
-
-def test_what_the_arm_cannot_follow_is_refused_with_its_field(bent):
-    wire, token, start = bent
-    far, under = after(start, x=-2.0), after(start, z=-0.6)
-    line = {"type": "line", "pose": after(start, z=0.05)}
-    for code, where, command in (
-        ("no_solution", "pose", {"type": "move_l", "pose": far}),
-        ("no_solution", "segments[1].pose", {"type": "move_path", "segments": [line, line | {"pose": far}]}),
-        ("collision", "pose", {"type": "move_l", "pose": under}),
-        ("singular", "pose", {"type": "move_l", "pose": after(start, -2.0 * start[0], -2.0 * start[1])}),
-        ("out_of_range", "via", {"type": "move_c", "via": line["pose"], "pose": line["pose"]}),
-        ("out_of_range", "velocity", {"type": "move_l", "pose": line["pose"], "velocity": 1e-4}),
-        ("limit_position", "segments[0].q[0]", {
-            "type": "move_path", "segments": [{"type": "joint", "q": [9.0, *BENT[1:]]}]
-        }),
-        ("unknown_type", "segments[1].type", {"type": "move_path", "segments": [line, {"type": "lin"}]}),
-    ):  # fmt: skip
-        answer = wire.command(token=token, **command)
-        validate(answer)
-        assert (answer["type"], answer["code"], answer["where"]) == ("refused", code, where), answer
-    wire.command("simulation.reset", token=token, q=Q1)
-    answer = wire.command("move_l", token=token, pose=start)
-    assert (answer["code"], answer["where"]) == ("singular", "pose")
 
 
 def test_poses_and_postures_are_answered_without_control(stepped):

@@ -137,8 +137,10 @@ class TestControl:
         with live.control() as token:
             refused = live.command("simulation.step", token=token, ticks=1)
             assert (refused["type"], refused["code"]) == ("refused", "wrong_mode")
-            refused = live.raw(msgpack.packb({"type": "setpoint", "token": token, "sequence": 0, "q": Q1}))
-            assert (refused["code"], refused["where"]) == ("unknown_type", "type")
+            setpoint = msgpack.packb({"type": "setpoint", "token": token, "sequence": 0, "q": Q1})
+            for data, code, where in ((setpoint, "unknown_type", "type"), (b"", "malformed", "")):
+                refused = live.raw(data)
+                assert (refused["code"], refused["where"]) == (code, where)
 
     def test_a_reset_puts_the_arm_there_at_rest_and_keeps_lease_and_tick(self, stepped):
         with stepped.control() as token:

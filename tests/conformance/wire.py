@@ -121,6 +121,18 @@ class Wire:
         """The one answer to a command."""
         return self.raw(msgpack.packb({"type": type, **fields}))
 
+    def begin(self, type, **fields):  # noqa: A002  the wire's name
+        """Send a command without waiting; its answer comes into what this returns."""
+        payload = msgpack.packb({"type": type, **fields})
+        return self.session.get(self.key("command"), payload=payload, timeout=PATIENCE)
+
+    def take(self, right, client):
+        """Be present as a client that holds control or the clock; the token."""
+        self.announce(client)
+        taken = self.command(f"take_{right}", client=client)
+        assert taken["type"] == "accepted", taken
+        return taken["token"]
+
     def info(self):
         (answer,) = self.ask(self.key("info"))
         return answer

@@ -39,7 +39,7 @@ def played(stream, arrivals, ticks):
     out = []
     for tick in range(ticks):
         for sequence, q in arrivals.get(tick, ()):
-            stream.offer(sequence, np.array(q, dtype=float))
+            stream.offer(sequence, np.atleast_1d(np.array(q, dtype=float)))
         out.append(stream.next())
     return np.array(out)
 

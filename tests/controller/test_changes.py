@@ -10,9 +10,8 @@ from tests.search.subject import Subject, refused, speeds, torques
 
 from tvist_controller.about import info_of
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.foresight.collision import CLEARANCE
-from tvist_controller.foresight.line_copy import resting_after
 from tvist_controller.foresight.stopper import Stopper
+from tvist_controller.foresight.stops import resting_after
 from tvist_controller.line.differentiator import STILL
 from tvist_controller.line.inverse_dynamics import SLEW, InverseDynamics
 from tvist_controller.line.limits import TORQUE_SHARE
@@ -143,7 +142,7 @@ def test_a_stream_whose_end_through_the_filter_would_meet_is_stopped_instead(sha
     assert [event.code for event in ended] == ["collision"]
     assert "through the filter" in ended[0].why
     model = robot.controller.motion.collisions
-    assert model.nearest(robot.column("target_q")) >= CLEARANCE
+    assert all(model.meeting(q) is None for q in robot.column("target_q"))
 
 
 def test_info_says_how_long_stops_last():

@@ -9,6 +9,7 @@ import yaml
 from tvist_cli.main import application
 
 DOCKER = Path(__file__).parents[2] / "docker"
+KUBERNETES = list(yaml.safe_load_all((DOCKER / "kubernetes.yaml").read_text()))
 
 
 def understood(words):
@@ -30,11 +31,7 @@ def test_every_recorder_starts_again_by_itself_into_a_volume():
             if "--record" in words:
                 mounts = [volume.partition(":")[2] for volume in service["volumes"]]
                 found.append(service["restart"] == "unless-stopped" and recorded(words, mounts))
-    (robots,) = (
-        document
-        for document in yaml.safe_load_all((DOCKER / "kubernetes.yaml").read_text())
-        if document["kind"] == "StatefulSet"
-    )
+    (robots,) = (document for document in KUBERNETES if document["kind"] == "StatefulSet")
     (container,) = robots["spec"]["template"]["spec"]["containers"]
     claims = {claim["metadata"]["name"] for claim in robots["spec"]["volumeClaimTemplates"]}
     mounts = [mount["mountPath"] for mount in container["volumeMounts"] if mount["name"] in claims]
@@ -43,15 +40,14 @@ def test_every_recorder_starts_again_by_itself_into_a_volume():
 
 
 def test_kubernetes_takes_every_resource():
-    documents = list(yaml.safe_load_all((DOCKER / "kubernetes.yaml").read_text()))
-    assert {document["kind"] for document in documents} >= {"Deployment", "StatefulSet", "Service"}
-    for document in documents:
+    assert {document["kind"] for document in KUBERNETES} >= {"Deployment", "StatefulSet", "Service"}
+    for document in KUBERNETES:
         kubernetes_validate.validate(document, "1.34", strict=True)
 
 
 def test_its_commands_and_probes_are_the_programs():
     commands = []
-    for document in yaml.safe_load_all((DOCKER / "kubernetes.yaml").read_text()):
+    for document in KUBERNETES:
         template = document["spec"].get("template", {"spec": {"containers": []}})
         for container in template["spec"]["containers"]:
             commands.append(container["args"])

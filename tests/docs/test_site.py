@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from markdown_it import MarkdownIt
-from tools.site import commands, navigation, reference, sources, stage, tree
+from tools.site import commands, navigation, reference, stage, tree
 
 from tvist_cli.main import examples
 
@@ -62,22 +62,17 @@ def test_every_package_that_is_imported_has_a_page():
     [("", "see ci, or x"), ("https://h/o/r", "see [ci](https://h/o/r/blob/main/.ci/run), or x")],
 )
 def test_a_link_to_a_source_file_leads_to_the_repository(repository, shown, monkeypatch):
-    monkeypatch.setattr(sources, "REPOSITORY", repository)
+    monkeypatch.setattr(stage, "REPOSITORY", repository)
     text = "see [ci](.ci/run), or x"
     (link,) = tree.links(text)
-    assert sources.to_repository(text, link.start(), link.end(), ROOT / ".ci" / "run") == shown
+    assert stage.to_repository(text, link.start(), link.end(), ROOT / ".ci" / "run") == shown
 
 
-@pytest.mark.parametrize(
-    ("text", "targets"),
-    [
-        ("see [a](b.md) and ![c](d.png)", ["b.md", "d.png"]),
-        ('<source srcset="a.webp"> <img src="b.gif">', ["a.webp", "b.gif"]),
-        ("`[a](b.md)` is code", []),
-        ("```md\n[a](b.md)\n```\n[`x`](y.md#z)", ["y.md#z"]),
-        ("[out](https://example.org)", []),
-    ],
-)
+@pytest.mark.parametrize(("text", "targets"), [
+    ("see [a](b.md) and ![c](d.png)", ["b.md", "d.png"]),
+    ('<source srcset="a.webp"> <img src="b.gif">', ["a.webp", "b.gif"]), ("`[a](b.md)` is code", []),
+    ("```md\n[a](b.md)\n```\n[`x`](y.md#z)", ["y.md#z"]), ("[out](https://example.org)", []),
+])  # fmt: skip
 def test_links_are_found_outside_code(text, targets):
     assert [match["target"] for match in tree.links(text)] == targets
 

@@ -186,7 +186,7 @@ def rotation(random):
 
 @dataclass
 class TwoDevices:
-    """What happens, and what each device writes about it: each has its clock, rate, units, names and faults."""
+    """What happens, and what each device writes about it, with its own clock, rate, units and faults."""
 
     seed: int
     offset: float = 0.0  # of the sensor's clock when the robot's is 0 [s]

@@ -11,10 +11,9 @@ from tests.examples import examples
 from tests.lab.made_logs import G, TwoDevices, write_csv
 
 from tvist_lab.recordings import RecordingError, read
-from tvist_lab.recordings.flange_motion import at_flange, by_sensor
 from tvist_lab.recordings.joined import joined
 from tvist_lab.recordings.table import SENSOR
-from tvist_lab.recordings.two_clocks import fits
+from tvist_lab.recordings.two_clocks import at_flange, by_sensor, fits
 from tvist_plant.description import load
 
 RECORDED = Path(__file__).parent / "data" / "ur5_stops.csv.gz"

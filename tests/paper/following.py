@@ -17,7 +17,7 @@ from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.safety.experience import AFTER, MotionRecord
 from tvist_controller.safety.payload_student import PayloadStudent
 from tvist_controller.sources.mode_source import first_source
-from tvist_lab.study.line import PAPER, RESTING, Unchanged
+from tvist_lab.study.line import PAPER, RESTING
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe, own_move
 from tvist_plant.description import load
@@ -74,7 +74,7 @@ class Driven:
         tvist.reset(start)
         shaped = np.array([tvist.filter(q).copy() for q in [*reference, *[reference[-1]] * 60]])
         believed = paper_payload(known, mass)
-        line = DrivenLine(known, Unchanged(known.joints), start, body(believed))
+        line = DrivenLine(known, body(believed))
         driven = line.drive(start, shaped, RESTING + len(shaped) + 200, RESTING, elastic)
         moving = np.flatnonzero(np.abs(np.diff(driven.targets[:, 0], axis=0)).max(axis=1) > 0)
         return cls(believed, driven, int(moving[0]), int(moving[-1]) + 2)

@@ -147,22 +147,13 @@ def scaled(table: str, key: str, factor: float = 1.001) -> RobotDescription:
     return changed(UR5E, table, **{key: (values[0] * factor, *values[1:])})
 
 
-@pytest.mark.parametrize(
-    "description",
-    [
-        scaled("drives", "gear_stiffness"),
-        scaled("drives", "gear_damping"),
-        scaled("drives", "rotor_inertia"),
-        scaled("drives", "velocity_gain"),
-        scaled("drives", "position_gain"),
-        scaled("drives", "integral_gain"),
-        scaled("drives", "coulomb_friction"),
-        scaled("links", "mass"),
-        scaled("link_flexibility", "stiffness"),
-        changed(UR5E, "link_flexibility", links=(), stiffness=()),
-        changed(UR5E, "kinematics", a=(0.0, -0.5, -0.4, 0.0, 0.0, 0.0)),
-    ],
-)
+@pytest.mark.parametrize("description", [
+    scaled("drives", "gear_stiffness"), scaled("drives", "gear_damping"), scaled("drives", "rotor_inertia"),
+    scaled("drives", "velocity_gain"), scaled("drives", "position_gain"), scaled("drives", "integral_gain"),
+    scaled("drives", "coulomb_friction"), scaled("links", "mass"), scaled("link_flexibility", "stiffness"),
+    changed(UR5E, "link_flexibility", links=(), stiffness=()),
+    changed(UR5E, "kinematics", a=(0.0, -0.5, -0.4, 0.0, 0.0, 0.0)),
+])  # fmt: skip
 def test_another_arm_has_another_one(description):
     assert fingerprint(description) != fingerprint(UR5E)
 
@@ -272,32 +263,21 @@ def test_it_vibrates_and_says_what_was_assumed(path, base):
 BRANCH = '<link name="x"/><joint name="jx" type="{}"><parent link="elbow"/><child link="x"/><limit effort="1" velocity="1" lower="0" upper="1"/></joint></robot>'  # noqa: E501
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ('<mass value="2.7"/>', '<mass value="0"/>', "link elbow has no <inertial> with a mass"),
-        (
-            "</robot>",
-            BRANCH.format("revolute"),
-            "the chain branches after link elbow, into the joints j5, jx",
-        ),
-        (
-            'name="j5" type="revolute"',
-            'name="j5" type="prismatic"',
-            "joint j5 is prismatic: must be revolute",
-        ),
-        ('effort="60" velocity="2.4"', 'effort="0" velocity="2.4"', "joint j5: <limit> has effort 0"),
-        ('lower="-3.05" upper="3.05"', 'lower="3" upper="-3"', "joint j7: <limit> has lower 3 and upper -3"),
-        ('xyz="0 0 0.16"', 'xyz="0 0 up"', "joint j1: xyz is '0 0 up': must be 3 numbers"),
-        ('<parent link="wrist"/>', '<parent link="wirst"/>', "joint j7: there is no link 'wirst'"),
-        ('<parent link="base"/>', '<parent link="tool0"/>', "in a circle"),
-        ('rpy="0 0 0.4"', 'rpy="1.5 0 0"', "the axis of joint j1 must point straight up"),
-        ('ixx="0.03"', 'ixx="3.0"', "no body can have this"),
-        ('<joint name="j7"', '<joint name="j5"', "two of joint j5: give each a name of its own"),
-        ('<robot name="seven">', "<!DOCTYPE x><robot>", "it has a document type"),
-        ('<robot name="seven">', '<robot name="seven"', "it is not valid XML"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ('<mass value="2.7"/>', '<mass value="0"/>', "link elbow has no <inertial> with a mass"),
+    ("</robot>", BRANCH.format("revolute"), "the chain branches after link elbow, into the joints j5, jx"),
+    ('name="j5" type="revolute"', 'name="j5" type="prismatic"', "joint j5 is prismatic: must be revolute"),
+    ('effort="60" velocity="2.4"', 'effort="0" velocity="2.4"', "joint j5: <limit> has effort 0"),
+    ('lower="-3.05" upper="3.05"', 'lower="3" upper="-3"', "joint j7: <limit> has lower 3 and upper -3"),
+    ('xyz="0 0 0.16"', 'xyz="0 0 up"', "joint j1: xyz is '0 0 up': must be 3 numbers"),
+    ('<parent link="wrist"/>', '<parent link="wirst"/>', "joint j7: there is no link 'wirst'"),
+    ('<parent link="base"/>', '<parent link="tool0"/>', "in a circle"),
+    ('rpy="0 0 0.4"', 'rpy="1.5 0 0"', "the axis of joint j1 must point straight up"),
+    ('ixx="0.03"', 'ixx="3.0"', "no body can have this"),
+    ('<joint name="j7"', '<joint name="j5"', "two of joint j5: give each a name of its own"),
+    ('<robot name="seven">', "<!DOCTYPE x><robot>", "it has a document type"),
+    ('<robot name="seven">', '<robot name="seven"', "it is not valid XML"),
+])  # fmt: skip
 def test_what_cannot_be_simulated_is_refused_in_a_sentence(old, new, said, tmp_path):
     text = SEVEN.read_text(encoding="utf-8")
     assert old in text

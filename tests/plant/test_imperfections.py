@@ -40,10 +40,6 @@ def drive(ur5e):
     return commands(ur5e, ur5e.poses["Q1"], ur5e.poses["Q3"], 500)
 
 
-def test_without_anything_it_is_the_described_arm_to_the_last_bit(ur5e, drive):
-    np.testing.assert_array_equal(felt(ur5e, drive, Imperfections()), felt(ur5e, drive, None))
-
-
 @pytest.mark.parametrize("imperfections", [None, *IMPERFECT.values()], ids=["described", *IMPERFECT])
 @pytest.mark.parametrize("pose", ["Q1", "Q3"])
 def test_the_start_has_no_transient(ur5e, imperfections, pose):

@@ -75,15 +75,10 @@ def fitted(alpha, guess, period):
     return best[0], best[count]
 
 
-@pytest.mark.parametrize(
-    ("pose", "joint", "push", "pulse", "guess"),
-    [
-        ("Q1", 0, 20.0, 0.15, (7.5, 0.4)),
-        ("Q1", 1, 20.0, 0.15, (7.5, 0.4)),
-        ("Q2", 0, 20.0, 0.15, (7.5, 0.4)),
-        ("Q3", 2, 40.0, 0.08, (17.0, 22.0, 0.2, 0.2)),
-    ],
-)
+@pytest.mark.parametrize(("pose", "joint", "push", "pulse", "guess"), [
+    ("Q1", 0, 20.0, 0.15, (7.5, 0.4)), ("Q1", 1, 20.0, 0.15, (7.5, 0.4)), ("Q2", 0, 20.0, 0.15, (7.5, 0.4)),
+    ("Q3", 2, 40.0, 0.08, (17.0, 22.0, 0.2, 0.2)),
+])  # fmt: skip
 def test_a_ring_down_of_the_nonlinear_arm_has_the_declared_mode(
     ur5e, plant, pose, joint, push, pulse, guess, measured
 ):

@@ -105,15 +105,12 @@ def test_the_ring_of_a_base_that_yields_is_a_body_too(arm):
     assert one._q[1] - before == pytest.approx(150.0 / 1.5e5, rel=1e-2)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ({"body": "nose"}, "body is 'nose': must be one of base, shoulder, .*flange"),
-        ({"body": "flange", "force": (1.0, 2.0)}, "force is .1.0, 2.0.: must be three finite"),
-        ({"body": "flange", "moment": (0.0, np.nan, 0.0)}, "moment is"),
-        ({"body": "flange", "point": (0.0, np.inf, 0.0)}, "point is"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "said"), [
+    ({"body": "nose"}, "body is 'nose': must be one of base, shoulder, .*flange"),
+    ({"body": "flange", "force": (1.0, 2.0)}, "force is .1.0, 2.0.: must be three finite"),
+    ({"body": "flange", "moment": (0.0, np.nan, 0.0)}, "moment is"),
+    ({"body": "flange", "point": (0.0, np.inf, 0.0)}, "point is"),
+])  # fmt: skip
 def test_a_wrench_without_sense_is_refused(ur5e, arguments, said):
     with pytest.raises(ValueError, match=said):
         FlexibleArm(ur5e, ur5e.payload).push_body(**arguments)

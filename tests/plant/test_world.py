@@ -143,16 +143,11 @@ def test_a_tool_is_turned_as_the_scene_says(tmp_path, shape, turned):
         np.testing.assert_allclose(np.abs(axis), [0.0, 1.0, 0.0] if turned else [0.0, 0.0, 1.0], atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("tool", "surface", "touches"),
-    [
-        ("", "", True),
-        ('contype="0" conaffinity="0"', "", False),
-        ("", 'contype="2" conaffinity="2"', False),
-        ('contype="2" conaffinity="0"', 'contype="0" conaffinity="2"', True),
-        ('contype="4" conaffinity="4"', 'contype="2" conaffinity="2"', False),
-    ],
-)
+@pytest.mark.parametrize(("tool", "surface", "touches"), [
+    ("", "", True), ('contype="0" conaffinity="0"', "", False), ("", 'contype="2" conaffinity="2"', False),
+    ('contype="2" conaffinity="0"', 'contype="0" conaffinity="2"', True),
+    ('contype="4" conaffinity="4"', 'contype="2" conaffinity="2"', False),
+])  # fmt: skip
 def test_a_tool_touches_what_its_masks_say_and_the_arm_all_that_is_solid(tmp_path, tool, surface, touches):
     text = (
         f'<mujoco><worldbody><body name="tool"><geom name="tip" size="0.02" {tool}/></body>'

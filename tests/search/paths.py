@@ -10,7 +10,6 @@ from tests.search.stops import KINDS, PAUSES
 from tests.search.subject import Subject, speeds, torques
 
 from tvist_controller.api.line import (
-    CLEARANCE,
     TORQUE_SHARE,
     CollisionModel,
     body,
@@ -103,7 +102,8 @@ def keeps_limits(q, free, payload, case):
     present = np.abs(np.diff(free, 2, axis=0)).max() / PERIOD**2
     hardest = np.abs(np.diff(q, 2, axis=0)).max() / PERIOD**2
     assert hardest <= max(1.01 * min(UR5E.limits.acceleration), present), case
-    assert CollisionModel(UR5E, body(payload)).nearest(q) >= CLEARANCE, case
+    collisions = CollisionModel(UR5E, body(payload))
+    assert all(collisions.meeting(each) is None for each in q), case
 
 
 def assert_on_path(q, legs):

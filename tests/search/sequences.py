@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from tests.search import draws, space
-from tests.search.changes import far_payload
 from tests.search.draws import WITHIN
 from tests.search.subject import CLIENT, SESSION, Subject, speeds
 
@@ -17,6 +16,7 @@ from tvist_protocol.faults import FAULTS as FAULT_FIELDS
 from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.simulation import SimulationInject, SimulationReset
 from tvist_protocol.transitions import Activity
+from tvist_protocol.values import Payload
 
 COMMANDS = 40
 """Number of commands in a sequence."""
@@ -44,6 +44,15 @@ places, since they often begin where a motion before was stopped at the clearanc
 
 ROUNDING = 1e-9
 """Differences between positions below this are rounding errors [rad]."""
+
+
+def far_payload(random, rated):
+    """Return a payload within the rating, with its centre of mass up to 0.3 m out."""
+    mass = float(random.uniform(0.1, rated))
+    direction = random.normal(size=3)
+    com: Floats = direction / np.linalg.norm(direction) * random.uniform(0.0, 0.3)
+    moment = 0.002 * mass
+    return Payload(mass=mass, com=(com[0], com[1], com[2]), inertia=(moment, 0.0, 0.0, moment, 0.0, moment))
 
 
 @dataclass

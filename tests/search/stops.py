@@ -10,7 +10,6 @@ from tests.search.draws import WITHIN
 from tests.search.subject import CLIENT, SESSION, Subject, refused, speeds, torques
 
 from tvist_controller.api.line import (
-    CLEARANCE,
     TORQUE_SHARE,
     CollisionModel,
     JointLine,
@@ -124,7 +123,8 @@ def judge(description, case):
     taken = np.abs(torques(description, payload, stopped[case.moment - 1 :])).max(axis=0)
     assert (taken / most).max() <= 1.0 + TORQUE_ROUNDING, case
     assert max(*speeds(description, stopped), *speeds(description, alone)) <= WITHIN, case
-    assert CollisionModel(description, body(payload)).nearest(stopped[after]) >= CLEARANCE, case
+    collisions = CollisionModel(description, body(payload))
+    assert all(collisions.meeting(q) is None for q in stopped[after]), case
     way = float(np.abs(stopped[-1] - stopped[case.moment]).max())
     speed = float(np.abs(stopped[case.moment] - stopped[case.moment - 1]).max()) / PERIOD
     assert speed > BARELY or way <= BARELY_WAY or case.kind in PAUSES, case

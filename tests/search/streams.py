@@ -8,7 +8,7 @@ from tests.search import draws
 from tests.search.draws import WITHIN
 from tests.search.subject import CLIENT, SESSION, Subject, refused, speeds
 
-from tvist_controller.api.line import CLEARANCE, CollisionModel, JointLine, body, paper_payload
+from tvist_controller.api.line import CollisionModel, JointLine, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
@@ -133,7 +133,7 @@ def judge(description, case):
     )
     rushed = np.count_nonzero(np.greater(steps, 1.5 * case.velocity)) > 10
     collisions = CollisionModel(description, body(paper_payload(description, case.mass)))
-    assert collisions.nearest(references) >= CLEARANCE, case
+    assert all(collisions.meeting(q) is None for q in references), case
     assert (np.abs(references) - reach).max() <= INTERPOLATION * case.jerk * PERIOD**3, case
     assert max(speeds(description, references)) <= WITHIN, case
     assert robot.controller.motion.streams.counters()[2] > 0 or not rushed, case

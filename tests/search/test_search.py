@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import pytest
-from tests.search import changes, paths, programs, sequences, stops, streams
+from tests.search import paths, programs, sequences, stops, streams
 
 from tvist_plant.description import load
 
@@ -67,11 +67,6 @@ def test_a_path_that_creeps_to_its_end_is_where_it_should_be():
 @pytest.mark.search
 def test_a_stream_keeps_the_clearance_and_the_limits_however_it_ends(arm, number):
     streams.judge(arm, streams.draw(arm, number))
-
-
-@pytest.mark.search
-def test_a_change_in_motion_keeps_the_clearance_and_the_limits(arm, number):
-    changes.judge(arm, number)
 
 
 @pytest.mark.search

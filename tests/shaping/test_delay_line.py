@@ -100,15 +100,6 @@ def test_a_delay_the_line_does_not_hold_is_refused_and_nothing_written(delay):
     assert (out == 5.0).all()
 
 
-def test_a_sample_of_another_size_is_refused():
-    line = DelayLine(2, 10)
-    for wrong in (1.0, [1.0], [1.0, 2.0, 3.0], [[1.0, 2.0]]):
-        with pytest.raises(ShapingError, match="shape"):
-            line.push(wrong)
-        with pytest.raises(ShapingError, match="shape"):
-            line.fill(wrong)
-
-
 @pytest.mark.parametrize(("joints", "capacity"), [(0, 10), (1, 3)])
 def test_a_line_that_could_not_interpolate_is_refused(joints, capacity):
     with pytest.raises(ShapingError, match="joints >= 1 and capacity >= 4"):

@@ -99,29 +99,16 @@ def test_the_saturation_has_two_derivatives_without_a_jump():
     assert slope.max() <= 1.0 + 1e-9
 
 
-@pytest.mark.parametrize(
-    ("changes", "field"),
-    [
-        ({"joints": ()}, "joints"),
-        ({"joints": (1, 1)}, "joints"),
-        ({"joints": (-1,)}, "joints"),
-        ({"joints": (7,)}, "joints"),
-        ({"degree": -1}, "degree"),
-        ({"degree": 1.5}, "degree"),
-        ({"degree": 10**9}, "degree"),
-        ({"degree": 30}, "degree"),
-        ({"centre": [0.0]}, "centre"),
-        ({"centre": [0.0, math.nan, 0.0]}, "centre"),
-        ({"f_d_coefficients": [10.0]}, "f_d_coefficients"),
-        ({"zeta_coefficients": [math.nan] * 25}, "zeta_coefficients"),
-        ({"f_d_range": (6.0,)}, "f_d_range"),
-        ({"f_d_range": (15.0, 6.0)}, "f_d_range"),
-        ({"f_d_range": (0.0, 6.0)}, "f_d_range"),
-        ({"f_d_range": (6.0, math.inf)}, "f_d_range"),
-        ({"zeta_range": (-0.1, 0.3)}, "zeta_range"),
-        ({"zeta_range": (0.1, 1.0)}, "zeta_range"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "field"), [
+    ({"joints": ()}, "joints"), ({"joints": (1, 1)}, "joints"), ({"joints": (-1,)}, "joints"),
+    ({"joints": (7,)}, "joints"), ({"degree": -1}, "degree"), ({"degree": 1.5}, "degree"),
+    ({"degree": 10**9}, "degree"), ({"degree": 30}, "degree"), ({"centre": [0.0]}, "centre"),
+    ({"centre": [0.0, math.nan, 0.0]}, "centre"), ({"f_d_coefficients": [10.0]}, "f_d_coefficients"),
+    ({"zeta_coefficients": [math.nan] * 25}, "zeta_coefficients"), ({"f_d_range": (6.0,)}, "f_d_range"),
+    ({"f_d_range": (15.0, 6.0)}, "f_d_range"), ({"f_d_range": (0.0, 6.0)}, "f_d_range"),
+    ({"f_d_range": (6.0, math.inf)}, "f_d_range"), ({"zeta_range": (-0.1, 0.3)}, "zeta_range"),
+    ({"zeta_range": (0.1, 1.0)}, "zeta_range"),
+])  # fmt: skip
 def test_bad_parameters_are_refused_by_name(changes, field):
     with pytest.raises(EstimatorError, match=f"^{field} is") as error:
         polynomial(**changes) if not changes.keys() & {"joints", "degree"} else Polynomial(

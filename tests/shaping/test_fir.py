@@ -95,19 +95,13 @@ def test_what_cannot_be_is_not_called_solved():
     assert not solved
 
 
-@pytest.mark.parametrize(
-    ("numbers", "field"),
-    [
-        ({"weight": (1.0,)}, "weight"),
-        ({"residual": (0.05, 0.05, 0.05)}, "residual"),
-        ({"spread": (), "residual": (), "weight": ()}, "spread"),
-        ({"spread": (-0.1, 0.0, 0.0, 0.0)}, "spread"),
-        ({"weight": (1.0, 1.0, 1.0, float("nan"))}, "weight"),
-        ({"residual": (0.0, 0.05, 0.05, 0.05)}, "residual"),
-        ({"shortest": 0.2}, "shortest"),
-        ({"shortest": 0.01}, "shortest"),
-    ],
-)
+@pytest.mark.parametrize(("numbers", "field"), [
+    ({"weight": (1.0,)}, "weight"), ({"residual": (0.05, 0.05, 0.05)}, "residual"),
+    ({"spread": (), "residual": (), "weight": ()}, "spread"), ({"spread": (-0.1, 0.0, 0.0, 0.0)}, "spread"),
+    ({"weight": (1.0, 1.0, 1.0, float("nan"))}, "weight"),
+    ({"residual": (0.0, 0.05, 0.05, 0.05)}, "residual"), ({"shortest": 0.2}, "shortest"),
+    ({"shortest": 0.01}, "shortest"),
+])  # fmt: skip
 def test_numbers_that_do_not_fit_are_refused_before_compiled_code_sees_them(numbers, field):
     with pytest.raises(FilterError) as error:
         FirDesign(**numbers)

@@ -231,18 +231,15 @@ def test_a_bad_parameter_is_refused_by_name(change, field):
     assert error.value.field == field
 
 
-@pytest.mark.parametrize(
-    ("rows", "field"),
-    [
-        (((1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), "stiffness"),
-        (((1.0, 1.0), (1.0,), (1.0, 1.0), (1.0, 1.0)), "rotor_inertia"),
-        (((1.0, 1.0), (0.0, 0.0), (1.0, 1.0), (1.0, 1.0)), "rotor_inertia"),
-        (((1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (1.0, 1.0)), "velocity_gain"),
-        (((1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (1.0, np.inf)), "position_gain"),
-        (((1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (np.nan, 0.0)), "damping"),
-        (((), (), (), ()), "stiffness"),
-    ],
-)
+@pytest.mark.parametrize(("rows", "field"), [
+    (((1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), "stiffness"),
+    (((1.0, 1.0), (1.0,), (1.0, 1.0), (1.0, 1.0)), "rotor_inertia"),
+    (((1.0, 1.0), (0.0, 0.0), (1.0, 1.0), (1.0, 1.0)), "rotor_inertia"),
+    (((1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (1.0, 1.0)), "velocity_gain"),
+    (((1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (1.0, np.inf)), "position_gain"),
+    (((1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (np.nan, 0.0)), "damping"),
+    (((), (), (), ()), "stiffness"),
+])  # fmt: skip
 def test_springs_and_motors_that_cannot_be_are_refused_by_name(rows, field):
     with pytest.raises(EstimatorError, match=f"{field} is") as error:
         Drivetrain(*rows)

@@ -201,25 +201,16 @@ def test_where_the_programme_is_not_solved_the_old_taps_stand_and_it_is_said():
     assert not tvist.clipped
 
 
-@pytest.mark.parametrize(
-    ("make", "field"),
-    [
-        (lambda: ProductDesign(0.0), "mean_delay"),
-        (lambda: ProductDesign(0.3), "mean_delay"),
-        (lambda: ProductDesign(float("nan")), "mean_delay"),
-        (lambda: ProductDesign(0.05, modes=0), "modes"),
-        (lambda: ProductDesign(0.05, modes=7), "modes"),
-        (lambda: ProductDesign(0.05, longest=float("inf")), "longest"),
-        (lambda: ProductDesign(0.05, period=0.0), "period"),
-        (lambda: ShortDesign(0.045), "mean_delay"),
-        (lambda: SteadyFilter(ProductDesign(0.05), Fixed([7.0], [0.1]), joints=1), "modes"),
-        (lambda: SteadyFilter(ProductDesign(0.05, modes=1), Fixed([7.0], [0.1]), joints=0), "joints"),
-        (
-            lambda: SteadyFilter(ProductDesign(0.05, modes=1), Fixed([7.0], [0.1]), joints=1, smooth=0),
-            "smooth",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("make", "field"), [
+    (lambda: ProductDesign(0.0), "mean_delay"), (lambda: ProductDesign(0.3), "mean_delay"),
+    (lambda: ProductDesign(float("nan")), "mean_delay"), (lambda: ProductDesign(0.05, modes=0), "modes"),
+    (lambda: ProductDesign(0.05, modes=7), "modes"),
+    (lambda: ProductDesign(0.05, longest=float("inf")), "longest"),
+    (lambda: ProductDesign(0.05, period=0.0), "period"), (lambda: ShortDesign(0.045), "mean_delay"),
+    (lambda: SteadyFilter(ProductDesign(0.05), Fixed([7.0], [0.1]), joints=1), "modes"),
+    (lambda: SteadyFilter(ProductDesign(0.05, modes=1), Fixed([7.0], [0.1]), joints=0), "joints"),
+    (lambda: SteadyFilter(ProductDesign(0.05, modes=1), Fixed([7.0], [0.1]), joints=1, smooth=0), "smooth"),
+])  # fmt: skip
 def test_what_does_not_fit_is_refused_by_name(make, field):
     with pytest.raises(FilterError) as error:
         make()

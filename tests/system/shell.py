@@ -45,7 +45,7 @@ def tvist(*arguments, **options):
     return python("-m", "tvist_cli", *arguments, **options)
 
 
-def begun(*arguments):
+def begun(*arguments, **options):
     """The program, which goes on until it is interrupted."""
     words = [sys.executable, "-m", "tvist_cli", *map(str, arguments)]
-    return forked.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return forked.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)

@@ -42,16 +42,6 @@ def recorded(lockstep, tmp_path_factory):
         process.communicate(timeout=PATIENCE)
 
 
-@pytest.mark.realtime
-def test_check_says_that_a_robot_in_real_time_is_well():
-    with Served("--speed", "0.1") as slow:  # so that no busy machine overloads it
-        said = tvist("check", slow.endpoint, "--json").assert_done().json
-        assert (said["ok"], said["robot"], said["protocol"]) == (True, "ur5e", 1)
-        assert said["state_rate_hz"] > 0.0
-        lines = tvist("check", slow.endpoint).assert_done().out.splitlines()
-    assert [line.split()[1] for line in lines] == ["connect", "info", "state", "refusal", "ready", "load"]
-
-
 def test_check_names_who_is_not_there_and_who_is(lockstep):
     endpoint = free_endpoint()
     assert tvist("check", endpoint, "--json").assert_failed(1, endpoint).json["ok"] is False
@@ -73,30 +63,6 @@ def test_a_robot_that_has_stopped_says_why_and_what_to_do_wherever_it_is_asked()
         ended = tvist("unlock", served.endpoint).assert_failed(1, "not ready", "torque of joint")
         assert ended.out.splitlines() == ["unlocked the protective stop", "the robot stopped again at once"]
         assert int(re.search(r"since tick (\d+)", ended.err).group(1)) > 6
-
-
-def inject(served, *faults):
-    with Wire(served.endpoint) as wire, wire.control() as token:
-        for fault in faults:
-            wire.command("simulation.inject", token=token, fault=fault)
-        wire.step(token, 5)
-
-
-def test_unlock_makes_it_ready_or_says_what_remains(lockstep):
-    at = lockstep.endpoint
-    inject(lockstep, "protective_stop")
-    tvist("check", at).assert_failed(1, "injected")
-    done = tvist("unlock", at).assert_done().out.splitlines()
-    assert done == ["unlocked the protective stop", "ur5e is ready to be moved"]
-    assert tvist("unlock", at, "--json").assert_done().json["done"] == []
-    inject(lockstep, "violation", "safeguard_stop")
-    ended = tvist("unlock", at)
-    ended.assert_failed(1, "SAFEGUARD_STOP", "a safeguard asked for a stop", "release it")
-    assert "restarted the safety system" in ended.out
-    inject(lockstep, "normal")
-    tvist("unlock", at).assert_failed(1, "POWER_OFF", "--power-on")
-    said = tvist("unlock", at, "--power-on", "--json").assert_done().json
-    assert (said["ok"], said["robot_mode"]) == (True, "RUNNING")
 
 
 def test_of_several_robots_one_has_to_be_named():

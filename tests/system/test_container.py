@@ -122,12 +122,6 @@ def test_the_health_check_is_liveness_and_a_robot_that_has_stopped_is_healthy_an
         assert engine.run("podman", "exec", robot.name, "tvist", "check").returncode == 0
 
 
-def test_a_check_from_outside_is_ok_once_it_listens(engine):
-    with Contained(engine) as robot:
-        report = check(robot.endpoint)
-    assert report.ok, report
-
-
 @pytest.mark.parametrize(
     ("options", "command"),
     [((), ()), (("--entrypoint=python",), ("-c", FOREIGN_MACHINE, *SERVE))],

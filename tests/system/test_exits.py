@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 
-import msgpack
 import pytest
 from tests.conformance.served import NOISE, PATIENCE, Served, finished, free_endpoint
 from tests.conformance.wire import Wire
@@ -171,8 +170,7 @@ def test_a_client_that_has_stopped_reading_does_not_hold_up_the_end(start, tmp_p
             assert wire.command("move_j", token=token, q=FAR)["type"] == "accepted"
             wire.listen("state")
             for _ in range(6):  # more states than its socket holds
-                step = msgpack.packb({"type": "simulation.step", "token": token, "ticks": 1000})
-                wire.session.get(wire.key("command"), payload=step, timeout=PATIENCE)
+                wire.begin("simulation.step", token=token, ticks=1000)
             wire.until(500)
             assert served.end() == 0
     assert read(path).complete

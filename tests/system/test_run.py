@@ -8,10 +8,10 @@ from xml.etree import ElementTree as ET
 
 import pytest
 from msgspec.structs import replace
-from tests import forked
 from tests.conformance.served import PATIENCE, free_endpoint
 from tests.conformance.wire import Wire
 from tests.places import own_address
+from tests.system.shell import begun
 from tests.system.test_wrong_invocations import assert_said
 from tests.system.ur_object import Client
 
@@ -40,12 +40,6 @@ FOUND = [
     "wrong.script:2:9: compile_error_name_not_found:x:",
     "wrong.script:3:3: warning: path_offset_enable: this controller does not simulate path offsets",
 ]
-
-
-def begun(*arguments, **options):
-    """The program, in a process that goes on until it is ended."""
-    words = [sys.executable, "-m", "tvist_cli", *map(str, arguments)]
-    return forked.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 
 @pytest.fixture(autouse=True)

@@ -1,7 +1,8 @@
-"""Who may do what on a robot that others can reach: real sessions, real certificates."""
+"""Who may do what on a robot that others can reach, also by number and size: real sessions, real certificates."""
 
 import queue
 import socket
+import ssl
 
 import msgpack
 import pytest
@@ -18,6 +19,7 @@ from tvist_client.errors import DeniedError, NotConnectedError
 from tvist_client.fleet import Fleet
 from tvist_client.transports import certificates
 from tvist_client.transports.session import open_session
+from tvist_protocol.codec import MAX_BYTES
 from tvist_server.gateways import network
 from tvist_server.gateways.network import GatewayError, Network
 from tvist_view.pilot import Pilot
@@ -134,13 +136,6 @@ class TestOperator:
         other.session.close()
         lost = operator.wait("event", lambda event: event["kind"] == "lease_lost", since=before)
         assert "otto" in lost["why"]
-
-    async def test_moves_it_with_the_client_of_this_project(self, served, ring):
-        async with await Robot.connect(served.endpoint, security=ring / "anna") as robot:
-            async with robot.control("anna") as arm:
-                motion = await arm.move_j([0.1, *Q1[1:]])
-                await arm.reset(Q1)
-            assert motion.done is not None
 
 
 class TestViewer:
@@ -339,3 +334,63 @@ def test_a_session_is_cut_when_its_certificate_expires(served, ring, operator, t
     lost = operator.wait("event", lambda event: event["kind"] == "lease_lost")
     assert "otto" in lost["why"]
     wire.session.close()
+
+
+def test_a_message_above_the_cap_does_not_pass_and_the_next_one_does(served, operator):
+    tick = operator.info()["tick"]
+    began = operator.wait("telemetry", lambda telemetry: telemetry["tick"] > tick)
+    too_large = bytes(4 * MAX_BYTES)
+    operator.put(too_large)
+    for ask in ({"payload": too_large}, {"payload": b"", "attachment": too_large}):
+        replies = list(operator.session.get(operator.key("command"), timeout=0.5, **ask))
+        # It came to nothing: the server never had it whole.
+        assert [reply.err.payload.to_bytes() for reply in replies] == [b"Timeout"]
+    assert operator.raw(bytes(MAX_BYTES + 1))["limit"] == MAX_BYTES
+    until = operator.info()["tick"]
+    after = operator.wait("telemetry", lambda telemetry: telemetry["tick"] > until)
+    assert after["setpoints_received"] == began["setpoints_received"]
+    served.assert_quiet()
+
+
+def half_a_handshake():
+    hello, nothing = ssl.MemoryBIO(), ssl.MemoryBIO()
+    half = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).wrap_bio(nothing, hello, server_hostname="localhost")
+    with pytest.raises(ssl.SSLWantReadError):
+        half.do_handshake()
+    return hello.read()
+
+
+def a_hundred(endpoint, first=b""):
+    """Connections that send this and nothing more."""
+    host, port = endpoint.partition("/")[2].split(":")
+    connections = [socket.create_connection((host, int(port))) for _ in range(100)]
+    for connection in connections:
+        connection.sendall(first)
+    return connections
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("first", [b"", half_a_handshake()], ids=["idle", "half a handshake"])
+def test_a_hundred_connections_lock_nobody_out(served, operator, session, ring, first):
+    """By default Zenoh turns everybody away while a hundred connections shake no hands."""
+    connections = a_hundred(served.endpoint, first)
+    assert session("anna").info()["type"] == "info"
+    for connection in connections:
+        connection.close()
+    # Zenoh now counts a hundred failed handshakes, and accepts nobody for 100 ms after each.
+    tick = operator.state()["tick"]
+    with BlockingRobot.connect(served.endpoint, security=ring / "anna") as robot:
+        assert robot.info().tick > tick
+    assert operator.state()["tick"] > tick  # and the connected stay so
+
+
+@pytest.mark.nightly
+def test_a_hundred_idle_connections_lock_nobody_out_where_there_is_no_security():
+    with Served() as plain:
+        connections = a_hundred(plain.endpoint)
+        with Wire(plain.endpoint) as wire:
+            assert wire.info()["type"] == "info"
+        for connection in connections:
+            connection.settimeout(PATIENCE)
+            assert connection.recv(1) == b""
+            connection.close()

@@ -1,38 +1,21 @@
 """One client holds the clock over the network: it alone lets time pass, and others are served within its steps."""
 
-import asyncio
-
 import msgpack
 import pytest
-from tests.conformance.served import PATIENCE, Served
-from tests.conformance.wire import Q1, Wire
+from tests.conformance.served import Served
+from tests.conformance.wire import Wire
 
 from tvist_client.robot import Robot
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
-from tvist_protocol.errors import RefusedError
 
-NEAR = [0.3, -2.9, 0.2, -1.4, 0.1, -0.1]
 FAR = [1.5, -3.0, 0.2, -1.5, 0.1, 0.3]
 LONG = 100_000
-
-
-def send(wire, type, **fields):  # noqa: A002  the wire's name
-    """Send a command without waiting for its answer, which comes into what this returns."""
-    payload = msgpack.packb({"type": type, **fields})
-    return wire.session.get(wire.key("command"), payload=payload, timeout=PATIENCE)
 
 
 def answer(replies):
     (reply,) = replies
     return msgpack.unpackb(reply.ok.payload.to_bytes())
-
-
-def take(wire, right, client):
-    wire.announce(client)
-    taken = wire.command(f"take_{right}", client=client)
-    assert taken["type"] == "accepted", taken
-    return taken["token"]
 
 
 def commands(path):
@@ -51,10 +34,10 @@ def test_a_stop_of_another_client_takes_effect_within_a_long_step_and_a_signal_e
         Wire(served.endpoint) as stepper,
         Wire(served.endpoint) as mover,
     ):
-        clock, token = take(stepper, "clock", "stepper"), take(mover, "control", "mover")
+        clock, token = stepper.take("clock", "stepper"), mover.take("control", "mover")
         mover.listen("state", "event")
         assert mover.command("move_j", token=token, q=FAR)["type"] == "accepted"
-        replies = send(stepper, "simulation.step", token=clock, ticks=LONG)
+        replies = stepper.begin("simulation.step", token=clock, ticks=LONG)
         mover.wait("state", lambda state: state["target_qd"][0] > 0.2)
         assert mover.command("stop")["type"] == "done"
         stopped = mover.wait("event", lambda event: event["kind"] == "motion_stopped")
@@ -70,11 +53,11 @@ def test_a_stop_of_another_client_takes_effect_within_a_long_step_and_a_signal_e
 def test_a_clock_that_is_taken_within_a_step_of_who_has_control_ends_the_step(lockstep):
     with Wire(lockstep.endpoint) as mover, Wire(lockstep.endpoint) as stepper:
         mover.listen("state")
-        token = take(mover, "control", "mover")
+        token = mover.take("control", "mover")
         before = mover.info()["tick"]
-        replies = send(mover, "simulation.step", token=token, ticks=LONG)
+        replies = mover.begin("simulation.step", token=token, ticks=LONG)
         mover.until(before + 10)
-        clock = take(stepper, "clock", "stepper")
+        clock = stepper.take("clock", "stepper")
         ended = answer(replies)
         assert ended["type"] == "done"
         assert before + 10 <= ended["tick"] < before + LONG
@@ -89,28 +72,6 @@ def test_a_clock_that_is_taken_within_a_step_of_who_has_control_ends_the_step(lo
         assert stepper.command("release_clock", token=clock) == {"type": "done"}
         assert mover.command("simulation.step", token=token, ticks=1)["tick"] == ended["tick"] + 6
         assert mover.command("release_control", token=token) == {"type": "done"}
-
-
-async def test_in_python_one_client_steps_while_another_moves_and_waits_for_its_motion(lockstep):
-    async with (
-        await Robot.connect(lockstep.endpoint) as robot,
-        await Robot.connect(lockstep.endpoint) as other,
-    ):
-        async with robot.clock_control("stepper") as stepper, other.control("mover") as arm:
-            with pytest.raises(RefusedError, match="'stepper'"):
-                await other.advance(1)
-            with pytest.raises(RefusedError, match="'stepper'"):
-                async with other.clock_control("mover"):
-                    pass
-            await arm.reset(q=Q1)
-            moving = asyncio.create_task(arm.move_j(NEAR))
-            while not moving.done():
-                await stepper.advance(500)
-            assert (await moving).done is not None
-            resting = asyncio.create_task(other.rest())
-            await stepper.step(5000)
-            assert (await resting).target_q == pytest.approx(NEAR, abs=1e-7)
-        assert (await robot.info()).stepper is None
 
 
 async def test_before_the_first_tick_a_client_is_told_how_the_robot_stands():

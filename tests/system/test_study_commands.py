@@ -13,6 +13,13 @@ from tvist_shaping.impulse_train import Impulses
 MOVE = {
     "start": [1.2, -1.4, 1.5, -1.6, 0.0, 0.0], "target": [0.0, -2.2, 1.9, -1.3, 0.0, 0.0], "payload": 1.5
 }  # fmt: skip
+FAILS = """from tvist_shaping import zv
+calls = []
+def later(f_d, zeta):
+    calls.append(f_d)
+    return zv(f_d, zeta) if len(calls) < 700 else None
+"""
+"""A shaper that fails between what is tried out and the motion."""
 PEEKS = """
 past = []
 
@@ -143,6 +150,13 @@ class TestMoves:
         (here / "moves.json").write_text(json.dumps(far), encoding="utf-8")
         ended = tvist("study", "moves", "--moves", "moves.json")
         ended.assert_failed(2, "move 2", "joint 3", "elbow", "6.28319")
+
+
+def test_rows_that_fail_are_counted_and_the_first_is_named(here):
+    (here / "mine.py").write_text(FAILS, encoding="utf-8")
+    ended = tvist("study", "moves", "--moves", 1, "--shapers", "mine.py:later", "--json")
+    said = "the shaper returns NoneType instead of Impulses(A, tau) of tvist_shaping for f_d = "
+    ended.assert_failed(1, "1 of 2 rows failed, the first with later at move 1", said)
 
 
 def test_the_bench_names_a_cheat_and_does_not_rank_it(here):

@@ -15,7 +15,7 @@ from tvist_controller.instruments.snapshot import Instruments
 from tvist_plant.description import load
 from tvist_protocol import Io, State
 
-from .test_ur_lockstep import begin_step, lockstep, take_clock
+from .test_ur_lockstep import lockstep
 
 rtde_receive = pytest.importorskip("rtde_receive")
 
@@ -141,9 +141,9 @@ def alone():
     host = own_address(12)
     options = ("--clock", "lockstep", "--profile", "real", "--start", "Q1", "--ur-address", host)
     with Served(*options) as served, Wire(served.endpoint) as wire:
-        clock = take_clock(wire)
+        clock = wire.take("clock", "stepper")
         wire.step(clock, 1)
-        _steps = [begin_step(wire, clock, 100_000) for _ in range(50)]
+        _steps = [wire.begin("simulation.step", token=clock, ticks=100_000) for _ in range(50)]
         yield wire, host
         assert served.end() == 0
 

@@ -5,7 +5,6 @@ import struct
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-import msgpack
 import pytest
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Wire
@@ -32,26 +31,23 @@ def timestamps(ticks):
 class Connection:
     """A connection to one of a robot's ports."""
 
-    def __init__(self, host, port, source=None):
-        address = None if source is None else (source, 0)
-        self.socket = socket.create_connection((host, port), PATIENCE, source_address=address)
-        self._bytes = b""
+    def __init__(self, host, port):
+        self.socket = socket.create_connection((host, port), PATIENCE)
+        self._stream = self.socket.makefile("rb")
 
     def __enter__(self):
         return self
 
     def __exit__(self, *error):
+        self._stream.close()
         self.socket.close()
 
     def send(self, data):
         self.socket.sendall(data)
 
     def take(self, size):
-        while len(self._bytes) < size:
-            more = self.socket.recv(65536)
-            assert more, "the robot closed the connection"
-            self._bytes += more
-        taken, self._bytes = self._bytes[:size], self._bytes[size:]
+        taken = self._stream.read(size)
+        assert len(taken) == size, "the robot closed the connection"
         return taken
 
     def package(self, head):
@@ -65,14 +61,11 @@ class Connection:
         return self.line()
 
     def line(self):
-        said = b""
-        while not said.endswith(b"\n"):
-            said += self.take(1)
-        return said.decode().strip()
+        return self._stream.readline().decode().strip()
 
 
-def dashboard(host, source=None):
-    interface = Connection(host, 29999, source)
+def dashboard(host):
+    interface = Connection(host, 29999)
     assert interface.line().startswith("Connected")
     return interface
 
@@ -91,36 +84,11 @@ def rtde(host):
     return interface
 
 
-def robot_states(interface, until):
-    """Time [s] and measured angles of the robot states, to the first one at a time or after it."""
-    found = []
-    while not found or found[-1][0] < until:
-        ((kind, body),) = decoders.split(interface.package(">i"))
-        if kind == 16:
-            of = dict(decoders.parts(body))
-            (time,) = struct.unpack_from(">Q", of[0])
-            found.append((time / 1e6, [struct.unpack_from(">d", of[1], joint * 41)[0] for joint in range(6)]))
-    return found
-
-
 @contextmanager
-def lockstep(last, path, *options, start="Q1"):
-    how = ("--clock", "lockstep", "--profile", "real", "--start", start, "--ur-address", own_address(last))
-    with Served(*how, "--record", str(path), *options) as served:
+def lockstep(last, path):
+    how = ("--clock", "lockstep", "--profile", "real", "--start", "Q1", "--ur-address", own_address(last))
+    with Served(*how, "--record", str(path)) as served:
         yield served, own_address(last)
-
-
-def take_clock(wire):
-    wire.announce("stepper")
-    taken = wire.command("take_clock", client="stepper")
-    assert taken["type"] == "accepted", taken
-    return taken["token"]
-
-
-def begin_step(wire, token, ticks):
-    """A step that is under way; its answers come into what this returns."""
-    payload = msgpack.packb({"type": "simulation.step", "token": token, "ticks": ticks})
-    return wire.session.get(wire.key("command"), payload=payload, timeout=PATIENCE)
 
 
 def running(interface):
@@ -154,7 +122,7 @@ def test_rtde_and_the_real_time_interface_have_every_tick_once_in_order_as_zenoh
             Connection(host, 30003) as realtime,
             Connection(host, 30013) as read_only,
         ):
-            clock = take_clock(stepper)
+            clock = stepper.take("clock", "stepper")
             token = mover.command("take_control", client="mover")["token"]
             assert mover.command("move_j", token=token, q=FAR)["type"] == "accepted"
             stepper.listen("state")
@@ -180,32 +148,6 @@ def test_rtde_and_the_real_time_interface_have_every_tick_once_in_order_as_zenoh
     replayed(tmp_path / "run.mcap")
 
 
-def test_the_primary_interface_tells_the_time_of_the_ticks_ten_times_a_second(tmp_path):
-    with (
-        lockstep(2, tmp_path / "run.mcap") as (served, host),
-        Wire(served.endpoint) as wire,
-        Wire(served.endpoint) as mover,
-    ):
-        wire.listen("state")
-        clock, token = take_clock(wire), mover.command("take_control", client="mover")["token"]
-        assert mover.command("move_j", token=token, q=FAR, velocity=0.2)["type"] == "accepted"
-        first = wire.step(clock, 10)["tick"]
-        for port in (30001, 30012):
-            with Connection(host, port) as interface:
-                assert decoders.message(interface.package(">i")).values["name"] == "URControl"
-                wire.step(clock, 500)
-                last = wire.received["state"][-1]["tick"]
-                of = {round(state["timestamp"], 3): state for state in wire.received["state"]}
-                found = robot_states(interface, BOOTED + last // 50 * 50 * TICK)
-            times = [round(time - BOOTED, 3) for time, _ in found]
-            # At once where the last tick is told again while no time passes, then at every fiftieth tick.
-            begun = round(times[0] / TICK)
-            assert first <= begun
-            due = range((begun // 50 + 1) * 50, last + 1, 50)
-            assert times[1:] == [round(tick * TICK, 3) for tick in due]
-            assert all(angles == of[time]["actual_q"] for time, (_, angles) in zip(times, found, strict=True))
-
-
 def test_a_program_of_the_dashboard_reaches_its_end_within_one_step_of_another_client(tmp_path):
     moves = built_in(load("ur5e"))[PAPER].count("movej(")
     with (
@@ -213,7 +155,7 @@ def test_a_program_of_the_dashboard_reaches_its_end_within_one_step_of_another_c
         Wire(served.endpoint) as stepper,
         dashboard(host) as interface,
     ):
-        clock = take_clock(stepper)
+        clock = stepper.take("clock", "stepper")
         stepper.listen("event")
         assert interface.ask("robotmode") == "Robotmode: NO_CONTROLLER"
         stepper.step(clock, 1)
@@ -221,7 +163,7 @@ def test_a_program_of_the_dashboard_reaches_its_end_within_one_step_of_another_c
         assert interface.ask(f"load {PAPER}") == f"Loading program: {PAPER}"
         assert interface.ask("play") == "Starting program"
         assert stepper.info()["control"].startswith("ur-")
-        begin_step(stepper, clock, 100_000)
+        stepper.begin("simulation.step", token=clock, ticks=100_000)
         done = 0
         for _ in range(moves):
             event = stepper.wait("event", lambda event: event["kind"] == "motion_done", since=done)
@@ -258,9 +200,9 @@ def test_a_script_of_a_client_is_told_and_moves_the_arm_and_what_replaces_it_end
                     found.append(f"{title} {told.values['text']}")
             return found
 
-        clock = take_clock(stepper)
+        clock = stepper.take("clock", "stepper")
         stepper.step(clock, 1)
-        begin_step(stepper, clock, 100_000)
+        stepper.begin("simulation.step", token=clock, ticks=100_000)
         sender.send(b"def one():\n  sleep(100)\nend\ndef two():\n  movej([0.1, -3, 0, -1.6, 0, 0])\nend\n")
         assert keys(4) == ["STARTED one", "STOPPED one", "STARTED two", "STOPPED two"]
         sender.send(b"def bad():\n  calldoesntexist()\nend\n")
@@ -290,7 +232,7 @@ def test_an_arm_with_seven_joints_has_the_dashboard_and_the_interpreter_alone():
         Wire(served.endpoint, "seven") as wire,
         dashboard(own_address(25)) as interface,
     ):
-        clock = take_clock(wire)
+        clock = wire.take("clock", "stepper")
         wire.step(clock, 5)
         running(interface)
         assert interface.ask("load Q2.urp") == "Loading program: Q2.urp"

@@ -15,7 +15,7 @@ from tests.places import own_address
 
 from tvist_plant.description import load
 
-from .test_ur_lockstep import begin_step, dashboard, lockstep, replayed, running, take_clock
+from .test_ur_lockstep import lockstep, replayed
 from .ur_driver import MANNERS
 
 HOST = own_address(51)
@@ -92,10 +92,10 @@ def test_in_lockstep_a_step_waits_for_what_a_program_reads_until_its_client_is_s
         socket.create_server((host, 0)) as server,
         socket.create_connection((host, 30001)) as script,
     ):
-        clock = take_clock(stepper)
+        clock = stepper.take("clock", "stepper")
         other.listen("io")
         stepper.step(clock, 1)
-        begin_step(stepper, clock, 100_000)
+        stepper.begin("simulation.step", token=clock, ticks=100_000)
         script.sendall(ECHO.format(host=host, port=server.getsockname()[1]).encode())
         stream, _ = server.accept()
         with stream:
@@ -109,34 +109,3 @@ def test_in_lockstep_a_step_waits_for_what_a_program_reads_until_its_client_is_s
     assert len(ticks) == 20
     assert {after - before for before, after in itertools.pairwise(ticks)} == {1}
     assert all(entry.tick > ticks[-1] for entry in journal if entry.change == "expired")
-
-
-def test_external_control_runs_the_text_of_the_client_and_the_program_goes_on_after_it(tmp_path):
-    (tmp_path / "cell.urp").write_text(
-        "<URProgram><children><MainProgram runOnlyOnce='true'><children>"
-        "<Contributed strategyClass='com.fzi.externalcontrol.ExternalControlNode'/>"
-        "<Script><cachedContents>textmsg(&quot;handed back&quot;)</cachedContents></Script>"
-        "</children></MainProgram></children></URProgram>"
-    )
-    text = b'# HEADER_BEGIN\nglobal a = 7\n# HEADER_END\ntextmsg("a=", a)\n# NODE_CONTROL_LOOP_ENDS\n'
-    with (
-        lockstep(53, tmp_path / "run.mcap", "--programs", str(tmp_path)) as (served, host),
-        Wire(served.endpoint) as wire,
-        socket.create_server((host, 50002)) as server,
-        dashboard(host, source=host) as interface,
-    ):
-        wire.listen("event")
-        clock = take_clock(wire)
-        wire.step(clock, 1)
-        running(interface)
-        begin_step(wire, clock, 100_000)
-        assert interface.ask("load cell.urp") == "Loading program: cell.urp"
-        interface.send(b"play\n")
-        stream, _ = server.accept()
-        with stream:
-            assert stream.recv(100) == b"request_program\n"
-            stream.sendall(text)
-            assert interface.line() == "Starting program"
-        wire.wait("event", lambda event: event["kind"] == "program_stopped")
-        said = [event["why"] for event in wire.received["event"] if event["kind"] == "text"]
-        assert said == ["a=7", "handed back"]

@@ -19,7 +19,7 @@ ANY = {
         "{assignment}": 50, f"textmsg{TWO}": 30, "if {expression}:\n{body}{branches}end": 30,
         "while {expression}:\n{body}{step}{leave}end": 20, "sync()": 10, "h = run t0()": 10, "kill {handle}": 5,
         "join {handle}": 5, "enter_critical": 5, "exit_critical": 5, "halt": 1, "return": 1,
-        "return {expression}": 1, "pass": 8, "movej({expression}, a=1.0)": 3, "{call}": 3,
+        "return {expression}": 1, "pass": 8, "movej({expression}, a=1.0)": 3, "{call}": 3
     },
     "branches": {"": 6, "elif {expression}:\n{body}": 3, "elif {expression}:\n" * 17: 1, "else:\n{body}": 6},
     "step": {"sync()\n": 7, "": 3},
@@ -27,12 +27,12 @@ ANY = {
     "handle": {"h": 1, "{name}": 1},
     "assignment": {
         "{name} = {expression}": 6, "global {name} = {expression}": 2, "local z = {expression}": 2,
-        "{name}[{expression}] = {expression}": 4,
+        "{name}[{expression}] = {expression}": 4
     },
     "expression": {
         "{atom}": 5, "({expression} {operator} {expression})": 2, "({expression} {operator}\n{expression})": 1,
         "(-({expression}))": 1, "(not ({expression}))": 1, "[{expression}, {expression}]": 1,
-        "({expression})[{expression}]": 1, "({expression})[{expression}, 0]": 0.3, "{call}": 1,
+        "({expression})[{expression}]": 1, "({expression})[{expression}, 0]": 0.3, "{call}": 1
     },
     "operator": dict.fromkeys(
         ["+", "-", "*", "/", "%", "==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"], 1
@@ -49,7 +49,7 @@ SANE = ANY | {
     "place": dict.fromkeys("012", 1),
     "expression": {
         "{atom}": 5, "({expression} {sign} {expression})": 2, "l[{place}]": 1, "norm([{expression}, {expression}])": 1,
-        "get_list_length([{expression} {operator} {expression}])": 2, "{call}": 1,
+        "get_list_length([{expression} {operator} {expression}])": 2, "{call}": 1
     },
     "sign": dict.fromkeys("+-*", 1),
     "operator": dict.fromkeys(["==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"], 1),

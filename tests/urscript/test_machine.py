@@ -97,13 +97,6 @@ def test_a_statement_beyond_the_budget_leaves_a_debt_and_one_that_waits_does_not
     assert waiting.ticks(3) == [0, 0, 0]
 
 
-def test_a_killed_thread_leaves_its_motion():
-    robot = Robot("thread t():\n move(1)\nend\nh = run t()\nsync()\nkill h\nsay(7)\nsync()")
-    robot.ticks(2)
-    assert robot.closed == [1]
-    assert robot.said == ["7"]
-
-
 def test_an_error_of_one_thread_ends_the_others():
     robot = Robot('thread t():\n sync()\n fail("x")\nend\nrun t()\nmove(2)')
     robot.ticks(1)
@@ -185,24 +178,11 @@ def test_the_line_of_the_main_thread_is_known():
     assert lines == [2, 3, 7]
 
 
-LOOP = "i = 0\nwhile i < 300:\n  i = i + 1\nend\nsay(i)"
-
-
 def test_what_is_left_of_the_budget_is_told():
     few, more = Robot("x = 1 + 2").ticks(1)[0], Robot("x = 1 + 2 + 3 + 4").ticks(1)[0]
     assert more == few - 2
     assert 0 < few < EVALUATIONS
     assert Robot("costly()").ticks(1)[0] < EVALUATIONS - 100
-
-
-def test_a_thread_without_budget_goes_on_where_it_was():
-    robot = Robot(LOOP)
-    ticks = 0
-    while robot.machine.running:
-        robot.ticks(1, budget=500)
-        ticks += 1
-    assert robot.said == ["300"]
-    assert 2 < ticks < 10
 
 
 def test_who_missed_a_tick_is_first_in_the_next():

@@ -5,7 +5,7 @@ from scipy.signal import TransferFunction, lsim
 
 from tvist_controller.api.line import DrivenLine, respond
 from tvist_lab.one_joint import FlexibleShoulder
-from tvist_lab.study.line import RESTING, Unchanged, point_to_point
+from tvist_lab.study.line import RESTING, point_to_point
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_shaping import Fixed, TvistFilter, residual, shaper
@@ -82,5 +82,5 @@ def moved(name, estimator, start, target):
     reference = point_to_point(np.array(start), np.array(target))
     rest = np.tile(reference[-1], (AFTER, 1))
     shaped = tvist.filter_all(np.concatenate([reference, rest]))
-    line = DrivenLine(description, Unchanged(2), np.array(start), description.payload)
+    line = DrivenLine(description, description.payload)
     return respond(arm, line.drive(np.array(start), shaped, RESTING + len(shaped), RESTING), 0).measured.q

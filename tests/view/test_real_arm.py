@@ -1,7 +1,7 @@
 """The steps to a real arm: each is ticked off by what the robot says, on the page, too."""
 
-import msgspec
 import pytest
+from msgspec.structs import replace
 from tests.conformance.served import PATIENCE, Served
 from tests.places import free_endpoint, own_address
 from tests.view.browser import Page, browser
@@ -26,16 +26,8 @@ class Seen:
         self.robot_mode, self.safety_mode, self.target_qd = mode, safety, [speed] * 6
 
 
-def named(info, **changes):
-    return msgspec.structs.replace(info, **changes)
-
-
 def done(way, info, state, io=None):
     return [step[0] for step in way.steps(info, state, io)]
-
-
-def event(kind):
-    return Event(tick=1, kind=kind)
 
 
 def test_a_simulated_robot_has_no_steps(info):
@@ -43,29 +35,29 @@ def test_a_simulated_robot_has_no_steps(info):
 
 
 def test_a_watched_robot_is_connected_released_moving_and_identified(info):
-    way, there = ObservedArm(), named(info, watched="ur://robot")
+    way, there = ObservedArm(), replace(info, watched="ur://robot")
     assert done(way, there, Seen(RobotMode.DISCONNECTED, SafetyMode.UNDEFINED)) == [False] * 5
     assert done(way, there, Seen(RobotMode.POWER_OFF)) == [True, *[False] * 4]
     assert done(way, there, Seen(speed=0.2)) == [True, True, True, False, False]
-    own = msgspec.structs.replace(info.calibration, shipped=False)
-    assert done(way, named(there, calibration=own), Seen()) == [True, True, True, True, False]
+    own = replace(info.calibration, shipped=False)
+    assert done(way, replace(there, calibration=own), Seen()) == [True, True, True, True, False]
 
 
 def test_a_moved_robot_is_held_moved_stopped_and_stopped_by_others(info):
-    way, there = ObservedArm(), named(info, moved="ur://robot")
+    way, there = ObservedArm(), replace(info, moved="ur://robot")
     assert done(way, there, Seen(RobotMode.POWER_OFF)) == [False] * 7
     assert done(way, there, Seen()) == [True, *[False] * 6]
     for kind in ("motion_done", "motion_stopped", "safety_stop"):
-        way.hear(event(kind))
+        way.hear(Event(tick=1, kind=kind))
     assert done(way, there, Seen(RobotMode.POWER_OFF)) == [False, False, True, True, False, False, False]
     way.compared()
     assert done(way, there, Seen()) == [True, False, True, True, True, True, False]
 
 
 def test_the_cap_and_why_it_is_not_held_are_said(info):
-    slow = msgspec.structs.replace(info.limits, velocity=[0.5] * 6)
+    slow = replace(info.limits, velocity=[0.5] * 6)
     stop = StopReason(tick=1, code=None, why="its program was paused")
-    there = named(info, moved="ur://robot", limits=slow, stop=stop)
+    there = replace(info, moved="ur://robot", limits=slow, stop=stop)
     steps = ObservedArm().steps(there, Seen(RobotMode.POWER_OFF), None)
     assert steps[0][2] == "its program was paused"
     assert "0.5 rad/s" in steps[2][1]

@@ -1,12 +1,14 @@
 """Write the site's sources: every page at its path in the repository, with links adapted to the site."""
 
 import json
+import os
+import re
 import shutil
 import subprocess
 import tomllib
 from pathlib import Path
 
-from tools.site import commands, reference, sources
+from tools.site import commands, reference
 from tools.site.navigation import navigation
 from tools.site.tree import HOME, ROOT, collect, linked, links
 
@@ -17,6 +19,14 @@ TRY = ROOT / "view" / "tvist_view" / "try.html"
 FRAME = '<iframe class="try" src="try.html" title="Try shaping"></iframe>\n\n'
 """The interactive shaping page, which the site's front page shows above its picture."""
 PICTURE = "<picture>"
+PICTURES = {
+    ".png",
+    ".gif",
+    ".svg",
+    ".webp",
+}  # suffixes of files that a browser shows by itself; they are copied
+REPOSITORY = os.environ.get("TVIST_REPOSITORY", "")
+"""Address of the repository for links to its files; without it they become plain text."""
 
 
 def stage(folder: Path) -> Path:
@@ -30,7 +40,7 @@ def stage(folder: Path) -> Path:
             assert PICTURE in text
             text = FIRST + text.replace(PICTURE, FRAME + PICTURE, 1)
         _write(to / page.relative_to(ROOT), text)
-    for path in (path for path in others if path.suffix in sources.PICTURES):
+    for path in (path for path in others if path.suffix in PICTURES):
         _place(to / path.relative_to(ROOT)).write_bytes(path.read_bytes())
     modules = reference.modules()
     for module in modules:
@@ -65,8 +75,8 @@ def stage(folder: Path) -> Path:
             }
         },
     }
-    if sources.REPOSITORY:
-        configuration["repo_url"] = sources.REPOSITORY
+    if REPOSITORY:
+        configuration["repo_url"] = REPOSITORY
     path = folder / "mkdocs.yml"
     _write(path, json.dumps(configuration, indent=2))  # JSON is YAML
     return path
@@ -77,15 +87,24 @@ def _with_links_of_the_site(page: Path) -> str:
     for match in reversed(links(text)):
         target, mark, anchor = match["target"].partition("#")
         path = linked(page, target)
-        if path == TRY:  # its anchor selects the scene
-            way = sources.way(page.relative_to(ROOT), Path(TRY.name))
-            text = text[: match.start()] + way + mark + anchor + text[match.end() :]
-        elif path.suffix != ".md" and path.suffix not in sources.PICTURES:
-            text = sources.to_repository(text, match.start(), match.end(), path)
-        elif target:
-            way = sources.way(page.relative_to(ROOT), path.relative_to(ROOT))
+        if path != TRY and path.suffix != ".md" and path.suffix not in PICTURES:
+            text = to_repository(text, match.start(), match.end(), path)
+        elif target:  # the anchor of the page for trying selects the scene
+            to = Path(TRY.name) if path == TRY else path.relative_to(ROOT)
+            way = Path(os.path.relpath(to, page.relative_to(ROOT).parent)).as_posix()
             text = text[: match.start()] + way + mark + anchor + text[match.end() :]
     return text
+
+
+def to_repository(text: str, start: int, end: int, path: Path) -> str:
+    """Return a page's text with a link to a file or folder redirected to the repository."""
+    if REPOSITORY:
+        kind = "tree" if path.is_dir() else "blob"
+        address = f"{REPOSITORY}/{kind}/main/{path.relative_to(ROOT).as_posix()}"
+        return text[:start] + address + text[end:]
+    opens = re.compile(r"\[[^\[\]]*\]\($").search(text[:start])
+    assert opens is not None, text[:end][-80:]
+    return text[: opens.start()] + opens[0][1:-2] + text[end + 1 :]
 
 
 def _place(path: Path) -> Path:

@@ -8,10 +8,10 @@ from tvist_lab.study.catalogue import some
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.study import Study
 from tvist_plant.description import load
+from tvist_plant.imperfections import STICTION
 from tvist_plant.variants import Variant, in_file, rubbed
 
 SEED, MOVES = 20327, 40
-STICTION = ("stiction", "stiction_load", "stiction_speed", "stiction_stiffness")
 BELIEFS = {
     "right": {},
     "without stiction": {"stiction": 0.0, "stiction_load": 0.0},

@@ -1,4 +1,4 @@
-"""The operators, for numbers and for lists of them as vectors and matrices."""
+"""The operators, for numbers and for lists of them as vectors and matrices, and access to elements of lists."""
 
 import math
 import operator
@@ -15,7 +15,9 @@ from tvist_urscript.values import (
     NUMBERS,
     Array,
     Pose,
+    Struct,
     Value,
+    integer,
     kind,
     number,
     only_numbers,
@@ -28,21 +30,15 @@ Number: TypeAlias = int | float
 Work: TypeAlias = Callable[[int], None]  # called with the number of elements that are about to be computed
 
 
-def total(a: Number, b: Number) -> Number:
-    """Return a + b."""
-    c = a + b
-    return c if type(c) is float else whole(c)  # type: ignore[arg-type]
+def _with_overflow(of: Callable[[Any, Any], Number]) -> Callable[[Any, Any], Number]:
+    def result(a: Number, b: Number) -> Number:
+        c = of(a, b)
+        return c if type(c) is float else whole(c)  # type: ignore[arg-type]
+
+    return result
 
 
-def difference(a: Number, b: Number) -> Number:
-    """Return a - b."""
-    c = a - b
-    return c if type(c) is float else whole(c)  # type: ignore[arg-type]
-
-
-def _product(a: Number, b: Number) -> Number:
-    c = a * b
-    return c if type(c) is float else whole(c)  # type: ignore[arg-type]
+total, difference, _product = map(_with_overflow, (operator.add, operator.sub, operator.mul))
 
 
 def quotient(a: Number, b: Number) -> Number:
@@ -89,7 +85,7 @@ def multiply(a: Value, b: Value, work: Work) -> Value:
     """Return a * b of numbers, a number and a list, lists of equal length (elementwise), matrices and vectors."""
     if type(a) in NUMBERS:
         if type(b) in NUMBERS:
-            return _product(a, b)  # type: ignore[arg-type]
+            return _product(a, b)
         if type(b) is Array:
             return _scaled(b, a, _product, work)  # type: ignore[arg-type]
     elif type(a) is Array:
@@ -193,3 +189,74 @@ _PLAIN: dict[Any, Callable[[Any, Any], Any]] = {
     total: operator.add, difference: operator.sub, _product: operator.mul, quotient: operator.truediv
 }  # fmt: skip
 """Python's operators for these functions, except for integers beyond 32 bits."""
+
+
+def element(value: Value, index: Any) -> Value:
+    """Return value[index]."""
+    items = _array(value).items
+    if type(index) is int and 0 <= index < len(items):
+        return items[index]
+    return items[_place(index, value)]  # type: ignore[arg-type]
+
+
+def element_of_matrix(value: Value, row: Any, column: Any) -> Value:
+    """Return value[row, column]."""
+    return element(element(value, row), column)
+
+
+def member(value: Value, name: str) -> Value:
+    """Return value.name."""
+    return _struct(value).items[_named(name, value)]  # type: ignore[arg-type]
+
+
+def replaced(new: Value, indices: tuple[Any, ...], value: Value, work: Work) -> Array:
+    """Return a copy of a list with another value for the element at these indices.
+
+    Copying four elements costs one evaluation.
+    """
+    step = indices[0]
+    if type(step) is tuple:  # a member's name
+        whole: Array = _struct(value)
+        place = _named(step[0], whole)  # type: ignore[arg-type]
+    else:
+        whole = _array(value)
+        place = _place(step, whole)
+    inner = new if len(indices) == 1 else replaced(new, indices[1:], whole.items[place], work)
+    work(len(whole.items) // 4)
+    items = list(whole.items)
+    if type(whole) is Pose:
+        items[place] = number(inner, "an element of a pose")
+        return Pose(items)
+    items[place] = inner
+    return Struct(whole.names, items) if type(whole) is Struct else Array(items)
+
+
+def _array(value: Value) -> Array:
+    if isinstance(value, Array):
+        return value
+    raise Fault(f"{kind(value)} has no elements")
+
+
+def _struct(value: Value) -> Struct:
+    if type(value) is Struct:
+        return value
+    raise Fault(f"{kind(value)} has no members")
+
+
+def _named(name: str, value: Struct) -> int:
+    try:
+        return value.names.index(name)
+    except ValueError:
+        raise Fault(f"the struct has no member {name}: it has {', '.join(value.names)}"[:200]) from None
+
+
+def _place(index: Any, value: Array) -> int:
+    place = integer(index, "a list index")
+    length = len(value.items)
+    what = "pose" if type(value) is Pose else "struct" if type(value) is Struct else "list"
+    has = f"the {what} has {length} element{'' if length == 1 else 's'}"
+    if place < 0:
+        raise Fault(f"list index {place} is negative: {has}")
+    if place >= length:
+        raise Fault(f"list index {place} is beyond the end: {has}")
+    return place

@@ -69,7 +69,19 @@ class Machine:
         self._started = 0
         self._holder: Thread | None = None
         self._line = 1
-        self._names = Namespace(script, functions, self.charge, self._called())
+        called = {
+            HERE: self,
+            MISSING: _MISSING,
+            "run": self._run,
+            "kill": self._kill,
+            "join": self._join,
+            "enter_critical": self._enter,
+            "exit_critical": self._exit,
+            "halt": _halt,
+            "label": self._label,
+            "too_deep": _too_deep,
+        }
+        self._names = Namespace(script, functions, self.charge, called)
         self._main = Thread(0, self._body(self._names[script.main]), None)
         self._running = self._main
         self._threads: list[Thread] = [self._main]
@@ -221,8 +233,7 @@ class Machine:
         """
         if cost is None:
             thread.spent = 0
-            if self._holder is thread:
-                self._holder = None
+            self._hand_over(thread)
             return
         thread.owes = cost
         thread.spent += before - (self.left + cost)
@@ -236,16 +247,18 @@ class Machine:
             )
 
     def _may_enter(self, thread: Thread) -> bool:
-        if not thread.critical:
-            return True
-        if self._holder is None:
+        if thread.critical and self._holder is None:
             self._holder = thread
-        return self._holder is thread
+        return not thread.critical or self._holder is thread
+
+    def _hand_over(self, thread: Thread) -> None:
+        """Let other threads enter critical sections, if this one is in its own."""
+        if self._holder is thread:
+            self._holder = None
 
     def _ended(self, thread: Thread) -> None:
         thread.leave(self._threads)
-        if self._holder is thread:
-            self._holder = None
+        self._hand_over(thread)
         if thread is self._main:
             self.end()
         elif thread in self._threads:
@@ -254,8 +267,7 @@ class Machine:
     def _close(self, thread: Thread) -> None:
         steps = thread.steps
         thread.leave(self._threads)
-        if self._holder is thread:
-            self._holder = None
+        self._hand_over(thread)
         if steps is not None and (thread is not self._running or not getattr(steps, "gi_running", False)):
             steps.close()
 
@@ -355,26 +367,12 @@ class Machine:
     def _exit(self) -> None:
         thread = self._running
         thread.critical = max(thread.critical - 1, 0)
-        if not thread.critical and self._holder is thread:
-            self._holder = None
+        if not thread.critical:
+            self._hand_over(thread)
 
     def _label(self, number: int, name: str) -> None:
         if self._running is self._main:
             self.label = number, name
-
-    def _called(self) -> dict[str, Any]:
-        return {
-            HERE: self,
-            MISSING: _MISSING,
-            "run": self._run,
-            "kill": self._kill,
-            "join": self._join,
-            "enter_critical": self._enter,
-            "exit_critical": self._exit,
-            "halt": _halt,
-            "label": self._label,
-            "too_deep": _too_deep,
-        }
 
 
 def _nothing() -> Steps:

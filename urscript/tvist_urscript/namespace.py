@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Mapping
 from types import FunctionType
 from typing import Any
 
-from tvist_urscript import arithmetic, indexing
+from tvist_urscript import arithmetic
 from tvist_urscript.arithmetic import Work
 from tvist_urscript.library import ANEW, PURE, WEIGHTS
 from tvist_urscript.script import Script
@@ -112,10 +112,10 @@ def _operators(work: Work) -> Mapping[str, Callable[..., Any]]:
         "negate": lambda a: arithmetic.negate(a, work),
         "is_equal": is_equal,
         "is_unequal": lambda a, b: not is_equal(a, b),
-        "element": indexing.element,
-        "member": indexing.member,
-        "element_of_matrix": indexing.element_of_matrix,
-        "replaced": lambda new, indices, value: indexing.replaced(new, indices, value, work),
+        "element": arithmetic.element,
+        "member": arithmetic.member,
+        "element_of_matrix": arithmetic.element_of_matrix,
+        "replaced": lambda new, indices, value: arithmetic.replaced(new, indices, value, work),
         "listed": Array,
         "structured": Struct,
         "arranged": lambda order, values: [values[place] for place in order],

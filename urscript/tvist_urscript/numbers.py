@@ -61,28 +61,20 @@ def log(b: Value, f: Value) -> float:
         raise Fault(f"log has no value for the base {a:g} and the number {x:g}") from None
 
 
-def floor(f: Value) -> int:
-    """Return the largest integer that is not above a number."""
-    return _integer("floor", math.floor, f)
+def _integer(name: str, of: Callable[[float], int]) -> Callable[[Value], int]:
+    def function(f: Value) -> int:
+        x = number(f, f"the argument of {name}")
+        if LOWEST <= x <= HIGHEST:
+            return of(x)
+        raise Fault(f"{name} has no integer of 32 bits for {x:g}")
+
+    return function
 
 
-def ceil(f: Value) -> int:
-    """Return the smallest integer that is not below a number."""
-    return _integer("ceil", math.ceil, f)
-
-
-def _integer(name: str, of: Callable[[float], int], f: Value) -> int:
-    x = number(f, f"the argument of {name}")
-    if LOWEST <= x <= HIGHEST:
-        return of(x)
-    raise Fault(f"{name} has no integer of 32 bits for {x:g}")
+floor, ceil = _integer("floor", math.floor), _integer("ceil", math.ceil)
 
 
 def generator() -> Callable[[], float]:
     """Return a `random` for a new program: numbers from 0 to below 1, the same sequence in each run."""
     dice = Random(0)  # noqa: S311  nothing secret
-
-    def random() -> float:
-        return dice.random()
-
-    return random
+    return lambda: dice.random()  # noqa: PLW0108  its signature can be read

@@ -59,7 +59,7 @@ def ask(
 ) -> asyncio.Future[zenoh.Reply | None]:
     """Query one key, on the loop; the result is the first answer, or None if nobody answers.
 
-    Zenoh ends a query that reaches no queryable silently at once, and an unanswered one with an error at its timeout.
+    Zenoh ends a query that reaches no queryable at once, and an unanswered one with an error at its timeout.
     """
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[zenoh.Reply | None] = loop.create_future()

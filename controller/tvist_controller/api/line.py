@@ -1,7 +1,7 @@
 """The control line for studies: the blocks of Figure 6, their parameters, and joint motions."""
 
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
-from tvist_controller.foresight.line_copy import resting_after
+from tvist_controller.foresight.stops import resting_after
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL, central_differences
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward

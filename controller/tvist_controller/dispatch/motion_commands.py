@@ -8,10 +8,9 @@ import numpy as np
 
 from tvist_controller.dispatch.robot import RobotParts
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.planning.command_row import CommandCall, CommandRow
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.path_planner import PathPlanner
-from tvist_controller.planning.plan import Planning
+from tvist_controller.planning.plan import CommandCall, CommandRow, Planning
 from tvist_controller.planning.snapshot import MOTION
 from tvist_controller.refusal import (
     SLOWEST,

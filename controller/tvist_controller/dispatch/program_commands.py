@@ -1,8 +1,7 @@
 """Commands that load, play, pause, stop and extend programs."""
 
 from tvist_controller.dispatch.robot import RobotParts
-from tvist_controller.planning.command_row import CommandCall, CommandRow
-from tvist_controller.planning.plan import Planning
+from tvist_controller.planning.plan import CommandCall, CommandRow, Planning
 from tvist_controller.planning.snapshot import SCRIPT
 from tvist_controller.programs.compiling import Kept, ScriptCompiler
 from tvist_controller.refusal import RefusalError, out_of_turn

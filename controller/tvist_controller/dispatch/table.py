@@ -6,9 +6,8 @@ import numpy as np
 
 from tvist_controller.dispatch import motion_commands, program_commands
 from tvist_controller.dispatch.robot import RobotParts
-from tvist_controller.planning.command_row import CommandCall, CommandRow
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.plan import Planning
+from tvist_controller.planning.plan import CommandCall, CommandRow, Planning
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import FILTER, TOOL
 from tvist_controller.refusal import RefusalError, check_body, check_joints

@@ -111,7 +111,7 @@ class CollisionModel:
         Steps are long where all bodies are far apart. Pairs that are too close at the start, or at a posture
         before it, may separate but not come closer.
         """
-        travel, share = self.travel(way.turned), 0.0
+        travel, share = float(np.abs(way.turned) @ self._reach), 0.0  # at most, of any point [m]
         least = np.minimum(self._gaps(way.at(0.0) if before is None else before), CLEARANCE)
         while True:
             gaps = self._gaps(way.at(share))
@@ -122,14 +122,6 @@ class CollisionModel:
                 return None
             nearest = min(float(gaps.min(initial=np.inf)), FAR_APART)
             share = 1.0 if travel <= 0.0 else min(share + max(nearest - CLEARANCE, SHORT) / travel, 1.0)
-
-    def nearest(self, postures: Floats, far: float = FAR_APART) -> float:
-        """Return the smallest distance at k postures, shape (k, n) [rad], at most `far` [m]."""
-        return min((far, *(float(self._gaps(q).min(initial=far)) for q in postures)))
-
-    def travel(self, turned: Floats) -> float:
-        """Return an upper bound of any point's travel for joint angles turned, shape (n,) [rad], in [m]."""
-        return float(np.abs(turned) @ self._reach)
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
         """Return whether turning the joints by these angles around a posture certainly avoids meetings."""

@@ -6,21 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from tvist_controller.foresight.line_copy import MAX_AHEAD, LineSimulation
-from tvist_controller.foresight.stops import StopPlan, StopPlanner
+from tvist_controller.foresight.stops import MAX_AHEAD, LineSimulation, StopPlan, StopPlanner
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.limits import torque_along
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.trajectory import AnyStop, BrakingForecast, JointStop, StuckError, Trajectory
+from tvist_controller.trajectory import AnyStop, BrakingForecast, StuckError, Trajectory
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
 LONG_STOP = 0.2  # duration above which slower playback along a curve is tried as a stop [s]
 EVEN = 1e-12  # differences between steps below this are rounding errors [rad]
-
-
-def _anywhere(_: JointStop) -> bool:
-    return True
 
 
 class Stopper:
@@ -74,7 +70,7 @@ class Stopper:
 
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
-        stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
+        stop = self.stops.by_joints(cycle.newest, deceleration, guard.clear if guard else lambda _: True)
         # Replace a running stop only by a harder one, since each new stop begins with a ramp.
         braking = cycle.mode is LineMode.STOPPING or present.acceleration > 0.0
         if braking and (stop is None or stop.acceleration <= present.acceleration):
@@ -87,41 +83,35 @@ class Stopper:
     def _on_path(self, forecast: BrakingForecast, deceleration: float | None) -> StopPlan | None:
         cycle, forecast = self._cycle, self._shaped(forecast)
         # Try the cheapest search first: bounds only, then simulation of a stop's duration, then of the whole motion.
-        state, newest = cycle.along.published, cycle.along.position
+        state, newest, stopping = cycle.along.published, cycle.along.position, cycle.mode is LineMode.STOPPING
         stop = self.stops.on_path(state, newest, forecast, deceleration)
-        lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
-        ahead = None
-        if stop is None:
-            ahead = LineSimulation(*cycle.fork())
-            # Unless the motion may turn back, simulating a stop's duration is enough.
-            ahead.until(MAX_AHEAD if forecast.turns else 0)
-            stop = self.stops.under(ahead, state, forecast, deceleration)
-        if stop is None and ahead is not None:
-            ahead.until(MAX_AHEAD)
-            asked = None
-            if not ahead.rests:  # too long: any stop ends sooner
-                stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
-            else:
-                last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
-                stop = self.stops.under(ahead, state, forecast, deceleration, asked)
-                lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
-            curved = forecast.path.posture_of is not None
-            lasts = math.inf if lets_run_out.duration is None else lets_run_out.duration
-            if stop is None and curved and lasts > LONG_STOP and cycle.mode is not LineMode.STOPPING:
-                slowed = self.stops.slowed(ahead, state, forecast, deceleration, asked)
-                if slowed is not None and slowed.duration < lasts:
-                    return self._plan(slowed, deceleration, slowed.duration, slowed.end)
         if stop is not None:
             return self._plan(stop, deceleration, stop.duration, stop.end)
-        return None if cycle.mode is LineMode.STOPPING else lets_run_out
+        ahead = LineSimulation(*cycle.fork())
+        # Unless the motion may turn back, simulating a stop's duration is enough.
+        ahead.until(MAX_AHEAD if forecast.turns else 0)
+        stop = self.stops.under(ahead, state, forecast, deceleration)
+        if stop is not None:
+            return self._plan(stop, deceleration, stop.duration, stop.end)
+        ahead.until(MAX_AHEAD)
+        quickest: AnyStop | None
+        asked: Floats | None = None
+        lasts, runs_out = math.inf, StopPlan(None, None, deceleration is not None, None, None)
+        if ahead.rests:
+            asked = torque_along(cycle.dynamics, np.array(ahead.references), PERIOD)
+            quickest = self.stops.under(ahead, state, forecast, deceleration, asked)
+            lasts = max((ahead.last - 1) * PERIOD, 0.0)
+            runs_out = self._plan(None, deceleration, lasts, ahead.references[-1])
+        else:  # too long: any stop ends sooner
+            quickest = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
+        if quickest is None and forecast.path.posture_of is not None and lasts > LONG_STOP and not stopping:
+            slowed = self.stops.slowed(ahead, state, forecast, deceleration, asked)
+            quickest = slowed if slowed is not None and slowed.duration < lasts else None
+        if quickest is not None:
+            return self._plan(quickest, deceleration, quickest.duration, quickest.end)
+        return None if stopping else runs_out
 
-    def _plan(
-        self,
-        stop: AnyStop | None,
-        wanted: float | None,
-        duration: float,
-        end: Floats,
-    ) -> StopPlan:
+    def _plan(self, stop: AnyStop | None, wanted: float | None, duration: float, end: Floats) -> StopPlan:
         kept = None if stop is None else stop.acceleration
         way = float(np.abs(end - self._cycle.position).max())
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)

@@ -1,17 +1,20 @@
-"""Planning of stops: which are permitted (see docs/explanations/design-notes.md), and the quickest."""
+"""Simulation of future references, and planning of stops: which are permitted, and the quickest.
+
+See docs/explanations/design-notes.md.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import TypeVar
 
 import numpy as np
 
-from tvist_controller.foresight.line_copy import LineSimulation
-from tvist_controller.line.differentiator import Floats, Target
+from tvist_controller.line.differentiator import STILL, Floats, ShapedReference, Target, rests_at
 from tvist_controller.line.inverse_dynamics import InverseDynamics
-from tvist_controller.line.limits import GENTLEST_STOP, StopTorque, torque_along
+from tvist_controller.line.limits import GENTLEST_STOP, StopTorque
+from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.trajectory import (
     AnyStop,
     BrakingForecast,
@@ -19,8 +22,51 @@ from tvist_controller.trajectory import (
     MotionLimits,
     PathStop,
     SlowedStop,
+    Trajectory,
 )
 from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
+
+MAX_AHEAD = 4000  # largest number of ticks simulated to find the end of a motion
+
+
+class LineSimulation:
+    """A control line without its arm, simulated ahead; it consumes its arguments. A stop has no filter."""
+
+    def __init__(
+        self, trajectory: Trajectory, line_filter: LineFilter | None, shaped: ShapedReference
+    ) -> None:
+        self._trajectory, self._line_filter, self._shaped = trajectory, line_filter, shaped
+        self.samples: list[Floats] = [shaped.along.published.q, shaped.along.position]
+        """Samples of the shaped reference, one per entry of `references`: path parameters or joint positions."""
+        self.references: list[Floats] = [shaped.joints.published.q, shaped.joints.position]
+        """The last two shaped references played, then the future ones per tick, each of shape (n,) [rad]."""
+        self.rests = False  # whether the last reference is at rest, so that no more follow
+
+    def until(self, ticks: int) -> None:
+        """Simulate until this many future references are known or they come to rest."""
+        trajectory, line_filter = self._trajectory, self._line_filter
+        while not self.rests and len(self.references) < ticks + 2:
+            x = trajectory.next()
+            x_star = x if line_filter is None else line_filter.filter(x)
+            self._shaped.take(x_star, x_star)
+            self.samples.append(x_star)
+            self.references.append(self._shaped.joints.position)
+            settled, shaped = line_filter is None or line_filter.settled, self._shaped
+            standing = trajectory.standing and settled
+            self.rests = standing and rests_at(shaped.posture(x), shaped.joints.published, PERIOD)
+
+    @cached_property
+    def last(self) -> int:
+        """Index of the last reference that moved, if they come to rest; 0 if none moved."""
+        return resting_after(np.array(self.references))
+
+
+def resting_after(references: Floats) -> int:
+    """Return the index of the last of references (k, n), one per tick, that moved; 0 if none."""
+    moves = np.flatnonzero(np.abs(np.diff(references, axis=0)).max(axis=1) > STILL)
+    return int(moves[-1]) + 1 if len(moves) else 0
+
 
 S = TypeVar("S", JointStop, PathStop, SlowedStop)
 
@@ -150,10 +196,6 @@ class StopPlanner:
         """Return whether a stop is never ahead of a motion whose distance at each tick is known."""
         shares = (stop.share(number * self.period) for number in range(1, len(along) + 1))
         return all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
-
-    def asked(self, ahead: Floats) -> Floats:
-        """Return the largest torques of future references of shape (k, n), shape (n,) [N m]."""
-        return torque_along(self._dynamics, ahead, self.period)
 
     def by_joints(
         self, state: Target, wanted: float | None, clear: Callable[[JointStop], bool]

@@ -65,8 +65,9 @@ class Report(Struct, gc=False):
         return State(
             tick=self.tick, timestamp=self.tick * PERIOD, robot_mode=robot_mode, safety_mode=safety_mode,
             runtime_state=runtime, setpoint_sequence=self.sequence,
-            reference_q=reference, target_q=target, target_qd=target_qd, target_qdd=target_qdd, target_moment=moment,
-            actual_q=measured.q.tolist(), actual_qd=measured.qd.tolist(), actual_moment=measured.moment.tolist(),
+            reference_q=reference, target_q=target, target_qd=target_qd, target_qdd=target_qdd,
+            target_moment=moment, actual_q=measured.q.tolist(), actual_qd=measured.qd.tolist(),
+            actual_moment=measured.moment.tolist(),
             actual_TCP_pose=motion[:6], actual_TCP_speed=motion[6:],
             actual_tool_accelerometer=measured.accelerometer.tolist(), speed_scaling=self.speed,
             estimated_f_d=self.f_d.tolist(), estimated_zeta=self.zeta.tolist(), shaper_delay=self.delay,

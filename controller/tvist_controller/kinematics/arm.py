@@ -22,29 +22,6 @@ AT_FLANGE = (0.0,) * 6  # tool centre point of an arm without tool
 
 
 @compiled_for_ticks
-def bias_of(jacobian: Floats, qd: Floats, found: Floats) -> None:
-    """Compute the end's acceleration at constant joint velocities, J̇ q̇, shape (6,).
-
-    With the parts ω and v of the Jacobian's columns, joint k moves column j by ω_min(j,k) x v_max(j,k), and
-    its ω_j by ω_k x ω_j if k < j.
-    """
-    a = b = c = 0.0  # angular velocity of the links before
-    for k in range(6):
-        found[k] = 0.0
-    for j in range(qd.shape[0]):
-        u, v, w = jacobian[0, j], jacobian[1, j], jacobian[2, j]
-        x, y, z, rate = jacobian[3, j], jacobian[4, j], jacobian[5, j], qd[j]
-        found[3] += rate * (b * z - c * y)
-        found[4] += rate * (c * x - a * z)
-        found[5] += rate * (a * y - b * x)
-        d, e, f = 2.0 * a + x * rate, 2.0 * b + y * rate, 2.0 * c + z * rate
-        found[0] += rate * (e * w - f * v)
-        found[1] += rate * (f * u - d * w)
-        found[2] += rate * (d * v - e * u)
-        a, b, c = a + x * rate, b + y * rate, c + z * rate
-
-
-@compiled_for_ticks
 def end_motion(chain: Floats, q: Floats, qd: Floats, out: Floats) -> None:
     """Compute position [m], rotation vector [rad] and their velocities at the end, shape (12,)."""
     R, J = np.empty((3, 3)), np.empty((6, q.shape[0]))
@@ -58,10 +35,27 @@ def end_motion(chain: Floats, q: Floats, qd: Floats, out: Floats) -> None:
 
 @compiled_for_ticks
 def end_acceleration(chain: Floats, q: Floats, qd: Floats, qdd: Floats, out: Floats) -> None:
-    """Compute the end's linear and angular acceleration, J q̈ + J̇ q̇, shape (6,) [m/s^2, rad/s^2]."""
+    """Compute the end's linear and angular acceleration, J q̈ + J̇ q̇, shape (6,) [m/s^2, rad/s^2].
+
+    With the parts ω and v of the Jacobian's columns, joint k moves column j by ω_min(j,k) x v_max(j,k), and
+    its ω_j by ω_k x ω_j if k < j.
+    """
     R, o, J = np.empty((3, 3)), np.empty(3), np.empty((6, q.shape[0]))
     locate(chain, q, R, o, J)
-    bias_of(J, qd, out)
+    a = b = c = 0.0  # angular velocity of the links before
+    for k in range(6):
+        out[k] = 0.0
+    for j in range(qd.shape[0]):
+        u, v, w = J[0, j], J[1, j], J[2, j]
+        x, y, z, rate = J[3, j], J[4, j], J[5, j], qd[j]
+        out[3] += rate * (b * z - c * y)
+        out[4] += rate * (c * x - a * z)
+        out[5] += rate * (a * y - b * x)
+        d, e, f = 2.0 * a + x * rate, 2.0 * b + y * rate, 2.0 * c + z * rate
+        out[0] += rate * (e * w - f * v)
+        out[1] += rate * (f * u - d * w)
+        out[2] += rate * (d * v - e * u)
+        a, b, c = a + x * rate, b + y * rate, c + z * rate
     for k in range(6):
         for j in range(q.shape[0]):
             out[k] += J[k, j] * qdd[j]

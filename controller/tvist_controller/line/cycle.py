@@ -4,17 +4,15 @@ from typing import TypeVar
 
 import numpy as np
 
-from tvist_controller.line.differentiator import Differentiator, Floats, Target, rests_at
+from tvist_controller.line.differentiator import Differentiator, Floats, ShapedReference, Target, rests_at
 from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.line.guard import Guard, Obstacle
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import arm_limits
 from tvist_controller.line.line_filter import LineFilter
-from tvist_controller.line.line_mode import LineMode, check_change
+from tvist_controller.line.line_mode import Guard, LineMode, Obstacle, check_change
 from tvist_controller.line.line_tick import SIGNALS, to_drives
 from tvist_controller.line.sample import Sample
-from tvist_controller.line.shaped_reference import ShapedReference
 from tvist_controller.trajectory import PlannedMotion, Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
@@ -29,20 +27,7 @@ T = TypeVar("T", bound=Trajectory)
 class ControlCycle:
     """Trajectory generator, TVIST filter, differentiator, inverse dynamics, joint controllers, plant.
 
-    Args:
-        description: The robot.
-        tvist: The filter with its shaper and estimator.
-        q: Initial joint angles, at rest, shape (n,) [rad].
-        declared: Payload for inverse dynamics.
-        carried: Payload of the arm.
-        seed: Seed of the arm's noise and gear errors.
-        plant: Plant to control; None for the flexible arm of the description.
-        elastic: Elastic feed-forward for the filter; None for the paper's.
-        compensate_sag: Whether set-points compensate the gears' twist under gravity.
-        law: Known friction to feed forward, see `LAWS`; None for a fraction of the description's.
-
-    Raises:
-        ValueError: The plant cannot start at q, or its measurement has the wrong shape.
+    Raise ValueError if the plant cannot start at q, or its measurement has the wrong shape.
     """
 
     def __init__(
@@ -50,42 +35,36 @@ class ControlCycle:
         description: RobotDescription,
         tvist: Filter,
         *,
-        q: Floats,
-        declared: Payload,
-        carried: Payload,
-        seed: int,
-        plant: Plant | None = None,
-        elastic: ElasticFeedForward | None = None,
-        compensate_sag: bool = False,
-        law: Floats | None = None,
+        q: Floats,  # initial joint angles, at rest, shape (n,) [rad]
+        declared: Payload,  # for inverse dynamics
+        carried: Payload,  # by the arm
+        seed: int,  # of the arm's noise and gear errors
+        plant: Plant | None = None,  # None for the flexible arm of the description
+        elastic: ElasticFeedForward | None = None,  # for the filter; None for the paper's
+        compensate_sag: bool = False,  # whether set-points compensate the gears' twist under gravity
+        law: Floats
+        | None = None,  # friction to feed forward, see `LAWS`; None for a share of the description's
     ) -> None:
         self.description = description
-        self._plant = arm_of(FlexibleArm(description, carried) if plant is None else plant)
+        self.plant: Plant = arm_of(FlexibleArm(description, carried) if plant is None else plant)
         self.trajectory: Trajectory = Rest(q)
         self.filter = LineFilter(tvist, arm_limits(description))
         """TVIST: shaper, estimator and fractional-delay filter."""
         self.shaped = ShapedReference(q, PERIOD)
-        self.dynamics = dynamics = InverseDynamics(description, declared)
+        self.dynamics = InverseDynamics(description, declared)
         """Torques of the rigid arm with its declared payload."""
-        self.drives = drives = DriveFeedForward(
-            description, PERIOD, compensate_sag=compensate_sag, positions=self._plant.supervised
+        self.drives = DriveFeedForward(
+            description, PERIOD, compensate_sag=compensate_sag, positions=self.plant.supervised
         )
         """Joint controllers: from the target to the drive commands."""
         self.drives.use(elastic)
         self.drives.compensate(law)
-        self.kernel_parts = dynamics.chain, dynamics.scratch, drives.rows
-        """Links, scratch and joint controllers: arguments of `line_tick`."""
         self.mode = LineMode.REST
         self.placements = 0  # number of times the arm was placed at rest, which interrupts its motion
         self.guard: Guard | None = None  # checks references and stops of a guarded motion; None without one
         self.sample = self.reset(q, carried=carried, seed=seed)
         """Signals of the last tick, or of the arm at rest after a reset."""
-        check_measurement(self.sample.measured, description.joints, self._plant)
-
-    @property
-    def plant(self) -> Plant:
-        """The arm."""
-        return self._plant
+        check_measurement(self.sample.measured, description.joints, self.plant)
 
     def step(self, external: Floats | None = None) -> Sample:
         """Compute one tick; `external` is the reading of an external force sensor, see `Sample.external`."""
@@ -99,7 +78,7 @@ class ControlCycle:
             signals, self.dynamics.payload_parameters,
             may_begin=mode.shaped and not self.filter.fading, may_go_on=mode is not LineMode.BYPASSED,
         )  # fmt: skip
-        measured = self._plant.step(command)
+        measured = self.plant.step(command)
         self.sample = Sample(
             mode, reference, self.shaped.references, self.shaped.joints.window, signals, command, measured,
             self.drives.reference, refused, external,
@@ -109,9 +88,10 @@ class ControlCycle:
 
     def _to_drives(self, reference: Floats) -> Floats:
         """Return signals from the shaped reference to the drives, and the last reference, shape (9, n)."""
-        signals = np.empty((SIGNALS, len(reference)))
+        signals, dynamics = np.empty((SIGNALS, len(reference))), self.dynamics
         before, middle, last = self.shaped.joints.window
-        to_drives(before, middle, last, reference, PERIOD, *self.kernel_parts, signals)
+        parts = dynamics.chain, dynamics.scratch, self.drives.rows
+        to_drives(before, middle, last, reference, PERIOD, *parts, signals)
         return signals
 
     def follow(self, target: Floats, measured: Measurement) -> Sample:
@@ -210,12 +190,12 @@ class ControlCycle:
     @property
     def newest(self) -> Target:
         """State of the newest shaped reference."""
-        return self.shaped.newest
+        return self.shaped.joints.newest
 
     @property
     def position(self) -> Floats:
         """The newest shaped reference, shape (n,) [rad]."""
-        return self.shaped.position
+        return self.shaped.joints.position
 
     @property
     def along(self) -> Differentiator:
@@ -249,18 +229,12 @@ class ControlCycle:
     def reset(
         self, q: Floats, *, carried: Payload | None = None, seed: int = 0, measured: Measurement | None = None
     ) -> Sample:
-        """Place the arm at rest in static equilibrium and restart the whole line.
+        """Place the arm at rest in static equilibrium, perhaps with another payload, and restart the whole line.
 
-        Args:
-            q: Joint angles, shape (n,) [rad]; ignored for an arm that cannot be placed.
-            carried: New carried payload; None for the present one.
-            seed: Seed of the arm's noise and gear errors.
-            measured: Last measurements of an arm that does not answer; the line then starts at its position.
-
-        Raises:
-            ValueError: The position of an arm that cannot be placed is unknown; nothing has changed.
+        An arm that cannot be placed stays where it is; if that is unknown, raise ValueError before any change.
+        The line of one that does not answer starts at its last measurements, `measured`.
         """
-        plant = self._plant
+        plant = self.plant
         if measured is None and not isinstance(plant, SimulatedArm):
             measured = measured_standing(plant, len(q))
             q = measured.q.copy()

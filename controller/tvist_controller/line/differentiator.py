@@ -1,4 +1,4 @@
-"""Velocity and acceleration of the shaped reference."""
+"""The shaped reference: filter samples, corresponding joint positions, and their derivatives."""
 
 import copy
 from typing import Self
@@ -8,6 +8,7 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from tvist_controller._compiled import compiled_for_ticks
+from tvist_shaping.base import Posture
 
 Floats = npt.NDArray[np.float64]
 
@@ -31,14 +32,9 @@ def rests_at(reference: Floats, target: Target, period: float) -> bool:
 
 
 def central_differences(references: Floats, period: float) -> tuple[Floats, Floats, Floats]:
-    """Return positions, velocities and accelerations of known references, equal to `Differentiator`.
+    """Return positions, velocities and accelerations of references (k + 2, n), equal to `Differentiator`.
 
-    Args:
-        references: References, one per tick, shape (k + 2, n) [rad].
-        period: Tick [s].
-
-    Returns:
-        References without the first and last, and their derivatives, each of shape (k, n).
+    They are those of all but the first and last reference, each of shape (k, n).
     """
     qd: Floats = (references[2:] - references[:-2]) / (2.0 * period)
     qdd: Floats = np.diff(references, 2, axis=0) / period**2
@@ -87,10 +83,6 @@ class Differentiator:
         self.window: tuple[Floats, Floats, Floats] = (at, at, at)
         """The last three references, oldest first, each of shape (n,) [rad]; the arrays never change."""
 
-    def fork(self) -> Self:
-        """Return an independent copy."""
-        return copy.copy(self)
-
     def push(self, q: Floats) -> None:
         """Take the reference of this tick."""
         _, middle, last = self.window
@@ -119,3 +111,52 @@ class Differentiator:
         rates = np.empty((2, len(last)))
         extrapolate(before, middle, last, self._period, rates)
         return Target(last, rates[0], rates[1])
+
+
+class ShapedReference:
+    """Converts filter samples (joint positions or a path's parameter) to targets, from rest."""
+
+    def __init__(self, q: Floats, period: float) -> None:
+        self._period = period
+        self.joints = Differentiator(q, period)  # state of the joints
+        self.reset(q)
+
+    def reset(self, q: Floats) -> None:
+        """Restart at rest with joint positions as samples."""
+        self.joints.reset(q)
+        self.references = self.joints.window
+        """The last three unshaped references, as `Differentiator.window`; during a bypass, the shaped ones."""
+        self.enter(None, q)
+
+    def enter(self, posture_of: Posture | None, sample: Floats) -> None:
+        """Accept samples of another kind, at rest; the joints keep their position."""
+        self.posture_of = posture_of
+        """Function from samples to joint positions; None if samples are joint positions."""
+        self.along = self.joints if posture_of is None else Differentiator(sample, self._period)
+        """State of the samples; without a path, of the joints."""
+
+    def take(self, x: Floats, x_star: Floats) -> Floats:
+        """Take this tick's samples, equal objects without a filter; return the unshaped joint positions."""
+        q, q_star, posture_of = x, x_star, self.posture_of
+        if posture_of is not None:
+            q = posture_of(x)
+            q_star = q if x_star is x else posture_of(x_star)
+            self.along.push(x_star)
+        self.joints.push(q_star)
+        if x_star is x:  # what bypasses the filter continues the shaped reference: the reference may jump
+            self.references = self.joints.window
+        else:
+            _, middle, last = self.references
+            self.references = (middle, last, q)
+        return q
+
+    def posture(self, sample: Floats) -> Floats:
+        """Return the joint positions of a sample, shape (n,) [rad]."""
+        return sample if self.posture_of is None else self.posture_of(sample)
+
+    def fork(self) -> Self:
+        """Return an independent copy."""
+        other = copy.copy(self)
+        other.joints = copy.copy(self.joints)
+        other.along = other.joints if self.posture_of is None else copy.copy(self.along)
+        return other

@@ -37,27 +37,20 @@ class ElasticFeedForward:
     With the lead w of `elastic_lead` the drives get q* + w, q̇* + ẇ, and τ* + B (q̈* + ẅ) + friction(q̇* + ẇ), where τ*
     includes the acceleration of the bending links. Central differences give ẇ and ẅ, so commands are one tick late
     (`delay`). ẅ contains the reference's fourth derivative. Where the reference is not smooth, as at the start of a
-    stop, ẅ is limited to the torque left by the target, and w and ẇ stay continuous.
-
-    Args:
-        description: The robot: masses, geometry, bending links, rotors, friction and torque limits.
-        stiffness: Stiffness of each gear and bending joint, in the model's order, shape (N,) [N m/rad].
-        damping_time: Damping divided by stiffness, shape (N,) [s].
-        period: Tick [s].
-        torques: Whether the lead affects torques, not only positions and velocities.
-        law: Known friction, see `LAWS`, shape (9, n), or (5, n) without stiction; None for a fraction of the described
-            Coulomb friction.
+    stop, ẅ is limited to the torque left by the target, and w and ẇ stay continuous. Springs and gains of the
+    description are not used.
     """
 
     def __init__(
         self,
         description: RobotDescription,
-        stiffness: Floats,
-        damping_time: Floats,
-        period: float,
+        stiffness: Floats,  # of each gear and bending joint, in the model's order, shape (N,) [N m/rad]
+        damping_time: Floats,  # damping divided by stiffness, shape (N,) [s]
+        period: float,  # tick [s]
         *,
-        torques: bool = True,
-        law: Floats | None = None,
+        torques: bool = True,  # whether the lead affects torques, not only positions and velocities
+        law: Floats
+        | None = None,  # known friction, first rows of `LAWS`; None for a share of the Coulomb friction
     ) -> None:
         flexible, rigid = flexible_model(description, Payload()), rigid_model(description, Payload())
         self.delay = period  # delay of commands behind their targets [s]

@@ -4,8 +4,7 @@ from msgspec import Struct
 
 from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.drive_feed_forward import MotorReference
-from tvist_controller.line.guard import Obstacle
-from tvist_controller.line.line_mode import LineMode
+from tvist_controller.line.line_mode import LineMode, Obstacle
 from tvist_controller.line.line_tick import QD, QDD, TORQUE, Q
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Measurement

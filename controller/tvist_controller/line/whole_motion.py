@@ -4,15 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
+from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.line.line_tick import all_to_drives
-from tvist_controller.trajectory import SampledPositions
+from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.line.line_tick import SIGNALS, TORQUE, Q, all_to_drives, to_drives
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Measurement, Response, SimulatedArm
-from tvist_shaping.base import Filter
+from tvist_plant.plant import PERIOD, Response, SimulatedArm
 
 
 @dataclass(frozen=True)
@@ -29,92 +28,49 @@ class Driven:
     """Delay of commands behind their targets [s]."""
 
 
-class Still(SimulatedArm):
-    """A plant that does nothing."""
-
-    payload = Payload()
-
-    def __init__(self, joints: int) -> None:
-        still: Floats = np.zeros(joints)
-        self._nothing = Measurement(still, still, still, np.zeros(3))
-
-    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
-        """See `SimulatedArm.reset`."""
-        return self._nothing
-
-    def step(self, command: DriveCommand) -> Measurement:  # noqa: ARG002
-        """See `Plant.step`."""
-        return self._nothing
-
-
 class DrivenLine:
-    """The control line from the shaped reference to the drives, without an arm.
+    """The control line from shaped reference to drives, without an arm; for `law` see `ControlCycle`."""
 
-    Args:
-        description: The controller's model of the arm.
-        passes: Filter that returns its input.
-        start: Joint angles, shape (n,) [rad].
-        declared: Declared payload.
-        law: Known friction to feed forward, see `ControlCycle`.
-    """
-
-    def __init__(
-        self,
-        description: RobotDescription,
-        passes: Filter,
-        start: Floats,
-        declared: Payload,
-        law: Floats | None = None,
-    ) -> None:
-        self._law = law
-        self._cycle = ControlCycle(
-            description, passes, q=start, declared=declared, carried=declared, seed=0, law=law,
-            plant=Still(description.joints),
-        )  # fmt: skip
+    def __init__(self, description: RobotDescription, declared: Payload, law: Floats | None = None) -> None:
+        self._dynamics, self._law = InverseDynamics(description, declared), law
+        self._drives = DriveFeedForward(description, PERIOD)
+        self._parts = self._dynamics.chain, self._dynamics.scratch, self._drives.rows
 
     def drive(
         self,
-        start: Floats,
-        shaped: Floats,
-        ticks: int,
-        resting: int = 0,
-        elastic: ElasticFeedForward | None = None,
-        law: Floats | None = None,
+        start: Floats,  # joint angles at rest, shape (n,) [rad]
+        shaped: Floats,  # shaped reference, shape (k, n) [rad]
+        ticks: int,  # T
+        resting: int = 0,  # ticks before the first sample
+        elastic: ElasticFeedForward | None = None,  # None for the paper's feed-forward
+        law: Floats | None = None,  # friction to feed forward in this motion; None for that of the line
     ) -> Driven:
-        """Compute the drive commands for a shaped reference, from rest.
-
-        Args:
-            start: Joint angles at rest, shape (n,) [rad].
-            shaped: Shaped reference, shape (k, n) [rad].
-            ticks: Number of ticks T.
-            resting: Number of ticks before the first sample.
-            elastic: Elastic feed-forward; None for the paper's.
-            law: Friction to feed forward in this motion; None for that of the line.
-        """
-        cycle = self._cycle
-        cycle.drives.compensate(self._law if law is None else law)
-        cycle.use(cycle.tvist, elastic)
-        rest, delay = cycle.reset(start).command, cycle.drives.delay
-        if elastic is not None:
-            return Driven(rest, *self._tick_by_tick(shaped, ticks, resting), delay)
+        """Compute the drive commands for a shaped reference, from rest."""
+        drives = self._drives
+        drives.compensate(self._law if law is None else law)
+        drives.use(elastic)
+        drives.reset(self._dynamics.gravity(start))
+        _, rest = self._tick(start, start, start)
         whole = np.empty((ticks, len(start)))
         whole[:resting], whole[resting:] = start, shaped[-1]
         moving = min(len(shaped), ticks - resting)
         whole[resting : resting + moving] = shaped[:moving]
         targets, commands = np.empty((2, ticks, 3, len(start)))
-        all_to_drives(start, whole, PERIOD, *cycle.kernel_parts, targets, commands)
-        return Driven(rest, targets, commands, delay)
-
-    def _tick_by_tick(self, shaped: Floats, ticks: int, resting: int) -> tuple[Floats, Floats]:
-        targets, commands = np.empty((2, ticks, 3, shaped.shape[1]))
-        for tick in range(ticks):
-            if tick == resting:
-                self._cycle.begin(SampledPositions(list(shaped), PERIOD))
-            sample = self._cycle.step()
-            target, command = sample.target, sample.command
-            targets[tick] = target.q, target.qd, target.qdd
+        if elastic is None:
+            all_to_drives(start, whole, PERIOD, *self._parts, targets, commands)
+            return Driven(rest, targets, commands, drives.delay)
+        before, middle = start, start
+        for tick, last in enumerate(whole):
+            targets[tick], command = self._tick(before, middle, last)
             commands[tick] = command.q, command.qd, command.torque
-        return targets, commands
+            before, middle = middle, last
+        return Driven(rest, targets, commands, drives.delay)
+
+    def _tick(self, before: Floats, middle: Floats, last: Floats) -> tuple[Floats, DriveCommand]:
+        """Return the target of three shaped references, shape (3, n), and the command for it."""
+        signals = np.empty((SIGNALS, len(last)))
+        to_drives(before, middle, last, last, PERIOD, *self._parts, signals)
+        return signals[Q:TORQUE], self._drives.command(signals, self._dynamics.payload_parameters)
 
 
 def respond(plant: SimulatedArm, driven: Driven, seed: int) -> Response:

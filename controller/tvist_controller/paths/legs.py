@@ -14,7 +14,7 @@ import numpy as np
 
 from tvist_controller.paths.poses import Placement
 from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine, ToolWay
-from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.spline import Knots
 
 LOOKS, HALVINGS = 64, 40

@@ -9,7 +9,7 @@ import numpy as np
 from tvist_controller.paths.legs import LegSpeed
 from tvist_controller.paths.route import Piece, Run
 from tvist_controller.paths.tool_curves import PER_RADIAN
-from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.retiming import Cells, RetimedLaw, RetimingLimits, longer_law, quickest_law
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 
@@ -64,7 +64,8 @@ def law_of(
             hurry = min(1.05 * hurry * law.duration / wanted, FASTEST)
             law = quickest_law(ground.way(limits, hurry), jerk, window)
         law = law.slowed(wanted)
-    return _kept(law, curve, limits)
+    # Slow it down by the per mille by which limits may be exceeded between samples.
+    return law.slowed(law.duration * max(_excess(law, law.moments, curve, limits), 1.0))
 
 
 def going_on(
@@ -92,11 +93,6 @@ def going_on(
             return law
         slower /= excess * MARGIN
     return None
-
-
-def _kept(law: RetimedLaw, curve: SplineCurve, limits: JointLimits) -> RetimedLaw:
-    """Slow the law down by the per mille by which limits may be exceeded between samples."""
-    return law.slowed(law.duration * max(_excess(law, law.moments, curve, limits), 1.0))
 
 
 def _excess(law: RetimedLaw, moments: Floats, curve: SplineCurve, limits: JointLimits) -> float:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.base import Floats
 
 
 class Placement(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 from tvist_controller.paths.legs import BlendJunction, JointWay, Leg, LegSpeed, meetings
 from tvist_controller.paths.tool_curves import EvenBlend, ToolBlend, ToolCurve, ToolPart, ToolState, evenly
 from tvist_controller.paths.tracking import Tracker, WayError
-from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 
 INSIDE, CLOSE = 1.0 + 1e-9, 1e-6
@@ -187,7 +187,8 @@ def _cut(
             raise _NoBlendError(why) from error
         if meets != (None, None):
             return _Cut(before, after, piece, curve)
-        postures = _middle(piece.knots)
+        s = np.linspace(0.0, piece.knots.s[-1], BETWEEN * (len(piece.knots.s) - 1) + 1)
+        postures = SplineCurve(piece.knots).derivatives(s)[0]
         off = [np.linalg.norm(tracker.pose(q).position - leg.corner.position) for q in postures]
         if max(off) <= leg.blend * INSIDE + CLOSE:
             return _Cut(before, after, piece, curve)
@@ -254,7 +255,3 @@ def _within(leg: Leg, radius: float, tracker: Tracker, *, from_end: bool) -> flo
     if isinstance(leg.way, JointWay):
         return leg.way.within(radius, lambda q: tracker.pose(q).position, from_end=from_end)
     return leg.way.within(radius)
-
-
-def _middle(knots: Knots) -> Floats:
-    return SplineCurve(knots).derivatives(np.linspace(0.0, knots.s[-1], BETWEEN * (len(knots.s) - 1) + 1))[0]

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from tvist_controller.kinematics.pose import turn, turned
 from tvist_controller.paths.poses import Placement
-from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.spline import evaluate, hermite
 
 PER_RADIAN = 0.25  # length equivalent to a turn by one radian [m]
@@ -91,7 +91,9 @@ class ToolArc(ToolWay):
         self._axis = normal / np.sqrt(square)
         self._out = -centre
         self._along = np.cross(self._axis, self._out)
-        angle = self._angle_of(end.position)  # the axis is chosen so that the arc passes via before its end
+        # The axis is chosen so that the arc passes via before its end.
+        last = end.position - self._centre
+        angle = float(np.arctan2(last @ self._along, last @ self._out) % (2.0 * np.pi))
         radius = float(np.linalg.norm(self._out))
         turning = angle * self._axis if tangent else turn(start.rotation, end.rotation)
         self.length = max(radius * angle, PER_RADIAN * float(np.linalg.norm(turning)))
@@ -101,10 +103,6 @@ class ToolArc(ToolWay):
         """See `ToolWay.within`."""
         share = radius / (2.0 * float(np.linalg.norm(self._out)))
         return 2.0 * float(np.arcsin(share)) / self._rate if share < 1.0 else np.inf
-
-    def _angle_of(self, point: Floats) -> float:
-        out = point - self._centre
-        return float(np.arctan2(out @ self._along, out @ self._out) % (2.0 * np.pi))
 
     def at(self, s: float) -> ToolState:
         """Return the state at a length from the start [m]."""

@@ -8,7 +8,7 @@ from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import ACCURATE, turn
 from tvist_controller.paths.poses import Placement
 from tvist_controller.paths.tool_curves import ToolCurve, ToolState
-from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.spline import Knots, hermite
 from tvist_plant.description import RobotDescription
 

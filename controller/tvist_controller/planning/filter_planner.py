@@ -1,30 +1,42 @@
 """Filters, shapers and estimators by the names that clients use."""
 
 from collections import deque
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.line.limits import arm_limits
 from tvist_controller.planning.snapshot import FilterState, PlanningState
-from tvist_controller.planning.surplus import surplus_of
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, paper_payload
 from tvist_controller.sources.calibrations import available, elastic_feed_forward, known_friction, load
 from tvist_controller.sources.mode_source import ModeSource, modal_source
+from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.commands import SetEstimator
 from tvist_protocol.errors import ProtocolError
+from tvist_protocol.replies import Code
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
-from tvist_shaping.errors import DesignError, EstimatorError, ShapingError, UnknownShaperError
+from tvist_shaping.errors import ShapingError, UnknownShaperError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
+from tvist_shaping.failures import FAILURES
+from tvist_shaping.filter import QUICKEST
 from tvist_shaping.named import BUILT_IN, AnyShaper, Registry
 
 SURPLUSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
 """Cache of `surplus` for all robots: source of modes, own shaper, name, number of modes, result."""
+POSTURES = 40  # number of postures at which modes are computed for it
+HALF_STEP = 0.03  # half the travel over which their change is measured [rad]
+TIME = 0.01  # time over which the quickest change of modes is measured [s]
+MARGIN = 1.1  # margin for postures not computed [-]
+RISE = 15.0  # ratio of largest D̈ to largest Ḋ, twice that of random streams [1/s]
+STEADY = 2.0  # ratio of a constant-delay filter's excess in a stream to that in a motion, its `excess` [-]
 REHEARSED = 9  # ticks of a rehearsal; some filters update weights only every fourth tick
 ESTIMATORS = ("fixed", "polynomial", "modal")
 
@@ -113,11 +125,9 @@ class FilterPlanner:
     def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> FilterChoice:
         """Add known friction and the feed-forward that a filter needs; raise RefusalError if impossible."""
         known = source if source.knows_payload else self._modal
-        try:
+        with _refusing(where):
             calibration = None if known is None else known.calibration
             law = known_friction(tvist, self._setup.description, calibration)
-        except EstimatorError as error:
-            raise RefusalError("out_of_range", where, str(error)) from error
         if tvist.feed_forward == "rigid":
             return FilterChoice(source, tvist, None, law)
         if tvist.feed_forward == "elastic" and self._setup.positions:
@@ -129,10 +139,8 @@ class FilterPlanner:
         if known is None or known.calibration is None:
             why = f"{tvist.name} needs the arm's springs: identify them with tvist identify"
             raise RefusalError("out_of_range", where, why)
-        try:
+        with _refusing(where, f"{tvist.name}: "):
             elastic = elastic_feed_forward(tvist, self._setup.description, known.calibration)
-        except EstimatorError as error:
-            raise RefusalError("out_of_range", where, f"{tvist.name}: {error}") from error
         return FilterChoice(source, tvist, elastic, law)
 
 
@@ -143,24 +151,23 @@ def _rehearse(tvist: Filter) -> None:
         copy.filter(np.full(tvist.joints, 1e-4 * tick))
 
 
-def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) -> int:
-    """Return the number of modes that a filter needs to suppress `modes`.
-
-    Args:
-        name: Name of the filter.
-        modes: Number of modes to suppress.
-        where: Field of the name, for messages.
-        known: The available shapers.
-
-    Raises:
-        RefusalError: There is no such filter, or it has a fixed number of modes.
-    """
+@contextmanager
+def _refusing(where: str, about: str = "", limit: float | None = None) -> Iterator[None]:
+    """Make errors of the shaping library refusals of a field; `about` begins their message."""
     try:
+        yield
+    except ShapingError as error:
+        code: Code = "unknown_shaper" if isinstance(error, UnknownShaperError) else "out_of_range"
+        raise RefusalError(code, where, f"{about}{error}", limit) from error
+
+
+def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) -> int:
+    """Return the number of modes that a filter needs to suppress `modes`; `where` is the field of its name.
+
+    Raise RefusalError if there is no such filter, or if it has a fixed number of modes.
+    """
+    with _refusing(where):
         own = known.modes_of(name, modes)
-    except UnknownShaperError as error:
-        raise RefusalError("unknown_shaper", where, str(error)) from error
-    except DesignError as error:
-        raise RefusalError("out_of_range", where, str(error)) from error
     if modes not in {1, own}:
         why = f"modes is {modes}; the filter {name} always has {own}"
         raise RefusalError("out_of_range", "modes", why, own)
@@ -169,26 +176,16 @@ def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) 
 
 def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str) -> Estimator:
     """Make the chosen estimator, or raise RefusalError if its source has fewer modes."""
-    try:
+    with _refusing(where, limit=source.most):
         return source.estimator(modes, payload)
-    except EstimatorError as error:
-        raise RefusalError("out_of_range", where, str(error), source.most) from error
 
 
 def choose_filter(
     name: str, estimator: Estimator, joints: int, *, where: str = "shaper", known: Registry = BUILT_IN
 ) -> Filter:
-    """Make a filter by its name, which comes from the field `where`.
-
-    Raises:
-        RefusalError: There is no such shaper, or it does not work with the estimator.
-    """
-    try:
+    """Make a filter by its name, from the field `where`; raise RefusalError if that is impossible."""
+    with _refusing(where):
         return known.make_filter(name, estimator, joints=joints)
-    except UnknownShaperError as error:
-        raise RefusalError("unknown_shaper", where, str(error)) from error
-    except ShapingError as error:
-        raise RefusalError("out_of_range", where, str(error)) from error
 
 
 def choose_source(command: SetEstimator, setup: Setup) -> ModeSource:
@@ -207,26 +204,23 @@ def choose_source(command: SetEstimator, setup: Setup) -> ModeSource:
         why = f"calibration.robot is {calibration.robot!r}; this arm is a {setup.description.robot.model}"
         raise RefusalError("out_of_range", "calibration.robot", why)
     source = ModeSource("modal" if command.name == "modal" else "polynomial", setup.description, calibration)
-    try:
+    with _refusing("calibration", "calibration: "):
         source.estimator(1, setup.payload)
-    except ShapingError as error:
-        raise RefusalError("out_of_range", "calibration", f"calibration: {error}") from error
     return source
 
 
 def _fixed(command: SetEstimator, setup: Setup) -> ModeSource:
-    for field in ("f_d", "zeta"):
-        if getattr(command, field) is None:
-            why = f"{field} is missing: the estimator fixed needs f_d and zeta"
-            raise RefusalError("missing_field", field, why)
+    f_d, zeta = command.f_d, command.zeta
+    if f_d is None or zeta is None:
+        field = "f_d" if f_d is None else "zeta"
+        raise RefusalError(
+            "missing_field", field, f"{field} is missing: the estimator fixed needs f_d and zeta"
+        )
     if command.calibration is not None:
         why = "calibration belongs to the estimators polynomial and modal, not to fixed"
         raise RefusalError("out_of_range", "calibration", why)
-    f_d, zeta = command.f_d or (), command.zeta or ()
-    try:
+    with _refusing("zeta"):
         Fixed(f_d, zeta)
-    except ShapingError as error:
-        raise RefusalError("out_of_range", "zeta", str(error)) from error
     return ModeSource("fixed", setup.description, f_d=f_d, zeta=zeta)
 
 
@@ -251,3 +245,51 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
         why = f"calibration is {command.calibration!r}: must be one of {known}"
         raise RefusalError("unknown_calibration", "calibration", why)
     return load(command.calibration)
+
+
+def surplus_of(
+    tvist: Filter, estimators: Iterable[Estimator], description: RobotDescription
+) -> tuple[float, float]:
+    """Return relative excesses of velocity and acceleration over a reference's, see `Filter.surplus` [-].
+
+    While the mean delay D shrinks, velocity is 1 - Ḋ times the reference's, and acceleration contains (1 -
+    Ḋ)² ẍ - ẋ D̈. Modes of a smooth estimator change quickest if all joints move at full speed in the worst
+    direction; those of an abrupt one at most as `TvistFilter` allows. Negative weights add at most what the
+    acceleration limit permits within the filter's length. `estimators` are the filter's, one per payload.
+    """
+    limits, peak = arm_limits(description), tvist.peak
+    reach = np.minimum(description.limits.position, np.pi)
+    hastens = 0.0
+    for estimator in estimators:
+        random = np.random.default_rng(0)
+        if tvist.mean_delay_of(*estimator.settle(np.zeros_like(reach))) is None:
+            break
+        for _ in range(POSTURES):
+            try:
+                hastens = max(
+                    hastens, _hastens(tvist, estimator, random.uniform(-reach, reach), limits.velocity)
+                )
+            except FAILURES:  # a user's shaper reports this when it is used
+                continue
+    hastens *= MARGIN
+    hardens = (2.0 + RISE * limits.velocity / limits.acceleration) * hastens + STEADY * tvist.excess
+    negative = min(peak - 1.0, limits.acceleration * tvist.delay / (2.0 * limits.velocity))
+    return (1.0 + hastens) * (1.0 + negative) - 1.0, (1.0 + hardens) * peak - 1.0
+
+
+def _hastens(tvist: Filter, estimator: Estimator, q: Floats, velocity: float) -> float:
+    """Return the largest -Ḋ at a posture and joint velocity [-]."""
+
+    def delay(f_d: Floats, zeta: Floats) -> float:
+        return tvist.mean_delay_of(f_d, zeta) or 0.0
+
+    f_d, zeta = estimator.settle(q)
+    if estimator.abrupt:
+        higher, change = f_d * (1.0 + QUICKEST[0] * TIME), QUICKEST[1] * TIME
+        least = min(delay(higher, np.maximum(zeta + sign * change, 0.0)) for sign in (-1.0, 1.0))
+        return (delay(f_d, zeta) - least) / TIME
+    steps = HALF_STEP * np.eye(len(q))
+    ways = [
+        abs(delay(*estimator.estimate(q + step)) - delay(*estimator.estimate(q - step))) for step in steps
+    ]
+    return sum(ways) * velocity / (2.0 * HALF_STEP)

@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.foresight.line_copy import MAX_AHEAD, LineSimulation
-from tvist_controller.line.differentiator import Floats, central_differences
+from tvist_controller.foresight.stops import MAX_AHEAD, LineSimulation
+from tvist_controller.line.differentiator import Floats, ShapedReference, central_differences
 from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.line_filter import LineFilter
-from tvist_controller.line.shaped_reference import ShapedReference
 from tvist_controller.planning.slower import Binding, Limited, lasts, limit_of
 from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.setup import Setup, body
@@ -193,32 +192,23 @@ class Fitter:
 
 def _states(motion: PlannedMotion) -> tuple[Floats, Floats, Floats]:
     """Return unshaped positions, velocities, accelerations, each (k, n), also at the law's own moments."""
-    moments = motion.law.moments
-    known = (moments > motion.law.begins) & (moments < motion.duration)
-    return motion.states(np.union1d(motion.evenly(SAMPLES), moments[known]))
+    begins, moments = motion.law.begins, motion.law.moments
+    known = moments[(moments > begins) & (moments < motion.duration)]
+    return motion.states(np.union1d(np.linspace(begins, motion.duration, SAMPLES), known))
 
 
 def keeping_motion(
     path: JointLine,
-    limits: MotionLimits,
-    tvist: Filter,
-    speed: float = 1.0,
-    agility: MotionLimits | None = None,
+    limits: MotionLimits,  # of the shaped reference for every joint
+    tvist: Filter,  # which is not changed
+    speed: float = 1.0,  # initial time rate [-]
+    agility: MotionLimits | None = None,  # of pauses and speed changes; None for `limits`
 ) -> PlannedMotion:
     """Return the quickest motion whose shaped reference keeps the limits.
 
     A filter whose weights vary with posture adds to the acceleration, at most by its `excess` at easy limits.
-    Beyond these, the motion is shaped in advance and planned again with less acceleration.
-
-    Args:
-        path: Straight line in joint space.
-        limits: Limits of the shaped reference for every joint.
-        tvist: The filter, which is not changed.
-        speed: Initial time rate [-].
-        agility: Limits of pauses and speed changes; None for `limits`.
-
-    Raises:
-        ValueError: There is no such motion.
+    Beyond these, the motion is shaped in advance and planned again with less acceleration. Raise ValueError
+    if there is no such motion.
     """
     easy = tvist.excess == 0.0 or not (
         limits.velocity > EASY.velocity or limits.acceleration > EASY.acceleration or limits.jerk > EASY.jerk

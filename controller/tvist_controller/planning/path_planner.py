@@ -139,11 +139,12 @@ class PathPlanner:
         if found is None:
             return
         share, meeting = found
-        covered, where = share * length_of(run), _field(run[-1].where)
+        covered, where = share * length_of(run), run[-1].where
         for piece, end in zip(run, np.cumsum([piece.knots.s[-1] for piece in run]), strict=True):
             if end >= covered:
-                where = _field(piece.where)
+                where = piece.where
                 break
+        where = where or "pose"
         whole = 100.0 * (part[0] + covered) / part[1]
         why = f"{where}: {meeting} after {whole:.0f} % of the way"
         raise RefusalError("collision", where, why, CLEARANCE)
@@ -268,21 +269,10 @@ def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tupl
         for number, piece in enumerate(run):
             # Before another segment, the last piece is the blend.
             last = run[-1].where == piece.where
-            marks[_number(piece.where)] = (
-                part,
-                ends[number] if last else ends[number] - float(piece.knots.s[-1]),
-            )
+            segment = int(piece.where[len("segments[") : -1]) if piece.where else 0
+            marks[segment] = part, ends[number] - (0.0 if last else float(piece.knots.s[-1]))
     found, here = [], (0, start)
     for segment in segments:
         here = marks.get(segment, here)
         found.append(here)
     return tuple(found)
-
-
-def _number(where: str) -> int:
-    return int(where[len("segments[") : -1]) if where else 0
-
-
-def _field(where: str) -> str:
-    """Return the command's field of a part of the path: a segment, or else `pose`."""
-    return where or "pose"

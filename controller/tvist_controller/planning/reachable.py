@@ -92,7 +92,12 @@ class Reachable:
                 case ArcSegment() | MoveC():
                     via = frame @ placement(segment.via)
                     end = frame @ placement(segment.pose)
-                    way = self._arc(start, via.position, end, segment, where)
+                    try:
+                        way = ToolArc(start, via.position, end, tangent=segment.orientation == "tangent")
+                    except ValueError as error:
+                        field = f"{where}.via".removeprefix(".")
+                        why = f"{field}: no arc leads from the present position through it to pose: {error}"
+                        raise RefusalError("out_of_range", field, why) from error
                 case _:
                     way = ToolLine(start, frame @ placement(segment.pose))
             if way.length < SHORTEST:
@@ -102,17 +107,6 @@ class Reachable:
             pacing = timed(_pacing(segment), way.length)
             blend = 0.0 if isinstance(segment, MoveL | MoveC) else segment.blend
             yield Leg(way, knots, tracker.pose(q), pacing, blend, where)
-
-    @staticmethod
-    def _arc(
-        start: Placement, via: Floats, end: Placement, segment: ArcSegment | MoveC, where: str
-    ) -> ToolArc:
-        try:
-            return ToolArc(start, via, end, tangent=segment.orientation == "tangent")
-        except ValueError as error:
-            field = f"{where}.via".removeprefix(".")
-            why = f"{field}: no arc leads from the present position through it to pose: {error}"
-            raise RefusalError("out_of_range", field, why) from error
 
     def _along(
         self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, now: PlanningState

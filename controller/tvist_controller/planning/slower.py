@@ -83,8 +83,9 @@ def slower_path(
 def slower_joint_motion(motion: PlannedMotion, asked: MotionLimits) -> Limited | None:
     """Return a message if jerk prevents the requested speed, unless the way is too short for it."""
     way = float(np.abs(motion.path.end - motion.path.start).max())
-    _, qd, _ = motion.states(motion.evenly(3))  # it is symmetric in time, so fastest in the middle
-    fastest = float(np.abs(qd).max())
+    fastest = float(
+        np.abs(motion.law.at(0.5 * motion.duration)[1]).max()
+    )  # symmetric in time, so in the middle
     if fastest >= REACHED * asked.velocity or asked.velocity**2 > asked.acceleration * way:
         return None
     jerk = Binding("limit_acceleration", f"the joints' jerk stays within {asked.jerk:.4g} rad/s³")
@@ -93,9 +94,9 @@ def slower_joint_motion(motion: PlannedMotion, asked: MotionLimits) -> Limited |
 
 def longer_joint_motion(motion: PlannedMotion, asked: float) -> Limited | None:
     """Return a message if the arm's limits make a joint motion longer than requested [s]."""
-    return (
-        None if motion.duration <= DURATION_TOLERANCE * asked else ARMS.makes(lasts(motion.duration, asked))
-    )
+    if motion.duration <= DURATION_TOLERANCE * asked:
+        return None
+    return ARMS.makes(lasts(motion.duration, asked))
 
 
 def lasts(duration: float, asked: float) -> str:

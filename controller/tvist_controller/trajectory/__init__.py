@@ -1,11 +1,18 @@
 """Sources of references: planned motions along paths, streams of set-points, stops."""
 
-from tvist_controller.trajectory.base import BrakingForecast, Rest, SampledPositions, Trajectory
+from tvist_controller.trajectory.base import (
+    BrakingForecast,
+    CheckedMotion,
+    JointLine,
+    MotionLimits,
+    Path,
+    Rest,
+    SampledPositions,
+    Trajectory,
+)
 from tvist_controller.trajectory.compliant import Compliant, ForceTask
 from tvist_controller.trajectory.guided import Guided, ServoFollower, StuckError
-from tvist_controller.trajectory.limits import MotionLimits
 from tvist_controller.trajectory.motion import DoubleS, PlannedMotion, at_least, quickest_motion
-from tvist_controller.trajectory.path import CheckedMotion, JointLine, Path
 from tvist_controller.trajectory.speed import Speed
 from tvist_controller.trajectory.stop import JointStop, PathStop, SlowedStop
 from tvist_controller.trajectory.stream import SetpointStream

@@ -8,9 +8,9 @@ import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import turn, turned
+from tvist_controller.trajectory.base import Floats, MotionLimits
 from tvist_controller.trajectory.guided import Guided, LimitedFollower, StuckError
 from tvist_controller.trajectory.limiter import TorqueMargin
-from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.speed import abrupt
 
 NEWTON = 3  # newton steps from tool pose to joint angles; two suffice for the travel of a tick
@@ -48,14 +48,6 @@ class ForceTask:
     """Least damping in contact [N s/m]."""
 
 
-def free_damping(parameter: float) -> float:
-    """Return the damping in free space [N s/m] for the damping parameter, 0 to 1.
-
-    The fourth root spreads the useful range: 0.005 gives a quarter of the whole, 0 none.
-    """
-    return FREE_DAMPING * math.sqrt(math.sqrt(parameter))
-
-
 def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats, period: float) -> Floats:
     """Return the velocity of the frame's axes a tick later, shape (6,) [m/s, rad/s].
 
@@ -65,15 +57,15 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats, period: 
     """
     scale = np.repeat([1.0, LEVER * LEVER], 3)
     touched = np.minimum(np.abs(felt) / np.repeat([CONTACT, CONTACT * LEVER], 3), 1.0)
-    free = free_damping(task.damping)
+    # The fourth root spreads the useful range: 0.005 gives a quarter of the whole, 0 none.
+    free = FREE_DAMPING * math.sqrt(math.sqrt(task.damping))
     damping = free + max(task.contact_damping - free, 0.0) * touched
     push = task.gain * (task.wrench + felt) / (scale * task.mass)
     moved = (velocity + period * push) / (1.0 + period * damping / task.mass)
     moved = np.clip(moved, -task.limits, task.limits)
     most = period * np.repeat(RELEASE, 3)
     released = velocity - np.clip(velocity, -most, most)
-    result: Floats = np.where(task.compliant > 0.0, moved, released)
-    return result
+    return np.where(task.compliant > 0.0, moved, released)
 
 
 class Compliant(LimitedFollower):
@@ -83,6 +75,8 @@ class Compliant(LimitedFollower):
     of the inner reference's tool elsewhere. The joints follow P by Newton's method and a `Limiter`. Compliance that
     joint limits or singular postures prevent is dropped from P, so that nothing is caught up later.
     """
+
+    finished = False  # it ends by a command
 
     def __init__(
         self,
@@ -132,11 +126,6 @@ class Compliant(LimitedFollower):
         """The task."""
         assert self._task is not None, "it is aimed before it moves"
         return self._task
-
-    @property
-    def finished(self) -> bool:
-        """Always False: compliance ends by a command."""
-        return False
 
     @property
     def nominal(self) -> Floats:
@@ -205,14 +194,11 @@ class Compliant(LimitedFollower):
     def _shifted(self, pose: tuple[Floats, Floats], way: Floats) -> tuple[Floats, Floats]:
         return turned(pose[0], way[3:]), pose[1] + way[:3]
 
-    def _off(self, q: Floats) -> Floats:
-        """Return the error of a posture to the tracked pose, shape (6,) [m, rad]."""
-        rotation, position = self.kinematics.pose(q)
-        return np.concatenate((self._pose[1] - position, turn(rotation, self._pose[0])))
-
     def _drop(self, q: Floats, axes: Floats) -> None:
         """Drop what the joints did not follow in compliant axes."""
-        lost = np.where(self.task.compliant > 0.0, _into(axes, self._off(q)), 0.0)
+        rotation, position = self.kinematics.pose(q)
+        off = np.concatenate((self._pose[1] - position, turn(rotation, self._pose[0])))
+        lost = np.where(self.task.compliant > 0.0, _into(axes, off), 0.0)
         self._pose = self._shifted(self._pose, -_out(axes, lost))
         kept = np.where(self.task.compliant > 0.0, 0.0, _into(axes, self._given))
         self._given = _out(axes, kept)

@@ -8,9 +8,8 @@ from typing import Self
 
 import numpy as np
 
-from tvist_controller.trajectory.base import Trajectory
+from tvist_controller.trajectory.base import Floats, MotionLimits, Trajectory
 from tvist_controller.trajectory.limiter import Limiter, TorqueMargin
-from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 LOOKAHEAD = (0.03, 0.2)  # range of the time constant [s]
 GAIN = (100.0, 2000.0)  # range of the gain [1/s^2]

@@ -8,7 +8,7 @@ import numpy.typing as npt
 import ruckig
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.trajectory.limits import Floats, MotionLimits
+from tvist_controller.trajectory.base import Floats, MotionLimits
 
 Bools = npt.NDArray[np.bool_]
 

@@ -1,16 +1,84 @@
-"""Planned motions: a time law along a path, with an adjustable time rate."""
+"""Planned motions: a time law along a path, with a time rate for speed slider, pause and resume."""
 
 import copy
-from typing import Protocol, Self
+from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 import ruckig
 
-from tvist_controller.trajectory.base import BrakingForecast, Trajectory
-from tvist_controller.trajectory.limits import Floats, MotionLimits
-from tvist_controller.trajectory.pace import TimeScaling
-from tvist_controller.trajectory.path import Path
+from tvist_controller.trajectory.base import BrakingForecast, Floats, MotionLimits, Path, Trajectory
+from tvist_controller.trajectory.retiming import RetimedLaw
 from tvist_controller.trajectory.spline import SplineCurve
+
+QUICKEST = 20.0  # largest change of the rate; from standstill to full speed takes at least 1/20 s [1/s]
+
+
+class TimeScaling:
+    """Time rate r of a trajectory, 0 to 1, whose changes keep the motion's limits.
+
+    Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. ṙ may have any value that keeps |q̈| within
+    every joint's limit, so near the limits the rate does not change until the curve leaves room. The rate approaches
+    its target time-optimally within that room, with limited jerk (ruckig), in ticks of `period` seconds.
+    """
+
+    def __init__(self, limits: MotionLimits, period: float, rate: float) -> None:
+        self.limits, self._period = limits, period
+        self.acceleration = limits.acceleration
+        """Acceleration limit of every joint, the motion's or less [rad/s^2]."""
+        self.rate, self._slope = rate, 0.0
+        self._open()
+
+    def _open(self) -> None:
+        self._generator = ruckig.Ruckig(1, self._period)
+        self._request, self._result = ruckig.InputParameter(1), ruckig.OutputParameter(1)
+        self._request.control_interface = ruckig.ControlInterface.Velocity
+
+    def fork(self) -> Self:
+        """Return an independent copy."""
+        other = copy.copy(self)
+        other._open()  # noqa: SLF001  one of its own kind
+        return other
+
+    def steady(self, target: float) -> bool:
+        """Return whether the rate stays at its target."""
+        return self.rate == target and self._slope == 0.0
+
+    def advance(self, target: float, curve: Sequence[Floats]) -> float:
+        """Advance by one tick towards a target rate [-]; return the time that passes on the path [s].
+
+        `curve` has q' [rad/s] and q'' [rad/s^2], each (2, n), at the present point and just ahead; the rate
+        must suit both, since a tick has finite length.
+        """
+        rooms = [self._room(qd, qdd) for qd, qdd in curve]
+        # ruckig requires limits on both sides of zero, so leave a little room in both directions.
+        lowest = min(max(room[0] for room in rooms), -1e-3)
+        highest = max(min(room[1] for room in rooms), 1e-3)
+        request = self._request
+        request.current_position, request.current_velocity = [0.0], [self.rate]
+        request.current_acceleration = [min(max(self._slope, lowest), highest)]
+        request.target_velocity, request.target_acceleration = [target], [0.0]
+        request.max_acceleration, request.min_acceleration = [highest], [lowest]
+        fastest = max(float(np.abs(qd).max()) for qd, _ in curve)
+        request.max_jerk = [self.limits.jerk / max(fastest, 0.05)]
+        self._generator.update(request, self._result)
+        self.rate = min(max(self._result.new_velocity[0], 0.0), 1.0)
+        self._slope = self._result.new_acceleration[0]
+        if abs(self.rate - target) < 1e-9 and abs(self._slope) < 1e-6:
+            self.rate, self._slope = target, 0.0
+        return max(float(self._result.new_position[0]), 0.0)
+
+    def _room(self, qd: Floats, qdd: Floats) -> tuple[float, float]:
+        """Return the range of ṙ that keeps every joint within its acceleration [1/s]."""
+        lowest, highest = -QUICKEST, QUICKEST
+        own = qdd * self.rate**2
+        for velocity, acceleration in zip(qd.tolist(), own.tolist(), strict=True):
+            if abs(velocity) < 1e-9:
+                continue
+            ends = sorted((sign * self.acceleration - acceleration) / velocity for sign in (-1.0, 1.0))
+            lowest, highest = max(lowest, ends[0]), min(highest, ends[1])
+        return lowest, highest
+
 
 LOOK_AHEAD = 2.0  # ticks that a rate change looks ahead on the path
 
@@ -19,22 +87,6 @@ SOONER = 25  # ticks that a pause must save to be worthwhile
 
 SURELY = 0.12
 """If the motion brakes later than this plus the pause's extra time, the pause is certainly sooner [s]."""
-
-
-class TimeLaw(Protocol):
-    """Time law of a path's parameter from rest at its start to rest at its end, never turning back."""
-
-    limits: MotionLimits  # limits for every entry of the parameter
-    duration: float  # duration from rest to rest [s]
-    brakes_at: float  # time at which it starts braking [s]
-    begins: float  # time from which it is known, above 0 if its beginning was dropped [s]
-
-    @property
-    def moments(self) -> Floats:
-        """Times of possibly largest velocity or acceleration; some may be before `begins` [s]."""
-
-    def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
-        """Return the parameter [rad], its velocity and acceleration [rad, s] at a time [s], m each."""
 
 
 class DoubleS:
@@ -71,7 +123,7 @@ class DoubleS:
         """Times at which the jerk changes, with possibly largest velocity or acceleration [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
-        """See `TimeLaw.at`."""
+        """Return the parameter [rad], its velocity and acceleration [rad, s] at a time [s], m each."""
         position, velocity, acceleration = self._trajectory.at_time(time)[:3]
         return position, velocity, acceleration
 
@@ -89,7 +141,7 @@ class PlannedMotion(Trajectory):
     def __init__(
         self,
         path: Path,
-        law: TimeLaw,  # from the path's start to its end
+        law: DoubleS | RetimedLaw,  # from the path's start to its end
         period: float,  # tick [s]
         speed: float = 1.0,  # initial rate of its time relative to the clock's [-]
         agility: MotionLimits | None = None,  # of a change of the rate; None for those of the law
@@ -130,10 +182,6 @@ class PlannedMotion(Trajectory):
         return self.path.states(
             *(np.array(values) for values in zip(*map(self.law.at, times.tolist()), strict=True))
         )
-
-    def evenly(self, count: int) -> Floats:
-        """Return evenly spaced times from the first known one to the end, shape (count,) [s]."""
-        return np.linspace(self.law.begins, self.duration, count)
 
     def next(self) -> Floats:
         """Advance by one tick and return the parameter, exactly the path's end from the end time on."""
@@ -242,15 +290,7 @@ def quickest_motion(
 ) -> PlannedMotion:
     """Return the double-S motion along a path from rest to rest within limits of its parameter.
 
-    Args:
-        path: The path.
-        limits: Limits of its parameter.
-        period: Tick [s].
-        speed: Initial time rate [-].
-        agility: Limits of a rate change; None for `limits`.
-
-    Raises:
-        ValueError: There is no such motion, or it would last for hours.
+    Speed and agility are those of `PlannedMotion`. Raise ValueError if it would last for hours.
     """
     return PlannedMotion(path, DoubleS(path.start, path.end, limits), period, speed, agility)
 

@@ -3,7 +3,7 @@
 import math
 from collections import deque
 
-from tvist_controller.trajectory.limits import MotionLimits
+from tvist_controller.trajectory.base import MotionLimits
 
 WINDOW = 128  # number of set-points over which lateness is observed, in four parts
 MAX_PERIODS, MAX_SECONDS = 2.0, 0.02

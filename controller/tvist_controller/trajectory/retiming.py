@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.trajectory.limits import Floats, MotionLimits
+from tvist_controller.trajectory.base import Floats, MotionLimits
 
 TOOL_SHARE = 0.25
 """Fraction of the shaper's window for which tool limits hold [-]. The speed changes so little within it that the shaped

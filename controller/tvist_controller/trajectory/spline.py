@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.trajectory.limits import Floats, MotionLimits
-from tvist_controller.trajectory.path import CheckedMotion, Path
+from tvist_controller.trajectory.base import CheckedMotion, Floats, MotionLimits, Path
 
 SAMPLES = np.linspace(0.0, 1.0, 9)  # places in each interval at which derivatives are sampled for bounds
 ENOUGH = 1.05  # factor from a derivative's largest sample to its bound [-]

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import ruckig
 
-from tvist_controller.trajectory.base import BrakingForecast, Trajectory
-from tvist_controller.trajectory.limits import Floats
-from tvist_controller.trajectory.path import Path
+from tvist_controller.trajectory.base import BrakingForecast, Floats, Path, Trajectory
 
 
 class Slowing(Trajectory):

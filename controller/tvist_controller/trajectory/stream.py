@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.trajectory.base import Floats, MotionLimits
 from tvist_controller.trajectory.guided import LimitedFollower
 from tvist_controller.trajectory.limiter import TorqueMargin
-from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.play_out import PlayOut
 from tvist_controller.trajectory.stop import JointStop
 
@@ -59,6 +59,7 @@ class SetpointStream(LimitedFollower):
         self.lost = 0  # number of skipped sequence numbers; a gap counts at most `MAX_WAITING`
         self.limited = 0  # number of ticks in which limits kept the reference from the set-points
 
+    finished = False  # it is ended from outside
     MAX_WAITING = 1000
     """Largest number of set-points waiting for play-out."""
 
@@ -95,11 +96,6 @@ class SetpointStream(LimitedFollower):
         """Stop within the stream's limits."""
         limits = self.limits
         return JointStop(*self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period)
-
-    @property
-    def finished(self) -> bool:
-        """Always False: a stream is ended from outside."""
-        return False
 
     @property
     def delay(self) -> float:

@@ -10,9 +10,6 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import msgspec
-from msgspec import Struct
-
 from tvist_lab.bench.moving import Run, cycle_tick, line_tick, plant_tick
 from tvist_lab.bench.served_robots import one_robot, robots_at_500_hz
 from tvist_plant.plant import PERIOD
@@ -24,21 +21,10 @@ LIBRARIES = ("tvist", "eclipse-zenoh", "mcap", "msgspec", "mujoco", "numba", "nu
 """Distributions whose versions affect speed."""
 
 
-class MachineInfo(Struct, frozen=True):
-    """The machine on which figures depend."""
-
-    cpu: str
-    cores: int  # number of cores available to this process
-    system: str
-    python: str
-    libraries: dict[str, str]
-    load: float  # average number of running processes in the minute before the start
-
-
 def speed(seconds: float, shaper: str, tell: Callable[[str], None]) -> dict[str, Any]:
     """Measure for `seconds` each, or with 0 serve no robot; `tell` receives a description before each measurement."""
     result: dict[str, Any] = {
-        "machine": msgspec.to_builtins(this_machine()),
+        "machine": this_machine(),
         "seconds": seconds,
         "shaper": shaper,
     }
@@ -62,16 +48,16 @@ def _usual(run: Run) -> float:
     return median(run() for _ in range(REPETITIONS))
 
 
-def this_machine() -> MachineInfo:
-    """Describe this machine as it is now."""
-    return MachineInfo(
-        cpu=_processor(),
-        cores=processors(),
-        system=f"{platform.system()} {platform.release()} {platform.machine()}",
-        python=platform.python_version(),
-        libraries={name: found for name in LIBRARIES if (found := _version(name)) is not None},
-        load=os.getloadavg()[0],
-    )
+def this_machine() -> dict[str, Any]:
+    """Describe this machine as it is now, on which figures depend."""
+    return {
+        "cpu": _processor(),
+        "cores": processors(),  # number of cores available to this process
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "python": platform.python_version(),
+        "libraries": {name: found for name in LIBRARIES if (found := _version(name)) is not None},
+        "load": os.getloadavg()[0],  # average number of running processes in the minute before the start
+    }
 
 
 def _processor() -> str:

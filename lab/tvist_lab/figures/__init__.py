@@ -8,9 +8,8 @@ from tvist_lab.figures.after_stop import (
     vibration_figure,
 )
 from tvist_lab.figures.calibration import identified_figure, move_plan_figure, workspace_map_figure
-from tvist_lab.figures.flexibility import figure_1
+from tvist_lab.figures.flexibility import figure_1, figure_2
 from tvist_lab.figures.one_filter import figure_3, figure_7, figure_8
-from tvist_lab.figures.one_joint import figure_2
 from tvist_lab.figures.recorded import Recorded, figure_15, figure_16, motion_figure
 from tvist_lab.figures.sheets import StyleError, house_settings, house_style, save
 from tvist_lab.figures.studies import (

@@ -1,4 +1,4 @@
-"""Vibration of the tool after a motion: several curves side by side, or one with its frequencies and decay."""
+"""Vibration of the tool after a motion: several curves, or one with its frequencies and decay."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

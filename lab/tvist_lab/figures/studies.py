@@ -202,7 +202,7 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     placed: list[tuple[float, float, bool]] = []
     for place, row in enumerate(sorted(rows, key=_point)):
         y, x = _point(row)
-        excess = _excess(row)
+        excess = max(row[f"reference_{kind}_ratio_max"] for kind in ("acceleration", "velocity"))
         exceeds = excess > NOTICEABLE
         style = OF_UNSHAPED if exceeds else OF_SHAPED
         filled = style.color if row["pareto"] and not exceeds else "white"
@@ -262,11 +262,6 @@ def _slowest(row: dict[str, Any]) -> float:
     """Return the 90th percentile of the settling time [ms], or the median if over a tenth never settle."""
     slow = row["time_until_still_ms_p90"]
     return float(row["time_until_still_ms_median"] if slow is None else slow)
-
-
-def _excess(row: dict[str, Any]) -> float:
-    """Return the largest peak of acceleration or velocity over its limit [-]."""
-    return max(float(row[f"reference_{kind}_ratio_max"]) for kind in ("acceleration", "velocity"))
 
 
 def _point(row: dict[str, Any]) -> tuple[float, float]:

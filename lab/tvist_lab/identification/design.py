@@ -80,7 +80,7 @@ def choose(
 def most_informative(
     knowledge: Floats, says: dict[tuple[int, int], Floats], counts: Sequence[int]
 ) -> list[tuple[int, int]]:
-    """Return the keys of the most informative matrices, the best first: `counts[k]` of those that end in k."""
+    """Return the keys of the most informative matrices, the best first: `counts[k]` that end in k."""
     left, chosen = list(counts), list[tuple[int, int]]()
     while open_ := [key for key in says if key not in chosen and left[key[1]] > 0]:
         best = max(open_, key=lambda key: float(np.linalg.slogdet(knowledge + says[key])[1]))

@@ -1,4 +1,4 @@
-"""Find ring-downs that contradict the others, cross-validate a fit, and predict modes with their uncertainty."""
+"""Find contradicting ring-downs, cross-validate a fit, and predict modes with their uncertainty."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

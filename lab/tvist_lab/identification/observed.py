@@ -12,7 +12,6 @@ from tvist_lab.metrics import MotionRows, motions
 from tvist_lab.metrics.vibration import SENSOR
 from tvist_lab.recordings import Floats, RecordingError
 from tvist_lab.recordings.two_clocks import closest_rotation
-from tvist_lab.study.line import Unchanged
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, Response
@@ -132,7 +131,7 @@ def _observed(log: Log, number: int, motion: MotionRows, payloads: Sequence[Payl
 def repeated(robot: RobotDescription, payload: Payload, motion: Observed) -> Response:
     """Return a served robot's response to a motion, without gear ripple, whose phases are unknown."""
     carried = body(payload)
-    line = DrivenLine(robot, Unchanged(robot.joints), motion.start, carried)
+    line = DrivenLine(robot, carried)
     driven = line.drive(motion.start, motion.reference, motion.ticks)
     smooth = replace(robot, drives=replace(robot.drives, gear_error_amplitude=0.0))
     return respond(FlexibleArm(smooth, carried), driven, 0)

@@ -28,7 +28,6 @@ from tvist_lab.workspace import ranges, workspace
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import carries_weight, rigid_model
-from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
 
 POSES = 6
@@ -65,7 +64,11 @@ async def identify_payload(
 ) -> PayloadFound:
     """Identify the payload as a client; raise IdentificationError if the arm or its poses do not allow it."""
     info = await robot.info()
-    _check(info, description)
+    check_model(info, description)
+    if not carries_weight(description):
+        raise IdentificationError(
+            f"no joint of a {info.model} carries weight, so its torques at rest say nothing of the payload: weigh it"
+        )
     arm = _Regressor(description)
     period = 1.0 / info.rate_hz
     rows, torques, rested = [], [], list[Floats]()
@@ -111,15 +114,6 @@ async def identify_payload(
         declared=info.payload,
         poses=len(rested),
     )
-
-
-def _check(info: Info, description: RobotDescription) -> None:
-    """Check, before the arm moves, that its torques can show the payload."""
-    check_model(info, description)
-    if not carries_weight(description):
-        raise IdentificationError(
-            f"no joint of a {info.model} carries weight, so its torques at rest say nothing of the payload: weigh it"
-        )
 
 
 class _Regressor:

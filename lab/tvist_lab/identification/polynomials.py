@@ -23,8 +23,7 @@ class FitError(ValueError):
 
 
 Deviations = dict[str, Spread]
-"""Deviations of a model from the measurements [%], by field of `Provenance`; cross-validated are those from fits
-without them."""
+"""Deviations of a model from measurements [%], by field of `Provenance`; some are from fits without them."""
 
 
 def polynomials(

@@ -62,7 +62,7 @@ class Ringing:
     softening: float = 0.0  # share by which hysteresis softens the springs, per amplitude of the tool [1/m]
 
     def rms(self, late: float = 0.0) -> float:
-        """Return the rms of the force without its mean, per axis, from `late` after the first sample [m/s²]."""
+        """Return the rms of the force without its mean, per axis, after a time [s] from the start [m/s²]."""
         rest = self.force[self.time >= late]
         return float(np.sqrt(np.mean((rest - rest.mean(axis=0)) ** 2)))
 

@@ -1,4 +1,4 @@
-"""Acceleration of the tool in a motion, and metrics with times from the start of the reference before shaping."""
+"""Acceleration of the tool in a motion, and metrics with times from the unshaped reference's start."""
 
 from collections.abc import Callable
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tvist_lab.metrics.measured_motion import SMALLEST, measured_spans
-from tvist_lab.metrics.servo_lag import servo_lag
+from tvist_lab.metrics.measured_motion import SMALLEST, measured_spans, servo_lag
 from tvist_lab.metrics.vibration import parts
 from tvist_lab.recordings import Floats, Recording
 

@@ -1,4 +1,4 @@
-"""The paper's metrics of a motion: E, the distance to the attained position (after ISO 9283), and RV, the residual."""
+"""The paper's metrics: E, the distance to the attained position (after ISO 9283), and RV, the residual."""
 
 from dataclasses import dataclass
 

@@ -13,11 +13,10 @@ from tvist_lab.metrics.common_clock import (
     still_after,
     vibration_after_stop,
 )
-from tvist_lab.metrics.measured_motion import still_driven
+from tvist_lab.metrics.measured_motion import servo_lag, still_driven
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.paper import Residual, Settling, residual, settling
 from tvist_lab.metrics.ring_down import SIGNIFICANT, SKIP, SLOW_POLE, Mode, RingDown, fit_ring_down
-from tvist_lab.metrics.servo_lag import servo_lag
 from tvist_lab.metrics.vibration import NotMeasurableError
 from tvist_lab.recordings import MissingColumnError, Recording
 

@@ -5,11 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from tvist_lab.recordings.checks import ACCELEROMETER, GYROSCOPE, TIME
-from tvist_lab.recordings.flange_motion import RATE, Felt, at_flange, by_sensor
 from tvist_lab.recordings.read import read
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.recordings.table import SENSOR, ticks_of
-from tvist_lab.recordings.two_clocks import Clocks, fits
+from tvist_lab.recordings.two_clocks import RATE, Clocks, Felt, at_flange, by_sensor, fits
 from tvist_lab.words import counted
 from tvist_plant.description import DescriptionError, RobotDescription, load, robots
 from tvist_plant.user_file import UserFileError

@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -251,26 +251,23 @@ class _Content:
         if len(self.ends) < len(self.files):
             return None
         dropped = Counter[str]()
-        try:
-            for counts in self.ends:
-                dropped.update({kind: int(count) for kind, count in counts.items()})
-            return dict(dropped)
-        except ValueError as error:
-            raise self._error(f"has no valid {END_METADATA}: {error}") from error
+        for counts in self.ends:
+            dropped.update({kind: self._valid(END_METADATA, counts[kind], int) for kind in counts})
+        return dict(dropped)
 
     def _integer(self, ours: Mapping[str, str], name: str) -> int | None:
-        try:
-            return int(ours[name]) if name in ours else None
-        except ValueError as error:
-            raise self._error(f"has no valid {name}: {error}") from error
+        return self._valid(name, ours[name], int) if name in ours else None
 
-    def _json(self, metadata: Mapping[str, str], name: str, kind: Any) -> Any:
+    def _json(self, ours: Mapping[str, str], name: str, kind: Any) -> Any:
+        if name not in ours:
+            raise self._error(f"has no {name}")
+        return self._valid(name, ours[name], lambda text: checked(parse_json(text.encode()), kind))
+
+    def _valid(self, name: str, text: str, read: Callable[[str], Any]) -> Any:
         try:
-            return checked(parse_json(metadata[name].encode()), kind)
-        except KeyError as error:
-            raise self._error(f"has no {name}") from error
-        except ProtocolError as error:
-            raise self._error(f"has no valid {name}: {error.why}") from error
+            return read(text)
+        except (ValueError, ProtocolError) as error:
+            raise self._error(f"has no valid {name}: {getattr(error, 'why', error)}") from error
 
     def _note(self, states: Block, dropped: Mapping[str, int] | None) -> str | None:
         notes = []

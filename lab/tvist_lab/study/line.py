@@ -5,7 +5,6 @@ result equals that of the tick-by-tick line to the last bit.
 """
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from tvist_controller.api.line import (
@@ -21,26 +20,12 @@ from tvist_controller.api.line import (
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, SimulatedArm
-from tvist_shaping.catalogue import shaper
-from tvist_shaping.estimators.fixed import Fixed
-from tvist_shaping.filter import TvistFilter
 
 PAPER = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 """The paper's limits, also the defaults of `move_j`."""
 REST = 0.7  # time simulated after the end of the shaped reference [s]
 
 RESTING = 4  # ticks at rest before the motion
-
-
-class Unchanged(TvistFilter):
-    """Returns its input, for trajectories that are already shaped."""
-
-    def __init__(self, joints: int) -> None:
-        super().__init__(shaper("none"), Fixed([10.0], [0.1]), joints=joints)
-
-    def filter(self, q_ref: npt.ArrayLike) -> Floats:
-        """Return the sample."""
-        return np.asarray(q_ref)
 
 
 def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
@@ -94,7 +79,7 @@ class ControlLine:
         self, description: RobotDescription, start: Floats, declared: Payload, law: Floats | None = None
     ) -> None:
         self._start = start
-        self._line = DrivenLine(description, Unchanged(description.joints), start, declared, law)
+        self._line = DrivenLine(description, declared, law)
 
     def follow(
         self,

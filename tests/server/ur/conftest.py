@@ -183,17 +183,30 @@ async def later(monkeypatch):
 
 
 @pytest.fixture
-async def desk():
+async def make_desk():
+    """Makes a controller with interfaces, whose arguments are the ports and the options of UrInterfaces."""
+    made = []
+
+    def make(ports=EVERYWHERE, **options):
+        made.append(desk := Desk())
+        desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", ports, **options)
+        return desk
+
+    yield make
+    for desk in made:
+        for writer in desk.writers:
+            writer.close()
+            with contextlib.suppress(ConnectionError):
+                await writer.wait_closed()
+        await desk.interfaces.shut()
+        await until(lambda desk=desk: not desk.interfaces._connections)
+        desk.interfaces.close()
+
+
+@pytest.fixture
+async def desk(make_desk):
     """A robot that has made its first tick, for which its interfaces would wait."""
-    desk = Desk()
-    desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", EVERYWHERE)
+    desk = make_desk()
     await desk.tick()
     await desk.interfaces.open()
-    yield desk
-    for writer in desk.writers:
-        writer.close()
-        with contextlib.suppress(ConnectionError):
-            await writer.wait_closed()
-    await desk.interfaces.shut()
-    await until(lambda: not desk.interfaces._connections)
-    desk.interfaces.close()
+    return desk

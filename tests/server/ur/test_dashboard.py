@@ -201,7 +201,7 @@ def test_popups_and_the_log_are_told_to_who_listens_to_the_robot(client, desk):
     client.ask("popup Mind the gap")
     client.ask("addToLog it went well")
     window, line = told(desk)
-    assert (window.kind, window.values["text"]) == (2, "Mind the gap")
+    assert (window.kind, window.values["text"], window.values["flags"]) == (2, "Mind the gap", [False] * 3)
     assert (line.kind, line.values["text"]) == (0, "it went well")
 
 

@@ -173,9 +173,7 @@ def script(random):
         return random.choice(ORDERS).encode() + b"\n"
     if kind < 0.7:
         return "".join(random.choices(SCRIPTS, k=random.randrange(8))).encode()
-    if kind < 0.71:
-        return b"def f():\n" + b"ab\n" * 2_000
-    return random.randbytes(random.randrange(200))
+    return b"def f():\n" + b"ab\n" * 2_000 if kind < 0.71 else random.randbytes(random.randrange(200))
 
 
 def line(random):
@@ -185,9 +183,8 @@ def line(random):
         said = random.choice([said, said.upper(), said + " ", said + "x"])
         argument = random.choice(["", " paper.urp", " Q1.urp", " /a/wait_program.urp", " ü\0", " MANUAL"])
         return (said + argument).encode() + random.choice([b"\n", b"\r\n"])
-    if kind < 0.81:
-        return b"a" * 10_000
-    return random.randbytes(random.randrange(80)) + random.choice([b"", b"\n", b"\n\n\n"])
+    said = b"a" * 10_000 if kind < 0.81 else random.randbytes(random.randrange(80))
+    return said + random.choice([b"", b"\n", b"\n\n\n"])
 
 
 SENT = {"rtde": rtde, "primary": script, "realtime": script, "dashboard": line}

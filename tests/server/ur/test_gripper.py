@@ -8,19 +8,16 @@ from tests.controller.robots import UR5E
 
 from tvist_controller.cell.live_cell import LiveCell
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_server.gateways.ur.interfaces import UrInterfaces
 
-from .desks import Desk, connect, until
+from .desks import connect, until
 
 MANY = 300  # requests at once: more than may wait for their answers
 
 
-async def test_requests_are_answered_in_their_order_even_if_many_come_at_once():
+async def test_requests_are_answered_in_their_order_even_if_many_come_at_once(make_desk):
     plant, terminals = FlexibleArm(UR5E, UR5E.payload), SimpleNamespace(set_tcp=print)
-    desk, cell, waiting = Desk(), LiveCell(a_cell(), UR5E, plant, terminals, print), []
-    desk.interfaces = UrInterfaces(
-        desk, UR5E, "ur5e", "127.0.0.1", {"gripper": 0}, gripper=lambda *asked: waiting.append(asked)
-    )
+    cell, waiting = LiveCell(a_cell(), UR5E, plant, terminals, print), []
+    desk = make_desk({"gripper": 0}, gripper=lambda *asked: waiting.append(asked))
     await desk.tick()
     await desk.interfaces.open()
     reader, writer = await connect(desk, "gripper")
@@ -35,7 +32,3 @@ async def test_requests_are_answered_in_their_order_even_if_many_come_at_once():
             answer(cell.answer(request))
     assert await reading == expected
     assert 0 < most < MANY
-    writer.close()
-    await until(lambda: not desk.interfaces._connections)
-    await desk.interfaces.shut()
-    desk.interfaces.close()

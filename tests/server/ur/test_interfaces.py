@@ -18,7 +18,7 @@ from tvist_protocol.programs import ProgramStop
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 
-from .desks import PATIENCE, Desk, connect, connect_and_greet, lines, until
+from .desks import PATIENCE, connect, connect_and_greet, lines, until
 
 
 async def test_every_door_speaks_its_language(desk):
@@ -96,9 +96,8 @@ async def test_a_file_that_is_never_read_to_its_end_keeps_nobody_waiting(desk):
     read.set()
 
 
-async def test_in_lockstep_nothing_is_dropped():
-    desk = Desk()
-    desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", {"realtime": 0}, lockstep=True)
+async def test_in_lockstep_nothing_is_dropped(make_desk):
+    desk = make_desk({"realtime": 0}, lockstep=True)
     await desk.interfaces.open()
     await desk.tick()
     reader, writer = await connect(desk, "realtime")
@@ -110,10 +109,6 @@ async def test_in_lockstep_nothing_is_dropped():
     packages = [await reader.readexactly(1220) for _ in range(ticks)]
     stamps = [struct.unpack_from(">id", package)[1] for package in packages]
     assert stamps == [40.0 + tick * 0.002 for tick in range(first, first + ticks)]
-    writer.close()
-    await desk.interfaces.shut()
-    await until(lambda: not desk.interfaces._connections)
-    desk.interfaces.close()
 
 
 async def test_a_client_that_asks_and_does_not_read_is_not_asked_for_more(desk):
@@ -191,9 +186,11 @@ async def test_a_client_whose_machine_lost_power_is_found_out(desk):
     assert idle + every * found.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT) <= 30
 
 
-async def test_without_a_client_ticks_wait_for_others_and_nothing_is_missing_for_the_next_one(monkeypatch):
-    desk = Desk()
-    desk.interfaces = house = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", {"rtde": 0, "dashboard": 0})
+async def test_without_a_client_ticks_wait_for_others_and_nothing_is_missing_for_the_next_one(
+    make_desk, monkeypatch
+):
+    desk = make_desk({"rtde": 0, "dashboard": 0})
+    house = desk.interfaces
     waiting = asyncio.create_task(house.open())
     await asyncio.sleep(0)
     assert not waiting.done(), "who comes first finds a robot"
@@ -215,10 +212,6 @@ async def test_without_a_client_ticks_wait_for_others_and_nothing_is_missing_for
     assert house.robot.latest.state == state
     for name in ("joint_temperatures", "actual_robot_energy_consumed", "actual_robot_current"):
         assert getattr(house.robot.latest, name) == getattr(expected, name)
-    for writer in desk.writers:
-        writer.close()
-    await house.shut()
-    house.close()
 
 
 async def test_a_client_that_leaves_at_once_without_reading_has_sent_its_script(desk):

@@ -205,17 +205,6 @@ def test_warnings_are_lines_of_the_log_and_other_events_are_not_told(robot, cont
     assert (line.kind, line.values) == (0, {"text": "mind the gap"})
 
 
-def test_messages_say_what_they_are_given():
-    key = message(messages.key(5_000_000, "PROGRAM_XXX_STARTED", "move"))
-    assert (key.time, key.source, key.kind) == (5_000_000, 254, 7)
-    assert (key.values["title"], key.values["text"]) == ("PROGRAM_XXX_STARTED", "move")
-    exception = message(messages.runtime_exception(1, 3, 14, "no"))
-    assert exception.values == {"line": 3, "column": 14, "text": "no"}
-    window = message(messages.popup(1, "Title", "Text"))
-    assert (window.kind, window.values["title"], window.values["text"]) == (2, "Title", "Text")
-    assert window.values["flags"] == [False] * 3
-
-
 @examples(40)
 @given(st.text(max_size=3000))
 def test_no_text_makes_a_message_that_clients_take_for_garbage(text):

@@ -5,10 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_protocol.programs import (
-    ProgramLabel,
-    ProgramRun,
-)
+from tvist_protocol.programs import ProgramLabel, ProgramRun
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.stream import Event
 
@@ -37,6 +34,8 @@ def test_clients_are_told_that_a_program_has_started_and_that_it_has_stopped(pro
     said = [(one.kind, one.values["title"], one.values["text"]) for one in told(robot)]
     names = ("paper", "there", "rtde_control")
     assert said == [(7, f"PROGRAM_XXX_{end}", name) for name in names for end in ("STARTED", "STOPPED")]
+    stamp = round(1e6 * robot.latest.timestamp)
+    assert {(one.time, one.source) for one in told(robot)} == {(stamp, 254)}
 
 
 def test_a_label_is_told_once_when_the_program_comes_to_it(programs, robot):

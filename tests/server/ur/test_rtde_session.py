@@ -235,16 +235,16 @@ WRITTEN = {
     "masks without values": (MASKS, {}, [0xFF] * len(MASKS), None),
     "digital outputs": (
         DIGITAL, {}, (0x81, 0xFF, 0x01, 0x01, 0xFF, 0x02),
-        outputs(digital_output_mask=0x20181, digital_outputs=0x20181),
+        outputs(digital_output_mask=0x20181, digital_outputs=0x20181)
     ),
     "digital outputs that differ": (
         DIGITAL, {"actual_digital_output_bits": 0b1100}, (0b1111, 0b0110, 0, 0, 0, 0),
-        outputs(digital_output_mask=0b1010, digital_outputs=0b0010),
+        outputs(digital_output_mask=0b1010, digital_outputs=0b0010)
     ),
     "analog outputs as shares of their ranges": (
         ANALOG, {}, (0b11, 0b10, 0.25, 0.75),
         outputs(standard_analog_output_mask=0b11, standard_analog_output_type=0b10,
-                standard_analog_output_0=0.25, standard_analog_output_1=0.75),
+                standard_analog_output_0=0.25, standard_analog_output_1=0.75)
     ),
     "analog outputs that are shown": (ANALOG, HALF, (0b11, 0b10, 0.3, 0.3), None),
 }  # fmt: skip

@@ -14,6 +14,7 @@ Role = Literal["operator", "viewer", "robot", "router"]
 """An operator sees and moves the robot; a viewer only sees it. On a router, a `robot` serves the robot or the
 namespace that its certificate names, and a `router` is trusted fully."""
 
+Rule = dict[str, Any]
 STREAMS = ("state", "event", "telemetry", "truth", "io")
 """Topics that every role may read and only the robot may publish."""
 MESSAGES = (
@@ -27,13 +28,13 @@ def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: 
     """Return Zenoh's `access_control` settings for a server with certificates; no role (by common name), no access."""
     robots = [_at(namespace, robot) for robot in robots]
     viewing, operating = _viewing(robots), _operating(robots)
-    rules_of: dict[Role, list[dict[str, Any]]] = {"viewer": viewing, "operator": [*viewing, *operating]}
+    rules_of: dict[Role, list[Rule]] = {"viewer": viewing, "operator": [*viewing, *operating]}
     named = {role: [name for name, its in roles.items() if its == role] for role in rules_of}
     # Zenoh rejects an empty list of names, because it would apply to everyone.
-    allowed = [
-        ({"id": role, "cert_common_names": names}, rules_of[role]) for role, names in named.items() if names
+    granted = [
+        ({"id": role, "cert_common_names": named[role]}, own) for role, own in rules_of.items() if named[role]
     ]
-    return _settings([*viewing, *operating], allowed)
+    return _settings([*viewing, *operating], granted)
 
 
 def open_access(robots: Sequence[str], namespace: str = "") -> dict[str, Any]:
@@ -57,50 +58,51 @@ def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
     """
     everywhere = [keys.ANYWHERE]
     viewing, operating = _viewing(everywhere), _operating(everywhere)
-    rules, allowed = [*viewing, *operating], list[tuple[dict[str, Any], list[dict[str, Any]]]]()
+    rules, granted = [*viewing, *operating], list[tuple[Rule, list[Rule]]]()
     for name, role in roles.items():
-        own: list[dict[str, Any]] = []
+        own: list[Rule] = []
         if role == "robot":
-            own = _turned([f"**/{keys.PREFIX}/{name}", f"**/{name}/{keys.PREFIX}/*"], name)
+            own = _serving([f"**/{keys.PREFIX}/{name}", f"**/{name}/{keys.PREFIX}/*"], name)
             own[0]["key_exprs"] = [f"{keys.ANYWHERE}/{leaf}" for leaf in STREAMS]
         elif role == "router":
             own = [{**_rule(f"all {name}", "ingress", MESSAGES, ["**"]), "flows": ["ingress", "egress"]}]
         rules += own
-        its = own or [*viewing, *(operating if role == "operator" else [])]
-        allowed.append(({"id": name, "cert_common_names": [name]}, its))
-    return _settings(rules, allowed)
+        allowed = own or [*viewing, *(operating if role == "operator" else [])]
+        granted.append(({"id": name, "cert_common_names": [name]}, allowed))
+    return _settings(rules, granted)
 
 
 def with_robots_behind(
     access: Mapping[str, Any], robots: Sequence[str], namespace: str, protocol: str
 ) -> dict[str, Any]:
     """Return `access_control` settings that also admit the robots' own processes, over a protocol only they can use."""
-    own = _turned([_at(namespace, robot) for robot in robots], "robots")
+    own = _serving([_at(namespace, robot) for robot in robots], "robots")
     more = _settings(own, [({"id": "robots", "link_protocols": [protocol]}, own)])
-    return {**access, **{key: [*access[key], *more[key]] for key in ("rules", "subjects", "policies")}}
+    return {**access, **{part: [*access[part], *more[part]] for part in ("rules", "subjects", "policies")}}
 
 
-def _settings(
-    rules: Sequence[dict[str, Any]], allowed: Sequence[tuple[dict[str, Any], Sequence[dict[str, Any]]]]
-) -> dict[str, Any]:
-    """Return settings that deny everything but the rules of each subject."""
+def _settings(rules: list[Rule], granted: Sequence[tuple[Rule, list[Rule]]]) -> dict[str, Any]:
+    """Return settings with these rules, of which each subject is granted some; everything else is denied."""
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
-        "subjects": [subject for subject, _ in allowed],
+        "subjects": [subject for subject, _ in granted],
         "policies": [
             {"id": subject["id"], "rules": [rule["id"] for rule in own], "subjects": [subject["id"]]}
-            for subject, own in allowed
+            for subject, own in granted
         ],
     }
 
 
-def _turned(places: Sequence[str], name: str) -> list[dict[str, Any]]:
-    """Return the rights of robots: egress to a client is ingress from its robot, and vice versa."""
-    turn = {"ingress": "egress", "egress": "ingress"}
+def _serving(places: Sequence[str], name: str) -> list[Rule]:
+    """Return the rules of robots that connect as clients: egress to their clients is ingress from them."""
     return [
-        {**rule, "id": f"{rule['id']} of {name}", "flows": [turn[rule["flows"][0]]]}
+        {
+            **rule,
+            "id": f"{rule['id']} of {name}",
+            "flows": ["egress" if rule["flows"] == ["ingress"] else "ingress"],
+        }
         for rule in (*_viewing(places), *_operating(places))
     ]
 
@@ -125,11 +127,7 @@ def _viewing(robots: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def _operating(robots: Sequence[str]) -> list[dict[str, Any]]:
-    command, setpoint, clients = (
-        _keys(robots, "command"),
-        _keys(robots, "setpoint"),
-        _keys(robots, "client/**"),
-    )
+    command, setpoint, clients = (_keys(robots, leaf) for leaf in ("command", "setpoint", "client/**"))
     return [
         _rule("command", "ingress", ["query"], command),
         _rule("answer command", "egress", ["declare_queryable", "reply"], command),

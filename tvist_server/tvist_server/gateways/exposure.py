@@ -33,18 +33,13 @@ IP_PROTOCOLS = frozenset({"tcp", "udp", "ws", "tls", "quic"})
 
 LIMITS: Mapping[str, Any] = {
     # Largest message assembled from fragments; the gateway refuses messages above MAX_BYTES.
-    "transport/link/rx/max_message_size": 2 * MAX_BYTES,
+    "transport/link/rx/max_message_size": 2 * MAX_BYTES
 }
 """Zenoh settings, by path, of a session that other machines can reach."""
 
 
 def guarded(
-    listen: Sequence[str],
-    robots: Sequence[str],
-    *,
-    security: str | None,
-    insecure: bool,
-    namespace: str = "",
+    listen: Sequence[str], robots: Sequence[str], *, security: str | None, insecure: bool, namespace: str = ""
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on and the settings that protect them; StartError if one is unprotected."""
     secured, settings, roles = _protected(listen, security, insecure=insecure)

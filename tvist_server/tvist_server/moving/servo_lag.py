@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 
+from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.guided import DAMPED, DELAY
-from tvist_controller.trajectory.limits import Floats
 from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_server.moving.program import GAIN, LOOKAHEAD

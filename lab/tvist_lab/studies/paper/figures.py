@@ -3,9 +3,8 @@
 from matplotlib.figure import Figure
 
 from tvist_lab.figures.after_stop import after_stop_figure, ring_down_figure
-from tvist_lab.figures.flexibility import figure_1
+from tvist_lab.figures.flexibility import figure_1, figure_2
 from tvist_lab.figures.one_filter import figure_3, figure_7, figure_8
-from tvist_lab.figures.one_joint import figure_2
 from tvist_lab.figures.recorded import Recorded, figure_15, figure_16, motion_figure
 from tvist_lab.figures.wrong_frequency import figure_4
 from tvist_lab.metrics import motions

@@ -240,11 +240,7 @@ class ConnectionLimit:
         return False
 
     def _send_one_away(self, newcomer: str) -> None:
-        silent = min(
-            (one for one in self.taken if one.dispensable),
-            key=lambda one: one.heard,
-            default=None,
-        )
+        silent = min((one for one in self.taken if one.dispensable), key=lambda one: one.heard, default=None)
         if silent is None:
             return
         taken = len(self.taken)

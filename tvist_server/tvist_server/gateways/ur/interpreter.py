@@ -81,13 +81,12 @@ class InterpreterSession(InTurnSession[tuple[str, bool]]):
 
 def _reason(refused: Refused) -> str:
     """Return the reason of a refusal, with the column if the line is invalid."""
-    why = refused.why
+    why, reason = refused.why, ""
     if refused.code == "script_error":
-        column = refused.where.rpartition(":")[2]
-        words = SYNTAX if why.startswith("syntax_error") else COMPILATION
-        return f"{words}: column {column}, {why}"
-    if refused.code == "wrong_mode":
-        return f"{NO_PROGRAM}: {why}"
-    if (refused.code, refused.where) == ("busy", "text"):
-        return f"{TOO_MANY}: {why}"
-    return why
+        reason = SYNTAX if why.startswith("syntax_error") else COMPILATION
+        why = f"column {refused.where.rpartition(':')[2]}, {why}"
+    elif refused.code == "wrong_mode":
+        reason = NO_PROGRAM
+    elif (refused.code, refused.where) == ("busy", "text"):
+        reason = TOO_MANY
+    return f"{reason}: {why}" if reason else why

@@ -17,14 +17,7 @@ from tvist_server.gateways.ur.rtde.inputs import INPUTS, NEED_CONTROL
 from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
 from tvist_server.gateways.ur.rtde.writing import InputWriter
-from tvist_server.rtde.codec import (
-    PackageKind,
-    PackageReader,
-    TextLevel,
-    package,
-    text_message,
-    words,
-)
+from tvist_server.rtde.codec import PackageKind, PackageReader, TextLevel, package, text_message, words
 
 RATE = 500.0  # frequency of the control loop and highest frequency of data packages [Hz]
 RECIPES = 255  # largest number of input recipes of a connection: their ids are 1 to 255

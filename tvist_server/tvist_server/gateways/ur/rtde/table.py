@@ -1,7 +1,5 @@
 """`python -m tvist_server.gateways.ur.rtde.table`: prints docs/reference/generated/rtde-variables.md."""
 
-from collections.abc import Iterable
-
 from tvist_controller.instruments.variables import VARIABLES
 from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
 from tvist_server.rtde.wire import WireType
@@ -36,8 +34,23 @@ REGISTER_ROWS = (
 
 def page() -> str:
     """Return the reference page that lists all variables."""
-    outputs = _table(("variable", "type", "source", "what"), _outputs())
-    inputs = _table(("variable", "type", "what"), _inputs())
+    registers = {
+        side: [
+            (f"`{name.format(bank=side)}`", wire.name, f"Registers: {what}.")
+            for name, wire, what in REGISTER_ROWS
+        ]
+        for side in ("output", "input")
+    }
+    outputs = _table(
+        ("variable", "type", "source", "what"),
+        *((f"`{one.name}`", one.type, one.source, one.what) for one in VARIABLES.values()),
+        *((name, wire, "io", what) for side in registers.values() for name, wire, what in side),
+    )
+    inputs = _table(
+        ("variable", "type", "what"),
+        *((f"`{name}`", wire.name, what) for name, (wire, what) in NAMED_INPUTS.items()),
+        *registers["input"],
+    )
     return f"""{HEAD}
 ## Outputs
 
@@ -58,22 +71,7 @@ def describe(name: str) -> str:
     return VARIABLES[name].what if name in VARIABLES else ""
 
 
-def _outputs() -> Iterable[tuple[str, ...]]:
-    for one in VARIABLES.values():
-        yield f"`{one.name}`", one.type, one.source, one.what
-    for bank in ("output", "input"):
-        for name, wire, what in REGISTER_ROWS:
-            yield f"`{name.format(bank=bank)}`", wire.name, "io", f"Registers: {what}."
-
-
-def _inputs() -> Iterable[tuple[str, ...]]:
-    for name, (wire, what) in NAMED_INPUTS.items():
-        yield f"`{name}`", wire.name, what
-    for name, wire, what in REGISTER_ROWS:
-        yield f"`{name.format(bank='input')}`", wire.name, f"Registers: {what}."
-
-
-def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+def _table(head: tuple[str, ...], *rows: tuple[str, ...]) -> str:
     lines = [head, ("---",) * len(head), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
