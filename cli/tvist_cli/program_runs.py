@@ -30,21 +30,22 @@ from tvist_server.recording import RecorderError
 from tvist_server.server import Server
 from tvist_server.shutdown import Shutdown
 
-STDIN = "<stdin>"
 SHOWN_EVERY = 0.1  # shortest time between two changes of the progress line [s]
 _CLEAR = "\r\x1b[K"  # moves to the start of the terminal's line and clears it
 
 
 def named(file: Path) -> str:
     """Return a file's name for messages."""
-    return (
-        STDIN if str(file).strip() == "-" else str(file)
-    )  # `readable` may have put a blank before the minus
+    return "<stdin>" if _is_stdin(file) else str(file)
+
+
+def _is_stdin(file: Path) -> bool:
+    return str(file).strip() == "-"  # `readable` may have put a blank before it
 
 
 def read_script(file: Path, skip: Sequence[str] = ()) -> str:
     """Read a program, without the nodes of some URCaps; `-` reads the standard input."""
-    if named(file) == STDIN:
+    if _is_stdin(file):
         content = sys.stdin.buffer.read(LARGEST + 1)
         if len(content) > LARGEST:
             raise Failure(

@@ -29,7 +29,10 @@ class Gripper:
     def ask(self, line: str) -> str:
         """Send a line, and return the answer."""
         self._socket.sendall(f"{line}\n".encode())
-        return self._socket.recv(1024).decode().strip()
+        answer = self._socket.recv(1024).decode().strip()
+        if answer in {"", "?"}:
+            raise RuntimeError(f"the gripper does not answer {line}")
+        return answer
 
     def activate(self) -> None:
         """Activate it, and wait until it is active."""

@@ -19,7 +19,7 @@ S = TypeVar("S", bound=Struct)
 Convert = Callable[[Any, str], Any]
 
 
-class Given(NamedTuple):
+class ArgumentFormat(NamedTuple):
     """How users pass a value."""
 
     kind: Any  # its type in users' programs
@@ -30,7 +30,7 @@ class Argument(NamedTuple):
     """A field of a message that users pass."""
 
     field: FieldInfo
-    given: Given
+    given: ArgumentFormat
 
 
 @cache
@@ -64,10 +64,10 @@ def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) ->
     return built(Payload, {"mass": mass, "com": com, "inertia": inertia})
 
 
-def given(hint: Any) -> Given:
+def given(hint: Any) -> ArgumentFormat:
     """Return how users pass a field of this type."""
     if hint in {Frequencies, DampingRatios}:
-        return Given(float | Iterable[float], _one_or_more)
+        return ArgumentFormat(float | Iterable[float], _one_or_more)
     hint, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     meaning = next((mark for mark in marks if isinstance(mark, str)), None)
     bounds = next((mark for mark in marks if isinstance(mark, Meta)), Meta())
@@ -75,7 +75,7 @@ def given(hint: Any) -> Given:
     if origin is tuple:
         return _list(parts, meaning, bounds)
     if kinds := _structs(hint):
-        return Given(hint, lambda value, where: _struct(value, where, kinds))
+        return ArgumentFormat(hint, lambda value, where: _struct(value, where, kinds))
     if origin in {Union, UnionType}:
         return _choice(parts)
     simple: dict[Any, Convert] = {
@@ -83,10 +83,10 @@ def given(hint: Any) -> Given:
         int: lambda value, where: whole(value, where, int(bounds.ge or 0)),
         bool: _switch,
     }
-    return Given(Mapping[str, Any] if origin is dict else hint, simple.get(hint, _unchanged))
+    return ArgumentFormat(Mapping[str, Any] if origin is dict else hint, simple.get(hint, _unchanged))
 
 
-def _list(parts: tuple[Any, ...], meaning: str | None, bounds: Meta) -> Given:
+def _list(parts: tuple[Any, ...], meaning: str | None, bounds: Meta) -> ArgumentFormat:
     """Return how users pass a tuple. The robot explains a wrong number of angles better than the type's bounds do."""
     entry = given(parts[0])
     count = None if parts[-1] is Ellipsis else len(parts)
@@ -101,10 +101,10 @@ def _list(parts: tuple[Any, ...], meaning: str | None, bounds: Meta) -> Given:
             raise ArgumentError(where, why, low if len(found) < low else high)
         return found
 
-    return Given(GenericAlias(Iterable, entry.kind), convert)
+    return ArgumentFormat(GenericAlias(Iterable, entry.kind), convert)
 
 
-def _choice(members: tuple[Any, ...]) -> Given:
+def _choice(members: tuple[Any, ...]) -> ArgumentFormat:
     """Return how users pass a value of one of several types; None and words are passed as such."""
     words = {word for member in members if get_origin(member) is Literal for word in get_args(member)}
     constants = [member for member in members if member is NoneType or get_origin(member) is Literal]
@@ -116,7 +116,7 @@ def _choice(members: tuple[Any, ...]) -> Given:
         as_it_is = (value is None and NoneType in members) or (isinstance(value, str) and value in words)
         return value if as_it_is else inner(value, where)
 
-    return Given(reduce(or_, kinds), convert)
+    return ArgumentFormat(reduce(or_, kinds), convert)
 
 
 def _unchanged(value: Any, _: str) -> Any:

@@ -151,6 +151,7 @@ class _Check:
         stop = robot.on_telemetry(heard.append)
         try:
             rate, ticks = await _rate(robot)
+            self.report.state_rate_hz = rate
             with suppress(TimeoutError):
                 async with asyncio.timeout(TELEMETRY_S):
                     while not heard:
@@ -159,7 +160,7 @@ class _Check:
             stop()
         last = heard[-1] if heard else None
         due = (await robot.info()).rate_hz if last is None else last.due_per_second
-        self.report.state_rate_hz, self.report.due_per_second = rate, due
+        self.report.due_per_second = due
         if due is None:  # an older server, whose speed is unknown
             return f"{rate:.1f} Hz"
         self.report.overloaded = ticks < TOO_SLOW * due or (last is not None and last.overloaded)

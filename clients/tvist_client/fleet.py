@@ -9,9 +9,9 @@ from typing import TypeVar
 import msgspec
 import zenoh
 
-from tvist_client.across import Across, RobotPlace
 from tvist_client.connection import understood
 from tvist_client.errors import UnexpectedReplyError
+from tvist_client.fleet_session import FleetSession, RobotPlace
 from tvist_client.readiness import RELIEVE, Readiness, readiness, unlock_command
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
@@ -65,7 +65,7 @@ class StopReport(msgspec.Struct, frozen=True):
     said: str
 
 
-class Fleet(Across):
+class Fleet(FleetSession):
     """Robots on a network, over one session. Use it as an asynchronous context.
 
     `endpoint` is that of a router or server. The robots are in or below `namespace`; ProtocolError if it is invalid.

@@ -8,7 +8,7 @@ from tvist_controller.about import info_of
 from tvist_controller.cell.gripper import changes
 from tvist_controller.controller import Controller
 from tvist_controller.dispatch.admission import Admitted, admit, admit_setpoint
-from tvist_controller.dispatch.rights import Standing, is_holders, may_step
+from tvist_controller.dispatch.rights import ControlHolders, is_holders, may_step
 from tvist_controller.instruments.report import Sink
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.plan import Plan
@@ -90,9 +90,9 @@ class Host:
         return reply
 
     @property
-    def standing(self) -> Standing:
+    def standing(self) -> ControlHolders:
         """Present holders of rights, readable from any thread."""
-        return Standing(self.controller.session.lease, self.controller.session.clock)
+        return ControlHolders(self.controller.session.lease, self.controller.session.clock)
 
     def setpoint(self, data: bytes) -> None:
         """Admit and take a set-point."""

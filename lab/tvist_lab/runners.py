@@ -74,7 +74,7 @@ def outcomes(
         raise ConnectionError("the executor has dropped its tasks; perhaps its scheduler has gone") from None
 
 
-class Here(Executor):
+class InlineExecutor(Executor):
     """Runs each task at once in this process, since starting others takes seconds."""
 
     def submit(self, work: Callable[..., Result], /, *args: Any, **kwargs: Any) -> "Future[Result]":

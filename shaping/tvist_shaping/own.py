@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tvist_shaping._types import Floats
+from tvist_shaping.catalogue import SHAPERS
 from tvist_shaping.errors import DesignError, ShaperFailureError
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
 from tvist_shaping.fir_shaper import FirShaper
@@ -49,9 +50,11 @@ def shaper_of(
     """
     if not 0.0 < zeta_max <= 1.0:
         raise DesignError("zeta_max", zeta_max, "above 0 and at most 1")
-    called = name or getattr(function, "__name__", "own")
+    known = next((one for one in SHAPERS.values() if one.function is function), None)
+    called = name or getattr(function, "__name__", "own" if known is None else known.name)
     lines = str(function.__doc__ or "").strip().splitlines()
-    what = description or (lines[0] if lines else "a shaper of your own")
+    what = lines[0] if lines else "a shaper of your own"
+    what = description or (what if known is None else known.description)
     trial = Shaper(called, what, function, np.inf, zeta_max, np.inf)
     duration, peak, _ = _tried(trial)
     return Shaper(called, what, function, duration, zeta_max, peak if peak > 1.0 + ROUNDING else 1.0)

@@ -19,8 +19,8 @@ from tvist_client import (
     Robot,
     ZenohTransport,
 )
-from tvist_client.across import RobotPlace
 from tvist_client.fleet import Fleet
+from tvist_client.fleet_session import RobotPlace
 from tvist_client.transports import certificates
 from tvist_client.transports import zenoh as zenoh_transport
 from tvist_client.transports.zenoh import robots_at

@@ -4,7 +4,7 @@ import numpy as np
 
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 
-from .robots import PAPER, H
+from .robots import PAPER, ROUNDING, H
 
 
 def network(motion, period, seconds, *, seed=0, jitter=0.0, loss=0.0, twice=0.0, clock=0.0, burst=1):
@@ -50,13 +50,13 @@ def peaks(out, limits):
     return np.array([np.abs(np.diff(out, order, axis=0)).max() / H**order / limit for order, limit in orders])
 
 
-def assert_within(out, limits=PAPER):
-    """Acceleration and jerk to rounding, velocity to a tick of acceleration."""
+def assert_within(out, limits=PAPER, *, beyond=(1e-5, 1e-4)):
+    """Acceleration and jerk to rounding and shares of them, velocity to a tick of acceleration."""
     velocity, acceleration, jerk = peaks(out, limits)
     assert np.isfinite(out).all()
     assert velocity <= 1.0 + limits.acceleration * H / limits.velocity
-    assert acceleration <= 1.0 + 1e-5
-    assert jerk <= 1.0 + 1e-4
+    assert acceleration <= 1.0 + beyond[0] + ROUNDING / limits.acceleration
+    assert jerk <= 1.0 + beyond[1] + 10 * ROUNDING / H / limits.jerk
 
 
 def there_and_back(limits: MotionLimits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), dwell=0.3):

@@ -99,13 +99,23 @@ def stopping(seed):
     random = np.random.default_rng(seed)
     head, body = Author(UR5E, np.array(URSIM), random).program("prog").split("\n", 1)
     end = ("thread t():", f"sleep({random.uniform(0.0, 0.3):.3f})", random.choice(ENDS), "end", "run t()")
-    return "\n".join((head, *end, body))
+    writes = ("thread w():", "n = 0.0", "while True:", "n = (n + 0.001) - floor(n)")
+    writes += (
+        "write_output_float_register(1, n)",
+        "set_standard_analog_out(0, n)",
+        "sync()",
+        "end",
+        "end",
+        "run w()",
+    )
+    return "\n".join((head, *writes, *end, body))
 
 
 def written(robot):
     """What programs have written."""
     places = robot.controller.peripherals
-    return places.digital_outputs, [places.read("output_int", place) for place in range(4)]
+    numbers = [places.read("output_int", place) for place in range(4)]
+    return places.digital_outputs, numbers, places.read("output_double", 1), list(places.analog_shares)
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -62,7 +62,7 @@ def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalle
     while limiter.limited and len(held) < enough:
         held.append(limiter.follow(walk[-1], still))
     held += [limiter.follow(walk[-1], still) for _ in range(10)]
-    assert_within(np.array([*out, *held]), limits)
+    assert_within(np.array([*out, *held]), limits, beyond=(2e-6, 1e-5))
     assert (np.array(held[-10:]) == walk[-1]).all()
 
 
@@ -80,7 +80,7 @@ def test_after_catching_up_with_what_moves_it_passes_to_the_bit_again(motion, ju
     walk = np.stack([motion(time) + jump * (time > 1.0), 0.1 * motion(time)], axis=1)
     limiter = at_rest(walk[0], PAPER, H)
     out = followed(limiter, walk[1:])
-    assert_within(out)
+    assert_within(out, beyond=(2e-6, 1e-5))
     equal = out == walk
     began = int(1.0 / H) + 1
     caught_up = began + int(

@@ -290,6 +290,20 @@ def test_secondary_programs_run_beside_the_main_one_and_do_not_move_the_arm():
     assert refused.code == "script_error"
 
 
+@pytest.mark.parametrize(("main", "extra"), [("halt", "sync()"), ("sync()", "halt")])
+def test_halt_ends_all_programs_and_the_motion(main, extra):
+    robot = a_robot()
+    start(robot, "speedj([0.5,0,0,0,0,0], 2, 0.1)", "sleep(0.1)", "while True:", main, "end")
+    robot.tick(2)
+    counts = "n = n + 1\n    write_output_integer_register(3, n)\n    sync()"
+    text = f"sec extra():\n  n = 0\n  sleep(0.05)\n  {extra}\n  while True:\n    {counts}\n  end\nend\n"
+    assert robot.send(ProgramRun, text=text) == Done()
+    finish(robot)
+    last = robot.controller.peripherals.read("output_int", 3)
+    robot.tick(20)
+    assert robot.controller.peripherals.read("output_int", 3) == last
+
+
 def test_a_new_program_replaces_the_one_that_runs_and_waits_until_the_arm_rests():
     robot = a_robot()
     start(robot, "speedj([0.5,0,0,0,0,0], 2, 9)", name="one")

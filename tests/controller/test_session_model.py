@@ -516,6 +516,7 @@ def test_every_reply_and_every_change_is_as_the_table_says(full):
     check("realtime", full)
 
 
+@pytest.mark.parametrize("clock", ["lockstep", "free"])
 @FULL
-def test_in_lockstep_time_passes_by_the_steps_of_who_may_and_by_nothing_else(full):
-    check("lockstep", full)
+def test_time_passes_by_the_steps_of_who_may_and_by_nothing_else(full, clock):
+    check(clock, full)

@@ -8,6 +8,7 @@ import os
 import sys
 from importlib.metadata import version
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from llvmlite import binding
 
@@ -43,7 +44,10 @@ def make(path, made):
 
 
 if __name__ == "__main__":
+    with TemporaryDirectory(dir=FOLDER) as folder:
+        paths = [Path(name) for name in sys.argv[1:]] or sorted(FOLDER.glob("*.mcap"))
+        for path in paths:
+            make(path, Path(folder, path.name))
+        for path in paths:
+            Path(folder, path.name).replace(FOLDER / path.name)
     MADE_ON.write_text(processor() + "\n", encoding="utf-8")
-    for path in map(Path, sys.argv[1:] or sorted(FOLDER.glob("*.mcap"))):
-        make(path, FOLDER / "made.mcap")
-        (FOLDER / "made.mcap").replace(FOLDER / path.name)

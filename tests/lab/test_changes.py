@@ -41,7 +41,7 @@ class ChangingArm:
 
     def change(self, mass, springs):
         carried = hidden_payload(body(paper_payload(UR5E, self.payload.mass + mass)), self._seed)
-        self._arm = FlexibleArm(stiffer(hidden(UR5E, self._seed), springs), carried)
+        self._arm = FlexibleArm(stiffer(springs, hidden(UR5E, self._seed)), carried)
         self._arm.reset(self._last, seed=self._seed)
 
     def reset(self, command, *, seed=0, **_):

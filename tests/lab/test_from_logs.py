@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tvist_controller.api.line import body, paper_payload
+from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.calibrate import agreeing, calibrate, more_jogs
-from tvist_lab.identification.design import free_configurations, predicted
+from tvist_lab.identification.design import free_configurations, jog_of, predicted
 from tvist_lab.identification.forecast import ModeForecast
 from tvist_lab.identification.jogs import RingDownLogs
 from tvist_lab.identification.modal_fit import describe, fit_modal, of_masses
@@ -220,11 +220,18 @@ def noisy(ring, rng):
     return replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape))
 
 
-def test_proposed_jogs_leave_less_uncertain(forecast):
+def test_proposals_are_jogs_that_no_body_is_in_the_way_of_and_leave_less_uncertain(forecast):
     known, rings = forecast
     found, rng = more_jogs(known, rings[-1]), np.random.default_rng(5)
     assert len(found) == 3
-    more = [*rings, *(noisy(predicted(known.arm, one.q, rings[-1].payload), rng) for one in found)]
+    collisions, at, more = CollisionModel(ROBOT, body(PAYLOADS[1])), rings[-1].q, list(rings)
+    for one in found:
+        for after in (*one.way, one.q):
+            between = [at + share * (after - at) for share in np.linspace(0.0, 1.0, 100)]
+            assert all(collisions.meeting(q) is None for q in between)
+            at = after
+        assert one.q - one.way[-1] == pytest.approx(jog_of(6))
+        more.append(noisy(predicted(known.arm, one.q, rings[-1].payload), rng))
     before, after = (np.linalg.slogdet(fit_modal(known.arm, some).covariance)[1] for some in (rings, more))
     assert after < before - 1.0
 

@@ -10,7 +10,7 @@ from polars.testing import assert_frame_equal
 from tests.lab.runner_work import die, square_or_raise
 
 from tvist_controller.sources.calibrations import load as load_calibration
-from tvist_lab.runners import Failed, Here, TaskError, outcomes, processes
+from tvist_lab.runners import Failed, InlineExecutor, TaskError, outcomes, processes
 from tvist_lab.study.case import Case
 from tvist_lab.study.catalogue import some
 from tvist_lab.study.engine import run
@@ -32,7 +32,7 @@ def cluster():
         client.wait_for_workers(2)  # Dask cannot end a worker that it is just starting again
 
 
-EXECUTORS = {"processes": lambda: processes(2), "dask": cluster, "here": Here}
+EXECUTORS = {"processes": lambda: processes(2), "dask": cluster, "here": InlineExecutor}
 
 
 @pytest.fixture(autouse=True)

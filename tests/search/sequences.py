@@ -95,6 +95,9 @@ class Sequence:
         self.seed, self.description = seed, description
         self._random = np.random.default_rng([seed, 15])
         self._free = CollisionModel(description, body(paper_payload(description, 0.0)))
+        self._declared = body(paper_payload(description, 0.0))
+        self._collisions = CollisionModel(description, self._declared)
+        """The arm and what is declared, apart from the robot's own model."""
         mass = draws.mass(description, self._random)
         self._free.declare(body(paper_payload(description, mass)))
         self.robot = Subject(
@@ -199,8 +202,11 @@ class Sequence:
                 raise self._broken(breach)
 
     def _watch_clearance(self, q):
-        collisions = self.robot.controller.motion.collisions
-        meeting = collisions.meeting(q[-1])
+        declared = body(self.robot.controller.declared)
+        if declared != self._declared:
+            self._declared = declared
+            self._collisions.declare(declared)
+        meeting = self._collisions.meeting(q[-1])
         if meeting is None:
             self._excused = False
         elif not self._excused and meeting.distance < CLEARANCE - DIP:

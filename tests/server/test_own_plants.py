@@ -24,7 +24,7 @@ from tvist_protocol.codec import decode_reply, encode
 from tvist_server.config import ServeConfig
 from tvist_server.option_values import StartError
 from tvist_server.recording.recorder import Recorder
-from tvist_server.schedule import Followed
+from tvist_server.schedule import ExternalTicks
 from tvist_server.shutdown import SignalExit
 from tvist_server.workers import _rehearse
 
@@ -142,7 +142,7 @@ def test_a_plant_is_not_taken_where_there_was_none(tmp_path, place):
 
 
 def test_ticks_of_an_arm_are_late_by_what_they_exceed_a_period_and_missed_where_it_left_some_out():
-    followed, found, now = Followed(0.002, 5.0), [], 5.0
+    followed, found, now = ExternalTicks(0.002, 5.0), [], 5.0
     for gap in (0.002, 0.0025, 0.0015, 0.0071):
         now += gap
         found.append(followed.begin(now))

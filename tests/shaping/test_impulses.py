@@ -147,6 +147,14 @@ def test_an_unknown_name_lists_those_there_are_and_the_nearest():
     assert error.value.nearest == "zvddd"
 
 
+def test_what_is_left_at_the_design_equals_the_golden_values(golden):
+    for entry in golden["shapers"]:
+        left = residual(
+            entry["f_d"], entry["zeta"], SHAPERS[entry["name"]].function(entry["f_d"], entry["zeta"])
+        )
+        assert left == pytest.approx(entry["V_at_design"], abs=5e-5), entry
+
+
 def test_figure_4_comes_out_to_a_two_hundredth_of_a_percent(golden):
     for name, row in golden["sensitivity_undamped_10_5_hz"].items():
         f = np.array([float(f) for f in row])

@@ -79,6 +79,11 @@ class Turning:
         return (self.wrong if self.failing else self.right)(f_d, zeta)
 
 
+def test_a_shaper_of_the_library_keeps_its_name_and_description():
+    assert shaper_of(zv).name == "zv"
+    assert shaper_of(zv).description == SHAPERS["zv"].description
+
+
 def test_a_function_gives_the_bits_of_the_built_in_shaper_that_it_imitates():
     fixed = Fixed([7.0], [0.1])
     own, built_in = (make_filter(one, fixed, joints=1) for one in (shaper_of(fine, name="mine"), "zv"))

@@ -6,10 +6,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from tests.conformance.served import Served
+from tests.conformance.served import Served, free_endpoint
 from tests.conformance.wire import Q1, STOPPED, TICK
 from tests.system.shell import tvist
 
+from tvist_client import NotConnectedError, RefusedError
+from tvist_client.blocking import Robot
+from tvist_protocol.commands import KeepAlive
 from tvist_server.schedule import CATCH_UP
 
 from .bystander import Bystander
@@ -54,6 +57,26 @@ def freeze(served, bystander):
     with pytest.raises(AssertionError, match="no such state"):
         bystander.next("state", lambda _: False, timeout=1.0)
     served.process.send_signal(signal.SIGCONT)
+
+
+def test_a_client_of_a_killed_server_is_told_at_once_and_finds_the_next_one_by_itself():
+    endpoint = free_endpoint()
+    with Served(endpoint=endpoint) as first, Robot.connect(endpoint) as robot:
+        with robot.control("me") as arm:
+            token = arm.token
+            motion = arm.move_j(FAR, wait=False)
+            first.process.kill()
+            with pytest.raises(NotConnectedError, match="this client reconnects when it is back"):
+                motion.wait()
+            with pytest.raises(NotConnectedError):
+                arm.stop()
+        first.wait()
+        with Served(endpoint=endpoint):
+            assert next(robot.states()).tick > 0
+            with pytest.raises(RefusedError, match="no_control"):
+                robot.request(KeepAlive(token=token))
+            with robot.control("me") as arm:
+                arm.move_j([0.05, *Q1[1:]])
 
 
 class Running(Served):
@@ -108,7 +131,10 @@ LOOKS = {("time", name) for name in ("time", "time_ns", "localtime", "gmtime", "
 """What tells the wall clock's time."""
 
 
-@pytest.mark.parametrize("package", ["tvist_server", "tvist_plant", "tvist_shaping", "tvist_protocol"])
+@pytest.mark.parametrize(
+    "package",
+    ["tvist_server", "tvist_controller", "tvist_plant", "tvist_shaping", "tvist_urscript", "tvist_protocol"],
+)
 def test_nothing_in_the_server_looks_at_the_wall_clock(package):
     (folder,) = find_spec(package).submodule_search_locations
     for path in Path(folder).rglob("*.py"):

@@ -25,6 +25,27 @@ def until_written(path):
     eventually(lambda: last() > TICKS - 600)
 
 
+async def advance_and_send(number, path):
+    with Served("--clock", "lockstep", "--record", str(path), "--keep", "1s") as served:
+        async with await Robot.connect(served.endpoint, "ur5e") as robot, robot.control("a"):
+            await robot.advance(TICKS)
+        until_written(path)
+        served.end(number)
+    content = read(path)
+    ticks = [state.tick for state in content.states]
+    assert ticks == list(range(ticks[0], ticks[-1] + 1))
+    assert content.from_tick == (None if ticks[0] == 1 else ticks[0])
+    return content, ticks
+
+
+async def test_a_server_that_ends_leaves_complete_files_with_the_last_second(tmp_path):
+    content, ticks = await advance_and_send(signal.SIGTERM, tmp_path / "run.mcap")
+    assert content.complete
+    assert ticks[0] == 751
+    assert ticks[-1] >= TICKS
+    assert sorted(tmp_path.iterdir()) == [tmp_path / f"run-1-part{number:04}.mcap" for number in range(7, 12)]
+
+
 @pytest.mark.parametrize("options", [(), ("--robots", "ur5e*2", "--workers", "2")])
 async def test_a_service_that_is_killed_and_started_again_loses_no_recording(options, tmp_path):
     """As with a restart policy: the same options, the same path, and SIGKILL in between."""

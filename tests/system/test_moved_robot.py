@@ -172,13 +172,18 @@ def test_a_program_that_is_ended_at_the_robot_is_begun_again_where_the_arm_stand
 
 
 def test_a_bridge_that_was_suspended_says_that_the_robot_got_no_set_point_meanwhile(arm, bridge):
+    stood = []
+
     def suspended():
         with Robot.connect(arm.endpoint) as there:
             bridge.process.send_signal(signal.SIGSTOP)
             eventually(lambda: max(map(abs, there.state().target_qd)) < 1e-3)
+            stood.extend(there.state().target_q)
             bridge.process.send_signal(signal.SIGCONT)
 
     stopped(bridge, suspended, "no set-point reached it", mode=1)
+    with Robot.connect(arm.endpoint) as there:
+        assert there.state().target_q == pytest.approx(stood, abs=1e-3)  # nothing that waited was played
 
 
 def test_an_arm_without_power_is_switched_on_at_the_robot_and_then_here(arm, bridge):

@@ -14,7 +14,7 @@ from tvist_plant.plant import PlantError
 from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness
 from tvist_server.punctual import PRIORITY, take_priority
-from tvist_server.schedule import Followed, Schedule
+from tvist_server.schedule import ExternalTicks, Schedule
 from tvist_server.tick_counts import TickCounts
 
 log = logging.getLogger(__name__)
@@ -170,10 +170,10 @@ class Realtime(Clock):
             self._asked.set()
         robots, overloads, now, sleep = self._robots, self._overloads, time.monotonic, time.sleep
         pace, silent = robots[0].pace, False
-        schedule: Schedule | Followed = (
+        schedule: Schedule | ExternalTicks = (
             Schedule(len(robots), self._period, now())
             if pace is None
-            else Followed(robots[0].interval or self._period, now(), counts=robots[0].interval is None)
+            else ExternalTicks(robots[0].interval or self._period, now(), counts=robots[0].interval is None)
         )
         while self._running:
             if pace is not None:

@@ -9,7 +9,7 @@ KEPT = 4096  # largest number of ticks kept: eight seconds, while they are read 
 
 
 @dataclass(frozen=True)
-class Punctuality:
+class LatenessMonitor:
     """Lateness of the ticks since the last call of `look`."""
 
     ticks: int
@@ -35,7 +35,7 @@ class Lateness:
         self._count += 1
         self._worked += worked
 
-    def look(self) -> Punctuality:
+    def look(self) -> LatenessMonitor:
         """Return the lateness since the last call."""
         count, now = self._count, time.monotonic()
         late = self._late[np.arange(max(self._looked, count - KEPT), count) % KEPT] * 1e6
@@ -44,6 +44,6 @@ class Lateness:
         worked, self._worked = self._worked, 0.0  # a tick that ends between the two is not counted
         load = worked / seconds if seconds > 0.0 else 0.0
         if not len(late):
-            return Punctuality(0, seconds, 0.0, 0.0, 0.0, load)
+            return LatenessMonitor(0, seconds, 0.0, 0.0, 0.0, load)
         p50, p99 = np.percentile(late, (50, 99))
-        return Punctuality(ticks, seconds, float(p50), float(p99), float(late.max()), load)
+        return LatenessMonitor(ticks, seconds, float(p50), float(p99), float(late.max()), load)

@@ -29,7 +29,7 @@ from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.gateways.sockets import ProgramSockets
 from tvist_server.intake import RobotIntake
 from tvist_server.kernels import warm_up
-from tvist_server.lateness import Punctuality
+from tvist_server.lateness import LatenessMonitor
 from tvist_server.plan_ahead import PlanAhead
 from tvist_server.program_folder import ProgramFolder
 from tvist_server.publisher import Publisher
@@ -196,7 +196,7 @@ class ServedRobot:
 
         self.driven.post(tell)
 
-    def _telemetry(self, on_time: Punctuality) -> Telemetry:
+    def _telemetry(self, on_time: LatenessMonitor) -> Telemetry:
         controller, counters, reception = self.controller, self.controller.counters, self.reception
         gateways = self.gateways
         late, lost, limited = controller.motion.streams.counters()

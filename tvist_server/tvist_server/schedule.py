@@ -7,7 +7,7 @@ CATCH_UP = 50
 """Largest number of periods made up for after a delay; further ones are skipped to limit the burst."""
 
 
-class Followed:
+class ExternalTicks:
     """Ticks that the arm starts itself, `period` apart [s]; with `counts` False, the arm counts its missed ticks."""
 
     due = math.inf  # time from which the next tick may start: unknown

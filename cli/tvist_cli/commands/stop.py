@@ -8,8 +8,8 @@ from cyclopts import Parameter
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, failing_on, interrupted
 from tvist_cli.output import out, print_json
-from tvist_client.across import RobotPlace, place_of
 from tvist_client.fleet import Fleet, StopReport
+from tvist_client.fleet_session import RobotPlace, place_of
 from tvist_client.halt import halt
 
 

@@ -15,9 +15,9 @@ from rich.text import Text
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, failing_on, interrupted
 from tvist_cli.output import number, out, print_json, waiting
-from tvist_client.across import ManyStates
 from tvist_client.errors import MisuseError
 from tvist_client.fleet import Fleet, FleetRobot
+from tvist_client.fleet_session import ManyStates
 from tvist_client.readiness import look, mode_name
 from tvist_client.robot import Robot
 from tvist_protocol.modes import RobotMode, SafetyMode

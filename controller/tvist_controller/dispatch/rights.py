@@ -99,7 +99,7 @@ def check_step(clock: Lease | None, lease: Lease | None, step: SimulationStep) -
     return client
 
 
-class Standing(NamedTuple):
+class ControlHolders(NamedTuple):
     """Holders of control and the clock at one moment."""
 
     lease: Lease | None  # lease of the client in control

@@ -7,7 +7,7 @@ from typing import Unpack
 import numpy as np
 
 from tvist_controller.cell.live_cell import LiveCell
-from tvist_controller.dispatch.assumptions import Assumptions
+from tvist_controller.dispatch.line_parameters import LineParameters
 from tvist_controller.dispatch.rights import Authority
 from tvist_controller.events import Counters, Fields
 from tvist_controller.foresight.collision import CollisionModel
@@ -77,7 +77,7 @@ class RobotParts(ABC):
         self.guidance = Guidance(motion)
         self.force_control = ForceControl(self.guidance, self.forces, timeouts=timeouts)
         self.programs = ProgramPlayer(self._access(), safety)
-        self.assumed = Assumptions(
+        self.assumed = LineParameters(
             setup.payload, first.source, motion, self.peripherals, planner.for_lesson, self.emit,
             follows=setup.adapt == "payload",
         )  # fmt: skip

@@ -36,7 +36,7 @@ PAYLOAD = "payload"
 
 
 @dataclass(frozen=True)
-class Meeting:
+class CloseBodies:
     """A pair of bodies that are too close."""
 
     first: str
@@ -80,7 +80,7 @@ class CollisionModel:
         """Whether the first axis is vertical, so that turning it changes no heights."""
         self.declare(payload)
 
-    def meeting(self, q: Floats) -> Meeting | None:
+    def meeting(self, q: Floats) -> CloseBodies | None:
         """Return the closest pair of bodies at a posture if it is below the clearance."""
         gaps = self._gaps(q)
         number = int(np.argmin(gaps)) if len(gaps) else None
@@ -105,7 +105,7 @@ class CollisionModel:
             why = f"{met}: choose a posture in which the arm and its payload are clear"
             raise RefusalError("collision", field, why, CLEARANCE)
 
-    def on_way(self, way: CheckedMotion, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
+    def on_way(self, way: CheckedMotion, *, before: Floats | None = None) -> tuple[float, CloseBodies] | None:
         """Return the first meeting on a path with its position (share of the path), or None.
 
         Steps are long where all bodies are far apart. Pairs that are too close at the start, or at a posture
@@ -156,9 +156,9 @@ class CollisionModel:
         rooms(*self._parts, q, self._still, found)
         return found
 
-    def _meeting_of(self, gaps: Floats, number: int) -> Meeting:
+    def _meeting_of(self, gaps: Floats, number: int) -> CloseBodies:
         pair = self._parts[2][number]
-        return Meeting(self._names[int(pair[ONE])], self._names[int(pair[OTHER])], float(gaps[number]))
+        return CloseBodies(self._names[int(pair[ONE])], self._names[int(pair[OTHER])], float(gaps[number]))
 
     def _put(self, number: int, link: int, ends: Floats, radius: float) -> None:
         """Place a body by the ends of its axis in its link's pinocchio frame, shape (2, 3) [m]."""

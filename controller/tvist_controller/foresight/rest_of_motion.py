@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
+from tvist_controller.foresight.collision import CLEARANCE, CloseBodies, CollisionModel
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import StopPlan, StopPlanner, resting_after
 from tvist_controller.line.cycle import ControlCycle
@@ -40,8 +40,8 @@ class StreamGuard(Guard):
         self._reach = reach
         self._collisions, self._stops, self._torque = collisions, stops, room
         self._before: tuple[Target, float | JointStop] | None = None
-        self.met: Meeting | None = None
-        """Meeting during the latest stop that is not clear; None if it leaves the joints' range."""
+        self.met: CloseBodies | None = None
+        """Bodies that come close during the latest stop that is not clear; None if it leaves the joints' range."""
         self.obstacle = Obstacle("", "collision")  # reason for refusing the latest reference
 
     def begin(self, state: Target) -> None:
@@ -169,13 +169,13 @@ class RemainingMotion:
         last = resting_after(ahead)
         return max(last - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 
-    def after_stream(self, end: JointStop) -> Meeting | None:
+    def after_stream(self, end: JointStop) -> CloseBodies | None:
         """Return the first meeting while the end of a stream runs through the filter, else None."""
         if self._tail_is_spacious(end):
             return None
         return self._on(self._stopper.foresee(trajectory=end))
 
-    def rest_of_way(self, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> Meeting | None:
+    def rest_of_way(self, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> CloseBodies | None:
         """Return the first meeting on the rest of a motion with a new filter; if unknown, in a stop."""
         cycle = self._cycle
         coming = [part.path.whole for part in parts]
@@ -193,7 +193,7 @@ class RemainingMotion:
         guard.take(cycle.newest, stop)
         return None
 
-    def _first(self, ways: Sequence[CheckedMotion]) -> Meeting | None:
+    def _first(self, ways: Sequence[CheckedMotion]) -> CloseBodies | None:
         return next((found[1] for way in ways if (found := self._collisions.on_way(way))), None)
 
     def check_payload(self, payload: Payload, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> None:
@@ -230,7 +230,7 @@ class RemainingMotion:
             q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk)
         )
 
-    def _on(self, ahead: Floats | None) -> Meeting | None:
+    def _on(self, ahead: Floats | None) -> CloseBodies | None:
         """Return the first meeting along known references, one per tick, shape (k, n), else None."""
         if ahead is None:
             return None

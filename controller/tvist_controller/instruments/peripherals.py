@@ -139,10 +139,11 @@ class Peripherals:
     def write_registers(self, command: SetRegisters, tick: int) -> None:
         """Write all registers of a client's command, or refuse them all; output registers need control."""
         runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
-        for number, run in enumerate(runs):
+        for run in runs:
             if command.token is None and run.bank.startswith("output"):
                 why = f"token is missing: {run.bank} registers belong to the robot, and writing them needs control"
                 raise RefusalError("missing_field", "token", why)
+        for number, run in enumerate(runs):
             where = f"also[{number - 1}].values" if number else "values"
             there = BITS if run.bank.endswith("bit") else NUMBERS
             if run.first + len(run.values) > there:

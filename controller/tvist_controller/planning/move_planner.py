@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.foresight.collision import CLEARANCE, CollisionModel, Meeting
+from tvist_controller.foresight.collision import CLEARANCE, CloseBodies, CollisionModel
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.fitting import Fitter, Slower, keeping_motion
 from tvist_controller.planning.slower import Limited, longer_joint_motion, slower_joint_motion
-from tvist_controller.planning.snapshot import Course, PlanningState
+from tvist_controller.planning.snapshot import ExtendableMotion, PlanningState
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
@@ -43,7 +43,7 @@ class PlannedMove(NamedTuple):
     peak: float = math.inf  # largest `Filter.peak` at which the limits hold at full rate [-]
     room: tuple[float, float] = (math.inf, math.inf)
     """Ratios of the arm's velocity and acceleration limits to the motion's [-]."""
-    course: Course | None = None
+    course: ExtendableMotion | None = None
     """State from which its last part can be extended while it runs; None if it cannot."""
     surplus: tuple[float, float] = (0.0, 0.0)  # `Filter.surplus` of the filter it was planned for [-]
 
@@ -111,7 +111,7 @@ class MovePlanner(Fitter):
             limits.velocity * slower, limits.acceleration * slower**2, limits.jerk * slower**3
         )
 
-    def meeting(self, way: CheckedMotion, now: PlanningState) -> tuple[float, Meeting] | None:
+    def meeting(self, way: CheckedMotion, now: PlanningState) -> tuple[float, CloseBodies] | None:
         """Return the position of the first meeting on a way (share of it) and the bodies, else None."""
         if self._collisions.declared is not now.body:
             self._collisions.declare(now.body)

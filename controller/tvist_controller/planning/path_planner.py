@@ -23,7 +23,7 @@ from tvist_controller.planning.fitting import Fitted, Slower
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.slower import Limited, slower_path
-from tvist_controller.planning.snapshot import Course, PlanningState
+from tvist_controller.planning.snapshot import ExtendableMotion, PlanningState
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
 from tvist_controller.trajectory import (
@@ -252,12 +252,12 @@ def _course(
     segments: int,
     window: float,
     start: float = 0.0,  # where the run begins on the curve [m]
-) -> Course | None:
+) -> ExtendableMotion | None:
     """Return the state from which a motion can be extended; None if its duration was requested."""
     if any(piece.pacing.duration is not None for piece in run):
         return None
     branches = tuple(replace(branch, s=start + branch.s) for branch in route.branches)
-    return Course(curve, ground, law, branches, segments, window)
+    return ExtendableMotion(curve, ground, law, branches, segments, window)
 
 
 def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tuple[int, float], ...]:

@@ -21,7 +21,7 @@ SAME = 1e-9  # distance below which two knots are one [m]
 
 
 @dataclass(frozen=True)
-class Cuts:
+class ExtensionEdges:
     """Edges of a law at which it is cut for an extension."""
 
     first: int  # first one kept
@@ -30,7 +30,7 @@ class Cuts:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class ExtendableMotion:
     """A motion to the end of the known moves, and where it can be extended."""
 
     curve: SplineCurve  # the joints' motion
@@ -45,7 +45,7 @@ class Course:
         """Joint positions at its end, shape (n,) [rad]."""
         return self.curve.posture(self.curve.end)
 
-    def branch(self, until: float) -> tuple[Cuts, Branch] | None:
+    def branch(self, until: float) -> tuple[ExtensionEdges, Branch] | None:
         """Return the first point after a time [s] at which it may change, and its cuts; None if too late."""
         law, edges = self.law, self.law.edges
         moment = until * law.rate
@@ -56,12 +56,14 @@ class Course:
         for branch in self.branches:
             at = int(np.argmin(np.abs(edges - branch.s)))
             if at >= known:
-                return Cuts(first, known, at), replace(branch, s=float(edges[at]))
+                return ExtensionEdges(first, known, at), replace(branch, s=float(edges[at]))
         last, s = self.branches[-1], float(edges[known])
         begun = last.begun + s - last.s  # the arm is on its last leg already
-        return Cuts(first, known, known), Branch(s, last.legs, begun, self.curve.posture(np.array([s])))
+        return ExtensionEdges(first, known, known), Branch(
+            s, last.legs, begun, self.curve.posture(np.array([s]))
+        )
 
-    def knots(self, cuts: Cuts) -> Knots:
+    def knots(self, cuts: ExtensionEdges) -> Knots:
         """Return the knots of the part kept, up to the branch."""
         s, old = self.law.edges, self.curve.knots
         kept = slice(
@@ -97,7 +99,7 @@ class PlanningState(Struct, frozen=True, eq=False, gc=False):
     tcp: tuple[float, ...]  # tool centre point in the flange frame: x y z [m] and rotation vector [rad]
     body: Body  # payload in the collision model
     bodies: tuple[Floats, ...]  # possible inertial parameters of the last link, see `InverseDynamics.bodies`
-    after: Course | None = None  # running motion to be extended; None for a motion from rest
+    after: ExtendableMotion | None = None  # running motion to be extended; None for a motion from rest
     until: float = 0.0  # time up to which that motion stays unchanged [s]
     script: Script | None = None
     """The program or its last added statement; None if no program accepts statements."""

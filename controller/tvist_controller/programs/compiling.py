@@ -9,7 +9,7 @@ from tvist_controller.programs.library import MOVING, known_signatures
 from tvist_controller.refusal import RefusalError
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
-from tvist_urscript import Script, ScriptError
+from tvist_urscript import Script, ScriptError, compile_script
 
 KEPT = 8  # size of the cache of compiled programs; many clients send the same text repeatedly
 MAX_KEPT = 100  # largest number of stored programs
@@ -62,8 +62,6 @@ def _program(text: str) -> Script:
 
 
 def _compiled(text: str, after: Script | None = None) -> Script:
-    from tvist_urscript import compile_script  # imported late, to keep the start fast
-
     try:
         return compile_script(text, known_signatures(), after)
     except ScriptError as error:

@@ -10,7 +10,8 @@ from tvist_controller.programs.functions.force import ForceFunctions
 from tvist_controller.programs.functions.gripper import GripperFunctions
 from tvist_controller.programs.functions.motions import MotionFunctions
 from tvist_controller.programs.functions.program import MessageFunctions, SafetyFunctions, StatementFunctions
-from tvist_controller.programs.functions.settings import SettingFunctions, SetupFunctions
+from tvist_controller.programs.functions.settings import SettingFunctions
+from tvist_controller.programs.functions.setup import SetupFunctions
 from tvist_controller.programs.functions.sockets import SocketFunctions
 from tvist_controller.programs.functions.state import PoseFunctions, StateFunctions
 from tvist_controller.programs.functions.terminals import RegisterFunctions, TerminalFunctions

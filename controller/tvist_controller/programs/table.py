@@ -21,7 +21,7 @@ The functions that programs can call, besides [those of the language](../urscrip
   values that it reads are those of the present. A function that waits ends the path: the arm stops at the target of the
   last move.
 """
-COSTS = """Evaluations that a call takes from [the budget](../urscript.md#5-threads). All other functions take one.
+COSTS = """Evaluations that a call takes from [the budget](../urscript.md#4-threads). All other functions take one.
 Inverse kinematics takes 900 more for an arm without a closed form, or with a free joint, for which it searches a curve
 of postures."""
 

@@ -59,6 +59,8 @@ class MotionRecorder:
             motion.samples.append(sample)
         if resting and not motion.stop:
             motion.stop = len(motion.samples)
+            if motion.stop > LONGEST:  # too long to teach anything: its samples take 20 MB
+                self.forget()
         if motion.stop and len(motion.samples) == motion.stop + AFTER:
             done = _recorded(motion)
             self.forget()
@@ -103,7 +105,7 @@ WAITING = 16
 """Largest number of waiting studies; motions beyond, made faster than they can be studied, teach nothing."""
 
 
-class Taught(NamedTuple):
+class LessonRecord(NamedTuple):
     """A lesson and what it depends on."""
 
     beliefs: FilterState  # state assumed by the controller during the motion
@@ -122,7 +124,7 @@ class Experience:
     ) -> None:
         self._recorder = MotionRecorder()
         self._study, self._later, self._plan = study, later, plan
-        self._under_way: list[tuple[Callable[[], bool], list[Taught]]] = []
+        self._under_way: list[tuple[Callable[[], bool], list[LessonRecord]]] = []
         self._raised: list[Exception] = []
         self._said = set[str]()
         self._placements = 0
@@ -142,7 +144,7 @@ class Experience:
         record = self._recorder.take(sample, present) if held else None
         if record is None or len(self._under_way) >= WAITING:
             return
-        learnt: list[Taught] = []
+        learnt: list[LessonRecord] = []
 
         def study() -> None:
             try:
@@ -150,7 +152,7 @@ class Experience:
                 lesson = self._study(motion)
                 if lesson is not None:
                     plan = None if self._plan is None else self._plan(lesson, motion.beliefs)
-                    learnt.append(Taught(motion.beliefs, lesson, plan))
+                    learnt.append(LessonRecord(motion.beliefs, lesson, plan))
             except Exception as error:  # noqa: BLE001  the robot goes on without the lesson, and `raised` reports it
                 self._raised.append(error)
 
@@ -160,7 +162,7 @@ class Experience:
         """Drop all studies in progress, because of `forget` or another load."""
         self._under_way = []
 
-    def lessons(self) -> Iterator[Taught]:
+    def lessons(self) -> Iterator[LessonRecord]:
         """Yield the lessons of finished studies once; call while the arm rests."""
         while self._under_way and self._under_way[0][0]():
             yield from self._under_way.pop(0)[1]

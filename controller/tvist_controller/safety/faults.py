@@ -1,6 +1,7 @@
 """Deliberate faults of `simulation.inject`, applied to the arm or the safety system."""
 
 import math
+from bisect import insort
 from collections.abc import Callable
 from functools import partial
 from operator import itemgetter
@@ -66,7 +67,7 @@ class Faults:
         """Functions of faults without duration."""
         self._plant = motion.cycle.plant
         self._push = np.zeros(motion.cycle.description.joints)
-        self._ends: list[tuple[int, str, Callable[[], None]]] = []  # tick, fault, and what ends it
+        self._ends: list[tuple[int, str, Callable[[], None]]] = []  # by tick: fault, and what ends it
 
     def inject(self, command: SimulationInject, tick: int) -> None:
         """Start a fault, or raise RefusalError if the plant does not support it."""
@@ -80,7 +81,7 @@ class Faults:
         if fault == "torque":
             joint, value = command.joint or 0, command.value or 0.0
             self._add(joint, value)
-            self._ends.append((ends, fault, lambda: self._add(joint, -value)))
+            self._end_at(ends, fault, lambda: self._add(joint, -value))
             return
         # Setting or releasing an input cancels its earlier end time.
         cancelled = {*self._inputs} if fault == "normal" else {fault}
@@ -89,18 +90,17 @@ class Faults:
             begin, end = self._inputs[fault]
             begin()
             if seconds is not None:
-                self._ends.append((ends, fault, end))
+                self._end_at(ends, fault, end)
         else:
             self._momentary[fault]()
 
     @property
     def next_end(self) -> float:
         """Tick in which the next fault ends; infinite if none does."""
-        return min((tick for tick, _, _ in self._ends), default=math.inf)
+        return self._ends[0][0] if self._ends else math.inf
 
     def end(self, tick: float = math.inf) -> None:
         """End faults that expire before a tick."""
-        self._ends.sort(key=itemgetter(0))
         while self._ends and self._ends[0][0] <= tick:
             self._ends.pop(0)[-1]()
 
@@ -110,6 +110,9 @@ class Faults:
         self._push[:] = 0.0
         if self._plant.can(Plant.push):
             self._plant.push(self._push)
+
+    def _end_at(self, tick: int, fault: str, end: Callable[[], None]) -> None:
+        insort(self._ends, (tick, fault, end), key=itemgetter(0))
 
     def _add(self, joint: int, torque: float) -> None:
         self._push[joint] += torque

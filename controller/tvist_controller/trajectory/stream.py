@@ -27,6 +27,9 @@ class SetpointStream(LimitedFollower):
     the sender runs ahead, play-out continues with the newest. The result passes the `Limiter`.
     """
 
+    finished = False  # it is ended from outside
+    MAX_WAITING = 1000  # largest number of set-points waiting for play-out
+
     def __init__(
         self,
         q: Floats,  # at which the arm is at rest, shape (n,) [rad]
@@ -58,10 +61,6 @@ class SetpointStream(LimitedFollower):
         self.late = 0  # number of late or duplicate set-points
         self.lost = 0  # number of skipped sequence numbers; a gap counts at most `MAX_WAITING`
         self.limited = 0  # number of ticks in which limits kept the reference from the set-points
-
-    finished = False  # it is ended from outside
-    MAX_WAITING = 1000
-    """Largest number of set-points waiting for play-out."""
 
     def offer(self, sequence: int, q: Floats) -> bool:
         """Take a set-point; return False if it is too late or too many are waiting."""

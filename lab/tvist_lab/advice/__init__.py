@@ -3,15 +3,15 @@
 from tvist_lab.advice.advise import Advice, RingingMode, advise
 from tvist_lab.advice.in_words import as_dict, command, verdict
 from tvist_lab.advice.options import EACH, ONE, ROBOT, Option
-from tvist_lab.advice.stops import Left, StopWithRest
+from tvist_lab.advice.stops import ResidualVibration, StopWithRest
 
 __all__ = [
     "EACH",
     "ONE",
     "ROBOT",
     "Advice",
-    "Left",
     "Option",
+    "ResidualVibration",
     "RingingMode",
     "StopWithRest",
     "advise",

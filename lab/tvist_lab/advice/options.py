@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from tvist_lab.advice.stops import Left, StopWithRest, followed, shaped_by
+from tvist_lab.advice.stops import ResidualVibration, StopWithRest, followed, shaped_by
 from tvist_lab.metrics import NotMeasurableError
 from tvist_lab.metrics.ring_down import decay_rate
 from tvist_lab.recordings import Floats
@@ -47,7 +47,7 @@ class Option:
 
     shaper: str
     aim: Aim
-    left: Mapping[StopWithRest, Left]
+    left: Mapping[StopWithRest, ResidualVibration]
     """Predicted vibration after each stop, by convolution."""
     by_modes: Mapping[StopWithRest, float]
     """Vibration left according to each stop's modes, as root of the share of their energy [-]; only where

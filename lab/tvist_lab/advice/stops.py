@@ -33,7 +33,7 @@ NONLINEAR = 0.05
 FELT = 0.05  # smallest rms of a vibration that is worth a shaper [m/s²]
 
 
-class Left(NamedTuple):
+class ResidualVibration(NamedTuple):
     """Vibration after a stop."""
 
     rms: float
@@ -100,7 +100,7 @@ class StopWithRest:
         return not longer and self.way.corresponds(other.way)
 
     @cached_property
-    def unshaped(self) -> Left:
+    def unshaped(self) -> ResidualVibration:
         """Recorded vibration."""
         return self.left(np.ones(1), np.zeros(1))
 
@@ -138,7 +138,7 @@ class StopWithRest:
         moved = [[np.interp(self.time - delay, self.time, axis) for axis in signal.T] for delay in delays]
         return np.asarray(np.tensordot(sizes, moved, axes=1).T)
 
-    def left(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> Left:
+    def left(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> ResidualVibration:
         """Return the predicted vibration, see `after`; raise NotMeasurableError if too little rest remains."""
         shaped, late = self.after(sizes, delays, gears=gears), self.time - float(delays[-1]) - COUNTED_FROM
         counts = (late > 0.0) & (late <= COUNTED[1])
@@ -152,7 +152,7 @@ class StopWithRest:
         if loud.size and loud[-1] == len(late) - 1:
             still = np.inf
         least = (NONLINEAR * self.unshaped.rms) ** 2 if len(sizes) > 1 else 0.0
-        return Left((max(float(np.mean(power[counts])) - noise, 0.0) + least) ** 0.5, still)
+        return ResidualVibration((max(float(np.mean(power[counts])) - noise, 0.0) + least) ** 0.5, still)
 
 
 def followed(recording: Recording) -> str:
@@ -170,7 +170,7 @@ def _at(times: Floats, time: Floats, values: Floats) -> Floats:
     return np.column_stack([np.interp(times, time, axis) for axis in values.T])
 
 
-def shaped_by(stop: StopWithRest, impulses: Impulses, *, gears: bool = True) -> Left:
+def shaped_by(stop: StopWithRest, impulses: Impulses, *, gears: bool = True) -> ResidualVibration:
     """Predict the vibration after a stop with a shaper; see `StopWithRest.left`."""
     return stop.left(np.asarray(impulses.A), np.asarray(impulses.tau), gears=gears)
 

@@ -8,7 +8,7 @@ from tvist_lab.recordings.checks import ACCELEROMETER, GYROSCOPE, TIME
 from tvist_lab.recordings.read import read
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.recordings.table import SENSOR, ticks_of
-from tvist_lab.recordings.two_clocks import RATE, Clocks, Felt, at_flange, by_sensor, fits
+from tvist_lab.recordings.two_clocks import RATE, BodyFrameSignal, Clocks, at_flange, by_sensor, fits
 from tvist_lab.words import counted
 from tvist_plant.description import DescriptionError, RobotDescription, load, robots
 from tvist_plant.user_file import UserFileError
@@ -94,7 +94,7 @@ def _robot(recording: Recording, robot: str | None) -> tuple[RobotDescription, l
         raise JoinError(str(error)) from error
 
 
-def _told(imu: Path, felt: Felt, sensor: Recording, *, force: bool) -> tuple[Clocks, float]:
+def _told(imu: Path, felt: BodyFrameSignal, sensor: Recording, *, force: bool) -> tuple[Clocks, float]:
     """Return the relation of the clocks, and the gyroscope's unit in SI."""
     least, moved = MOVED[force]
     if (amount := float(felt.change.sum()) / RATE) < least:

@@ -45,7 +45,7 @@ TURN, BIAS, LEVER = slice(2, 5), slice(5, 8), slice(8, None)
 
 
 @dataclass(frozen=True)
-class Felt:
+class BodyFrameSignal:
     """A vector over time, in axes that move with it."""
 
     time: Floats  # times on its own clock, spaced by 1/`RATE`, shape (T,) [s]
@@ -63,13 +63,13 @@ class Felt:
         return more
 
 
-def by_sensor(time: Floats, vector: Floats, *, force: bool) -> Felt:
+def by_sensor(time: Floats, vector: Floats, *, force: bool) -> BodyFrameSignal:
     """Resample a sensor's angular velocity [rad/s] or specific force [m/s²], shape (T, 3), in its own axes."""
     grid, values, known = _resampled(time, vector)
     return _smoothed(grid, values, known, np.zeros((len(grid), 3, 3 if force else 0)))
 
 
-def at_flange(robot: RobotDescription, time: Floats, q: Floats, *, force: bool) -> Felt:
+def at_flange(robot: RobotDescription, time: Floats, q: Floats, *, force: bool) -> BodyFrameSignal:
     """Return what a sensor at the flange would measure, by forward kinematics.
 
     ω = Rᵀ J_ω q̇, and f = Rᵀ (p̈ + g z) with an upright base. A sensor at r from the flange measures f + α x r + ω x
@@ -114,12 +114,12 @@ def _resampled(time: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
     return grid, np.column_stack([np.interp(grid, time, axis) for axis in values.T]), known
 
 
-def _smoothed(grid: Floats, values: Floats, known: Floats, lever: Floats) -> Felt:
+def _smoothed(grid: Floats, values: Floats, known: Floats, lever: Floats) -> BodyFrameSignal:
     """Smooth equally spaced rows and reduce them to `RATE`."""
     every = round(1.0 / (RATE * (grid[1] - grid[0])))
     width = SMOOTHING[bool(lever.shape[2])] * RATE * every
     smooth, arms = (gaussian_filter1d(one, width, axis=0)[::every] for one in (values, lever))
-    return Felt(grid[::every], smooth, arms, known[::every])
+    return BodyFrameSignal(grid[::every], smooth, arms, known[::every])
 
 
 def _crossing(vector: Floats) -> Floats:
@@ -151,7 +151,7 @@ class Clocks:
         return self.other - self.middle + self.drift * (time - self.middle)
 
 
-def fits(first: Felt, other: Felt) -> list[Clocks]:
+def fits(first: BodyFrameSignal, other: BodyFrameSignal) -> list[Clocks]:
     """Return the possible alignments of two signals, that which explains most first."""
     found: list[Clocks] = []
     for start, drift in _places(first, other):
@@ -163,7 +163,7 @@ def fits(first: Felt, other: Felt) -> list[Clocks]:
     return sorted(found, key=lambda clocks: -clocks.explained)
 
 
-def _places(first: Felt, other: Felt) -> Iterator[tuple[float, float]]:
+def _places(first: BodyFrameSignal, other: BodyFrameSignal) -> Iterator[tuple[float, float]]:
     """Yield the other clock at the first row, and its drift, where both signals are active at once."""
     length, rows = first.time[-1] - first.time[0], COARSE / RATE
     moved, moved_there = first.change[::COARSE], other.change
@@ -183,7 +183,7 @@ def _places(first: Felt, other: Felt) -> Iterator[tuple[float, float]]:
             yield start, drift
 
 
-def _fitted(first: Felt, other: Felt, start: float, drift: float) -> Clocks | None:
+def _fitted(first: BodyFrameSignal, other: BodyFrameSignal, start: float, drift: float) -> Clocks | None:
     """Fit everything from a starting point by Gauss-Newton; None if that leaves the common time."""
     # Use the derivative of the first signal: joint angles have little ringing and noise.
     rate = np.gradient(first.vector, 1.0 / RATE, axis=0)

@@ -8,7 +8,14 @@ from pathlib import Path
 from tvist_controller.api.line import OwnShaper
 from tvist_lab.study.foreign import FromFile
 from tvist_lab.study.menus import ROWS, Kind, MenuMethod, row, rows
-from tvist_lab.study.method import ConstantMeanDelay, ConstantModes, Longer, Method, Named, PeriodOfJerk
+from tvist_lab.study.method import (
+    ConstantMeanDelay,
+    ConstantModes,
+    Method,
+    Named,
+    PeriodOfJerk,
+    StretchedDoubleS,
+)
 from tvist_lab.study.recipes import Recipe, longest_mean_delay, robust
 from tvist_lab.study.study import StudyError
 from tvist_plant.description import RobotDescription
@@ -43,7 +50,7 @@ def _as_long_as(
     row: MenuMethod, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
 ) -> Method:
     like = next(one for one in ROWS if one.name == row.of)
-    return Longer(row.name, row.label, build_method(like, recipe, description, masses))
+    return StretchedDoubleS(row.name, row.label, build_method(like, recipe, description, masses))
 
 
 _MAKERS: dict[Kind, Callable[[MenuMethod, Recipe, RobotDescription, tuple[float, float]], Method]] = {
@@ -59,7 +66,7 @@ _MAKERS: dict[Kind, Callable[[MenuMethod, Recipe, RobotDescription, tuple[float,
     ),
     "for workspace": _for_workspace,
     "held": _held,
-    "longer": lambda row, *_: Longer(row.name, row.label),
+    "longer": lambda row, *_: StretchedDoubleS(row.name, row.label),
     "as long as": _as_long_as,
     "jerk of a period": lambda row, recipe, *_: PeriodOfJerk(recipe, row.name, row.label),
 }

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import polars as pl
 
-from tvist_lab.runners import Failed, Here, outcomes, processes
+from tvist_lab.runners import Failed, InlineExecutor, outcomes, processes
 from tvist_lab.study.store import Store
 from tvist_lab.study.study import Study
 from tvist_lab.study.work import FAILED, Row, failed, measure_each, why
@@ -49,7 +49,7 @@ def run(
         missing = [place for place in range(len(study.cases)) if place not in done]
         if missing:
             few = len(missing) * next(study.jobs(missing)).motions <= FEW_MOTIONS
-            pool = stack.enter_context((executor or (Here if few else processes))())
+            pool = stack.enter_context((executor or (InlineExecutor if few else processes))())
             _run(missing, study, store, pool, stack.enter_context(progress(len(missing))))
         return StudyRun(store.finish(), len(done), len(missing))
 

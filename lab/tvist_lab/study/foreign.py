@@ -5,7 +5,6 @@ import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -54,7 +53,7 @@ class FromFile(SampleMethod):
     name: str
     label: str
 
-    def stepper(self, task: Task) -> "Foreign":
+    def stepper(self, task: Task) -> "UserShaper":
         """Return a new shaper, reset."""
         description, move = task.description, task.move
         estimator = self.recipe.estimator(description, move.mass, MODES)
@@ -73,10 +72,10 @@ class FromFile(SampleMethod):
             raise
         except Exception as error:
             raise ShaperFaultError(f"raises {named(error)} when it is made") from error
-        return Foreign(made, info, estimator, np.array(move.start), np.array(description.limits.position))
+        return UserShaper(made, info, estimator, np.array(move.start), np.array(description.limits.position))
 
 
-class Foreign:
+class UserShaper:
     """A user's shaper in operation."""
 
     def __init__(self, made: Any, info: TickInfo, estimator: Estimator, start: Floats, reach: Floats) -> None:
@@ -125,13 +124,22 @@ class Foreign:
         return q_star.copy()
 
 
-@cache
+_loaded: dict[Path, Callable[[], Any]] = {}
+
+
 def load_shaper(path: Path) -> Callable[[], Any]:
     """Return a function that creates the file's shaper: its class with `step`, or one that returns its module.
 
     The file is run once in each process, so its module's state persists from motion to motion. Raises
     CandidateError if the file cannot be run, or does not contain exactly one shaper.
     """
+    file = path.resolve()
+    if file not in _loaded:
+        _loaded[file] = _load(path)
+    return _loaded[file]
+
+
+def _load(path: Path) -> Callable[[], Any]:
     if not path.is_file():
         raise CandidateError(f"shaper {path}: there is no such file")
     module = run_file(path, "shaper", CandidateError)

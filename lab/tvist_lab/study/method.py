@@ -174,7 +174,7 @@ class Planned(Method):
 
 
 @dataclass(frozen=True)
-class Longer(Planned):
+class StretchedDoubleS(Planned):
     """A double S with less jerk that takes as long as another motion, without a model."""
 
     name: str

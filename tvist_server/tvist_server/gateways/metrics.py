@@ -93,8 +93,8 @@ class Metrics(Collector):
         for kind, name, what, source, field in FIGURES:
             family = families[kind](name, what, labels=LABELS)
             for robot in self._robots:
-                value = getattr(getattr(robot, source), field, None)
-                if value is not None:
+                message = getattr(robot, source)
+                if message is not None and (value := getattr(message, field)) is not None:
                     family.add_metric(robot.labels, value)
             yield family
         late = GaugeMetricFamily(

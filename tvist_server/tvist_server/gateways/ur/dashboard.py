@@ -73,7 +73,8 @@ def _mode(title: str, field: str, unknown: RobotMode | SafetyMode) -> Handler:
     """Return a handler that answers with a mode of the last tick, or with `unknown` before the first."""
 
     def carry_out(request: Request) -> str:
-        mode = type(unknown)(getattr(request.robot.latest, field, unknown))
+        latest = request.robot.latest
+        mode = unknown if latest is None else type(unknown)(getattr(latest, field))
         return f"{title}: {mode.name}"
 
     return carry_out

@@ -22,7 +22,7 @@ from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
 
 
-class Assumptions:
+class LineParameters:
     """The control line's payload and filter, changed without disturbing the motion."""
 
     def __init__(

@@ -42,7 +42,7 @@ def place_of(text: str) -> RobotPlace:
     return RobotPlace(keys.check_namespace(namespace) if namespace else "", keys.check_robot_name(robot))
 
 
-class Across(ABC):
+class FleetSession(ABC):
     """A session with the robots in or below a namespace (empty: all). Use it as an asynchronous context."""
 
     def __init__(
@@ -87,7 +87,7 @@ class Newest(NamedTuple):
     at: float  # time of its arrival on the loop's clock [s]
 
 
-class ManyStates(Across):
+class ManyStates(FleetSession):
     """Newest state of each robot that a key selects, decoded by `look`. Use it as an asynchronous context.
 
     `selector` is a key with wildcards that ends in `/state`, such as `tvist/*/state`, or `**/tvist/*/state` for all
