@@ -19,11 +19,13 @@ from tvist_lab.programs.results import Shortcoming, as_dict, summary
 from tvist_lab.programs.running import InputError, ProgramServer, run_in_lockstep
 from tvist_lab.programs.watch import ProgramMessage, ProgramWatch
 from tvist_lab.words import counted
-from tvist_plant.user_file import LARGEST, UserFileError, read_text
+from tvist_plant.user_file import LARGEST, UserFileError
 from tvist_protocol.errors import harmless
 from tvist_server.config import ServeConfig
 from tvist_server.gateways.base import GatewayError
 from tvist_server.option_values import StartError
+from tvist_server.polyscope.files import read_program
+from tvist_server.program_folder import SCRIPT, URP
 from tvist_server.recording import RecorderError
 from tvist_server.server import Server
 from tvist_server.shutdown import Shutdown
@@ -41,8 +43,8 @@ def _is_stdin(file: Path) -> bool:
     return str(file).strip() == "-"  # `readable` may have put a blank before it
 
 
-def read_script(file: Path) -> str:
-    """Read a program; `-` reads the standard input."""
+def read_script(file: Path, skip: Sequence[str] = ()) -> str:
+    """Read a program, without the nodes of some URCaps; `-` reads the standard input."""
     if _is_stdin(file):
         content = sys.stdin.buffer.read(LARGEST + 1)
         if len(content) > LARGEST:
@@ -56,9 +58,27 @@ def read_script(file: Path) -> str:
             raise Failure(why, code=2) from error
     with failing_on(OSError, exit_code=2):
         try:
-            return read_text(file, "program")
+            return read_program(file, frozenset(skip))
         except UserFileError as error:
             raise Failure(str(error), code=2) from error
+
+
+def programs_in(files: Sequence[Path]) -> list[Path]:
+    """Return files, with folders replaced by their programs; of one saved by PolyScope, its own export is left out."""
+    found: list[Path] = []
+    for file in files:
+        inside = sorted(file.rglob("*")) if file.is_dir() else [file]
+        programs = [one for one in inside if one.suffix in {SCRIPT, URP}] if file.is_dir() else inside
+        if not programs:
+            raise Failure(f"folder {file} has no programs: files that end with {SCRIPT} or {URP}", code=2)
+        found += [one for one in programs if one.suffix != SCRIPT or one.with_suffix(URP) not in programs]
+    return found
+
+
+def print_scripts(files: Sequence[Path], skip: Sequence[str]) -> None:
+    """Print programs as URScript."""
+    for file in programs_in(files):
+        print(read_script(file, skip), end="")
 
 
 def placed(file: Path, finding: ProgramFinding) -> str:
@@ -67,9 +87,10 @@ def placed(file: Path, finding: ProgramFinding) -> str:
     return f"{named(file)}:{finding.line}:{finding.column}: {kind}{finding.text}"
 
 
-def check_scripts(files: Sequence[Path], *, json: bool) -> None:
+def check_scripts(files: Sequence[Path], skip: Sequence[str], *, json: bool) -> None:
     """Print the errors and warnings of programs; raise Failure if there are errors."""
-    found = [(one, finding) for one in files for finding in check_program(read_script(one))]
+    files = programs_in(files)
+    found = [(one, finding) for one in files for finding in _findings(one, skip, alone=len(files) == 1)]
     errors = sum(finding.level == "error" for _, finding in found)
     if json:
         findings = [
@@ -83,6 +104,16 @@ def check_scripts(files: Sequence[Path], *, json: bool) -> None:
             print(harmless(placed(one, finding)))
     if errors:
         raise Failure(f"{counted(errors, 'error')} in {counted(len(files), 'program')}")
+
+
+def _findings(file: Path, skip: Sequence[str], *, alone: bool) -> Sequence[ProgramFinding]:
+    """Check a program; of several, one that cannot be read is an error in its first line."""
+    try:
+        return check_program(read_script(file, skip))
+    except Failure as error:
+        if alone:
+            raise
+        return [ProgramFinding(1, 1, "error", str(error))]
 
 
 @dataclass(frozen=True)
@@ -150,8 +181,12 @@ class Runner:
     baseline: Mapping[str, Run] | None  # earlier runs by program name; None if there is no baseline
     tell: ProgramConsole
 
-    def run(self, file: Path, text: str) -> ProgramOutcome:
-        """Run a program, unless it does not compile."""
+    def run(self, file: Path, text: str | Failure) -> ProgramOutcome:
+        """Run a program, unless it does not compile or was not read."""
+        if isinstance(text, Failure):
+            why = asdict(Shortcoming("refused", str(text)))
+            result = {"file": named(file), "ok": False, "exit_reason": "refused", "failures": [why]}
+            return ProgramOutcome(result, failure=text)
         if (refused := _refused(file, text)) is not None:
             return refused
         lockstep = self.config.clock == "free"

@@ -198,10 +198,11 @@ def _npz(folder):
 
 
 def _program_contents():
-    from tests.server.test_program_folder import SCRIPT_NODE, TEXT, polyscope
+    from tests.server.polyscope_files import expression, move, saved, waypoint
 
-    wait = "<Wait type='Sleep'><waitTime>0.5</waitTime></Wait>"
-    return TEXT, polyscope(SCRIPT_NODE, wait), gzip.compress(polyscope(SCRIPT_NODE).encode())
+    assigned = f"<Assignment><variable name='x'/>{expression('[1, 2.5]')}</Assignment>"
+    tree = saved(assigned, move(waypoint("A", (0, -1.5, 1, 0, 0, 0))), repeats=True)
+    return "def pick():\n  sync()\nend\n", tree, gzip.compress(tree.encode())
 
 
 def _written(name, *contents):

@@ -1,23 +1,19 @@
 """Folder with programs that clients load by name."""
 
-import zlib
 from pathlib import Path, PurePosixPath
-from typing import Final
 
 import msgspec
 
 from tvist_controller.dispatch.admission import Admitted
-from tvist_plant.user_file import LARGEST, UserFileError, read_bytes
+from tvist_plant.user_file import UserFileError, read_bytes
 from tvist_protocol.codec import decode, encode
 from tvist_protocol.info import Info
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad
 from tvist_protocol.replies import Refused
-from tvist_server.polyscope import script_of
+from tvist_server.polyscope.files import text_of
 
 SCRIPT, URP = ".script", ".urp"
 """File endings. A script is URScript text; a .urp file is the same, or a program saved by PolyScope."""
-_GZIP: Final = b"\x1f\x8b"
-_XML: Final = b"<"
 
 
 class ProgramFolder:
@@ -53,7 +49,7 @@ class ProgramFolder:
                 continue
             except (OSError, ValueError) as error:  # a name may contain characters that no file name can
                 raise UserFileError(f"program {str(path)!r} cannot be read: {error}") from error
-            return _checked(path, _text(path, data))
+            return _checked(path, text_of(path, data))
         return None
 
     def complete(self, admitted: Admitted) -> Admitted | Refused:
@@ -75,29 +71,6 @@ class ProgramFolder:
         content = decode(Info, info)
         programs = sorted({*content.programs, *self.names()})
         return encode(msgspec.structs.replace(content, programs=programs))
-
-
-def _text(path: Path, data: bytes) -> str:
-    """Return the text of a program file; raise UserFileError if it is neither text nor a simple PolyScope program."""
-    if data.startswith(_GZIP):
-        unpack = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
-        try:
-            data = unpack.decompress(data, LARGEST)
-        except zlib.error as error:
-            raise UserFileError(f"program {path} is packed, and cannot be unpacked: {error}") from error
-        if not (unpack.eof or unpack.unconsumed_tail):
-            raise UserFileError(f"program {path} is packed, and its end is missing")
-        if unpack.unconsumed_tail:
-            raise UserFileError(f"program {path} has more than {LARGEST >> 20} MiB when it is unpacked")
-    if data.lstrip().startswith(_XML):
-        try:
-            return script_of(path.stem, data)
-        except UserFileError as error:
-            raise UserFileError(f"program {path}: {error}") from error
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise UserFileError(f"program {path} is not text in UTF-8: byte {error.start}") from error
 
 
 def _checked(path: Path, text: str) -> str:

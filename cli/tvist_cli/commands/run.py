@@ -21,6 +21,8 @@ NO_LIMITS = RunLimits()
 def run(
     *file: Annotated[Path, Parameter(required=True)],
     check: bool = False,
+    translate: bool = False,
+    skip: list[str] | None = None,
     lockstep: bool = False,
     inputs: Annotated[list[str] | None, Parameter(name="--input")] = None,
     timeout: float | None = None,
@@ -31,7 +33,7 @@ def run(
     json: bool = False,
     **given: Any,
 ) -> None:
-    """Run a URScript program on a new robot, print its messages as they come, and end with an exit code.
+    """Run a program on a new robot, print its messages as they come, and end with an exit code.
 
     Exit code 0: the program ended by itself, within all limits. Exit code 1: it does not compile; an error, a
     protective stop, a safety stop, a client or --timeout ended it; or it exceeded a limit, or differs from
@@ -47,9 +49,13 @@ def run(
     program starts, and ends with an error when it calls that function.
 
     Args:
-        file: Run this program, or with --lockstep or --check these programs; - reads the standard input.
+        file: Run this program, URScript or a .urp file that PolyScope saved; with --lockstep or --check these
+            programs, or all programs of a folder and its subfolders. - reads the standard input.
         check: Look for errors without running anything, and print each as FILE:LINE:COLUMN: text. Exit code
             0: there is none. Exit code 1: there is at least one. Exit code 2: a file cannot be read.
+        translate: Print the program as URScript instead of running it.
+        skip: Leave out the nodes of this URCap in .urp files, repeatable: a name such as Robotiq_Copilot, or one of its
+            nodes such as 'Robotiq_Copilot: Force Control'.
         lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real
             time. A program that waits for a client then waits for ever: see --input and --timeout. It can
             open sockets only to the gripper of a cell.
@@ -65,17 +71,20 @@ def run(
         json: Print one JSON object at the end instead of messages; for several programs it contains a list.
         given: Fields of `ServeConfig`.
     """
-    from tvist_cli.program_runs import check_scripts
+    from tvist_cli.program_runs import check_scripts, print_scripts
     from tvist_cli.running import run_programs
 
+    if translate:
+        print_scripts(file, skip or ())
+        return
     if check:
         if any((given, lockstep, inputs, config, timeout is not None, limits != NO_LIMITS, junit, baseline)):
             raise Failure(
                 "--check runs nothing, so that only --json goes with it: leave the others out", code=2
             )
-        check_scripts(file, json=json)
+        check_scripts(file, skip or (), json=json)
         return
     run_programs(
-        file, given, lockstep=lockstep, inputs=inputs or (), timeout=timeout, limits=limits, junit=junit,
-        baseline=baseline, config=config, json=json,
+        file, given, skip=skip or (), lockstep=lockstep, inputs=inputs or (), timeout=timeout, limits=limits,
+        junit=junit, baseline=baseline, config=config, json=json,
     )  # fmt: skip

@@ -30,6 +30,7 @@ from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, Proces
 from tvist_protocol.transitions import Activity
 from tvist_urscript import Array, Fault, Pose, costs
 
+OUT_OF_REACH: Final = 10.0  # distance of a pose from the base that no arm reaches [m]
 LONGEST: Final = 3600.0  # longest duration of a move [s]
 ARRIVED = 1e-5  # distance at which a move without blend has arrived [m, and rad times `TURN`]
 TURN = 0.25  # length equivalent to a turn by 1 rad [m]
@@ -144,16 +145,24 @@ class MotionFunctions(Family):
     def movel(
         self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, t: Duration = 0, r: Blend = 0
     ) -> Turns:
-        """Move the tool on a straight line to a pose, or to the pose at joint positions."""
-        return self._follow(
-            LineSegment(
-                pose=self._pose("pose", pose),
-                velocity=_within(v, "velocity"),
-                acceleration=_within(a, "acceleration"),
-                duration=t or None,
-                blend=r,
-            )
+        """Move the tool on a straight line to a pose, or to the pose at joint positions.
+
+        PolyScope's motions "until" something happens are moves to a pose 1 km away: towards such a pose the tool moves
+        until it is stopped.
+        """
+        segment = LineSegment(
+            pose=self._pose("pose", pose),
+            velocity=_within(v, "velocity"),
+            acceleration=_within(a, "acceleration"),
+            duration=t or None,
+            blend=r,
         )
+        if float(np.linalg.norm(segment.pose[:3])) <= OUT_OF_REACH:
+            return self._follow(segment)
+        way = np.subtract(segment.pose[:3], self._kinematics.tool_pose(np.array(self._near))[:3])
+        distance = float(np.linalg.norm(way))
+        twist = (*(segment.velocity * way / distance), 0.0, 0.0, 0.0)
+        return self.speedl(twist, segment.acceleration, distance / segment.velocity)
 
     @costs(60)
     def movep(self, pose: object, a: ToolRate = 1.2, v: ToolRate = 0.25, r: Blend = 0) -> Turns:

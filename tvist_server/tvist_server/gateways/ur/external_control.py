@@ -7,8 +7,8 @@ from typing import Final
 
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.programs import MAX_SCRIPT
-from tvist_server.polyscope import program, with_external_control
-from tvist_server.polyscope_nodes import EXTERNAL_CONTROL
+from tvist_server.polyscope.contributed import EXTERNAL_CONTROL
+from tvist_server.polyscope.script import program, with_external_control
 from tvist_server.program_folder import ProgramFolder
 
 FILE: Final = "external_control.urp"  # built-in program that consists of the node alone

@@ -1,0 +1,271 @@
+"""Programs that PolyScope saved: the URScript of each kind of node, and what is refused."""
+
+import numpy as np
+import pytest
+from tests.server.polyscope_files import contributed, expression, move, saved, waypoint
+
+from tvist_controller.programs.checking import check_program
+from tvist_plant.user_file import UserFileError, xml
+from tvist_server.polyscope.contributed import EXTERNAL_CONTROL
+from tvist_server.polyscope.files import read_program, text_of
+from tvist_server.polyscope.positions import tool_pose
+from tvist_server.polyscope.references import References
+from tvist_server.polyscope.script import program, with_external_control
+
+Q = (-1.5, -1.6, -2.2, -0.8, 1.6, 0.0)
+GRIPPER = "com.robotiq.urcap.gripper."
+DIRECTION = "gui.program.direction.MoveDirectionNode"
+PARTS = (
+    "<ExpressionToken token=' not '/>", "<ExpressionIO><pin referencedName='digital_in[2]'/></ExpressionIO>", "≠",
+    "<ExpressionVariable><ProgramVariable name='x'/></ExpressionVariable>",
+)  # fmt: skip
+TOOL = "<feature referencedName='Joint_6_name'/>"
+
+
+@pytest.fixture
+def lines(tmp_path):
+    """The lines of a program without indentation, between its first label and its end."""
+
+    def translate(*nodes, skip=(), **parts):
+        text = text_of(tmp_path / "p.urp", saved(*nodes, **parts).encode(), frozenset(skip))
+        assert [one for one in check_program(text) if "in column 1" not in one.text] == []
+        return [line.strip() for line in text.splitlines()[1:-1]]
+
+    return translate
+
+
+@pytest.mark.parametrize(
+    ("node", "script"),
+    [
+        ("<Comment comment='why'/>", ["$ 2 \"'why'\""]),
+        ("<Folder name='f'><children><Halt/></children></Folder>", ['$ 2 "f"', '$ 3 "Halt"', "halt"]),
+        ("<SuppressedNode><suppressedNode class='Halt'/></SuppressedNode>", []),
+        ("<Script type='File'><cachedContents>a=1\nb=2</cachedContents><file>/programs/s.script</file></Script>",
+         ['$ 2 "Script: s.script"', "a=1", "b=2"]),
+        (f"<Script type='Line'>{expression('sync()')}</Script>", ['$ 2 "sync()"', "sync()"]),
+        ("<Wait type='Sleep'><waitTime>0.5</waitTime></Wait>", ['$ 2 "Wait: 0.5"', "sleep(0.5)"]),
+        (f"<Wait type='Condition'>{expression('True')}</Wait>",
+         ['$ 2 "Wait: True"', "while (not(True)):", "sync()", "end"]),
+        ("<Wait type='DigitalInput'><pin referencedName='digital_in[3]'/><digitalValue>1</digitalValue></Wait>",
+         ['$ 2 "Wait: get_standard_digital_in(3) == True"',
+          "while (not(get_standard_digital_in(3) == True)):", "sync()", "end"]),
+        ("<Popup type='Error' message='no part' haltProgram='true'/>",
+         ['$ 2 "Popup: no part"', 'popup("no part", "Error", False, True, blocking=True)', "halt"]),
+        (f"<Assignment><variable name='x'/>{expression('1≟2')}</Assignment>", ['$ 2 "x≔1≟2"', "global x=1 == 2"]),
+        (f"<Assignment><variable name='x'/>{expression(*PARTS)}</Assignment>",
+         ['$ 2 "x≔ not digital_in[2]≠x"', "global x=  not  get_standard_digital_in(2) != x"]),
+        (f"<Assignment><variable name='Größe'/>{expression('1')}</Assignment>",
+         ['$ 2 "Gru246u223e≔1"', "global Gru246u223e=1"]),
+        ("<Loop type='Counting' count='3'><loopVariable name='i'/><children><Halt/></children></Loop>",
+         ['$ 2 "Loop 3 times"', "i = 0", "while (i < 3):", '$ 3 "Halt"', "halt", "i = i + 1", "end"]),
+        (f"<Loop type='While' checkContinuously='true'>{expression('True')}<children><Halt/></children></Loop>",
+         ['$ 2 "Loop True"', "thread Thread_while_2():", "while (True):", '$ 3 "Halt"', "halt", "sync()", "end", "end",
+          "if (True):", "global thread_handler_2=run Thread_while_2()", "while (True):", "sync()", "end",
+          "kill thread_handler_2", "end"]),
+        ("<Set type='NoAction'/>", ['$ 2 "Set"']),
+        ("<Set type='DigitalOutput'><pin referencedName='tool_out[0]'/><digitalValue>1</digitalValue></Set>",
+         ['$ 2 "Set tool_out[0]=On"', "set_tool_digital_out(0, True)"]),
+        (f"<Switch>{expression('2')}<children><Case caseValue='1'/><Case caseValue='2147483647'/></children></Switch>",
+         ['$ 2 "Switch 2"', "switch_1 = 2", '$ 3 "Case 1"', "if (1 == switch_1):", "else:", '$ 4 "Default Case"',
+          "end"]),
+        (contributed(f"{GRIPPER}GripperNode", "Gripper", positionInDouble=50.0, speedInDouble=30.0, forceInDouble=0.0),
+         ['$ 2 "Gripper"', "rq_set_pos(128)", "rq_set_speed(77)", "rq_set_force(0)", "rq_go_to()", "rq_wait()"]),
+        (contributed(f"{GRIPPER}GripperActivate", "Gripper Activate"),
+         ['$ 2 "Gripper Activate"', "rq_activate_and_wait()"]),
+    ],
+)  # fmt: skip
+def test_a_node_becomes_what_polyscope_writes_for_it(lines, node, script):
+    assert lines(node) == ['$ 1 "Robot Program"', *script]
+
+
+def test_branches_end_once(lines):
+    branches = "".join(
+        f"<If type='{kind}'>{expression('True') if kind != 'Else' else expression('')}<children/></If>"
+        for kind in ("If", "ElseIf", "Else")
+    )
+    assert lines(branches)[1:] == [
+        '$ 2 "If True"', "if (True):", "elif (True):", '$ 3 "ElseIf True"', "else:", '$ 4 "Else"', "end",
+    ]  # fmt: skip
+
+
+def test_a_grip_check_asks_whether_the_gripper_holds_something(lines):
+    held = contributed(f"{GRIPPER}gripper_validation_if_node", "If", "<Halt/>")
+    other = contributed(f"{GRIPPER}gripper_validation_else_node", "Else", "<Halt/>")
+    check = contributed(
+        f"{GRIPPER}gripper_validation_node", "Grip Check", held, other, ObjectDetectedKey="false"
+    )
+    assert [line for line in lines(check) if not line.startswith("$")] == [
+        "if (not(rq_is_object_detected())):", "halt", "else:", "halt", "end",
+    ]  # fmt: skip
+
+
+DH = (
+    (0.0,) * 6,
+    (0, -0.425, -0.3922, 0, 0, 0),
+    (0.1625, 0, 0, 0.1333, 0.0997, 0.0996),
+    (1.57, 0, 0, 1.57, -1.57, 0),
+)
+KINEMATICS = "".join(
+    f"<{name} value='{', '.join(map(str, row))}'/>"
+    for name, row in zip(("deltaTheta", "a", "d", "alpha"), DH, strict=True)
+)
+KNOWN = f"<TCPOffset pose='0, 0, 0.1, 0, 0, 0'/><Kinematics>{KINEMATICS}</Kinematics>"
+
+
+def test_a_taught_waypoint_is_a_pose_by_the_kinematics_in_the_file_and_the_posture_near_it(lines):
+    text = lines(
+        move(waypoint("A 1", Q, kinematics=KNOWN)), move(waypoint("A 1", Q, kinematics=KNOWN), kind="MoveL")
+    )
+    assert text[-3:] == ['$ 4 "MoveL"', '$ 5 "A 1"', "movel(A_1_p, a=2.0, v=1.5)"]
+    assert "movej(get_inverse_kin(A_1_p, qnear=A_1_q), a=2.0, v=1.5)" in text
+    assert text.count(f"global A_1_q={list(Q)}") == 1
+    straight = tool_pose(xml(f"<position><JointAngles angles='0,0,0,0,0,0'/>{KNOWN}</position>".encode()))
+    flat = [0.0, -0.425 - 0.3922, 0.0]
+    assert np.allclose(straight[0], flat[1], atol=1e-3)
+    assert straight[1] == pytest.approx(-0.1333 - 0.0996 - 0.1, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("node", "script"),
+    [
+        (move(waypoint("A", Q)), "movej(A_q, a=2.0, v=1.5)"),
+        (move(waypoint("A", Q, "<motionParameters jointSpeed='0.3' blendRadius='0.05'/>")),
+         "movej(A_q, a=2.0, v=0.3, r=0.05)"),
+        (move("<Waypoint type='Variable'><variable name='x'/></Waypoint>", kind="MoveL"), "movel(x, a=2.0, v=1.5)"),
+        (move(waypoint("A", Q), waypoint("B", Q), kind="MoveP", blendRadius=0.02), "movep(B_q, a=2.0, v=1.5, r=0.0)"),
+        (move(waypoint("A", Q), waypoint("B", Q), kind="MoveP", blendRadius=0.02), "movep(A_q, a=2.0, v=1.5, r=0.02)"),
+        (move(f"<CircleMove OrientationMode='FIXED'><children>{waypoint('A', Q) * 2}</children></CircleMove>",
+              kind="MoveP", blendRadius=0.02), "movec(A_q, A_q, a=2.0, v=1.5, r=0.0, mode=1)"),
+    ],
+)  # fmt: skip
+def test_moves_have_the_speeds_of_their_node_or_of_the_waypoint(lines, node, script):
+    set_up = f"<Assignment><variable name='x'/>{expression('p[0,0,0,0,0,0]')}</Assignment>"
+    assert script in lines(set_up, node)
+
+
+def test_a_direction_is_a_thread_that_the_first_fulfilled_condition_ends(lines):
+    ends = (
+        "<Until type='TOOL_CONTACT_DETECTION' retraction='0.002'/>"
+        "<Until type='IO' digitalValue='true'><pin referencedName='digital_in[1]'/></Until>"
+        "<Until type='DISTANCE' distanceNodeType='STOP' deceleration='3' allowActions='true'>"
+        "<Distance>0.02</Distance><children><Halt/></children></Until>"
+    )
+    inside = f"{TOOL}<children>{ends}</children>"
+    node = f"<{DIRECTION} selectedDirection='ZMinus' toolParams='0.1, 0.8'>{inside}</{DIRECTION}>"
+    text = lines(move(node, kind="MoveL"))
+    assert '$ 3 "Direction: Tool Z-"' in text
+    assert "local ahead=point_towards(get_forward_kin(), [0.0, 0.0, -1.0], 0.02)" in text
+    assert "movel(ahead, a=0.8, v=0.1)" in text
+    places = [text.index(line) for line in (
+        "if (steps_back > 0):", "if (get_standard_digital_in(1) == True):", "if (move_state_3 > 1):", "halt",
+    )]  # fmt: skip
+    assert places == sorted(places)
+
+
+def test_sub_programs_threads_and_initial_values_come_first(lines):
+    inner = "<subprogram name='pick'><children><Halt/></children></subprogram>"
+    call = f"<CallSubProgram>{inner}</CallSubProgram>"
+    listed = "<SubProgram reference='../MainProgram/children/CallSubProgram/subprogram'/>"
+    values = f"<variables><variable name='n'>{expression('4')}</variable></variables>"
+    begin = f"<InitVariablesNode>{values}</InitVariablesNode>"
+    begin += "<SpecialSequence type='BeforeStart'><children><Halt/></children></SpecialSequence>"
+    wait = "<Wait type='Sleep'><waitTime>1</waitTime></Wait>"
+    thread = f"<Thread name='T 1'><children>{wait}</children></Thread>"
+    text = lines(call, before=begin, threads=thread + listed, repeats=True, InitVariablesNode="true")
+    assert text == [
+        "def pick():", '$ 7 "pick"', '$ 8 "Halt"', "halt", "end", "global n=4",
+        '$ 1 "BeforeStart"', '$ 2 "Halt"', "halt",
+        '$ 5 "T_1"', "thread T_1():", "while (True):", '$ 6 "Wait: 1.0"', "sleep(1.0)", "end", "end",
+        "threadId_T_1 = run T_1()",
+        "while (True):", '$ 3 "Robot Program"', '$ 4 "Call pick"', "pick()", "end",
+    ]  # fmt: skip
+
+
+INSTALLATION = """<Installation>
+<IOs><DigitalOutputNames value="lamp, , "/></IOs>
+<TCPSettings activePose="hook" toolPayload="1.5" centerOfGravity="0, 0, 0.05"><availablePoses>
+  <tcp name="hook" offset="0, 0, 0.2, 0, 0, 0"/></availablePoses></TCPSettings>
+<Features><GeomPoseNode name="table" isVariable="true"><toolPosition value="0.3, 0.4, 0"/>
+  <toolAxisAngle value="0, 0, 1"/></GeomPoseNode></Features>
+</Installation>"""
+
+
+def test_the_installation_beside_the_file_gives_tcp_payload_signals_features_and_variables(tmp_path):
+    lamp = "<Set type='DigitalOutput'><pin referencedName='lamp'/><digitalValue>1</digitalValue></Set>"
+    own = move(waypoint("A", Q), useActiveTCP="false", inside="<tcp referencedName='hook'/>")
+    (tmp_path / "p.urp").write_text(saved(lamp, own))
+    (tmp_path / "cell.installation").write_text(INSTALLATION)
+    (tmp_path / "cell.variables").write_text("#\ncount=3\n")
+    text = read_program(tmp_path / "p.urp")
+    expected = (
+        "set_tcp(p[0.0, 0.0, 0.2, 0.0, 0.0, 0.0])", "set_payload(1.5, [0.0, 0.0, 0.05])", "global count = 3",
+        "global table = p[0.3, 0.4, 0.0, 0.0, 0.0, 1.0]", "set_standard_digital_out(0, True)",
+    )  # fmt: skip
+    for line in expected:
+        assert line in text
+    assert text.count("set_tcp(") == 2
+    (tmp_path / "cell.installation").write_text(INSTALLATION.replace("0.2, 0", "much, 0"))
+    with pytest.raises(UserFileError, match=r"cell\.installation"):
+        read_program(tmp_path / "p.urp")
+
+
+@pytest.mark.parametrize(
+    ("node", "what"),
+    [
+        ("<Event/>", "Event"),
+        ("<Wait type='AnalogInput'/>", r"Wait \(AnalogInput\)"),
+        ("<Script/>", "a Script without text"),
+        ("<Move/>", r"Move \(without a type\)"),
+        (waypoint("A", Q), "a waypoint outside a Move"),
+        (move(waypoint("A", Q[:5])), "the waypoint A"),
+        (move(waypoint("A", Q, "<motionParameters odd='1'/>")), "a waypoint's odd"),
+        (move(waypoint("A", Q), useActiveTCP="false", inside="<tcp referencedName='hook'/>"), "the TCP hook"),
+        ("<Set type='DigitalOutput'><pin referencedName='RearPlc'/></Set>", "the signal RearPlc"),
+        (f"<Assignment><variable/>{expression('1')}</Assignment>", "a variable without a name"),
+        ("<Assignment valueSource='Operator'><variable name='x'/></Assignment>", r"Assignment \(Operator\)"),
+        ("<If type='If' checkContinuously='true'/>", "an If that checks its condition continuously"),
+        (contributed("com.other.Node", "Vision", name="Cam"), "Cam: Vision"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_simulated_is_listed_once(lines, node, what):
+    with pytest.raises(
+        UserFileError, match=f"PolyScope saved it with {what}[^,]*, which cannot be simulated"
+    ):
+        lines(node, node)
+
+
+def test_nodes_of_a_urcap_are_left_out_on_request(lines):
+    node = contributed("com.other.Node", "Vision", name="Cam")
+    for skip in ("Cam", "Cam: Vision"):
+        assert lines(node, "<Halt/>", skip=[skip]) == ['$ 1 "Robot Program"', '$ 3 "Halt"', "halt"]
+
+
+SENT = "# HEADER_BEGIN\ndef step():\n  sync()\nend\n# HEADER_END\nstep()\n# NODE_CONTROL_LOOP_ENDS\n"
+
+
+def test_a_client_s_text_replaces_external_control_and_its_header_comes_first(lines, tmp_path):
+    node = contributed("com.fzi.externalcontrol.ExternalControlNode", "External Control", name="ext")
+    assert EXTERNAL_CONTROL in lines(node)
+    text = text_of(tmp_path / "p.urp", saved(node, "<Halt/>", repeats=True).encode())
+    whole = with_external_control(text, SENT)
+    assert whole.index("def step") < whole.index("step()\n") < whole.index("halt")
+    assert (
+        with_external_control(program("a", EXTERNAL_CONTROL), "sync()\n") == "def a():\n\n  sync()\n\nend\n"
+    )
+
+
+def test_a_program_that_repeats_definitions_alone_ends(lines):
+    node = "<Script type='File'><cachedContents>def step():\n  sync()\nend</cachedContents></Script>"
+    assert "while (True):" not in lines(node, repeats=True)
+    assert "while (True):" in lines(node, "<Wait type='Sleep'><waitTime>1</waitTime></Wait>", repeats=True)
+
+
+@pytest.mark.parametrize(
+    ("hops", "place", "found"),
+    [(90, "h[{}]", True), (200, "h[{}]", False), (1, f"h[{'9' * 5000}]", False), (1, "x/../" * 300 + "h[{}]", False)],
+)  # fmt: skip
+def test_references_are_followed_but_not_without_end(hops, place, found):
+    chain = "".join(f"<h><v reference='../../{place.format(hop)}/v'/></h>" for hop in range(2, hops + 2))
+    root = xml(f"<root>{chain}<h><v name='a'/></h></root>".encode())
+    target = References(root).target(root.find("./h/v"))
+    assert (target is not None and target.get("name") == "a") is found

@@ -1,0 +1,69 @@
+"""Program files: URScript, or what PolyScope saves, with the installation and the variables beside it."""
+
+import zlib
+from pathlib import Path
+
+from tvist_plant.user_file import LARGEST, UserFileError, read_bytes, xml
+from tvist_server.polyscope.installation import Installation
+from tvist_server.polyscope.script import script_of
+
+_GZIP, _XML = b"\x1f\x8b", b"<"
+
+
+def read_program(path: Path, skip: frozenset[str] = frozenset()) -> str:
+    """Return the text of a program, translated if PolyScope saved it.
+
+    Args:
+        path: The file.
+        skip: Names of URCaps, or `URCap: node`, whose nodes are left out.
+
+    Raises:
+        UserFileError: It is no program, or has nodes that cannot be translated.
+        OSError: It cannot be read.
+    """
+    return text_of(path, read_bytes(path, "program"), skip)
+
+
+def text_of(path: Path, data: bytes, skip: frozenset[str] = frozenset()) -> str:
+    """Return the text of a program from the content of its file; see `read_program`."""
+    data = unpacked(f"program {path}", data)
+    try:
+        if data.lstrip().startswith(_XML):
+            return script_of(path.stem, xml(data), lambda name: _installation(path, name), skip)
+        return data.decode("utf-8-sig")
+    except UserFileError as error:
+        raise UserFileError(f"program {path}: {error}") from error
+    except UnicodeDecodeError as error:
+        raise UserFileError(f"program {path} is not text in UTF-8: byte {error.start}") from error
+
+
+def unpacked(what: str, data: bytes) -> bytes:
+    """Return the content of a file that may be packed by gzip."""
+    if not data.startswith(_GZIP):
+        return data
+    unpack = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
+    try:
+        data = unpack.decompress(data, LARGEST)
+    except zlib.error as error:
+        raise UserFileError(f"{what} is packed, and cannot be unpacked: {error}") from error
+    if not (unpack.eof or unpack.unconsumed_tail):
+        raise UserFileError(f"{what} is packed, and its end is missing")
+    if unpack.unconsumed_tail:
+        raise UserFileError(f"{what} has more than {LARGEST >> 20} MiB when it is unpacked")
+    return data
+
+
+def _installation(program: Path, name: str) -> Installation:
+    """Return the installation of a name beside a program or one folder above; empty if there is none."""
+    for folder in program.parents[:2]:
+        path = folder / f"{Path(name).name}.installation"
+        if not path.is_file():
+            continue
+        variables = path.with_suffix(".variables")
+        values = read_bytes(variables, "variables").decode(errors="replace") if variables.is_file() else ""
+        what = f"installation {path}"
+        try:
+            return Installation.of(xml(unpacked(what, read_bytes(path, "installation"))), values)
+        except ValueError as error:
+            raise UserFileError(f"{what}: {error}") from error
+    return Installation()

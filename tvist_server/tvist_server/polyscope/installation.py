@@ -1,0 +1,105 @@
+"""The installation of a program saved by PolyScope: TCPs, payload, names of signals, positions of features."""
+
+from dataclasses import dataclass, field
+from typing import Self
+from xml.etree.ElementTree import Element
+
+_SIGNALS = {
+    "DigitalInputNames": "digital_in", "DigitalOutputNames": "digital_out", "ToolDigitalInputNames": "tool_in",
+    "ToolDigitalOutputNames": "tool_out", "ToolAnalogInputNames": "tool_analog_in", "AnalogInputNames": "analog_in",
+    "AnalogOutputNames": "analog_out", "ConfigurableInputNames": "config_in", "ConfigurableOutputNames": "config_out",
+    "GeneralPurposeBooleanRegisterInputNames": "gp_bool_in", "GeneralPurposeBooleanRegisterOutputNames": "gp_bool_out",
+    "GeneralPurposeIntRegisterInputNames": "gp_int_in", "GeneralPurposeIntRegisterOutputNames": "gp_int_out",
+    "GeneralPurposeFloatRegisterInputNames": "gp_float_in", "GeneralPurposeFloatRegisterOutputNames": "gp_float_out",
+}  # fmt: skip
+_LARGEST = 1e6  # largest magnitude of a number that is accepted
+
+Pose = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Tcp:
+    """A tool centre point of the installation."""
+
+    offset: Pose  # in the flange frame [m, rotation vector in rad]
+    mass: float | None = None  # payload that PolyScope declares with it [kg]; None if none
+    cog: Pose = (0.0, 0.0, 0.0)  # centre of gravity of that payload [m]
+
+
+@dataclass(frozen=True)
+class Installation:
+    """What a program needs of its installation; empty if the file is missing."""
+
+    tcps: dict[str, Tcp] = field(default_factory=dict)
+    active: Tcp | None = None  # TCP and payload at the start of a program
+    pins: dict[str, str] = field(default_factory=dict)  # signals such as `digital_in[0]` by their names
+    features: dict[str, Pose] = field(default_factory=dict)  # poses of features in the base frame
+    variables: dict[str, str] = field(default_factory=dict)  # initial values as URScript
+    home: Pose | None = None  # joint angles of Safe Home [rad]
+
+    @classmethod
+    def of(cls, tree: Element, variables: str = "") -> Self:
+        """Return the content of an installation file and of the variables file beside it."""
+        tcps = {
+            tcp.get("name") or "": Tcp(numbers(tcp.get("offset"), 6), *_payload(tcp))
+            for tcp in tree.findall("./TCPSettings/availablePoses/tcp")
+        }
+        settings, home = tree.find("TCPSettings"), tree.find("SafeHomeSettings")
+        active = None if settings is None else tcps.get(settings.get("activePose") or "")
+        if active is not None and settings is not None and settings.get("toolPayload") is not None:
+            active = Tcp(active.offset, *_payload(settings))
+        pins = {
+            name.strip(): f"{kind}[{number}]"
+            for list_of, kind in _SIGNALS.items()
+            for names in tree.findall(f"./IOs/{list_of}")
+            for number, name in enumerate((names.get("value") or "").split(","))
+            if name.strip()
+        }
+        features = {
+            one.get("name") or "": numbers(place.get("value"), 3) + numbers(turn.get("value"), 3)
+            for one in tree.iter("GeomPoseNode")
+            if one.get("isVariable") == "true"
+            and (place := one.find("toolPosition")) is not None
+            and (turn := one.find("toolAxisAngle")) is not None
+        }
+        lines = (line.partition("=") for line in variables.splitlines() if not line.startswith("#"))
+        values = {name: value for name, equals, value in lines if equals}
+        position = None if home is None or home.get("enabled") == "false" else home.get("position")
+        return cls(tcps, active, pins, features, values, numbers(position, 6) if position else None)
+
+    def pin(self, name: str) -> str:
+        """Return the signal with a name of the installation, or the name itself."""
+        return self.pins.get(name, name)
+
+    def shown(self, pin: str) -> str:
+        """Return how PolyScope names a signal."""
+        return next((name for name, signal in self.pins.items() if signal == pin), pin)
+
+    def start(self) -> list[str]:
+        """Return the lines of URScript with which PolyScope begins a program."""
+        lines = []
+        if self.active is not None:
+            lines.append(f"set_tcp({pose(self.active.offset)})")
+            if self.active.mass is not None:
+                lines.append(f"set_payload({self.active.mass!r}, {list(self.active.cog)})")
+        lines += [f"global {name} = {pose(at)}" for name, at in self.features.items() if name]
+        return lines + [f"global {name} = {value}" for name, value in self.variables.items()]
+
+
+def numbers(text: str | None, count: int) -> Pose:
+    """Return the finite numbers of a text, separated by commas; raise ValueError unless there are `count`."""
+    found = tuple(float(part) for part in (text or "").split(","))
+    found = tuple(number for number in found if abs(number) < _LARGEST)
+    if len(found) != count:
+        raise ValueError(f"{len(found)} numbers below {_LARGEST:g} instead of {count}")
+    return found
+
+
+def pose(values: Pose) -> str:
+    """Return a pose as URScript."""
+    return f"p[{', '.join(map(repr, values))}]"
+
+
+def _payload(element: Element) -> tuple[float | None, Pose]:
+    mass, cog = element.get("toolPayload"), element.get("centerOfGravity")
+    return (None if mass is None else numbers(mass, 1)[0]), (numbers(cog, 3) if cog else (0.0, 0.0, 0.0))

@@ -1,0 +1,270 @@
+"""Move nodes of PolyScope with their waypoints, circles and directions, as URScript."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from tvist_server.polyscope.expressions import Expressions, UnknownPartError, script_name
+from tvist_server.polyscope.installation import Installation, numbers, pose
+from tvist_server.polyscope.positions import joint_angles, tool_pose
+from tvist_server.polyscope.references import References
+from tvist_server.polyscope.script_text import ScriptText
+
+DIRECTION = "gui.program.direction.MoveDirectionNode"
+"""Tag of a motion in a direction until something happens."""
+_FUNCTIONS = {"MoveJ": "movej", "MoveL": "movel", "MoveP": "movep"}
+_BASE, _TOOL = "p[0.0,0.0,0.0,0.0,0.0,0.0]", "get_forward_kin()"
+_FEATURES = {"Joint_0_name": ("Base", _BASE), "Joint_6_name": ("Tool", _TOOL)}
+_AXES = {
+    f"{axis}{name}": (f"{axis}{sign}", [float(f"{sign}1") * (axis == other) + 0.0 for other in "XYZ"])
+    for axis in "XYZ"
+    for name, sign in (("Plus", "+"), ("Minus", "-"))
+}
+_BRAKING = "1.2"  # deceleration after a contact that has none [m/s^2]
+_FAR = 1000.0  # length of a motion that only a contact or a signal ends [m]
+TOWARDS = """def point_towards(feature, direction, distance):
+  local axis = [direction[0], direction[1], direction[2]]
+  if norm(axis) < 1e-6:
+    return get_target_waypoint()
+  end
+  axis = normalize(axis)
+  local ahead = pose_trans(feature, p[axis[0] * distance, axis[1] * distance, axis[2] * distance, 0, 0, 0])
+  return pose_add(get_target_waypoint(), pose_sub(ahead, feature))
+end"""
+"""Function that directions call: a pose ahead of the last waypoint along an axis of a feature."""
+
+
+@dataclass(frozen=True)
+class _Style:
+    """How a Move node moves to its waypoints."""
+
+    kind: str
+    speed: str
+    acceleration: str
+    blend: float  # of MoveP [m]
+    joints: bool  # whether its waypoints are postures, not poses
+    tcp: str  # set before each motion; empty for the active TCP
+    flange: bool  # whether waypoints are poses of the flange
+    feature: Element | None
+
+
+class Moves:
+    """Translates motions; `children` translates the nodes inside one."""
+
+    def __init__(
+        self,
+        text: ScriptText,
+        expressions: Expressions,
+        references: References,
+        installation: Installation,
+        numbers_of: dict[Element, int],
+        children: Callable[[Element], None],
+    ) -> None:
+        self._text, self._expressions, self._references = text, expressions, references
+        self._installation, self._number, self._children = installation, numbers_of, children
+        self._styles: list[_Style] = []
+        self.waypoints: dict[str, str] = {}
+        """Values of the variables that taught waypoints need, by name."""
+        self.has_directions = False
+
+    def move(self, node: Element, following: Element | None) -> None:
+        """Translate a Move node; `following` is the node behind it."""
+        kind = node.get("motionType") or ""
+        if kind not in _FUNCTIONS or node.get("optimoveEnabled") == "true":
+            raise UnknownPartError(f"Move ({kind or 'without a type'})")
+        speed, acceleration = _number(node.get("speed")), _number(node.get("acceleration"))
+        tcp, active = node.find("tcp"), node.get("useActiveTCP") != "false"
+        style = _Style(
+            kind, speed, acceleration, float(node.get("blendRadius") or 0.0), node.get("positionType") == "JointAngles",
+            "" if active or tcp is None else self._tcp(tcp), not active and tcp is None, node.find("feature"),
+        )  # fmt: skip
+        self._text.label(self._number[node], kind)
+        self._styles.append(style)
+        self._ends = following is None or following.get("motionType") != "MoveP"
+        self._children(node)
+        self._styles.pop()
+
+    def _tcp(self, node: Element) -> str:
+        target = self._references.target(node)
+        name = "" if target is None else target.get("referencedName") or ""
+        if name not in self._installation.tcps:
+            raise UnknownPartError(f"the TCP {name or 'without a name'} (not in its installation)")
+        return f"set_tcp({pose(self._installation.tcps[name].offset)})"
+
+    @property
+    def _style(self) -> _Style:
+        if not self._styles:
+            raise UnknownPartError("a waypoint outside a Move")
+        return self._styles[-1]
+
+    # ------------------------------------------------------------------ waypoints
+
+    def waypoint(self, node: Element, following: Element | None) -> None:
+        """Translate a Waypoint."""
+        style, (place, near) = self._style, self._place(node)
+        own = node.find("motionParameters")
+        speed, acceleration, blend, duration = style.speed, style.acceleration, 0.0, ""
+        for name, value in {} if own is None else own.attrib.items():
+            plain = name.lower()
+            if "blend" in plain:
+                blend = float(_number(value))
+            elif "acceleration" in plain:
+                acceleration = _number(value)
+            elif "speed" in plain:
+                speed = _number(value)
+            elif "time" in plain or "duration" in plain:
+                duration = f", t={_number(value)}"
+            else:
+                raise UnknownPartError(f"a waypoint's {name}")
+        self._text.label(self._number[node], self._name(node))
+        if style.tcp:
+            self._text.line(style.tcp)
+        if near and place != near:
+            place = f"pose_trans({place}, get_tcp_offset())" if style.flange else place
+            place = f"get_inverse_kin({place}, qnear={near})" if style.kind == "MoveJ" else place
+        radius = f", r={blend!r}" if blend else ""
+        if style.kind == "MoveP":
+            radius = f", r={0.0 if following is None and self._ends else style.blend!r}"
+        self._text.line(f"{_FUNCTIONS[style.kind]}({place}, a={acceleration}, v={speed}{duration}{radius})")
+
+    def _name(self, node: Element) -> str:
+        if node.get("type") == "Variable":
+            return self._expressions.variable(node.find("variable"))
+        return node.get("name") or "Waypoint"
+
+    def _place(self, node: Element) -> tuple[str, str]:
+        """Return where a waypoint is: a pose or posture, and a posture near it if it was taught."""
+        name = script_name(self._name(node))
+        position = self._references.target(node.find("position"))
+        try:
+            match node.get("type"):
+                case "Variable":
+                    return name, ""
+                case "Fixed" if position is not None:
+                    posture = f"{name}_q"
+                    self.waypoints[posture] = str(list(joint_angles(position)))
+                    if self._style.joints or position.find("Kinematics") is None:
+                        return posture, posture
+                    self.waypoints[f"{name}_p"] = pose(tool_pose(position))
+                    return f"{name}_p", posture
+                case "Relative" if position is not None:
+                    begin = self._references.target(node.find("relativeFromPosition"))
+                    if begin is not None:
+                        for end, at in (("from", begin), ("to", position)):
+                            self.waypoints[f"{name}_{end}_p"] = pose(tool_pose(at))
+                        return f"pose_add(get_target_tcp_pose(), pose_sub({name}_to_p, {name}_from_p))", ""
+        except ValueError as error:
+            raise UnknownPartError(f"the waypoint {name}: {error}") from error
+        raise UnknownPartError(f"a Waypoint ({node.get('type') or 'without a type'}) that is not taught")
+
+    def circle(self, node: Element, following: Element | None) -> None:
+        """Translate a CircleMove: an arc through its first waypoint to its second."""
+        style, points = self._style, node.findall("./children/Waypoint")
+        if len(points) != 2:
+            raise UnknownPartError("a CircleMove without two waypoints")
+        self._text.label(self._number[node], "CircleMove")
+        places = [self._place(point)[0] for point in points]
+        for point in points:
+            self._text.label(self._number[point], self._name(point))
+        radius = 0.0 if following is None and self._ends else style.blend
+        mode = ", mode=1" if node.get("OrientationMode") == "FIXED" else ""
+        ends = ", ".join(places)
+        self._text.line(f"movec({ends}, a={style.acceleration}, v={style.speed}, r={radius!r}{mode})")
+
+    # ------------------------------------------------------------------ directions
+
+    def direction(self, node: Element) -> None:
+        """Translate a motion in a direction: a thread moves until one of the Until nodes ends it."""
+        style, text, number = self._style, self._text, self._number[node]
+        feature = node.find("feature")
+        shown, frame = self.feature(style.feature if feature is None else feature)
+        axis, direction = self._axis(node)
+        speed, acceleration = style.speed, style.acceleration
+        if (own := node.get("toolParams")) is not None:
+            speed, acceleration = map(repr, numbers(own, 2))
+        ends = node.findall("./children/Until")
+        far = next(
+            (_number(end.findtext("Distance")) for end in ends if end.get("type") == "DISTANCE"), repr(_FAR)
+        )
+        self.has_directions = True
+        text.label(number, f"Direction: {shown} {axis}".rstrip())
+        text.line(f"global move_state_{number}=0")
+        with text.block(f"thread move_{number}():"):
+            text.line("enter_critical", f"move_state_{number} = 1")
+            text.line(f"local ahead=point_towards({frame}, {direction}, {far})")
+            text.line(
+                f"movel(ahead, a={acceleration}, v={speed})", f"move_state_{number} = 2", "exit_critical"
+            )
+        text.line(f"move_state_{number} = 0", f"move_handle_{number} = run move_{number}()")
+        with text.block("while (True):"):
+            for end in ends:
+                self._until(end, number)
+            text.line("sync()")
+
+    def _axis(self, node: Element) -> tuple[str, str]:
+        if (chosen := node.get("selectedDirection")) is None:
+            return "", self._expressions.text(node)
+        if chosen not in _AXES:
+            raise UnknownPartError(f"a Direction ({chosen})")
+        return _AXES[chosen][0], str(_AXES[chosen][1])
+
+    def feature(self, node: Element | None) -> tuple[str, str]:
+        """Return a feature's name and its pose as URScript."""
+        target = self._references.target(node)
+        name = "Joint_0_name" if target is None else target.get("referencedName") or ""
+        if name in _FEATURES:
+            return _FEATURES[name]
+        if name not in self._installation.features:
+            raise UnknownPartError(f"the feature {name or 'without a name'} (not in its installation)")
+        return name, script_name(name)
+
+    def _until(self, node: Element, number: int) -> None:
+        text, kind = self._text, node.get("type") or ""
+        stop = _number(node.get("decelerationAcceleration") or node.get("deceleration") or _BRAKING)
+        match kind:
+            case "DISTANCE" if node.get("distanceNodeType") == "STOP":
+                text.line("sleep(1.0E-10)")
+                condition, halt = f"move_state_{number} > 1", f"join move_handle_{number}"
+            case "TOOL_CONTACT_DETECTION":
+                text.line(
+                    "local towards=get_target_tcp_speed()", "local steps_back=tool_contact(direction=towards)"
+                )
+                condition, halt = "steps_back > 0", f"kill move_handle_{number}\nstopl({stop})"
+            case "IO":
+                condition = self.input_is(node)
+                halt = f"kill move_handle_{number}\nstopl(3.0)"
+            case "EXPRESSION":
+                condition = self._expressions.text(node)
+                halt = f"kill move_handle_{number}\nstopl({stop})"
+            case _:
+                raise UnknownPartError(f"Until ({kind or 'without a type'})")
+        with text.block(f"if ({condition}):"):
+            text.line(*halt.split("\n"))
+            if kind == "TOOL_CONTACT_DETECTION":
+                self._retract(_number(node.get("retraction")), stop)
+            text.label(self._number[node], f"Until ({kind.lower()})")
+            if node.get("allowActions") == "true":
+                self._children(node)
+            text.line("break")
+
+    def _retract(self, distance: str, acceleration: str) -> None:
+        """Move back to where the contact began, and further against the direction."""
+        self._text.line("local touched=get_forward_kin(get_actual_joint_positions_history(steps_back))")
+        self._text.line("local back=[towards[0], towards[1], towards[2]]")
+        with self._text.block("if (norm(back) > 1e-6):"):
+            self._text.line("back = normalize(back)")
+            away = ", ".join(f"back[{axis}] * {distance}" for axis in range(3))
+            self._text.line(f"touched = pose_sub(touched, p[{away}, 0, 0, 0])")
+        self._text.line(f"movel(touched, a={acceleration}, v=0.1)")
+
+    def input_is(self, node: Element) -> str:
+        """Return the condition that a digital input has a node's value."""
+        wanted = node.get("digitalValue") or node.findtext("digitalValue") or ""
+        if wanted not in {"0", "1", "true", "false"}:
+            raise UnknownPartError("an analog input as a condition")
+        return f"{self._expressions.input(node.find('pin'))} == {wanted in {'1', 'true'}}"
+
+
+def _number(text: str | None) -> str:
+    """Return a number as URScript; ValueError if it is none."""
+    return repr(numbers(text, 1)[0])

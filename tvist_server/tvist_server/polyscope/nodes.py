@@ -1,0 +1,310 @@
+"""The nodes of a program saved by PolyScope, as URScript."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from xml.etree.ElementTree import Element
+
+from tvist_server.polyscope import contributed
+from tvist_server.polyscope.expressions import Expressions, UnknownPartError, script_name
+from tvist_server.polyscope.installation import Installation, numbers
+from tvist_server.polyscope.moves import DIRECTION, Moves
+from tvist_server.polyscope.references import References
+from tvist_server.polyscope.script_text import ScriptText
+
+_OTHERS = "2147483647"  # value of the case for all others
+_POPUPS = {"Message": "False, False", "Warning": "True, False", "Error": "False, True"}
+
+
+def children_of(node: Element) -> list[Element]:
+    """Return the nodes inside a node."""
+    return node.findall("./children/*")
+
+
+def inside(node: Element) -> Iterator[Element]:
+    """Yield a node and all nodes inside it, suppressed ones too, in the order of their numbers."""
+    todo = [node]
+    while todo:
+        yield (one := todo.pop())
+        hidden = one.find("suppressedNode")
+        parts = children_of(one) if hidden is None else children_of(hidden)
+        todo += reversed([part for part in parts if part.tag != "SubProgram"])
+
+
+class Nodes:
+    """Translates nodes into `text`; `missing` lists what it cannot translate, in order."""
+
+    def __init__(
+        self,
+        references: References,
+        installation: Installation,
+        numbers_of: dict[Element, int],
+        skip: frozenset[str] = frozenset(),
+    ) -> None:
+        self.text, self.missing = ScriptText(), list[str]()
+        self._references, self._number, self._skip = references, numbers_of, skip
+        self.expressions = Expressions(references, installation)
+        self._installation, self._switches = installation, 0
+        self.moves = Moves(
+            self.text, self.expressions, references, installation, numbers_of, self.children
+        )  # fmt: skip
+        self.skipped: list[str] = []
+
+    def children(self, node: Element) -> None:
+        """Translate the nodes inside a node."""
+        self.siblings(children_of(node))
+
+    def siblings(self, nodes: list[Element]) -> None:
+        """Translate nodes that follow each other."""
+        shown = [node for node in nodes if node.tag != "SuppressedNode"]
+        for node, following in pairwise([*shown, None]):
+            assert node is not None
+            try:
+                self._node(node, following)
+            except UnknownPartError as error:
+                self.missing.append(str(error))
+            except ValueError as error:
+                self.missing.append(f"{node.tag} with {error}")
+
+    def _label(self, node: Element, title: str) -> None:
+        self.text.label(self._number.get(node, 0), title)
+
+    def _node(self, node: Element, following: Element | None) -> None:  # noqa: C901, PLR0912  one case a kind
+        text, kind = self.text, node.get("type")
+        match node.tag, kind:
+            case ("Placeholder", _):
+                pass
+            case ("Folder", _):
+                self._label(node, node.get("name") or "Folder")
+                self.children(node)
+            case ("Comment", _):
+                words = " ".join((node.get("comment") or "").split())
+                self._label(node, f"'{words}'")
+            case ("Script", _):
+                self._script(node)
+            case ("Wait", _):
+                self._wait(node)
+            case ("Halt", _):
+                self._label(node, "Halt")
+                text.line("halt")
+            case ("Popup", _) if kind in _POPUPS:
+                self._popup(node, kind)
+            case ("Assignment", _):
+                self._assignment(node)
+            case ("If", _):
+                self._branch(node, following)
+            case ("Loop", _):
+                self._loop(node)
+            case ("Switch", _):
+                self._switch(node)
+            case ("Set", _):
+                self._set(node)
+            case ("Force", "Frame"):
+                self._force(node)
+            case ("CallSubProgram", _):
+                name = script_name(self._sub_program(node))
+                self._label(node, f"Call {name}")
+                text.line(f"{name}()")
+            case ("SubProgram", _):
+                pass  # defined before the program
+            case ("Move", _):
+                self.moves.move(node, following)
+            case ("Waypoint", _):
+                self.moves.waypoint(node, following)
+            case ("CircleMove", _):
+                self.moves.circle(node, following)
+            case (tag, _) if tag == DIRECTION:
+                self.moves.direction(node)
+            case ("Contributed", _):
+                self._contributed(node, following)
+            case (tag, _):
+                raise UnknownPartError(tag if kind is None else f"{tag} ({kind})")
+
+    # ------------------------------------------------------------------ flow
+
+    def _script(self, node: Element) -> None:
+        if node.find("./expression/*") is not None:
+            self._label(node, self.expressions.label(node))
+            self.text.line(self.expressions.text(node))
+            return
+        content = node.findtext("cachedContents") or node.findtext("text") or node.text or ""
+        if not content.strip():
+            raise UnknownPartError("a Script without text")
+        file = (node.findtext("file") or "").rpartition("/")[2]
+        self._label(node, f"Script: {file}")
+        self.text.line(content.rstrip("\n"))
+
+    def _wait(self, node: Element) -> None:
+        match node.get("type"):
+            case "Sleep":
+                seconds = repr(numbers(node.findtext("waitTime"), 1)[0])
+                self._label(node, f"Wait: {seconds}")
+                self.text.line(f"sleep({seconds})")
+                return
+            case "Condition":
+                shown, condition = self.expressions.label(node), self.expressions.text(node)
+            case "DigitalInput":
+                shown = condition = self.moves.input_is(node)
+            case other:
+                raise UnknownPartError(f"Wait ({other or 'without a type'})")
+        self._label(node, f"Wait: {shown}")
+        with self.text.block(f"while (not({condition})):"):
+            self.text.line("sync()")
+
+    def _popup(self, node: Element, kind: str) -> None:
+        message = " ".join((node.get("message") or "").replace('"', "'").split())
+        self._label(node, f"Popup: {message}")
+        self.text.line(f'popup("{message}", "{kind}", {_POPUPS[kind]}, blocking=True)')
+        if node.get("haltProgram") == "true":
+            self.text.line("halt")
+
+    def _assignment(self, node: Element) -> None:
+        name, source = (
+            self.expressions.variable(node.find("variable")),
+            node.get("valueSource") or "Expression",
+        )
+        if source != "Expression":
+            raise UnknownPartError(f"Assignment ({source})")
+        self._label(node, f"{name}≔{self.expressions.label(node)}")
+        self.text.line(f"global {name}={self.expressions.text(node)}")
+
+    def _branch(self, node: Element, following: Element | None) -> None:
+        if node.get("checkContinuously") == "true":
+            raise UnknownPartError("an If that checks its condition continuously")
+        kind, shown = node.get("type") or "If", self.expressions.label(node)
+        end = (
+            "" if following is not None and following.tag == "If" and following.get("type") != "If" else "end"
+        )
+        if kind == "If":
+            self._label(node, f"If {shown}")
+        head = {"If": "if", "ElseIf": "elif", "Else": "else"}.get(kind)
+        if head is None:
+            raise UnknownPartError(f"If ({kind})")
+        with self.text.block("else:" if kind == "Else" else f"{head} ({self.expressions.text(node)}):", end):
+            if kind != "If":
+                self._label(node, f"{kind} {shown}".rstrip())
+            self.children(node)
+
+    def _loop(self, node: Element) -> None:
+        match node.get("type"):
+            case "Forever":
+                self._label(node, "Loop")
+                with self.text.block("while (True):"):
+                    self.children(node)
+            case "Counting":
+                count = int(numbers(node.get("count"), 1)[0])
+                name = self.expressions.variable(node.find("loopVariable"))
+                self._label(node, f"Loop {count} times")
+                self.text.line(f"{name} = 0")
+                with self.text.block(f"while ({name} < {count}):"):
+                    self.children(node)
+                    self.text.line(f"{name} = {name} + 1")
+            case "While":
+                self._label(node, f"Loop {self.expressions.label(node)}")
+                self._while(node)
+            case other:
+                raise UnknownPartError(f"Loop ({other or 'without a type'})")
+
+    def _while(self, node: Element) -> None:
+        condition, number = self.expressions.text(node), self._number.get(node, 0)
+        if node.get("checkContinuously") != "true":
+            with self.text.block(f"while ({condition}):"):
+                self.children(node)
+            return
+        with self.text.block(f"thread Thread_while_{number}():"), self.text.block("while (True):"):
+            self.children(node)
+            self.text.line("sync()")
+        with self.text.block(f"if ({condition}):"):
+            self.text.line(f"global thread_handler_{number}=run Thread_while_{number}()")
+            with self.text.block(f"while ({condition}):"):
+                self.text.line("sync()")
+            self.text.line(f"kill thread_handler_{number}")
+
+    def _switch(self, node: Element) -> None:
+        self._label(node, f"Switch {self.expressions.label(node)}")
+        self._switches += 1
+        name = f"switch_{self._switches}"
+        self.text.line(f"{name} = {self.expressions.text(node)}")
+        cases = [case for case in children_of(node) if case.tag == "Case"]
+        for place, case in enumerate(cases):
+            value = case.get("caseValue") or ""
+            if value == _OTHERS and place:
+                head, title = "else:", "Default Case"
+            else:
+                number = int(numbers(value, 1)[0])
+                head, title = f"{'elif' if place else 'if'} ({number} == {name}):", f"Case {number}"
+            if not place:
+                self._label(case, title)
+            with self.text.block(head, "" if case is not cases[-1] else "end"):
+                if place:
+                    self._label(case, title)
+                self.children(case)
+
+    def _sub_program(self, node: Element) -> str:
+        target = self._references.target(node.find("subprogram"))
+        name = "" if target is None else target.get("name") or ""
+        if not name:
+            raise UnknownPartError("a call of a sub-program that is not in the file")
+        return name
+
+    # ------------------------------------------------------------------ robot
+
+    def _set(self, node: Element) -> None:
+        match node.get("type"):
+            case "NoAction":
+                self._label(node, "Set")
+            case "DigitalOutput":
+                function, number, shown = self.expressions.output(node.find("pin"))
+                on = node.findtext("digitalValue") in {"1", "true"}
+                self._label(node, f"Set {shown}={'On' if on else 'Off'}")
+                self.text.line(f"{function}({number}, {on})")
+            case other:
+                raise UnknownPartError(f"Set ({other or 'without a type'})")
+
+    def _force(self, node: Element) -> None:
+        name, frame = self.moves.feature(node.find("feature"))
+        parts = {
+            tag: numbers(_value(node, tag), 6)
+            for tag in ("selection", "wrench", "limitsForce", "limitsMotion")
+        }
+        chosen = [int(axis) for axis in parts["selection"]]
+        limits = [
+            force if axis else motion
+            for axis, force, motion in zip(chosen, parts["limitsForce"], parts["limitsMotion"], strict=True)
+        ]
+        self._label(node, "Force")
+        self.text.line("sleep(0.02)", "zero_ftsensor()")
+        frame = "tool_pose()" if name == "Tool" else frame
+        self.text.line(f"force_mode({frame}, {chosen}, {list(parts['wrench'])}, 2, {limits})")
+        self.children(node)
+        self.text.line("end_force_mode()", "stopl(5.0)")
+
+    def _contributed(self, node: Element, following: Element | None) -> None:
+        kind = contributed.kind_of(node)
+        title = node.get("strategyProgramNodeType") or "URCap"
+        if kind in self._skip or node.get("strategyURCapName") in self._skip:
+            self.skipped.append(kind)
+        elif (lines := contributed.lines_of(node)) is not None:
+            self._label(node, title)
+            self.text.line(*lines)
+        elif (branch := contributed.branch_of(node)) is not None:
+            if not branch:
+                self._checked = contributed.detection(node)
+                self._label(node, title)
+                self.children(node)
+                return
+            more = following is not None and contributed.branch_of(following) == "else"
+            if branch == "if":
+                self._label(node, f"If {self._checked}")
+            with self.text.block(
+                f"if ({self._checked}):" if branch == "if" else "else:", "" if more else "end"
+            ):
+                if branch == "else":
+                    self._label(node, "Else")
+                self.children(node)
+        else:
+            raise UnknownPartError(kind)
+
+
+def _value(node: Element, tag: str) -> str:
+    found = node.find(tag)
+    return "" if found is None else found.get("value") or ""

@@ -1,0 +1,143 @@
+"""Programs saved by PolyScope as URScript, with PolyScope's labels."""
+
+from collections.abc import Callable
+from xml.etree.ElementTree import Element
+
+from tvist_plant.user_file import UserFileError
+from tvist_protocol.errors import short
+from tvist_server.polyscope.contributed import EXTERNAL_CONTROL
+from tvist_server.polyscope.expressions import UnknownPartError, script_name
+from tvist_server.polyscope.installation import Installation
+from tvist_server.polyscope.moves import TOWARDS
+from tvist_server.polyscope.nodes import Nodes, inside
+from tvist_server.polyscope.references import References
+from tvist_server.polyscope.script_text import ScriptText
+
+_HEADER_ENDS = "# HEADER_END"
+
+
+def script_of(
+    name: str, tree: Element, installed: Callable[[str], Installation], skip: frozenset[str] = frozenset()
+) -> str:
+    """Return the text of a program.
+
+    Args:
+        name: Name of the program.
+        tree: Content of its file.
+        installed: Returns the installation of a name.
+        skip: Names of URCaps, or `URCap: node`, whose nodes are left out.
+
+    Raises:
+        UserFileError: It has nodes that cannot be translated.
+    """
+    root, main = tree.find("./children"), tree.find("./children/MainProgram")
+    if root is None or main is None or main.find("./children/*") is None:
+        raise UserFileError("it is PolyScope's and has no program: save it as a script")
+    before, threads = root.findall("./SpecialSequence"), root.findall("./Thread")
+    references = References(tree)
+    functions = _functions(root, references)
+    numbers = {
+        node: number
+        for number, node in enumerate(
+            (node for part in (*before, main, *threads, *functions.values()) for node in inside(part)), 1
+        )
+    }
+    given = installed(tree.get("installation") or "default")
+    nodes = Nodes(references, given, numbers, skip)
+    text = nodes.text
+    for title, function in functions.items():
+        with text.block(f"def {title}():"):
+            text.label(numbers[function], title)
+            nodes.children(function)
+    if main.get("InitVariablesNode") == "true":
+        for variable in root.findall("./InitVariablesNode/variables/variable"):
+            _initial(nodes, variable)
+    for sequence in before:
+        text.label(numbers[sequence], "BeforeStart")
+        nodes.children(sequence)
+    for thread in threads:
+        title = script_name(thread.get("name") or "Thread")
+        text.label(numbers[thread], title)
+        with text.block(f"thread {title}():"):
+            _repeated(nodes, thread, thread.get("runOnlyOnce") != "true", title)
+        text.line(f"threadId_{title} = run {title}()")
+    _repeated(nodes, main, main.get("runOnlyOnce") == "false" and _acts(main), "Robot Program", numbers[main])
+    if nodes.missing:
+        found = ", ".join(dict.fromkeys(map(short, nodes.missing)))
+        raise UserFileError(f"PolyScope saved it with {found}, which cannot be simulated")
+    start = ScriptText()
+    start.line(*given.start(), *(f"global {at}={value}" for at, value in nodes.moves.waypoints.items()))
+    if nodes.moves.has_directions:
+        start.line(TOWARDS)
+    return program(name, f"{start}{text}")
+
+
+def _repeated(nodes: Nodes, part: Element, again: bool, title: str, number: int | None = None) -> None:
+    """Translate a main program or thread, which may repeat."""
+
+    def body() -> None:
+        if number is not None:
+            nodes.text.label(number, title)
+        nodes.children(part)
+
+    if again:
+        with nodes.text.block("while (True):"):
+            body()
+    else:
+        body()
+
+
+def _initial(nodes: Nodes, variable: Element) -> None:
+    try:
+        name, value = nodes.expressions.variable(variable), nodes.expressions.text(variable)
+    except UnknownPartError as error:
+        nodes.missing.append(str(error))
+        return
+    if value:
+        nodes.text.line(f"global {name}={value}")
+
+
+def _functions(root: Element, references: References) -> dict[str, Element]:
+    """Return the sub-programs of a file by their names in scripts."""
+    found: dict[str, Element] = {}
+    for one in root.findall("./SubProgram"):
+        target = references.target(one)
+        if target is not None and target.get("name"):
+            found[script_name(target.get("name") or "")] = target
+    return found
+
+
+def _acts(main: Element) -> bool:
+    """Return whether a program does more than define functions: repeating that would compute for ever."""
+    return any(
+        node.tag not in {"Comment", "MainProgram", "Folder", "SuppressedNode"}
+        and not (node.tag == "Script" and _only_defines(node.findtext("cachedContents") or ""))
+        for node in inside(main)
+    )
+
+
+def _only_defines(text: str) -> bool:
+    from tvist_urscript import tree
+    from tvist_urscript.errors import ScriptError
+    from tvist_urscript.parsing import parse
+
+    try:
+        return bool(text) and all(isinstance(one, tree.Function) for one in parse(f"{text}\n"))
+    except ScriptError:  # compiling it reports the error
+        return False
+
+
+def program(name: str, body: str) -> str:
+    """Return a program with a body, named after a file."""
+    title = "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in name)
+    lines = "\n".join(f"  {line}" if line else "" for line in body.rstrip("\n").split("\n"))
+    return f"def {title if title[:1].isalpha() else 'program'}():\n{lines}\nend\n"
+
+
+def with_external_control(text: str, sent: str) -> str:
+    """Replace the External Control nodes by a client's text; its header goes first, as functions cannot be in loops."""
+    header, mark, part = sent.partition(_HEADER_ENDS)
+    if not mark:
+        header, part = "", sent
+    first, _, rest = text.partition("\n")
+    return f"{first}\n{header}{mark}\n{rest.replace(EXTERNAL_CONTROL, part)}"

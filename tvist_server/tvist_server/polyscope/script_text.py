@@ -1,0 +1,35 @@
+"""The text of a script while it is written: indented blocks, and labels with the numbers of PolyScope's nodes."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class ScriptText:
+    """Lines of URScript."""
+
+    def __init__(self) -> None:
+        self._lines: list[str] = []
+        self._depth = 0
+
+    def line(self, *lines: str) -> None:
+        """Add lines at the present indentation; one with line breaks is several."""
+        indent = "  " * self._depth
+        self._lines += [indent + part for line in lines for part in line.split("\n")]
+
+    def label(self, number: int, title: str) -> None:
+        """Add the label of a node."""
+        plain = "".join(c for c in title.replace('"', "'") if c.isprintable())
+        self.line(f'$ {number} "{plain}"')
+
+    @contextmanager
+    def block(self, head: str, end: str = "end") -> Iterator[None]:
+        """Add a block; an empty `end` leaves it to a following branch."""
+        self.line(head)
+        self._depth += 1
+        yield
+        self._depth -= 1
+        if end:
+            self.line(end)
+
+    def __str__(self) -> str:
+        return "".join(f"{line}\n" for line in self._lines)
