@@ -32,7 +32,7 @@ def said(seed: int) -> str:
     """Return a page's statement about its seed."""
     tuned = f"seeds {TUNING.start} to {TUNING.stop - 1}"
     if seed in TUNING:
-        return f"Seed {seed} is one of those that shapers may be tuned on, {tuned}: these moves are not held out."
+        return f"Seed {seed} is a tuning seed ({tuned}), so these moves are not held out."
     return f"Nothing is tuned on seed {seed}: shapers may be tuned on {tuned}."
 
 
