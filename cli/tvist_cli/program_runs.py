@@ -75,6 +75,19 @@ def programs_in(files: Sequence[Path]) -> list[Path]:
     return found
 
 
+def read_scripts(files: Sequence[Path], skip: Sequence[str]) -> list[str | Failure]:
+    """Read programs; of several, one that cannot be read is its failure, and keeps no other from running."""
+    found: list[str | Failure] = []
+    for file in files:
+        try:
+            found.append(read_script(file, skip))
+        except Failure as error:
+            if len(files) == 1:
+                raise
+            found.append(error)
+    return found
+
+
 def print_scripts(files: Sequence[Path], skip: Sequence[str]) -> None:
     """Print programs as URScript."""
     for file in programs_in(files):
@@ -90,7 +103,8 @@ def placed(file: Path, finding: ProgramFinding) -> str:
 def check_scripts(files: Sequence[Path], skip: Sequence[str], *, json: bool) -> None:
     """Print the errors and warnings of programs; raise Failure if there are errors."""
     files = programs_in(files)
-    found = [(one, finding) for one in files for finding in _findings(one, skip, alone=len(files) == 1)]
+    texts = zip(files, read_scripts(files, skip), strict=True)
+    found = [(one, finding) for one, text in texts for finding in _findings(text)]
     errors = sum(finding.level == "error" for _, finding in found)
     if json:
         findings = [
@@ -106,14 +120,9 @@ def check_scripts(files: Sequence[Path], skip: Sequence[str], *, json: bool) -> 
         raise Failure(f"{counted(errors, 'error')} in {counted(len(files), 'program')}")
 
 
-def _findings(file: Path, skip: Sequence[str], *, alone: bool) -> Sequence[ProgramFinding]:
-    """Check a program; of several, one that cannot be read is an error in its first line."""
-    try:
-        return check_program(read_script(file, skip))
-    except Failure as error:
-        if alone:
-            raise
-        return [ProgramFinding(1, 1, "error", str(error))]
+def _findings(text: str | Failure) -> list[ProgramFinding]:
+    """Check a program; one that was not read has an error in its first line."""
+    return check_program(text) if isinstance(text, str) else [ProgramFinding(1, 1, "error", str(text))]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 from tvist_cli.failure import Failure, failing_on
 from tvist_cli.output import print_json, say
-from tvist_cli.program_runs import ProgramConsole, ProgramOutcome, Runner, named, programs_in, read_script
+from tvist_cli.program_runs import ProgramConsole, ProgramOutcome, Runner, named, programs_in, read_scripts
 from tvist_cli.robot_options import configuration, content_of
 from tvist_cli.serving import leave
 from tvist_lab.programs.judging import BaselineError, Run, read_baseline
@@ -43,7 +43,7 @@ def run_programs(
     before = None if baseline is None else _baseline(baseline, file, lockstep=lockstep)
     with failing_on(ValueError, exit_code=2):
         limits.check()
-    texts = [_text(one, skip, alone=len(file) == 1) for one in file]
+    texts = read_scripts(file, skip)
     checked = _configuration(given, config, lockstep=lockstep)
     if checked.record is not None and len(file) > 1:
         raise Failure(f"record is {checked.record}: it keeps one run, and these are {len(file)}", code=2)
@@ -71,16 +71,6 @@ def _leave(server: Server | None, failure: Failure | None) -> None:
         if failure is not None:
             say(f"tvist: {failure}")
         leave(server, 0 if failure is None else failure.code)
-
-
-def _text(file: Path, skip: Sequence[str], *, alone: bool) -> str | Failure:
-    """Return a program; of several, why one cannot be read: the others run nevertheless."""
-    try:
-        return read_script(file, skip)
-    except Failure as error:
-        if alone:
-            raise
-        return error
 
 
 def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str | Failure]) -> list[ProgramOutcome]:

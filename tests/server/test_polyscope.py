@@ -225,6 +225,8 @@ def test_the_installation_beside_the_file_gives_tcp_payload_signals_features_and
         ("<Assignment valueSource='Operator'><variable name='x'/></Assignment>", r"Assignment \(Operator\)"),
         ("<If type='If' checkContinuously='true'/>", "an If that checks its condition continuously"),
         (contributed("com.other.Node", "Vision", name="Cam"), "Cam: Vision"),
+        (contributed(f"{GRIPPER}gripper_validation_if_node", "If"), "Robotiq_Grippers: If outside a Grip Check"),
+        (move(waypoint("A", Q), kind="MoveP", blendRadius="wide"), "Move with could not convert"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_simulated_is_listed_once(lines, node, what):

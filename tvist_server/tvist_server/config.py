@@ -88,7 +88,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         if self.dump is None:
             try:
                 return Path(tempfile.gettempdir())
-            except FileNotFoundError:  # in a container without any; what cannot be saved there says so
+            except FileNotFoundError:  # a container may have no such folder; saving then fails with a message
                 return Path.cwd()
         if not Path(self.dump).is_dir():
             raise StartError(f"dump is {self.dump!r}: must be a folder that exists")

@@ -74,11 +74,16 @@ def run(
     from tvist_cli.program_runs import check_scripts, print_scripts
     from tvist_cli.running import run_programs
 
+    runs = any((given, lockstep, inputs, config, timeout is not None, limits != NO_LIMITS, junit, baseline))
     if translate:
+        if runs or check or json:
+            raise Failure(
+                "--translate runs nothing, so that only --skip goes with it: leave the others out", code=2
+            )
         print_scripts(file, skip or ())
         return
     if check:
-        if any((given, lockstep, inputs, config, timeout is not None, limits != NO_LIMITS, junit, baseline)):
+        if runs:
             raise Failure(
                 "--check runs nothing, so that only --json goes with it: leave the others out", code=2
             )

@@ -35,7 +35,6 @@ class Installation:
     pins: dict[str, str] = field(default_factory=dict)  # signals such as `digital_in[0]` by their names
     features: dict[str, Pose] = field(default_factory=dict)  # poses of features in the base frame
     variables: dict[str, str] = field(default_factory=dict)  # initial values as URScript
-    home: Pose | None = None  # joint angles of Safe Home [rad]
 
     @classmethod
     def of(cls, tree: Element, variables: str = "") -> Self:
@@ -44,7 +43,7 @@ class Installation:
             tcp.get("name") or "": Tcp(numbers(tcp.get("offset"), 6), *_payload(tcp))
             for tcp in tree.findall("./TCPSettings/availablePoses/tcp")
         }
-        settings, home = tree.find("TCPSettings"), tree.find("SafeHomeSettings")
+        settings = tree.find("TCPSettings")
         active = None if settings is None else tcps.get(settings.get("activePose") or "")
         if active is not None and settings is not None and settings.get("toolPayload") is not None:
             active = Tcp(active.offset, *_payload(settings))
@@ -64,8 +63,7 @@ class Installation:
         }
         lines = (line.partition("=") for line in variables.splitlines() if not line.startswith("#"))
         values = {name: value for name, equals, value in lines if equals}
-        position = None if home is None or home.get("enabled") == "false" else home.get("position")
-        return cls(tcps, active, pins, features, values, numbers(position, 6) if position else None)
+        return cls(tcps, active, pins, features, values)
 
     def pin(self, name: str) -> str:
         """Return the signal with a name of the installation, or the name itself."""

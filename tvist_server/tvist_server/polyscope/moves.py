@@ -46,6 +46,7 @@ class _Style:
     tcp: str  # set before each motion; empty for the active TCP
     flange: bool  # whether waypoints are poses of the flange
     feature: Element | None
+    ends: bool  # whether no MoveP continues it, so that its last waypoint has no blend
 
 
 class Moves:
@@ -75,12 +76,13 @@ class Moves:
         speed, acceleration = _number(node.get("speed")), _number(node.get("acceleration"))
         tcp, active = node.find("tcp"), node.get("useActiveTCP") != "false"
         style = _Style(
-            kind, speed, acceleration, float(node.get("blendRadius") or 0.0), node.get("positionType") == "JointAngles",
+            kind, speed, acceleration, numbers(node.get("blendRadius") or "0", 1)[0],
+            node.get("positionType") == "JointAngles",
             "" if active or tcp is None else self._tcp(tcp), not active and tcp is None, node.find("feature"),
+            following is None or following.get("motionType") != "MoveP",
         )  # fmt: skip
         self._text.label(self._number[node], kind)
         self._styles.append(style)
-        self._ends = following is None or following.get("motionType") != "MoveP"
         self._children(node)
         self._styles.pop()
 
@@ -107,7 +109,7 @@ class Moves:
         for name, value in {} if own is None else own.attrib.items():
             plain = name.lower()
             if "blend" in plain:
-                blend = float(_number(value))
+                blend = numbers(value, 1)[0]
             elif "acceleration" in plain:
                 acceleration = _number(value)
             elif "speed" in plain:
@@ -124,7 +126,7 @@ class Moves:
             place = f"get_inverse_kin({place}, qnear={near})" if style.kind == "MoveJ" else place
         radius = f", r={blend!r}" if blend else ""
         if style.kind == "MoveP":
-            radius = f", r={0.0 if following is None and self._ends else style.blend!r}"
+            radius = f", r={0.0 if following is None and style.ends else style.blend!r}"
         self._text.line(f"{_FUNCTIONS[style.kind]}({place}, a={acceleration}, v={speed}{duration}{radius})")
 
     def _name(self, node: Element) -> str:
@@ -166,7 +168,7 @@ class Moves:
         places = [self._place(point)[0] for point in points]
         for point in points:
             self._text.label(self._number[point], self._name(point))
-        radius = 0.0 if following is None and self._ends else style.blend
+        radius = 0.0 if following is None and style.ends else style.blend
         mode = ", mode=1" if node.get("OrientationMode") == "FIXED" else ""
         ends = ", ".join(places)
         self._text.line(f"movec({ends}, a={style.acceleration}, v={style.speed}, r={radius!r}{mode})")
@@ -239,7 +241,7 @@ class Moves:
             case _:
                 raise UnknownPartError(f"Until ({kind or 'without a type'})")
         with text.block(f"if ({condition}):"):
-            text.line(*halt.split("\n"))
+            text.line(halt)
             if kind == "TOOL_CONTACT_DETECTION":
                 self._retract(_number(node.get("retraction")), stop)
             text.label(self._number[node], f"Until ({kind.lower()})")

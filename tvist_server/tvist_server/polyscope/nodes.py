@@ -43,11 +43,10 @@ class Nodes:
         self.text, self.missing = ScriptText(), list[str]()
         self._references, self._number, self._skip = references, numbers_of, skip
         self.expressions = Expressions(references, installation)
-        self._installation, self._switches = installation, 0
+        self._switches, self._grip = 0, ""  # number of Switch nodes; condition of the present Grip Check
         self.moves = Moves(
             self.text, self.expressions, references, installation, numbers_of, self.children
         )  # fmt: skip
-        self.skipped: list[str] = []
 
     def children(self, node: Element) -> None:
         """Translate the nodes inside a node."""
@@ -66,7 +65,17 @@ class Nodes:
                 self.missing.append(f"{node.tag} with {error}")
 
     def _label(self, node: Element, title: str) -> None:
-        self.text.label(self._number.get(node, 0), title)
+        self.text.label(self._number[node], title)
+
+    def _branch(self, node: Element, head: str, title: str, *, more: bool) -> None:
+        """Translate a branch; `more` follow it. The label of an `if` stands before it, those of others inside."""
+        first = head.startswith("if ")
+        if first:
+            self._label(node, title)
+        with self.text.block(head, "" if more else "end"):
+            if not first:
+                self._label(node, title)
+            self.children(node)
 
     def _node(self, node: Element, following: Element | None) -> None:  # noqa: C901, PLR0912  one case a kind
         text, kind = self.text, node.get("type")
@@ -91,7 +100,7 @@ class Nodes:
             case ("Assignment", _):
                 self._assignment(node)
             case ("If", _):
-                self._branch(node, following)
+                self._if(node, following)
             case ("Loop", _):
                 self._loop(node)
             case ("Switch", _):
@@ -158,31 +167,22 @@ class Nodes:
             self.text.line("halt")
 
     def _assignment(self, node: Element) -> None:
-        name, source = (
-            self.expressions.variable(node.find("variable")),
-            node.get("valueSource") or "Expression",
-        )
+        name = self.expressions.variable(node.find("variable"))
+        source = node.get("valueSource") or "Expression"
         if source != "Expression":
             raise UnknownPartError(f"Assignment ({source})")
         self._label(node, f"{name}≔{self.expressions.label(node)}")
         self.text.line(f"global {name}={self.expressions.text(node)}")
 
-    def _branch(self, node: Element, following: Element | None) -> None:
+    def _if(self, node: Element, following: Element | None) -> None:
         if node.get("checkContinuously") == "true":
             raise UnknownPartError("an If that checks its condition continuously")
-        kind, shown = node.get("type") or "If", self.expressions.label(node)
-        end = (
-            "" if following is not None and following.tag == "If" and following.get("type") != "If" else "end"
-        )
-        if kind == "If":
-            self._label(node, f"If {shown}")
-        head = {"If": "if", "ElseIf": "elif", "Else": "else"}.get(kind)
-        if head is None:
+        kind, condition = node.get("type") or "If", self.expressions.text(node)
+        heads = {"If": f"if ({condition}):", "ElseIf": f"elif ({condition}):", "Else": "else:"}
+        if kind not in heads:
             raise UnknownPartError(f"If ({kind})")
-        with self.text.block("else:" if kind == "Else" else f"{head} ({self.expressions.text(node)}):", end):
-            if kind != "If":
-                self._label(node, f"{kind} {shown}".rstrip())
-            self.children(node)
+        more = following is not None and following.tag == "If" and following.get("type") != "If"
+        self._branch(node, heads[kind], f"{kind} {self.expressions.label(node)}".rstrip(), more=more)
 
     def _loop(self, node: Element) -> None:
         match node.get("type"):
@@ -205,7 +205,7 @@ class Nodes:
                 raise UnknownPartError(f"Loop ({other or 'without a type'})")
 
     def _while(self, node: Element) -> None:
-        condition, number = self.expressions.text(node), self._number.get(node, 0)
+        condition, number = self.expressions.text(node), self._number[node]
         if node.get("checkContinuously") != "true":
             with self.text.block(f"while ({condition}):"):
                 self.children(node)
@@ -232,12 +232,7 @@ class Nodes:
             else:
                 number = int(numbers(value, 1)[0])
                 head, title = f"{'elif' if place else 'if'} ({number} == {name}):", f"Case {number}"
-            if not place:
-                self._label(case, title)
-            with self.text.block(head, "" if case is not cases[-1] else "end"):
-                if place:
-                    self._label(case, title)
-                self.children(case)
+            self._branch(case, head, title, more=case is not cases[-1])
 
     def _sub_program(self, node: Element) -> str:
         target = self._references.target(node.find("subprogram"))
@@ -282,27 +277,22 @@ class Nodes:
         kind = contributed.kind_of(node)
         title = node.get("strategyProgramNodeType") or "URCap"
         if kind in self._skip or node.get("strategyURCapName") in self._skip:
-            self.skipped.append(kind)
-        elif (lines := contributed.lines_of(node)) is not None:
+            return
+        if (lines := contributed.lines_of(node)) is not None:
             self._label(node, title)
             self.text.line(*lines)
-        elif (branch := contributed.branch_of(node)) is not None:
-            if not branch:
-                self._checked = contributed.detection(node)
-                self._label(node, title)
-                self.children(node)
-                return
-            more = following is not None and contributed.branch_of(following) == "else"
-            if branch == "if":
-                self._label(node, f"If {self._checked}")
-            with self.text.block(
-                f"if ({self._checked}):" if branch == "if" else "else:", "" if more else "end"
-            ):
-                if branch == "else":
-                    self._label(node, "Else")
-                self.children(node)
-        else:
+        elif (branch := contributed.branch_of(node)) is None:
             raise UnknownPartError(kind)
+        elif not branch:
+            self._grip = contributed.detection(node)
+            self._label(node, title)
+            self.children(node)
+        elif not self._grip:
+            raise UnknownPartError(f"{kind} outside a Grip Check")
+        else:
+            head, shown = (f"if ({self._grip}):", f"If {self._grip}") if branch == "if" else ("else:", "Else")
+            more = following is not None and contributed.branch_of(following) == "else"
+            self._branch(node, head, shown, more=more)
 
 
 def _value(node: Element, tag: str) -> str:

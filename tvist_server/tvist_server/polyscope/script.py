@@ -1,6 +1,7 @@
 """Programs saved by PolyScope as URScript, with PolyScope's labels."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from xml.etree.ElementTree import Element
 
 from tvist_plant.user_file import UserFileError
@@ -59,9 +60,10 @@ def script_of(
         title = script_name(thread.get("name") or "Thread")
         text.label(numbers[thread], title)
         with text.block(f"thread {title}():"):
-            _repeated(nodes, thread, thread.get("runOnlyOnce") != "true", title)
+            _repeated(nodes, thread, again=thread.get("runOnlyOnce") != "true")
         text.line(f"threadId_{title} = run {title}()")
-    _repeated(nodes, main, main.get("runOnlyOnce") == "false" and _acts(main), "Robot Program", numbers[main])
+    again = main.get("runOnlyOnce") == "false" and _acts(main)
+    _repeated(nodes, main, again=again, label=(numbers[main], "Robot Program"))
     if nodes.missing:
         found = ", ".join(dict.fromkeys(map(short, nodes.missing)))
         raise UserFileError(f"PolyScope saved it with {found}, which cannot be simulated")
@@ -72,19 +74,12 @@ def script_of(
     return program(name, f"{start}{text}")
 
 
-def _repeated(nodes: Nodes, part: Element, again: bool, title: str, number: int | None = None) -> None:
-    """Translate a main program or thread, which may repeat."""
-
-    def body() -> None:
-        if number is not None:
-            nodes.text.label(number, title)
+def _repeated(nodes: Nodes, part: Element, *, again: bool, label: tuple[int, str] | None = None) -> None:
+    """Translate a main program, which has a label, or a thread; `again` repeats it."""
+    with nodes.text.block("while (True):") if again else nullcontext():
+        if label is not None:
+            nodes.text.label(*label)
         nodes.children(part)
-
-    if again:
-        with nodes.text.block("while (True):"):
-            body()
-    else:
-        body()
 
 
 def _initial(nodes: Nodes, variable: Element) -> None:
