@@ -43,7 +43,7 @@ LOOK = 0.05  # time between two checks whether the last client is gone [s]
 COMPLETING = 20.0  # longest wait for the end of the recording [s]
 ATTEMPTS = 50
 """Ports or addresses to try, since another process may take one just before the robot listens there."""
-CLIENT = "tvist_testing"  # name under which faults are injected while nobody else has control
+CLIENT = "tvist_testing"  # client that injects faults if no other client has control
 log = logging.getLogger("robot")
 
 

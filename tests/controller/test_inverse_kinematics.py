@@ -168,7 +168,7 @@ def missed(description, pose, rng, starts=64):
     "make", [lambda _: UR5E, random_ur, random_spherical], ids=["ur5e", "ur", "spherical"]
 )
 def test_the_nearest_posture_is_returned_and_none_is_missed(make, measured):
-    """Of arms with any lengths and signs, in closed form."""
+    """Arms have any lengths and signs; all their postures are computed in closed form."""
     rng, worst = np.random.default_rng(3), 0.0
     for _ in range(share(100)):
         description = make(rng)

@@ -161,7 +161,7 @@ class Sessions(RuleBasedStateMachine):
         self.taken("lease", c.TakeControl(client=client, lease_s=seconds), seconds)
 
     def take_clock(self, client, _):
-        if self.realtime:  # time passes by itself here, whoever asks
+        if self.realtime:  # the clock needs no client, and none may take it
             reply = self.request(c.TakeClock(client=client))
             assert (reply.code, reply.where) == ("wrong_mode", "type")
         else:
@@ -410,7 +410,7 @@ class Sessions(RuleBasedStateMachine):
 
     @rule(ticks=st.sampled_from([1, 5, 60, 130, 400]))
     def wait(self, ticks):
-        """Let time pass, by a step of whoever may where that is needed."""
+        """Let time pass; if that needs a step, a client that may step sends it."""
         if self.realtime:
             for _ in range(ticks):
                 self.tick()

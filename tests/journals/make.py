@@ -17,8 +17,7 @@ from tvist_lab.replay import replay_file
 from tvist_server.recording.recorder import Recorder
 
 FOLDER = Path(__file__).parent
-EVERY = 50
-"""Of so many states one is kept."""
+EVERY = 50  # every fiftieth state is kept
 MADE_ON = FOLDER / "made-on.txt"
 """Names the processor that made the runs."""
 

@@ -57,7 +57,7 @@ class LoopbackTransport(Transport):
     def on_lost(self, callback: Callable[[NotConnectedError], None]) -> None:
         """Do nothing: a robot in this process does not disconnect."""
 
-    def presence(self, client: str) -> AbstractContextManager[object]:  # noqa: ARG002
+    def presence(self, client: str) -> AbstractContextManager[object]:  # noqa: ARG002  no network
         """Do nothing: a client in this process does not disconnect either."""
         return nullcontext()
 

@@ -132,7 +132,7 @@ class ZenohTransport(Transport):
             yield
         finally:
             if not self._closed:
-                token.undeclare()  # type: ignore[no-untyped-call]
+                token.undeclare()  # type: ignore[no-untyped-call]  # zenoh has no type for it
 
     async def close(self) -> None:
         """Close the session; pending requests fail."""

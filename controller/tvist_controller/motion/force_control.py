@@ -50,7 +50,7 @@ class ContactWatch:
 
     @property
     def awake(self) -> bool:
-        """Whether a program watches for contacts; `note` is then called every tick."""
+        """True while a program watches for contacts; `note` is then called every tick."""
         return self._asked > 0
 
     def note(self, force: Floats) -> None:
@@ -104,7 +104,7 @@ class ExternalSensor:
 
     @property
     def awaited(self) -> bool:
-        """Whether the sensor is in use but has no recent value."""
+        """True if the sensor is in use but has no recent value."""
         return self._offset is not None and self.latest is None
 
     def next(self) -> Floats | None:

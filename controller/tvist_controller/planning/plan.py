@@ -149,5 +149,5 @@ class CommandRow(NamedTuple):
 
     @property
     def asks(self) -> bool:
-        """Whether it only queries the tool's kinematics."""
+        """True for queries of the tool's kinematics, which move nothing."""
         return self.plan is not None and self.plan.needs is TOOL

@@ -270,7 +270,7 @@ def _point(row: dict[str, Any]) -> tuple[float, float]:
 
 
 def _beside(place: int, point: tuple[float, float], points: Sequence[tuple[float, float]]) -> bool:
-    """Whether to put a name on the right: away from a neighbour of similar height, else alternately."""
+    """Return whether a name goes on the right: away from a neighbour of similar height, else alternately."""
     x, y = point
     away = [other - x for other, height in points if abs(math.log(y / height)) < 0.12]
     if any(0.0 < other < 45.0 for other in away):

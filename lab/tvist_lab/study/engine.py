@@ -63,7 +63,7 @@ def _run(
         for index, outcome in outcomes(executor, measure_each, study.jobs(missing)):
             place = missing[index]
             if isinstance(outcome, Failed):
-                outcome = failed(next(study.jobs([place])), FAILED, why(outcome.error))  # noqa: PLW2901
+                outcome = failed(next(study.jobs([place])), FAILED, why(outcome.error))  # noqa: PLW2901  its failure
             kept += [{"case": place, **row} for row in outcome]
             pending += 1
             if pending == PART:

@@ -103,7 +103,7 @@ def read_rosbag(path: Path) -> LogTable:
 
 
 def has_ros(path: Path) -> bool:
-    """Whether an MCAP file contains ROS 2 messages of any type."""
+    """Return whether an MCAP file contains ROS 2 messages of any type."""
     try:
         with path.open("rb") as stream:
             return any(
