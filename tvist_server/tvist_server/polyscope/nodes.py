@@ -182,7 +182,8 @@ class Nodes:
         if kind not in heads:
             raise UnknownPartError(f"If ({kind})")
         more = following is not None and following.tag == "If" and following.get("type") != "If"
-        self._branch(node, heads[kind], f"{kind} {self.expressions.label(node)}".rstrip(), more=more)
+        title = f"{kind} {self.expressions.label(node)}"
+        self._branch(node, heads[kind], title if kind == "If" else title.rstrip(), more=more)
 
     def _loop(self, node: Element) -> None:
         match node.get("type"):
