@@ -9,6 +9,10 @@ WORKERS ?= auto
 PROFILE ?= full
 # --known-skips fails unless what `make test-all` skips is what tests/skips.json lists.
 SKIPS ?=
+# Random cases of each search, and the seed that draws them.
+CASES ?= 30
+SEED ?= 0
+SEARCH = --cases $(CASES) --seed $(SEED)
 READY := .venv/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
@@ -42,7 +46,7 @@ test: setup
 	$(BESIDE) --hypothesis-profile quick --quick
 
 test-all: setup
-	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not nightly" --durations 20 $(SKIPS)
+	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not nightly" --durations 20 $(SEARCH) $(SKIPS)
 
 # On a quiet machine: how long each test takes, which says what `make test` runs and what is beyond its budget.
 durations: setup
@@ -67,10 +71,8 @@ nightly: setup elsewhere
 	$(BESIDE) -m nightly --record-nightly --durations 20
 
 # Random cases of all that is promised of stops, streams, changes and sequences of commands, over five arms in turn.
-CASES ?= 100
-SEED ?= 0
 search: setup
-	$(BESIDE) -m search --cases $(CASES) --seed $(SEED)
+	$(BESIDE) -m search $(SEARCH)
 
 # Those, and a search for hours of what `.ci/run` searches for two minutes.
 soak: CASES = 2000

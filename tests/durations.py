@@ -63,16 +63,16 @@ def function_of(nodeid):
 def arrange(items):
     """Let one process have each file's tests, one have all that need the clock, and the longest group begin first.
 
-    The cases of a search go to any process.
+    The cases of a search go to any process, last.
     """
     seconds = kept()
     took = defaultdict(float)
     for item in items:
         file, _ = function_of(item.nodeid)
-        group = item.nodeid if item.get_closest_marker("search") else file
-        group = CLOCK if item.get_closest_marker("realtime") else group
+        group = CLOCK if item.get_closest_marker("realtime") else file
+        took[group] = sum(seconds.get(file, {OTHERS: UNKNOWN}).values())
+        group = item.nodeid if item.get_closest_marker("search") else group
         item.add_marker(pytest.mark.xdist_group(group))
-        took[group] = max(took[group], sum(seconds.get(file, {OTHERS: UNKNOWN}).values()))
     took[CLOCK] = float("inf")
     items.sort(key=lambda item: -took[item.get_closest_marker("xdist_group").args[0]])
 
