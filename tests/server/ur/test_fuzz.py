@@ -248,9 +248,9 @@ def test_a_door_stands_and_nobody_else_notices(interface, packages):
     house.tick()
     memory, long = [], packages > 1000
     if long:
+        tracemalloc.start(1)
         for _ in range(HISTORY):  # past postures are kept, which would count as memory that is lost
             house.host.tick()
-        tracemalloc.start(1)
     try:
         for _ in range(8 if long else 2):
             attack(house, interface, random, packages // (8 if long else 2))
