@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 
@@ -107,8 +107,13 @@ def _missing_field(fault: _Fault, name: str) -> ProtocolError:
 
 def _length(fault: _Fault, kind: str, relation: str, limit: str) -> ProtocolError:
     things, one = ("characters", "character") if kind == "str" else ("entries", "entry")
-    has = f" has {len(fault.value)} {things}:" if isinstance(fault.value, str | list) else ""
-    why = f"{fault.whole}{has} must have {_RELATIONS[relation]} {limit} {one if limit == '1' else things}"
+    has = f" has {len(fault.value)} {things}:" if isinstance(fault.value, str | list | tuple) else ""
+    kinds = (fault.place.kind, *get_args(fault.place.kind))
+    meant = next((m for kind in kinds for m in getattr(kind, "__metadata__", ()) if isinstance(m, str)), None)
+    each = "" if meant is None else f", {meant}"
+    why = (
+        f"{fault.whole}{has} must have {_RELATIONS[relation]} {limit} {one if limit == '1' else things}{each}"
+    )
     return ProtocolError("out_of_range", fault.where, why, int(limit))
 
 

@@ -125,7 +125,7 @@ def children(place):
 
 @given(value=changed())
 @examples(400)
-def test_what_a_decoder_accepts_the_schema_accepts_and_it_survives_a_round_trip(value):
+def test_accepted_messages_fit_the_schema_and_survive_a_round_trip(value):
     data = msgpack.packb(value)
     for read in (decode_command, partial(decode, Setpoint)):
         message = decoded(read, data)
