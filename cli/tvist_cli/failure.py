@@ -1,5 +1,6 @@
 """How a command reports a failure: a message and an exit code."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -16,9 +17,38 @@ class Failure(Exception):  # noqa: N818  the plain word for it
         self.code = code
 
 
+class Misuse(Failure):
+    """A wrong command line."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(why, code=2)
+
+
 def interrupted(what: str) -> Failure:
     """Return the failure for Control+C; `what` tells what was done and what was not."""
     return Failure(f"interrupted: {what}", code=130)
+
+
+@contextmanager
+def interruptible(what: str) -> Iterator[None]:
+    """Let Control+C end the body with the failure of `interrupted`."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise interrupted(what) from None
+
+
+def check_range(
+    name: str, value: float | None, low: float, high: float = math.inf, unit: str = "", *, above: bool = False
+) -> None:
+    """Refuse an option's value outside `low` to `high`, or with `above` also `low` itself; None was not given."""
+    if value is None or (low <= value <= high and not (above and value == low)):
+        return
+    least = f"{'more than' if above else 'at least'} {low:g}"
+    said = f"{value:g}" if isinstance(value, float) else f"{value}"
+    raise Misuse(
+        f"{name} is {said}{unit}: must be {least if high == math.inf else f'{low:g} to {high:g}'}{unit}"
+    )
 
 
 @contextmanager

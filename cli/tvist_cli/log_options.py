@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.offered import ROBOTS
 
 if TYPE_CHECKING:
@@ -46,9 +46,9 @@ class LogOptions:
 
         for name in ("imu_columns", "robot"):
             if self.imu is None and getattr(self, name) is not None:
-                raise Failure(f"--{name.replace('_', '-')} is about --imu: give --imu FILE too", code=2)
+                raise Misuse(f"--{name.replace('_', '-')} is about --imu: give --imu FILE too")
         if self.imu is not None and len(self.imu) != len(files):
-            raise Failure(f"{len(self.imu)} --imu for {len(files)} logs: give one for each", code=2)
+            raise Misuse(f"{len(self.imu)} --imu for {len(files)} logs: give one for each")
         needs = ROBOT_OR_SENSOR if sensor and self.imu is None else ROBOT
         with failing_on(RecordingError):
             logs = [read(file, self.columns, needs) for file in files]

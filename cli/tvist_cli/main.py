@@ -144,11 +144,6 @@ def _example(command: str) -> str | None:
     return f"Example: `{examples()[command]}`" if command in examples() else None
 
 
-def _known(chain: Sequence[str]) -> Mapping[str, str]:
-    """Return the commands among which an unknown one was sought."""
-    return OF_GROUPS.get(chain[0], COMMANDS) if chain else COMMANDS
-
-
 def _add(app: "cyclopts.App", package: str, commands: Mapping[str, str], called: Sequence[str]) -> None:
     for place, (name, what) in enumerate(commands.items()):
         if name in OF_GROUPS:
@@ -197,9 +192,9 @@ def _run() -> None:
         with failing_on(OSError):  # a folder for figures that is none, mostly
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
-        print(
-            harmless(f"tvist: {sentence(error, tuple(_known(error.command_chain or ())))}"), file=sys.stderr
-        )
+        group = (error.command_chain or ("",))[0]
+        said = sentence(error, tuple(OF_GROUPS.get(group, COMMANDS)))
+        print(harmless(f"tvist: {said}"), file=sys.stderr)
         sys.exit(2)
     except Failure as failure:
         print(harmless(f"tvist: {failure}"), file=sys.stderr)

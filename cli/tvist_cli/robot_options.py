@@ -8,7 +8,7 @@ from cyclopts import Group, Parameter
 from msgspec import inspect as types
 from msgspec.structs import FieldInfo, fields
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.misuse import lower
 from tvist_cli.offered import PLANTS, PROFILES, ROBOTS, SHAPERS, WORLDS
 from tvist_protocol.schema import field_docs
@@ -117,7 +117,5 @@ def _ur_port(text: str) -> tuple[str, int]:
     """Split INTERFACE=PORT; the configuration checks the name of the interface."""
     interface, equals, port = text.partition("=")
     if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
-        raise Failure(
-            f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off", code=2
-        )
+        raise Misuse(f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off")
     return interface, 0 if port == "off" else int(port)

@@ -8,10 +8,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, check_range, failing_on
 from tvist_cli.shapers_of import load_given, loaded
 from tvist_cli.study_options import StudyOptions
-from tvist_cli.studying import check_range, check_seed
+from tvist_cli.studying import check_seed
 from tvist_controller.planning.filter_planner import wanted_modes
 from tvist_controller.refusal import RefusalError
 from tvist_controller.sources import calibrations
@@ -48,7 +48,7 @@ def preset_study(name: str, options: StudyOptions) -> Study:
     of_others = {one for other in PRESETS.values() for one in other.options} - preset.options
     for option in options.given:
         if option in of_others or (option == "baselines" and preset.menu is None):
-            raise Failure(f"--{option.replace('_', '-')} is not for {name}: see tvist study --help", code=2)
+            raise Misuse(f"--{option.replace('_', '-')} is not for {name}: see tvist study --help")
     _check(options)
     with failing_on(StudyError, MovesError, DescriptionError, CandidateError, *OF_SHAPERS, exit_code=2):
         asked = _asked(preset, name, options)
@@ -75,15 +75,15 @@ def _check(options: StudyOptions) -> None:
     check_range("payload-error", options.payload_error, -100.0, 900.0, " %")
     check_range("stiffness-error", options.stiffness_error, 0.0, 90.0, " %")
     if options.streams and options.save_moves is not None:
-        raise Failure("--save-moves writes moves, but --streams follows streams: leave one out", code=2)
+        raise Misuse("--save-moves writes moves, but --streams follows streams: leave one out")
     if options.clean and options.disturbances is not None:
-        raise Failure("give either --clean or --disturbances", code=2)
+        raise Misuse("give either --clean or --disturbances")
     for name in ("wrists", "stroke"):
         if name in options.given and not options.moves.isdigit():
-            raise Failure(f"--{name} is for random moves: it does not change the moves of a file", code=2)
+            raise Misuse(f"--{name} is for random moves: it does not change the moves of a file")
     low, high = options.stroke or STROKE
     if not 0.001 <= low <= high <= 1.0:
-        raise Failure(f"stroke is {low:g} {high:g}: must be two increasing shares of 0.001 to 1", code=2)
+        raise Misuse(f"stroke is {low:g} {high:g}: must be two increasing shares of 0.001 to 1")
 
 
 def _asked(
@@ -169,15 +169,13 @@ def _calibration(
     if given is not None:
         found = calibrations.load(given)
         if modal and found.modal is None:
-            raise Failure(
-                f"calibration {found.name} has no modal model: make one with tvist identify", code=2
-            )
+            raise Misuse(f"calibration {found.name} has no modal model: make one with tvist identify")
         return found
     default = calibrations.default_for(description.robot.model)
     if default is None:
         if modal:
             model = description.robot.model
-            raise Failure(f"the package has no calibration of a {model}: give --calibration FILE", code=2)
+            raise Misuse(f"the package has no calibration of a {model}: give --calibration FILE")
         return None
     calibration = calibrations.load(default)
     source = modal_source(description, calibration) if several else None
@@ -194,7 +192,7 @@ def _masses(payload: Sequence[float] | None, description: RobotDescription) -> t
     low, high = given[0], given[-1]
     if len(given) > 2 or not 0.0 <= low <= high <= 100.0:
         said = " ".join(f"{one:g}" for one in given)
-        raise Failure(f"payload is {said}: must be a mass of 0 to 100 kg, or two increasing ones", code=2)
+        raise Misuse(f"payload is {said}: must be a mass of 0 to 100 kg, or two increasing ones")
     return low, high
 
 

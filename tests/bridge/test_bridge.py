@@ -45,7 +45,7 @@ def targets(side, ticks):
 
 
 @pytest.mark.parametrize("shaper", ["zv", "auto"])
-def test_over_an_ideal_link_the_robot_s_target_is_that_of_a_shaper_inside_a_fixed_time_later(shaper):
+def test_over_an_ideal_link_an_external_shaper_equals_an_internal_one_with_a_delay(shaper):
     inside = HiddenRobot(UR5E, 3, Q1, PAYLOAD, shaper)
     bridge = Bridge(UR5E, 3, Q1, PAYLOAD, shaper, IDEAL)
     for side in (inside, bridge):
@@ -60,7 +60,7 @@ def test_over_an_ideal_link_the_robot_s_target_is_that_of_a_shaper_inside_a_fixe
     assert np.abs(through[-1, 0] - NEAR).max() < 1e-9
 
 
-def test_equal_seeds_make_equal_motions_and_other_links_other_ones():
+def test_equal_seeds_reproduce_motions_over_a_lossy_link():
     def motion(link):
         bridge = Bridge(UR5E, 5, Q1, PAYLOAD, "zv", link)
         bridge.send(MoveJ, q=tuple(NEAR.tolist()))
@@ -152,7 +152,7 @@ def peak(side):
 
 @pytest.mark.nightly
 @pytest.mark.parametrize(("name", "seed", "shaper"), [("ur5e", 11, "auto"), ("ur5-light", 12, "auto-target")])
-def test_over_a_link_that_loses_packages_a_shaper_in_front_leaves_what_one_inside_leaves(
+def test_over_a_lossy_link_an_external_shaper_is_as_effective_as_an_internal_one(
     name, seed, shaper, measured
 ):
     description = load(name)

@@ -84,9 +84,7 @@ def unseen(description, hidden, declared, seed):
 @pytest.mark.parametrize(
     ("name", "hidden", "every"), [("ur5e", 11, 4), ("ur5e", 12, 1), ("ur5-light", 13, 1)]
 )
-def test_a_robot_that_takes_positions_alone_is_known_where_it_was_never_visited(
-    name, hidden, every, measured
-):
+def test_a_position_controlled_robot_is_identified_at_unseen_poses(name, hidden, every, measured):
     description = load(name)
     measured_jogs = asyncio.run(measured_in_lockstep(description, hidden, every))
     how = {"name": "found", "command": "tvist identify", "progress": lambda _: None}

@@ -10,6 +10,7 @@ import pytest
 
 from tvist_client import (
     ArcSegment,
+    ArgumentError,
     Arm,
     JointSegment,
     LineSegment,
@@ -21,7 +22,7 @@ from tvist_client import (
     blocking,
     make_payload,
 )
-from tvist_client.arguments import given
+from tvist_client.arguments import built
 from tvist_client.command import Sent
 from tvist_client.commands import Commands, Questions
 from tvist_protocol import commands as c
@@ -168,7 +169,7 @@ def sent(host, wanted):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-async def test_a_command_is_sent_as_it_was_asked_for(host, robot, name):
+async def test_a_method_sends_its_command(host, robot, name):
     call, wanted, host.answers[tag(COMMANDS[name][1])] = COMMANDS[name]
     async with robot.control("me") as arm:
         await call(arm)
@@ -176,14 +177,14 @@ async def test_a_command_is_sent_as_it_was_asked_for(host, robot, name):
 
 
 @pytest.mark.parametrize("name", QUESTIONS)
-async def test_questions_need_no_control_and_are_answered_by_tuples(host, robot, name):
+async def test_kinematics_need_no_control_and_return_tuples(host, robot, name):
     call, wanted, host.answers[tag(QUESTIONS[name][1])] = QUESTIONS[name]
     (answer,) = msgspec.structs.astuple(QUESTIONS[name][2])
     assert await call(robot) == answer
     assert host.commands == [check(wanted)]
 
 
-def test_the_blocking_client_sends_the_same(host):
+def test_the_blocking_client_sends_the_same_commands(host):
     with blocking.Robot.over(LoopbackTransport(host)) as robot, robot.control("me") as arm:
         for name, (call, wanted, answer) in (COMMANDS | QUESTIONS).items():
             host.answers, host.commands = {tag(wanted): answer}, []
@@ -195,7 +196,7 @@ def test_the_blocking_client_sends_the_same(host):
 @pytest.mark.parametrize(
     ("name", "reply"), [("move_j", Done()), ("move_l", Accepted(token="t")), ("inverse", Done())]
 )
-async def test_an_answer_of_another_kind_is_an_error_that_names_both(host, robot, name, reply):
+async def test_an_answer_of_another_type_raises_an_error_naming_both_types(host, robot, name, reply):
     call, wanted, _ = (COMMANDS | QUESTIONS)[name]
     host.answers[tag(wanted)] = reply
     async with robot.control("me") as arm:
@@ -231,7 +232,7 @@ def test_help_describes_every_argument_of_a_command():
             assert "RefusedError: " in pydoc.render_doc(method)
 
 
-def test_arguments_that_may_be_given_by_position_stay():
+def test_positional_arguments_stay_positional():
     found = {}
     for name, method in SENT.items():
         parameters = list(inspect.signature(method).parameters.values())[1:]
@@ -249,13 +250,13 @@ def test_arguments_that_may_be_given_by_position_stay():
         (lambda arm: arm.move_j(Q, speed=1), r"move_j\(\): got an unexpected keyword argument 'speed'"),
     ],
 )
-def test_an_argument_that_a_command_lacks_is_named_with_it(host, wrong, said):
+def test_a_missing_or_unknown_argument_is_named_with_its_command(host, wrong, said):
     robot = blocking.Robot.over(LoopbackTransport(host))
     with robot, robot.control("me") as arm, pytest.raises(TypeError, match=said):
         wrong(arm)
 
 
-async def test_an_unknown_argument_is_an_error_at_the_call_and_a_forgotten_await_names_the_command(robot):
+async def test_unknown_arguments_fail_at_the_call_and_a_missing_await_names_the_command(robot):
     async with robot.control("me") as arm:
         with pytest.raises(TypeError, match="speed"):
             arm.move_j([0.0] * 6, speed=1)
@@ -265,12 +266,14 @@ async def test_an_unknown_argument_is_an_error_at_the_call_and_a_forgotten_await
 
 
 @pytest.mark.parametrize("value", [1.5, -1, float("nan"), 1j, 10**400, "yes"])
-def test_what_is_neither_true_nor_false_reaches_the_codec_as_it_is(value):
-    assert given(bool).convert(value, "shaped") is value
-    assert given(bool).convert(np.True_, "shaped") is True
+def test_only_0_1_and_numpy_booleans_are_taken_for_booleans(value):
+    for true in (1, 1.0, np.True_):
+        assert built(m.ServoJ, {"q": Q, "shaped": true}, token="").shaped is True
+    with pytest.raises(ArgumentError, match="shaped"):
+        built(m.ServoJ, {"q": Q, "shaped": value}, token="")
 
 
-def test_attributes_without_await_are_described_and_only_read(host):
+def test_blocking_attributes_have_docstrings_and_are_read_only(host):
     assert blocking.Motion.done.__doc__.startswith("Tick at which its shaped reference came to rest")
     assert blocking.Motion.ended.__doc__ == inspect.getdoc(Motion.ended)
     robot = blocking.Robot.over(LoopbackTransport(host))

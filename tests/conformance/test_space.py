@@ -64,7 +64,7 @@ def test_a_line_is_straight_and_ends_at_its_pose(bent):
         assert at[3:] == pytest.approx(start[3:], abs=1e-5)
 
 
-def test_poses_and_postures_are_answered_without_control(stepped):
+def test_kinematics_are_answered_without_control(stepped):
     pose = stepped.command("forward_kinematics", q=BENT)["pose"]
     answer = stepped.command("inverse_kinematics", pose=pose, near=BENT)
     validate(answer)

@@ -1,13 +1,17 @@
 """What `tvist completion` prints lets each shell complete commands, options, their values and files."""
 
+import contextlib
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from tvist_cli import offered
+from tvist_cli.commands.completion import completion
 from tvist_cli.main import COMMANDS, LOG
 
 ASKING_ZSH = Path(__file__).with_name("completion")
@@ -19,14 +23,19 @@ CASES = {
     "tvist run wave.script --input digital_input_1=1 --prof": {"--profile"},
     "tvist serve --no-f": {"--no-floor"},
     "tvist run wav": {"wave.script"},
-    "tvist serve --shaper zvd": {"zvd", "zvdd", "zvddd"},
-    "tvist serve --shaper ow": {"own.py"},
     "tvist serve --robot ur5": {"ur5-light", "ur5e", "ur5e_stiction"},
-    "tvist serve --robot a": {"arm.toml"},
-    "tvist move Q": {"Q1", "Q2", "Q3"},
-    "tvist study moves --shapers zvd": {"zvd", "zvdd", "zvddd"},
 }
 """Typed lines with what completes their last word."""
+VALUES = [
+    (offered.SHAPERS, "zvd", {"zvd", "zvdd", "zvddd"}),
+    (offered.SHAPERS, "ow", {"own.py"}),
+    (offered.ROBOTS, "a", {"arm.toml"}),
+    (offered.POSES, "Q", {"Q1", "Q2", "Q3"}),
+    (offered.COMPARED, "zvd", {"zvd", "zvdd", "zvddd"}),
+    (offered.PLANTS, "stri", {"stribeck"}),
+    (offered.STUDIES, "ma", {"match"}),
+]
+"""What completes a value of an option that is annotated so."""
 
 
 @pytest.fixture(scope="module")
@@ -36,9 +45,8 @@ def folder(tmp_path_factory):
     for name in ("wave.script", "own.py", "arm.toml"):
         (folder / name).touch()
     for shell, file in {"bash": "bash-script", "zsh": "_tvist", "fish": "fish-script"}.items():
-        words = [sys.executable, "-m", "tvist_cli", "completion", shell]
-        script = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-        (folder / file).write_text(script, encoding="utf-8")
+        with (folder / file).open("w", encoding="utf-8") as script, contextlib.redirect_stdout(script):
+            completion(shell)
     shutil.copy(ASKING_ZSH / "capture.zsh", folder)
     return folder
 
@@ -71,7 +79,14 @@ def test_the_last_word_is_completed(shell, typed, folder):
     assert candidates(shell, folder, typed) == CASES[typed]
 
 
+@pytest.mark.parametrize(("annotation", "typed", "wanted"), VALUES)
+def test_a_value_is_completed(annotation, typed, wanted, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    names = annotation.completer(SimpleNamespace(incomplete=typed))
+    assert {name for name in names if name.startswith(typed)} == wanted
+
+
 @pytest.mark.parametrize("file", ["bash-script", "_tvist", "fish-script"])
-def test_every_command_is_in_the_script(folder, file):
+def test_the_completion_script_contains_every_command(folder, file):
     text = (folder / file).read_text(encoding="utf-8")
     assert [name for name in (*COMMANDS, *LOG) if name not in text] == []

@@ -95,7 +95,7 @@ MISUSE = [
     (("study", "moves", "--modes", "9"), ["modes is 9", "1 to 6"]),
     (("study",), ["STUDY is missing"]),
     (("study", "sweep"), ["there is no study sweep", "moves, bench, robustness, match"]),
-    (("study", "x.toml", "--seed", "1"), ["--seed is for moves, bench", "x.toml says itself"]),
+    (("study", "x.toml", "--seed", "1"), ["--seed is for moves, bench", "x.toml defines its own"]),
     (("study", "x.toml", "--processes", "0"), ["processes is 0", "1 to 1024"]),
     (("study", "x.toml", "--scheduler", "localhost"), ["scheduler is 'localhost'", "tcp://HOST:8786"]),
     (("study", "x.toml", "--processes", "2", "--scheduler", "x"), ["either --processes or --scheduler"]),
@@ -181,7 +181,7 @@ MISUSE = [
 @pytest.mark.parametrize(
     ("arguments", "words"), MISUSE, ids=[" ".join(case[0]) or "empty" for case in MISUSE]
 )
-def test_misuse_is_a_sentence_and_exit_code_2(called, arguments, words):
+def test_misuse_prints_one_message_and_exits_with_code_2(called, arguments, words):
     assert_said(called(*arguments), 2, words)
 
 
@@ -215,7 +215,7 @@ def test_misuse_is_a_sentence_and_exit_code_2(called, arguments, words):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
-def test_what_cannot_be_done_is_a_sentence_and_exit_code_1(called, tmp_path, arguments, words):
+def test_a_failure_prints_one_message_and_exits_with_code_1(called, tmp_path, arguments, words):
     assert_said(called(*arguments), 1, words)
     assert list(tmp_path.iterdir()) == []
 
@@ -236,9 +236,7 @@ FILES = [
 
 
 @pytest.mark.parametrize(("option", "name", "content", "words"), FILES)
-def test_a_wrong_file_is_a_sentence_with_file_key_value_and_what_is_allowed(
-    called, tmp_path, option, name, content, words
-):
+def test_an_invalid_file_is_reported_with_key_value_and_limit(called, tmp_path, option, name, content, words):
     (tmp_path / name).write_text(content, encoding="utf-8")
     code = 1 if option == "--robot" or "deeply" in words[0] else 2  # these are no misuse of the options
     assert_said(called("serve", option, name), code, [name, *words])
@@ -259,7 +257,7 @@ SWEEPS = [
 
 
 @pytest.mark.parametrize(("content", "words"), SWEEPS)
-def test_a_wrong_sweep_is_a_sentence_with_file_and_line_or_key(called, tmp_path, content, words):
+def test_an_invalid_sweep_is_reported_with_file_and_line_or_key(called, tmp_path, content, words):
     (tmp_path / "x.toml").write_text(content, encoding="utf-8")
     assert_said(called("study", "x.toml"), 1, ["x.toml", *words])
     assert not (tmp_path / "x").exists()
@@ -273,7 +271,7 @@ def test_a_wrong_sweep_is_a_sentence_with_file_and_line_or_key(called, tmp_path,
         ("anna", ["not valid TOML"]),
     ],
 )
-def test_a_wrong_line_of_the_roles_is_named(called, tmp_path, line, words):
+def test_an_invalid_line_of_the_roles_is_reported(called, tmp_path, line, words):
     (tmp_path / "clients.toml").write_text(line, encoding="utf-8")
     ended = called("serve", "--security", ".", "--listen", f"tls/{free_endpoint().partition('/')[2]}")
     assert_said(ended, 2, ["clients.toml", *words])

@@ -6,18 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from tvist_cli.compiling import compile_if_new
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, check_range, failing_on
 from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, write
 from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, print_json, program, progress, words
-from tvist_cli.pages import MAGNIFY, PageAddress
+from tvist_cli.pages import MAGNIFY, serve_page
 from tvist_cli.paper_tables import print_paper
 from tvist_cli.studying import give
 
 if TYPE_CHECKING:
     from tvist_lab.studies.paper.served import ServedExperiment
 
-PORT = 8080  # port of the page that --view opens
 FOLDER = Path("tvist-demo")
 ANSWERED = "Q1-Q3"
 """Motion of the overview figure: the arm's frequency doubles along it, and the ringing is easy to see."""
@@ -58,16 +57,15 @@ def demo(
     """
     if runs is None:
         if robot is not None or calibration is not None or not baselines:
-            raise Failure(
-                "--robot, --calibration and --no-baselines are for --runs: give it, or leave them out", code=2
+            raise Misuse(
+                "--robot, --calibration and --no-baselines are for --runs: give it, or leave them out"
             )
         _in_real_time(FOLDER if output is None else output, seed, look, tables=tables, view=view, json=json)
         return
     if view:
-        raise Failure("--view shows what was recorded in real time: leave --runs out", code=2)
+        raise Misuse("--view shows what was recorded in real time: leave --runs out")
     look.check(output, option="--output")
-    if runs < 1:
-        raise Failure(f"runs is {runs}: must be at least 1", code=2)
+    check_range("runs", runs, 1)
     from tvist_lab.in_process import free_setup
     from tvist_lab.studies.paper.experiment import count, simulate
     from tvist_lab.studies.paper.published import ARMS
@@ -124,8 +122,9 @@ def _in_real_time(
         raise Failure("the recording differs from its replay or from what the client received")
     if view:
         from tvist_cli.tracks import recorded
+        from tvist_view.playback import meet
 
-        recorded(recording).serve(MAGNIFY, PageAddress("127.0.0.1", PORT, insecure=False))
+        serve_page(recorded(recording).page(MAGNIFY), meet)
 
 
 def _figures(result: "ServedExperiment", folder: Path, look: FigureOptions) -> Path:

@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, check_range, failing_on
 from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, progress, say, table, words
-from tvist_cli.studying import check_range, check_seed, give, show
+from tvist_cli.studying import check_seed, give, show
 
 if TYPE_CHECKING:
     from tvist_plant.description import RobotDescription
@@ -43,7 +43,7 @@ def robots(
     check_range("vary", vary, 0.0, VARIED, " %")
     check_seed(seed)
     if vary and not measure:
-        raise Failure("vary needs --measure: it changes nothing in a list", code=2)
+        raise Misuse("vary needs --measure: give it, or leave --vary out")
     with failing_on(DescriptionError):
         arms = {name: load(name) for name in robot or shipped()}
     listed = [about(name, description) for name, description in arms.items()]
@@ -69,16 +69,16 @@ def _measured(
     with progress(len(factors) * moves, f"moves of {name}") as bar:
         for factor in factors:
             try:
-                found.append(
-                    measure(
-                        description,
-                        calibration if factor == 1.0 else None,
-                        stiffness=factor,
-                        moves=moves,
-                        seed=seed,
-                        progress=lambda made: bar(made, None),
-                    )
+                own = calibration if factor == 1.0 else None
+                made = measure(
+                    description,
+                    own,
+                    stiffness=factor,
+                    moves=moves,
+                    seed=seed,
+                    progress=lambda done: bar(done, None),
                 )
+                found.append(made)
             except IdentificationError as error:
                 say(f"{name} with springs times {factor:g} is left out: {error}")
     return found
