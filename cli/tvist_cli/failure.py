@@ -52,21 +52,22 @@ def check_range(
 
 
 @contextmanager
-def failing_on(*errors: type[Exception], exit_code: int = 1) -> Iterator[None]:
+def failing_on(*errors: type[Exception], exit_code: int = 1, where: str = "") -> Iterator[None]:
     """Turn errors of these types, and those of client and protocol, into a `Failure` with the same message.
 
-    A file that exists but has the wrong content always gives exit code 1, whatever `exit_code` is.
+    A file that exists but has the wrong content always gives exit code 1, whatever `exit_code` is. `where` precedes the
+    message, also that of a `Failure` in the body, which then has `exit_code`.
     """
-    kinds: tuple[type[Exception], ...] = (*errors, ClientError, TvistError)
+    kinds: tuple[type[Exception], ...] = (*errors, ClientError, TvistError, *((Failure,) if where else ()))
     try:
         yield
     except UserFileError as error:
-        raise Failure(one_line(str(error))) from error
+        raise Failure(f"{where}{one_line(str(error))}") from error
     except kinds as error:
-        raise Failure(one_line(_sentence(error)), code=exit_code) from error
+        raise Failure(f"{where}{one_line(_message(error))}", code=exit_code) from error
 
 
-def _sentence(error: Exception) -> str:
+def _message(error: Exception) -> str:
     """Return the message without the code that a protocol error carries for a remote client."""
     if isinstance(error, ProtocolError):
         return error.why

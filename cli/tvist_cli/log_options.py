@@ -31,11 +31,6 @@ class LogOptions:
     """Use this robot as the one that moves the sensor of --imu: a name that comes with the package, or the
     path of a robot file [that of the log, or ur5e]."""
 
-    @property
-    def given(self) -> bool:
-        """Whether any option was given."""
-        return self != AS_IT_IS
-
     def read(self, *files: Path, sensor: bool = False) -> "list[Recording]":
         """Read logs and join each with its sensor's log; raise Failure if a file or an option does not fit.
 

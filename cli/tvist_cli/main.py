@@ -182,7 +182,7 @@ def _run() -> None:
             "tvist: more than the client is needed: pip install 'tvist[server]', for studies 'tvist[lab]'"
         )
     from tvist_cli.failure import Failure, failing_on
-    from tvist_cli.misuse import readable, sentence
+    from tvist_cli.misuse import message_of, readable
     from tvist_protocol.errors import harmless
 
     # Print only the message of a warning, without a line of code.
@@ -193,7 +193,7 @@ def _run() -> None:
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
         group = (error.command_chain or ("",))[0]
-        said = sentence(error, tuple(OF_GROUPS.get(group, COMMANDS)))
+        said = message_of(error, tuple(OF_GROUPS.get(group, COMMANDS)))
         print(harmless(f"tvist: {said}"), file=sys.stderr)
         sys.exit(2)
     except Failure as failure:

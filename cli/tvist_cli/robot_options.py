@@ -41,6 +41,11 @@ _BOX_OF = {
 _OFFERED = {"robot": ROBOTS, "robots": ROBOTS, "shaper": SHAPERS, "plant": PLANTS, "world": WORLDS,
             "profile": PROFILES}  # fmt: skip
 """Completion of option values."""
+_READ_AS: dict[type, Any] = {
+    types.BoolType: bool, types.IntType: int, types.FloatType: float, types.VarTupleType: list[str],
+    types.StructType: list[str],
+}  # fmt: skip
+"""Types of option values by those of the fields; the others are texts."""
 _IN_ANY_CASE = ("profile", "shaper", "clock")
 
 
@@ -75,16 +80,7 @@ def content_of(file: str | None) -> dict[str, object]:
 def _option(field: FieldInfo) -> inspect.Parameter:
     may_be = types.type_info(field.type)
     kind = may_be.types[0] if isinstance(may_be, types.UnionType) else may_be
-    read: Any = str
-    match kind:
-        case types.BoolType():
-            read = bool
-        case types.IntType():
-            read = int
-        case types.FloatType():
-            read = float
-        case types.VarTupleType() | types.StructType():
-            read = list[str]
+    read: Any = _READ_AS.get(type(kind), str)
     name = "ur-port" if field.name == "ur_ports" else field.name.replace("_", "-")
     # Options that a profile may switch on need a form that switches them off.
     negative = f"--no-{name}" if read is bool and kind is not may_be else ()

@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from tvist_cli.failure import Failure, Misuse, check_range, failing_on
+from tvist_cli.failure import Misuse, check_range, failing_on
 from tvist_cli.shapers_of import load_given, loaded
 from tvist_cli.study_options import StudyOptions
 from tvist_cli.studying import check_seed
@@ -71,9 +71,12 @@ def preset_study(name: str, options: StudyOptions) -> Study:
 def _check(options: StudyOptions) -> None:
     check_seed(options.seed)
     check_range("modes", options.modes, 1, 6)
-    check_range("frequency-error", options.frequency_error, -90.0, 900.0, " %")
-    check_range("payload-error", options.payload_error, -100.0, 900.0, " %")
-    check_range("stiffness-error", options.stiffness_error, 0.0, 90.0, " %")
+    for name, low, high in (
+        ("frequency", -90.0, 900.0),
+        ("payload", -100.0, 900.0),
+        ("stiffness", 0.0, 90.0),
+    ):
+        check_range(f"{name}-error", getattr(options, f"{name}_error"), low, high, " %")
     if options.streams and options.save_moves is not None:
         raise Misuse("--save-moves writes moves, but --streams follows streams: leave one out")
     if options.clean and options.disturbances is not None:
@@ -269,28 +272,20 @@ def swept(path: Path) -> Study:
     """Read a sweep file and load all that it names; its paths are relative to its folder."""
     spec = read_spec(path)
     loaded_robots = [_robot(path, spec, place, named) for place, named in enumerate(spec.robots)]
-    try:
+    with failing_on(MovesError, where=f"sweep {path}: "):
         return study(spec, loaded_robots)
-    except MovesError as error:
-        raise Failure(f"sweep {path}: {error}") from error
 
 
 def _robot(path: Path, spec: Spec, place: int, named: str | NamedRobot) -> SweptRobot:
     robot, calibration = (named, None) if isinstance(named, str) else (named.robot, named.calibration)
-    try:
-        with failing_on(DescriptionError):
-            arm = load(robot if robot in robots() else path.parent / robot).disturbed_by(spec.disturbances)
-    except Failure as failure:
-        raise Failure(f"sweep {path}: robots[{place}]: {failure}") from failure
+    with failing_on(DescriptionError, where=f"sweep {path}: robots[{place}]: "):
+        arm = load(robot if robot in robots() else path.parent / robot).disturbed_by(spec.disturbances)
     if calibration is not None and (path.parent / calibration).exists():
         calibration = str(path.parent / calibration)
     recipes = []
     for number, shaper in enumerate(spec.shapers):
-        try:
-            with failing_on(*OF_SHAPERS):
-                recipes.append(_recipe(path, spec, shaper, calibration, arm))
-        except Failure as failure:
-            raise Failure(f"sweep {path}: shapers[{number}] with robots[{place}]: {failure}") from failure
+        with failing_on(*OF_SHAPERS, where=f"sweep {path}: shapers[{number}] with robots[{place}]: "):
+            recipes.append(_recipe(path, spec, shaper, calibration, arm))
     label = robot if isinstance(named, str) else f"{robot} with {named.calibration}"
     return SweptRobot(label, arm, tuple(recipes))
 

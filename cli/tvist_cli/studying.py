@@ -41,7 +41,7 @@ class ResultFiles:
                     write(save, draw())
 
 
-def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, json: bool) -> None:
+def print_result(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, json: bool) -> None:
     """Print a result as one JSON object or as text."""
     if json:
         print_json(result)
@@ -49,7 +49,7 @@ def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, js
         say_it(result)
 
 
-def show(title: str, entries: "Iterable[Entry]", columns: "Sequence[Column]") -> None:
+def print_entries(title: str, entries: "Iterable[Entry]", columns: "Sequence[Column]") -> None:
     """Print a table of nested results."""
     from tvist_lab.study.columns import cells, titles
 

@@ -80,17 +80,9 @@ def explain_unknown_type(name: object, types: Types) -> ProtocolError:
 
 def explain_bytes(error: Exception) -> ProtocolError:
     """Return the error of bytes that are not MessagePack."""
-    match error:
-        case RecursionError():
-            why = "the message is nested too deeply"
-        case UnicodeDecodeError():
-            why = "the message contains text that is not UTF-8"
-        case MemoryError():
-            why = "the message declares a length that exceeds memory"
-        case _:
-            said = str(error).removeprefix("MessagePack data is malformed: ")
-            why = f"the message is not valid MessagePack: {short(said)}"
-    return ProtocolError("malformed", "", why)
+    said = str(error).removeprefix("MessagePack data is malformed: ")
+    why = _BYTES.get(type(error)) or f"is not valid MessagePack: {short(said)}"
+    return ProtocolError("malformed", "", f"the message {why}")
 
 
 def _unknown_field(fault: _Fault, name: str) -> ProtocolError:
@@ -157,15 +149,13 @@ _RULES: tuple[tuple[re.Pattern[str], Callable[..., ProtocolError]], ...] = (
 )
 _RELATIONS = {">= ": "at least", "<= ": "at most", "> ": "more than", "< ": "less than", "": "exactly"}
 _KINDS = {
-    "float": "a number",
-    "int": "an integer",
-    "str": "a string",
-    "array": "a list",
-    "object": "a map",
-    "bool": "a boolean",
-    "None": "null",
-    "bytes": "a byte string",
-    "ext": "an extension value",
+    "float": "a number", "int": "an integer", "str": "a string", "array": "a list", "object": "a map",
+    "bool": "a boolean", "None": "null", "bytes": "a byte string", "ext": "an extension value",
+}  # fmt: skip
+_BYTES: dict[type, str] = {
+    RecursionError: "is nested too deeply",
+    UnicodeDecodeError: "contains text that is not UTF-8",
+    MemoryError: "declares a length that exceeds memory",
 }
 
 

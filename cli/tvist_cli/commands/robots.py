@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tvist_cli.failure import Misuse, check_range, failing_on
 from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, progress, say, table, words
-from tvist_cli.studying import check_seed, give, show
+from tvist_cli.studying import check_seed, print_entries, print_result
 
 if TYPE_CHECKING:
     from tvist_plant.description import RobotDescription
@@ -50,7 +50,7 @@ def robots(
     for one in listed if measure else ():
         one["measured"] = _measured(one["name"], arms[one["name"]], one, random, vary, seed)
     result = {"robots": listed}
-    give(result, lambda _: _print(listed, in_full=bool(robot)), json=json)
+    print_result(result, lambda _: _print(listed, in_full=bool(robot)), json=json)
 
 
 def _measured(
@@ -87,7 +87,7 @@ def _measured(
 def _print(listed: list[dict[str, Any]], *, in_full: bool) -> None:
     from tvist_lab.studies.arms.about import LISTED, RESULTS
 
-    show("arms", listed, LISTED)
+    print_entries("arms", listed, LISTED)
     for one in listed if in_full else ():
         out.print(one["name"], style="bold", markup=False)
         origins = one["origins"].items()
@@ -105,4 +105,4 @@ def _print(listed: list[dict[str, Any]], *, in_full: bool) -> None:
         )
     measured = [{"name": one["name"], **found} for one in listed for found in one.get("measured", ())]
     if measured:
-        show("measured", measured, RESULTS)
+        print_entries("measured", measured, RESULTS)

@@ -12,7 +12,7 @@ from tvist_cli.offered import SHAPERS as OFFERED
 from tvist_cli.output import out, table
 from tvist_cli.sensitivity import print_sensitivity
 from tvist_cli.shapers_of import load_given
-from tvist_cli.studying import Figures, ResultFiles, give
+from tvist_cli.studying import Figures, ResultFiles, print_result
 
 if TYPE_CHECKING:
     from tvist_shaping import Impulses
@@ -79,7 +79,7 @@ def shapers(
     found = [_about(one, f_d, zeta) for one in listed]
     result = {"f_d_hz": f_d, "zeta": zeta, "shapers": found, "for_calibrated_arms": others}
     places.write(result, lambda: _figures(listed, f_d, zeta))
-    give(result, _print, json=json)
+    print_result(result, _print, json=json)
 
 
 def _figures(listed: "list[AnyShaper]", f_d: float, zeta: float) -> Figures:

@@ -31,7 +31,7 @@ def export(
     kind = lower(to)
     if kind not in (*FORMATS, FOXGLOVE):
         raise Misuse(f"to is {to!r}: must be one of {', '.join((*FORMATS, FOXGLOVE))}")
-    if kind == FOXGLOVE and logs.given:
+    if kind == FOXGLOVE and logs != AS_IT_IS:
         raise Misuse("--columns and --imu are for logs: --to foxglove needs a recording")
     ending = f".{kind}.mcap" if kind == FOXGLOVE else f".{kind}"
     with failing_on(RecordingError):

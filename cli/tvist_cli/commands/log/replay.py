@@ -48,18 +48,21 @@ def replay(
         insecure: With --publish, accept remote connections without TLS and do not authenticate clients.
         json: Print one JSON object.
     """
-    own_server = {
+    own_server: dict[str, object] = {
         "listen": listen, "name": name, "speed": speed, "loop": loop or None, "security": security,
         "insecure": insecure or None,
     }  # fmt: skip
+    unused: dict[str, object] = {"the output": output, "--shaper": shaper, "--plant": plant}
+    for option, given in (unused if publish else own_server).items():
+        if given is not None:
+            raise Misuse(
+                f"--publish computes nothing: leave out {option}"
+                if publish
+                else f"--{option} needs --publish"
+            )
     if not publish:
-        if given := [key for key, value in own_server.items() if value is not None]:
-            raise Misuse(f"--{given[0]} needs --publish")
         _run_again(file, output, shaper or [], plant, json=json)
         return
-    unused = {"the output": output, "--shaper": shaper, "--plant": plant}
-    if words := [word for word, given in unused.items() if given]:
-        raise Misuse(f"--publish computes nothing: leave {words[0]} out")
     _publish(
         file, listen=listen or [DEFAULT_ENDPOINT], name=name, speed=1.0 if speed is None else speed, loop=loop,
         security=security, insecure=insecure, json=json,
