@@ -152,6 +152,16 @@ class TestControl:
         assert state["target_q"] == Q_NEAR
         assert state["target_qd"] == [0.0] * 6
 
+    def test_kinematics_are_answered_without_control(self, stepped):
+        bent = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+        pose = stepped.command("forward_kinematics", q=bent)
+        answer = stepped.command("inverse_kinematics", pose=pose["pose"], near=bent)
+        validate(pose)
+        validate(answer)
+        assert answer["q"] == pytest.approx(bent, abs=1e-9)
+        refused = stepped.command("inverse_kinematics", pose=[2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        assert (refused["type"], refused["code"], refused["where"]) == ("refused", "no_solution", "pose")
+
 
 class TestIo:
     def test_io_is_sent_before_the_state_of_a_change_and_once_a_second(self, stepped):

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 from tests.conformance.served import PATIENCE, Served, free_endpoint
 from tests.conformance.wire import STOPPED, Wire
-from tests.lab.made_logs import TwoDevices
-from tests.system.shell import Ended, begun, python, tvist
+from tests.system.shell import begun, python, tvist
 
 from tvist_cli.output import out, table
 from tvist_client.blocking import Robot
@@ -22,24 +21,6 @@ HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "clients" / "examples"
 NEAR = "0.1,-3.1,0.1,-1.5,0.1,0.1"
 BENT = "0,-1.57,1.57,-1.57,-1.57,0"
-
-
-@pytest.fixture(scope="module")
-def recorded(lockstep, tmp_path_factory):
-    """A recording that `tvist log record` made of a motion, and what it said; in lockstep no state is lost."""
-    path = tmp_path_factory.mktemp("recorded") / "seen.mcap"
-    process = begun("log", "record", path, "--endpoint", lockstep.endpoint, "--json")
-    try:
-        assert "recording ur5e into" in process.stderr.readline()
-        assert tvist("move", NEAR, "--endpoint", lockstep.endpoint).code == 0
-        with Wire(lockstep.endpoint) as wire, wire.control() as token:
-            wire.step(token, 400)  # what rings after the motion
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=PATIENCE)
-        return path, Ended(process.returncode, out, err)
-    finally:
-        process.kill()
-        process.communicate(timeout=PATIENCE)
 
 
 def test_check_names_missing_and_present_robots(lockstep):
@@ -68,45 +49,6 @@ def test_a_name_is_required_if_there_are_several_robots():
     with Served("--robots", "ur5e*2", "--clock", "lockstep", name=None) as served:
         tvist("unlock", served.endpoint).assert_failed(1, "ur5e-1, ur5e-2", "--name")
         assert "ur5e-2" in tvist("unlock", served.endpoint, "--name", "ur5e-2").assert_done().out
-
-
-def test_control_c_ends_an_open_ended_recording_with_exit_code_0(recorded):
-    path, ended = recorded
-    said = ended.assert_done().json
-    assert (said["file"], said["lost"]) == (str(path), 0)
-    assert said["states"] > 400
-
-
-@pytest.mark.realtime
-def test_control_c_before_the_requested_time_keeps_the_recording_and_exits_with_130(realtime, tmp_path):
-    path = tmp_path / "short.mcap"
-    process = begun("log", "record", path, "--endpoint", realtime.endpoint, "--seconds", 600)
-    assert "recording" in process.stderr.readline()
-    with Wire(realtime.endpoint) as wire:
-        wire.until(wire.state()["tick"] + 50)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 130
-    assert f"s recorded into {path}" in err.splitlines()[-1]
-    tvist("log", "analyze", path, "--json").assert_done()
-
-
-def test_analyze_measures_and_draws_a_motion_and_prints_a_table(recorded, tmp_path):
-    given = (recorded[0], "--figures", tmp_path / "drawn", "--json")
-    (motion,) = tvist("log", "analyze", *given).assert_done().json["motions"]
-    assert motion["residual_vibration_m_s2"] is not None
-    assert 0.3 < motion["stop_s"] - motion["start_s"] < 3.0
-    assert {path.name for path in (tmp_path / "drawn").iterdir()} == {"motion_1.png", "ring_down_1.png"}
-    said = tvist("log", "analyze", recorded[0]).assert_done().out
-    assert all(words in said for words in ("RV m/s²", "overshoot", "e_os mm"))
-
-
-def test_a_recording_of_a_client_is_neither_replayed_nor_overwritten(lockstep, recorded, tmp_path):
-    tvist("log", "replay", recorded[0]).assert_failed(1, "serve --record")
-    tvist("log", "record", recorded[0], "--endpoint", lockstep.endpoint).assert_failed(1, "exists")
-    (tmp_path / "text.mcap").write_text("hello", encoding="utf-8")
-    ended = tvist("log", "analyze", tmp_path / "text.mcap", "--json").assert_failed(1, "no MCAP file")
-    assert ended.out == ""
 
 
 def test_move_accepts_radians_degrees_and_pose_names(lockstep):
@@ -270,22 +212,3 @@ def test_a_wide_table_is_split_and_repeats_its_first_column(capsys, monkeypatch)
     assert max(map(len, lines)) <= 30
     assert [line.split()[0] for line in lines if "0123456789" in line] == ["one", "one"]
     assert sum(line.count("0123456789") for line in lines) == 3
-
-
-def test_log_commands_join_the_logs_of_a_robot_and_a_sensor(tmp_path):
-    devices = TwoDevices(4, 2.5, 0.003, motions=3)
-    log = devices.robot(tmp_path / "robot.csv", ("zeit", "achse {}"), first=1, units=(1e-3, math.pi / 180.0))
-    imu = devices.sensor(tmp_path / "imu.csv", header=False)
-    of_robot = ("--columns", "time=zeit:ms,q=achse {}:deg")
-    of_imu = ("--imu", imu, "--imu-columns", "time=1,accelerometer=2-4,gyroscope=5-7", "--robot", "ur5e")
-    given = (*of_robot, *of_imu)
-    analysed = tvist("log", "analyze", log, *given, "--json").assert_done().json
-    assert len(analysed["motions"]) == devices.motions
-    assert any("joined by its gyroscope" in note for note in analysed["notes"])
-    page, joined = tmp_path / "page.html", tmp_path / "joined.csv"
-    tvist("log", "report", log, *given, "--output", page).assert_done()
-    assert "joined by its gyroscope" in page.read_text()
-    tvist("log", "export", log, *given, "--to", "csv", "--output", joined).assert_done()
-    again = tvist("log", "analyze", joined, "--json").assert_done().json["motions"]
-    assert [one["stop_s"] for one in again] == [one["stop_s"] for one in analysed["motions"]]
-    tvist("log", "analyze", log, *of_robot, "--imu", log).assert_failed(1, "its columns with --imu-columns")

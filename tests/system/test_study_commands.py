@@ -96,8 +96,17 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize(("words", "figures", "check"), RUNS)
-def test_results_are_correct_and_written_as_printed(here, words, figures, check):
+@pytest.mark.parametrize(("words", "figures", "check"), RUNS[:1])
+def test_a_study_of_random_moves_is_written_as_printed_and_reproducible(here, words, figures, check):
+    run_and_check(here, words, figures, check)
+
+
+@pytest.mark.parametrize(("words", "figures", "check"), RUNS[1:])
+def test_shapers_are_correct_and_written_as_printed(here, words, figures, check):
+    run_and_check(here, words, figures, check)
+
+
+def run_and_check(here, words, figures, check):
     told = tvist(*words.split(), "--json").assert_done().json
     check(told, here)
     assert {path.name for path in here.iterdir() if path.suffix in {".png", ".svg", ".pdf"}} == figures
@@ -156,6 +165,7 @@ def test_failed_rows_are_counted_and_the_first_is_named(here):
     ended.assert_failed(1, "1 of 2 rows failed, the first with later at move 1", said)
 
 
+@pytest.mark.nightly
 def test_bench_does_not_rank_a_shaper_that_uses_future_samples(here):
     (here / "peeks.py").write_text(PEEKS, encoding="utf-8")
     given = "study bench --quick --moves 1 --shapers zv peeks.py --json"

@@ -89,6 +89,9 @@ MISUSE = [
     (("log", "export", "x.mcap", "--to", "foxglove", "--imu", "i.csv"), ["--imu", "needs a recording"]),
     (("log", "analyze", "x.csv", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),
     (("log", "analyze", "x.csv", "--robot", "ur10e"), ["--robot is about --imu"]),
+    (("log", "report", "x.csv", "--output", "x.html", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),
+    (("log", "advise", "x.csv", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),
+    (("log", "export", "x.csv", "--to", "csv", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),
     (("log", "analyze"), ["one recording or log, or two", "not 0"]),
     (("log", "analyze", "x.csv", "y.csv", "--figures", "x"), ["--figures is for one file"]),
     (("log", "analyze", "x.csv", "y.csv", "--imu", "i.csv"), ["1 --imu for 2 logs", "one for each"]),
@@ -178,10 +181,23 @@ MISUSE = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"), MISUSE, ids=[" ".join(case[0]) or "empty" for case in MISUSE]
-)
-def test_misuse_prints_one_message_and_exits_with_code_2(called, arguments, words):
+STUDIES = {"study", "demo", "identify", "robots", "shapers", "bench"}
+"""Commands that import the laboratory."""
+OF_STUDIES = [case for case in MISUSE if case[0][0] in STUDIES]
+OF_ROBOTS = [case for case in MISUSE if case not in OF_STUDIES]
+
+
+def name_of(value):
+    return " ".join(value) or "empty" if isinstance(value, tuple) else ""
+
+
+@pytest.mark.parametrize(("arguments", "words"), OF_ROBOTS, ids=name_of)
+def test_misuse_of_robots_and_logs_prints_one_message_and_exits_with_code_2(called, arguments, words):
+    assert_said(called(*arguments), 2, words)
+
+
+@pytest.mark.parametrize(("arguments", "words"), OF_STUDIES, ids=name_of)
+def test_misuse_of_studies_prints_one_message_and_exits_with_code_2(called, arguments, words):
     assert_said(called(*arguments), 2, words)
 
 
@@ -213,7 +229,7 @@ def test_misuse_prints_one_message_and_exits_with_code_2(called, arguments, word
         (("shapers", "--figures", __file__), [__file__, "no folder", "another name"]),
         (("keys", __file__, "--robot", "ur5e", "--host", "x"), [__file__, "no folder", "another name"]),
     ],
-    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+    ids=name_of,
 )
 def test_a_failure_prints_one_message_and_exits_with_code_1(called, tmp_path, arguments, words):
     assert_said(called(*arguments), 1, words)
