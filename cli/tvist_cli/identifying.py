@@ -3,7 +3,7 @@
 import asyncio
 import sys
 from collections.abc import AsyncIterator, Sequence
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, nullcontext
 from pathlib import Path
 
 from tvist_cli.connection import Connection
@@ -56,26 +56,20 @@ def from_logs(
     arm, logs = _robot_logs(
         [*files, *checks], robot, None if masses is None else masses[0], columns, len(files)
     )
+    measured = RingDownLogs(tuple(logs))
     with failing_on(RecordingError, OSError), waiting("identifying") as step:
         if twin:
             made = fit_twin(arm, logs[: len(files)], logs[len(files) :], step)
             write_whole(output, twin_file(made, typed()).encode())
         else:
-            found = _calibrated(arm, RingDownLogs(tuple(logs)), output, step)
+            found = _calibrated(arm, measured, output, step)
     if twin:
         report_twin(made, output, json=json)
         return
     if figures is not None:
         _draw(found, look, figures, arm, None)
     named = robot or arm.robot.name
-    report(
-        found,
-        RingDownLogs(tuple(logs)),
-        output,
-        "" if named == ROBOT else f" --robot {named}",
-        None,
-        json=json,
-    )
+    report(found, measured, output, "" if named == ROBOT else f" --robot {named}", None, json=json)
 
 
 def _calibrated(arm: RobotDescription, measured: RingDownLogs, output: Path, step: Progress) -> Found:
@@ -164,16 +158,12 @@ class MovableRobot:
                 async with client.control("identify") as control:
                     return arm, await make_jogs(client, control, plan, step)
 
-        with failing_on(ServedError, OSError, RecordingError):
-            if self._positions:  # the question stands on the same screen
-                arm, measured = asyncio.run(run(say))
-                found = _calibrated(arm, measured, output, say)
-            else:
-                with waiting("identifying") as step:
-                    arm, measured = asyncio.run(run(step))
-                    found = _calibrated(arm, measured, output, step)
-        payloads = found.forecast.arm.payloads
-        true = None
+        # The question to the user needs the screen.
+        shown = nullcontext(say) if self._positions else waiting("identifying")
+        with failing_on(ServedError, OSError, RecordingError), shown as step:
+            arm, measured = asyncio.run(run(step))
+            found = _calibrated(arm, measured, output, step)
+        payloads, true = found.forecast.arm.payloads, None
         if self._setup is not None:
             true = true_errors(arm, found.calibration, payloads, self._seed, found.modes)
         if figures is not None:
@@ -246,11 +236,9 @@ def _draw(
     maps = None if true is None else workspace_map(arm, found.calibration, mass)
     words = f"{arm.robot.name}, {mass:g} kg, calibration {found.calibration.name}"
     with look.into(folder) as save:
-        drawn = (
-            {"identification": identified_figure(found.calibration.name, measured, fitted)}
-            if measured.size
-            else {}
-        )
+        drawn = {}
+        if measured.size:
+            drawn["identification"] = identified_figure(found.calibration.name, measured, fitted)
         if maps is not None:
             drawn |= {
                 f"map_{name}": workspace_map_figure(maps, key, words) for key, name in QUANTITIES.items()

@@ -57,11 +57,9 @@ async def _rest(robot: Robot, tick: int) -> State:
 
 
 def _ended(event: Event) -> list[str]:
-    match event.kind:
-        case "motion_stopped":
-            return [f"motion {event.id}"]
-        case "stream_stopped":
-            return ["the stream of set-points"]
-        case "program_stopped":
-            return ["a program" if event.program is None else f"the program {event.program}"]
-    return []
+    ended = {
+        "motion_stopped": f"motion {event.id}",
+        "stream_stopped": "the stream of set-points",
+        "program_stopped": "a program" if event.program is None else f"the program {event.program}",
+    }
+    return [ended[event.kind]] if event.kind in ended else []

@@ -18,8 +18,7 @@ from tvist_cli.failure import Misuse, check_range, failing_on, interrupted, inte
 from tvist_cli.output import number, out, print_json, waiting
 from tvist_client.errors import MisuseError
 from tvist_client.fleet import Fleet, FleetRobot, ManyStates, NewestState, RobotPlace
-from tvist_client.readiness import look, mode_name
-from tvist_client.robot import Robot
+from tvist_client.readiness import Readiness, look, mode_name
 from tvist_protocol import Event, RobotMode, SafetyMode, State, Telemetry
 
 REFRESH_S = 0.1  # time between two readings of states [s]
@@ -97,12 +96,22 @@ async def _robot_frames(at: Connection, *, json: bool) -> AsyncIterator[Frame]:
     with waiting(f"waiting for {at.name} at {at.endpoint}"):
         found = await at.robot()
     async with found as robot:
-        events, load = list[Event](), deque[Telemetry](maxlen=1)
+        events, load, line = list[Event](), deque[Telemetry](maxlen=1), Text()
+        modes: tuple[int, int] | None = None
+
+        def on_event(event: Event) -> None:
+            nonlocal modes
+            events.append(event)
+            if event.kind in {"protective_stop", "safety_stop"}:
+                modes = None  # ask again why the robot cannot be moved
+
         robot.on_telemetry(load.append)
-        robot.on_event(print_json if json else events.append)
-        standing = _Standing(robot, at.unlock_command(str(at.name)))
+        robot.on_event(print_json if json else on_event)
         async for state in robot.states(buffer=1):
-            line = Text() if json else await standing.line(state)
+            now = (state.robot_mode, state.safety_mode)
+            if not json and now != modes:
+                modes = now  # first, since an event may come meanwhile
+                line = _standing(await look(robot, at.unlock_command(str(at.name))))
             yield [state], _robot_screen(state, events[-5:], line, load)
 
 
@@ -133,29 +142,10 @@ async def _states_frames(states: ManyStates) -> AsyncIterator[Frame]:
             )
 
 
-class _Standing:
-    """Whether the robot can be moved, and why not; asked again whenever its modes change or it stops."""
-
-    def __init__(self, robot: Robot, unlock: str) -> None:
-        self._robot, self._unlock = robot, unlock
-        self._modes: tuple[int, int] | None = None
-        self._line = Text()
-        robot.on_event(self._on_event)
-
-    async def line(self, state: State) -> Text:
-        """Return the line for the screen."""
-        modes = (state.robot_mode, state.safety_mode)
-        if modes != self._modes:
-            self._modes = modes  # first, since an event may come meanwhile
-            found = await look(self._robot, self._unlock)
-            self._line = Text(f"robot_mode {found.robot_mode}   safety_mode {found.safety_mode}")
-            if not found.ready:
-                self._line.append(f"\n{found.sentence}", style="bold red")
-        return self._line
-
-    def _on_event(self, event: Event) -> None:
-        if event.kind in {"protective_stop", "safety_stop"}:
-            self._modes = None
+def _standing(found: Readiness) -> Text:
+    """Return the modes and, if the robot cannot be moved, the reason."""
+    line = Text(f"robot_mode {found.robot_mode}   safety_mode {found.safety_mode}")
+    return line if found.ready else line.append(f"\n{found.sentence}", style="bold red")
 
 
 def _load(telemetry: Sequence[Telemetry]) -> Text:
