@@ -70,18 +70,15 @@ def test_equal_seeds_reproduce_motions_over_a_lossy_link():
     assert motion(lossy) == motion(lossy) != motion(Link())
 
 
-PAPER = ("Q2", "Q1", "Q3", "Q1")
-"""Where the paper's motions end, from Q1."""
+PAPER = ("Q2", "Q1", "Q3", "Q1")  # where the paper's motions end, from Q1
 SPEEDS = ((1.5, 2.0, 100.0), (1.05, 1.4, 50.0), (0.8, 2.0, 200.0))
 """Velocity, acceleration and jerk of the motions [rad/s, rad/s², rad/s³]; the first are the paper's."""
-REST = 250
-"""Ticks at rest after a motion."""
+REST = 250  # ticks at rest after a motion
 TORQUE = 0.95
 """Share of the joints' torques that twice the motion's accelerations may need [-]. The simulated `servoj` is late where
 they need more than the torques: nothing smooths what a client sends, and the arm swings as far again.
 """
-BAD = ("protective_stop", "motion_stopped", "program_stopped")
-"""Kinds of events that end a motion."""
+BAD = ("protective_stop", "motion_stopped", "program_stopped")  # kinds of events that end a motion
 
 
 def asked(description, count, seed):

@@ -19,14 +19,10 @@ from tvist_plant.description import load
 from tvist_plant.variants import hidden_variant
 from tvist_server.moving.servo_lag import ServoLag, ServoSetpoints
 
-SPEED = 0.5
-"""Speed cap [rad/s]."""
-STANDS = (0.2, -1.3, 1.4, -1.7, -1.5, 0.1)
-"""Where the arm stands at first [rad]."""
-BEGINS = 100
-"""Ticks until the program follows."""
-PLACES = 60
-"""Number of unseen configurations of each robot."""
+SPEED = 0.5  # speed cap [rad/s]
+STANDS = (0.2, -1.3, 1.4, -1.7, -1.5, 0.1)  # where the arm stands at first [rad]
+BEGINS = 100  # ticks until the program follows
+PLACES = 60  # number of unseen configurations of each robot
 
 
 class Rows(Port):

@@ -1,4 +1,4 @@
-"""What does without: the first example without our packages, and the package without libraries until it is used."""
+"""The first example uses no tvist package, and the client imports no library before it needs one."""
 
 import importlib.util
 import re

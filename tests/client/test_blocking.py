@@ -1,4 +1,4 @@
-"""The blocking face: the same names, in threads that may wait."""
+"""The blocking client has the same methods as the asynchronous one."""
 
 import asyncio
 import inspect

@@ -1,4 +1,4 @@
-"""`python -m tvist_client check`: tells a robot that works from one that does not."""
+"""`python -m tvist_client check` finds out whether a robot works and is ready to move."""
 
 import json
 import math
@@ -68,21 +68,18 @@ def test_check_fails_without_a_server_and_names_the_next_step(endpoint, capsys):
 
 
 @pytest.mark.parametrize(
-    ("answer", "sentence"),
-    [(Done(), "does not check control"), (Refused(code="busy", where="", why="not now"), "busy: not now")],
+    ("told", "answers", "words"),
+    [
+        ({"protocol": 2}, {}, "protocol 2"),
+        ({}, {"move_j": Done()}, "does not check control"),
+        ({}, {"move_j": Refused(code="busy", where="", why="not now")}, "busy: not now"),
+    ],
 )
-def test_check_fails_if_a_command_without_control_is_accepted(realtime, endpoint, answer, sentence):
-    realtime.robot.answers["move_j"] = answer
+def test_check_fails_for_another_protocol_and_without_control(realtime, endpoint, told, answers, words):
+    realtime.robot.told, realtime.robot.answers = told, answers
     report = check(endpoint)
     assert not report.ok
-    assert sentence in report.findings[-1].said
-
-
-def test_check_fails_for_another_protocol_version(realtime, endpoint):
-    realtime.robot.told = {"protocol": 2}
-    report = check(endpoint)
-    assert (report.ok, report.protocol) == (False, 2)
-    assert "protocol 2" in report.findings[-1].said
+    assert words in report.findings[-1].said
 
 
 def test_check_fails_if_the_robot_does_not_tick(realtime, endpoint, monkeypatch):

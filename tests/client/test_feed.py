@@ -1,4 +1,4 @@
-"""Messages on their way to whoever listens: none breaks the stream, none is older than its buffer."""
+"""Messages reach listeners and iterators in order; invalid ones are dropped."""
 
 import asyncio
 import logging

@@ -24,8 +24,7 @@ from tvist_protocol.simulation import SimulationStep
 
 from .conftest import NEAR
 
-SLOW = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
-"""Velocities of a motion that is guided."""
+SLOW = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)  # velocities of a motion that is guided
 
 
 def steps(host):

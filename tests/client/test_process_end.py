@@ -1,4 +1,4 @@
-"""No program hangs at its end: not one that forgets to close, not one that is interrupted."""
+"""Programs end even if they do not close their connection or are interrupted."""
 
 import signal
 import subprocess

@@ -1,4 +1,4 @@
-"""What each call of the client sends, the same from both faces, and what it makes of the answer."""
+"""The commands that methods of both clients send, and their results."""
 
 import inspect
 import json

@@ -1,4 +1,4 @@
-"""`unlock` over a network, and what becomes of an unlock that does not hold."""
+"""`unlock` over a network, also if the robot stops again."""
 
 import pytest
 

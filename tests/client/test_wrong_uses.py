@@ -1,4 +1,4 @@
-"""What a programmer gets wrong: an error of ours with a sentence that names argument, value and what is allowed."""
+"""Wrong uses of the client raise its own errors, which name argument, value and limit."""
 
 import math
 import re

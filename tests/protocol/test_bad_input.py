@@ -1,4 +1,4 @@
-"""Every way a message can be wrong: code, field, sentence and limit of the refusal."""
+"""Invalid messages are refused with code, field, message and limit."""
 
 import math
 import struct

@@ -1,4 +1,4 @@
-"""Keys: a name is one chunk, and never a wildcard."""
+"""Names in keys are one chunk each and contain no wildcard."""
 
 from functools import partial
 from typing import get_args

@@ -1,6 +1,6 @@
-"""What a person mistypes: one sentence that says what is wrong and what is allowed, and nothing on stdout.
+"""Wrong command lines print one message with value and limit on stderr, and nothing on stdout.
 
-The program's own entry is called in this process, as the console script does; what a shell adds is nothing.
+The entry point of the program is called in this process.
 """
 
 import re
@@ -12,8 +12,7 @@ from tests.conformance.served import free_endpoint
 MSGSPEC = re.compile(
     r"Expected `|Object (missing|contains)|Invalid enum|at `\$|is malformed|Traceback|Errno|Unused"
 )
-NOWHERE = "tcp/127.0.0.1:1"
-"""Where nobody listens: port 1 is the system's."""
+NOWHERE = "tcp/127.0.0.1:1"  # where nobody listens: port 1 is the system's
 OWN = str(Path(__file__).parents[1] / "own_arm.py:OwnArm")
 SEVEN = str(Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf")
 

@@ -1,4 +1,4 @@
-"""Whatever text is sent: an error with a position or a run, no other exception, and no tick beyond its budget."""
+"""Any text compiles or has an error with a position, and no tick exceeds its budget."""
 
 import pytest
 

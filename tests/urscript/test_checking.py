@@ -1,4 +1,4 @@
-"""What a checker tells, and what has limits."""
+"""Errors that the checker finds, and limits of a script's size."""
 
 import pytest
 from tests.conformance.served import finished

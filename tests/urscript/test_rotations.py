@@ -1,4 +1,4 @@
-"""Rotation vectors against scipy's, and near 0 and π against what is known exactly."""
+"""Rotations agree with scipy, and near 0 and π with exact values."""
 
 import math
 
