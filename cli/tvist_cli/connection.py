@@ -1,13 +1,19 @@
 """Options that locate a served robot, the same on every command that connects to one."""
 
+import asyncio
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from cyclopts import Parameter
 
+from tvist_cli.failure import failing_on
 from tvist_client.readiness import unlock_command
 from tvist_client.robot import ENDPOINT, NAME, Robot
 from tvist_client.transports.zenoh import only_robot
+
+T = TypeVar("T")
 
 
 @Parameter(name="*")
@@ -26,6 +32,16 @@ class Connection:
         """Connect to the robot; raise ClientError if it does not answer, or if there are several and none was named."""
         name = self.name or await only_robot(self.endpoint, NAME, self.security, self.namespace)
         return await Robot.connect(self.endpoint, name, security=self.security, namespace=self.namespace)
+
+    def run(self, use: Callable[[Robot], Awaitable[T]]) -> T:
+        """Connect to the robot and return the result of `use`; raise Failure if it is not there or refuses."""
+
+        async def used() -> T:
+            async with await self.robot() as robot:
+                return await use(robot)
+
+        with failing_on():
+            return asyncio.run(used())
 
     def unlock_command(self, name: str) -> str:
         """Return the command line that unlocks the robot of this name."""

@@ -1,5 +1,6 @@
 """How a command reports a failure: a message and an exit code."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -16,27 +17,57 @@ class Failure(Exception):  # noqa: N818  the plain word for it
         self.code = code
 
 
+class Misuse(Failure):
+    """A wrong command line."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(why, code=2)
+
+
 def interrupted(what: str) -> Failure:
     """Return the failure for Control+C; `what` tells what was done and what was not."""
     return Failure(f"interrupted: {what}", code=130)
 
 
 @contextmanager
-def failing_on(*errors: type[Exception], exit_code: int = 1) -> Iterator[None]:
+def interruptible(what: str) -> Iterator[None]:
+    """Let Control+C end the body with the failure of `interrupted`."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise interrupted(what) from None
+
+
+def check_range(
+    name: str, value: float | None, low: float, high: float = math.inf, unit: str = "", *, above: bool = False
+) -> None:
+    """Refuse an option's value outside `low` to `high`, or with `above` also `low` itself; None was not given."""
+    if value is None or (low <= value <= high and not (above and value == low)):
+        return
+    least = f"{'more than' if above else 'at least'} {low:g}"
+    said = f"{value:g}" if isinstance(value, float) else f"{value}"
+    raise Misuse(
+        f"{name} is {said}{unit}: must be {least if high == math.inf else f'{low:g} to {high:g}'}{unit}"
+    )
+
+
+@contextmanager
+def failing_on(*errors: type[Exception], exit_code: int = 1, where: str = "") -> Iterator[None]:
     """Turn errors of these types, and those of client and protocol, into a `Failure` with the same message.
 
-    A file that exists but has the wrong content always gives exit code 1, whatever `exit_code` is.
+    A file that exists but has the wrong content always gives exit code 1, whatever `exit_code` is. `where` precedes the
+    message, also that of a `Failure` in the body, which then has `exit_code`.
     """
-    kinds: tuple[type[Exception], ...] = (*errors, ClientError, TvistError)
+    kinds: tuple[type[Exception], ...] = (*errors, ClientError, TvistError, *((Failure,) if where else ()))
     try:
         yield
     except UserFileError as error:
-        raise Failure(one_line(str(error))) from error
+        raise Failure(f"{where}{one_line(str(error))}") from error
     except kinds as error:
-        raise Failure(one_line(_sentence(error)), code=exit_code) from error
+        raise Failure(f"{where}{one_line(_message(error))}", code=exit_code) from error
 
 
-def _sentence(error: Exception) -> str:
+def _message(error: Exception) -> str:
     """Return the message without the code that a protocol error carries for a remote client."""
     if isinstance(error, ProtocolError):
         return error.why

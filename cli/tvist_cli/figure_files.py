@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, failing_on
 from tvist_cli.output import say
 
 if TYPE_CHECKING:
@@ -47,9 +47,9 @@ class FigureOptions:
                 raise Failure(f"{file} cannot be written: there is no folder {file.parent}")
         for name in ("format", "style"):
             if folder is None and getattr(self, name) is not None:
-                raise Failure(f"--{name} is about figures: give {option} DIR too, or leave it out", code=2)
+                raise Misuse(f"--{name} is about figures: give {option} DIR too, or leave it out")
         if {"paper", "slides"} <= set(self.style or ()):
-            raise Failure("style is paper and slides: give one of them", code=2)
+            raise Misuse("style is paper and slides: give one of them")
         if folder is not None and folder.exists() and not folder.is_dir():
             raise Failure(f"{folder} exists already and is no folder: choose another name")
         if self.style:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tvist_cli.output import out, print_json, table
+from tvist_cli.output import number, out, print_json, table
 from tvist_lab.identification.calibrate import Found, ModeErrors
 from tvist_lab.identification.jogs import Jog, RingDownLogs
 from tvist_lab.identification.payload import PayloadFound
@@ -15,8 +15,10 @@ from tvist_lab.identification.twin_file import said
 from tvist_lab.recordings import Floats
 from tvist_protocol.calibration import ModalParameter, Spread
 
-Modes = Sequence[tuple[Spread | None, Spread | None]]
+Modes = Sequence[tuple[Spread | None, Spread | None]]  # deviations of f_d and ζ, the lowest mode first
 
+DEVIATIONS = ("measured at m/s²", "f_d median %", "p90 %", "ζ median %", "p90 %")  # heads of tables
+FIGURES = ("f_d_percent", "f_d_p90_percent", "zeta_percent", "zeta_p90_percent")  # their keys in --json
 UNSEEN = "ring-downs at poses that were left out of the fit"
 QUANTITIES = {
     "gear_stiffness": ("gear stiffness", "N m/rad"),
@@ -67,8 +69,8 @@ def report(
                 "f_d_range_hz": how.measured_f_d_range,
                 "zeta_range": how.measured_zeta_range,
                 "residual_to_noise": model.residual_to_noise,
-                "error_f_d_percent": _median(judged[0][0]),
-                "error_zeta_percent": _median(judged[0][1]),
+                "error_f_d_percent": _figures(judged[0])[0],
+                "error_zeta_percent": _figures(judged[0])[2],
                 "against": against,
                 "modes": _modes(judged, found.amplitudes),
                 "cross_validated": _modes(crossed, found.amplitudes),
@@ -110,10 +112,10 @@ def report(
     for title, errors in ((against, judged), *(() if true is None else ((UNSEEN, crossed),))):
         table(
             f"deviation of the modes from {title}",
-            ("mode", "measured at m/s²", "f_d median %", "p90 %", "ζ median %", "p90 %"),
+            ("mode", *DEVIATIONS),
             [
-                _row(str(number), amplitude, *pair)
-                for number, (amplitude, pair) in enumerate(zip(found.amplitudes, errors, strict=False), 1)
+                _row(str(place), amplitude, pair)
+                for place, (amplitude, pair) in enumerate(zip(found.amplitudes, errors, strict=False), 1)
             ],
         )
     out.print(
@@ -123,14 +125,13 @@ def report(
     if found.no_polynomial:
         out.print(f"Without polynomials: {found.no_polynomial}.")
     else:
+        left_out = (how.cross_validated_f_d_percent, how.cross_validated_zeta_percent)
         table(
             "deviation of the polynomials",
-            ("from", "measured at m/s²", "f_d median %", "p90 %", "ζ median %", "p90 %"),
+            ("from", *DEVIATIONS),
             [
-                _row("their ring-downs", None, how.residual_f_d_percent, how.residual_zeta_percent),
-                _row(
-                    "those left out", None, how.cross_validated_f_d_percent, how.cross_validated_zeta_percent
-                ),
+                _row("their ring-downs", None, (how.residual_f_d_percent, how.residual_zeta_percent)),
+                _row("those left out", None, left_out),
             ],
         )
     _lag(servo, positions=bool(more))
@@ -233,27 +234,19 @@ def _springs(parameters: Sequence[ModalParameter]) -> None:
         )
 
 
-def _median(spread: Spread | None) -> float | None:
-    return None if spread is None else spread.median
+def _figures(spreads: Sequence[Spread | None]) -> list[float | None]:
+    return [getattr(spread, name, None) for spread in spreads for name in ("median", "p90")]
 
 
 def _modes(errors: Modes, amplitudes: Sequence[float | None]) -> list[dict[str, float | None]]:
     return [
-        {
-            "mode": number,
-            "measured_at_m_s2": amplitude,
-            "f_d_percent": _median(f_d),
-            "f_d_p90_percent": None if f_d is None else f_d.p90,
-            "zeta_percent": _median(zeta),
-            "zeta_p90_percent": None if zeta is None else zeta.p90,
-        }
-        for number, (amplitude, (f_d, zeta)) in enumerate(zip(amplitudes, errors, strict=False), 1)
+        {"mode": place, "measured_at_m_s2": amplitude, **dict(zip(FIGURES, _figures(pair), strict=True))}
+        for place, (amplitude, pair) in enumerate(zip(amplitudes, errors, strict=False), 1)
     ]
 
 
-def _row(name: str, amplitude: float | None, f_d: Spread | None, zeta: Spread | None) -> tuple[str, ...]:
-    figures = [f"{v:.1f}" for s in (f_d, zeta) if s is not None for v in (s.median, s.p90)]
-    return (name, "–" if amplitude is None else f"{amplitude:.2f}", *(figures or ["–"] * 4))
+def _row(name: str, amplitude: float | None, spreads: Sequence[Spread | None]) -> tuple[str, ...]:
+    return (name, number(amplitude, 2), *(number(value, 1) for value in _figures(spreads)))
 
 
 def _parameter(parameter: ModalParameter) -> tuple[str, ...]:
@@ -296,34 +289,23 @@ def report_twin(twin: Twin, output: Path, *, json: bool) -> None:
 
 
 def _twin_rows(twin: Twin) -> list[tuple[str, ...]]:
-    links = twin.robot.link_flexibility.links
     rows = []
-    for entry, told_, deviation in zip(twin.parameters.entries, twin.told, twin.deviations, strict=True):
+    for entry, told, deviation in zip(twin.parameters.entries, twin.told, twin.deviations, strict=True):
         if entry.table == "payload":
             continue
-        before, after = (
-            getattr(getattr(one, entry.table), entry.key) for one in (twin.parameters.description, twin.robot)
-        )
-        place = entry.places[0]
-        values = [one[place] if isinstance(one, tuple) else one for one in (before, after)]
-        where = links[place] if entry.table == "link_flexibility" else place
+        place, robots = entry.places[0], (twin.parameters.description, twin.robot)
+        found = [getattr(getattr(robot, entry.table), entry.key) for robot in robots]
+        values = [f"{one[place] if isinstance(one, tuple) else one:.4g}" for one in found]
+        where = twin.robot.link_flexibility.links[place] if entry.table == "link_flexibility" else place
         name = "all" if len(entry.places) > 1 or entry.key == "damping_time" else str(where + 1)
-        rows.append(
-            (
-                entry.key.replace("_", " "),
-                name,
-                *(f"{value:.4g}" for value in values),
-                f"{100.0 * deviation:.0f} %",
-                "" if told_ else "not told by the logs",
-            )
-        )
+        note = "" if told else "not determined by the logs"
+        rows.append((entry.key.replace("_", " "), name, *values, f"{100.0 * deviation:.0f} %", note))
     return rows
 
 
 def _twin_figures(twin: Twin, output: Path) -> dict[str, object]:
-    carried = [
-        twin.parameters.payload(twin.values, number) for number in range(len(twin.parameters.payloads))
-    ]
+    fitted = twin.parameters
+    carried = [fitted.payload(twin.values, place) for place in range(len(fitted.payloads))]
     return {
         "file": str(output),
         "motions": twin.motions,
@@ -338,15 +320,13 @@ def _twin_figures(twin: Twin, output: Path) -> dict[str, object]:
         "too_quiet_to_compare": twin.quiet,
         "payloads": [
             {"declared_kg": said.mass, "carried_kg": found.mass, "com_m": found.com}
-            for said, found in zip(twin.parameters.payloads, carried, strict=True)
+            for said, found in zip(fitted.payloads, carried, strict=True)
         ],
         "parameters": [
             {
                 "table": entry.table, "key": entry.key, "places": entry.places, "deviation": float(deviation),
-                "told": told_,
+                "told": told,
             }
-            for entry, deviation, told_ in zip(
-                twin.parameters.entries, twin.deviations, twin.told, strict=True
-            )
+            for entry, deviation, told in zip(fitted.entries, twin.deviations, twin.told, strict=True)
         ],
     }  # fmt: skip

@@ -3,15 +3,14 @@
 import asyncio
 import sys
 from collections.abc import AsyncIterator, Sequence
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, nullcontext
 from pathlib import Path
 
 from tvist_cli.connection import Connection
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, failing_on
 from tvist_cli.figure_files import FigureOptions, write
 from tvist_cli.identified import angles, report, report_payload, report_twin
 from tvist_cli.output import err, say, table, typed, waiting
-from tvist_cli.robot_logs import robot_file, robot_logs
 from tvist_client.arm import Arm
 from tvist_client.errors import MotionStoppedError
 from tvist_client.robot import Robot
@@ -20,17 +19,16 @@ from tvist_controller.setup import check_rating
 from tvist_lab.identification.calibrate import Found, ModeErrors, calibrate, true_errors
 from tvist_lab.identification.jogs import JogPlan, RingDownLogs, make_jogs, plan_jogs
 from tvist_lab.identification.payload import identify_payload
-from tvist_lab.identification.ring_downs import Progress
+from tvist_lab.identification.ring_downs import Log, Progress
 from tvist_lab.identification.twin import fit_twin
 from tvist_lab.identification.twin_file import twin_file
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_lab.recordings import RecordingError
+from tvist_lab.recordings import RecordingError, read
 from tvist_lab.served import ServedError, served_robot
 from tvist_lab.whole_file import write_whole
-from tvist_plant.description import DescriptionError, RobotDescription, load
+from tvist_plant.description import DescriptionError, RobotDescription, load, robots
+from tvist_protocol import RefusedError, RobotMode
 from tvist_protocol.calibration import calibration_to_json
-from tvist_protocol.errors import RefusedError
-from tvist_protocol.modes import RobotMode
 from tvist_server.config import from_mapping
 from tvist_server.option_values import StartError
 from tvist_server.watching.address import place_of
@@ -55,29 +53,23 @@ def from_logs(
     json: bool,
 ) -> None:
     """Write a calibration fitted to stops in logs, or a twin that repeats their motions."""
-    arm, logs = robot_logs(
+    arm, logs = _robot_logs(
         [*files, *checks], robot, None if masses is None else masses[0], columns, len(files)
     )
+    measured = RingDownLogs(tuple(logs))
     with failing_on(RecordingError, OSError), waiting("identifying") as step:
         if twin:
             made = fit_twin(arm, logs[: len(files)], logs[len(files) :], step)
             write_whole(output, twin_file(made, typed()).encode())
         else:
-            found = _calibrated(arm, RingDownLogs(tuple(logs)), output, step)
+            found = _calibrated(arm, measured, output, step)
     if twin:
         report_twin(made, output, json=json)
         return
     if figures is not None:
         _draw(found, look, figures, arm, None)
     named = robot or arm.robot.name
-    report(
-        found,
-        RingDownLogs(tuple(logs)),
-        output,
-        "" if named == ROBOT else f" --robot {named}",
-        None,
-        json=json,
-    )
+    report(found, measured, output, "" if named == ROBOT else f" --robot {named}", None, json=json)
 
 
 def _calibrated(arm: RobotDescription, measured: RingDownLogs, output: Path, step: Progress) -> Found:
@@ -108,12 +100,11 @@ class MovableRobot:
                 place_of(source)
                 load(robot or ROBOT)
             if masses is not None and len(masses) > 1:
-                raise Failure("payload is several masses: name the one that the robot carries", code=2)
+                raise Misuse("payload is several masses: give the one that the robot carries")
             if not (sure or sys.stdin.isatty()):
-                raise Failure(
-                    "the arm is going to move, and there is no terminal to ask you on: look at the moves first on a "
-                    "terminal, or give --yes",
-                    code=2,
+                raise Misuse(
+                    "the arm would move, and there is no terminal to ask for your consent: run this on a terminal, or "
+                    "give --yes"
                 )
         elif source is None:
             content = {
@@ -167,16 +158,12 @@ class MovableRobot:
                 async with client.control("identify") as control:
                     return arm, await make_jogs(client, control, plan, step)
 
-        with failing_on(ServedError, OSError, RecordingError):
-            if self._positions:  # the question stands on the same screen
-                arm, measured = asyncio.run(run(say))
-                found = _calibrated(arm, measured, output, say)
-            else:
-                with waiting("identifying") as step:
-                    arm, measured = asyncio.run(run(step))
-                    found = _calibrated(arm, measured, output, step)
-        payloads = found.forecast.arm.payloads
-        true = None
+        # The question to the user needs the screen.
+        shown = nullcontext(say) if self._positions else waiting("identifying")
+        with failing_on(ServedError, OSError, RecordingError), shown as step:
+            arm, measured = asyncio.run(run(step))
+            found = _calibrated(arm, measured, output, step)
+        payloads, true = found.forecast.arm.payloads, None
         if self._setup is not None:
             true = true_errors(arm, found.calibration, payloads, self._seed, found.modes)
         if figures is not None:
@@ -194,7 +181,7 @@ class MovableRobot:
                 yield await stack.enter_async_context(robot_in_process(self._setup)), self._setup.description
             elif isinstance(self._source, Connection):
                 client = await stack.enter_async_context(await self._source.robot())
-                yield client, robot_file(self._robot, {(await client.info()).model}, "the robot")
+                yield client, _robot_file(self._robot, {(await client.info()).model}, "the robot")
             else:
                 robot = self._robot or ROBOT
                 options = ["--plant", str(self._source), "--enable-motion", "--robot", robot]
@@ -204,6 +191,37 @@ class MovableRobot:
                 arm = load(robot)
                 client, _ = await stack.enter_async_context(served_robot(options, arm.robot.name))
                 yield client, arm
+
+
+def _robot_file(robot: str | None, models: set[str], what: str) -> RobotDescription:
+    """Return the robot file of this name or path, or else the one that comes with the package for a model."""
+    if robot is None:
+        fitting = [name for name in robots() if load(name).robot.model in models]
+        if len(models) != 1 or len(fitting) != 1:
+            why = f"{what}: {' and '.join(sorted(models))}" if models else f"{what} not named"
+            raise Misuse(f"robot is unknown ({why}): give --robot, one of {', '.join(robots())}, or a file")
+        robot = fitting[0]
+    with failing_on(DescriptionError, exit_code=2):
+        return load(robot)
+
+
+def _robot_logs(
+    files: Sequence[Path],
+    robot: str | None,
+    mass: float | None,
+    columns: str | None,
+    known: int,
+) -> tuple[RobotDescription, list[Log]]:
+    """Read logs; return the robot's description and the logs with their payloads."""
+    with failing_on(RecordingError):
+        recordings = [read(file, columns) for file in files]
+    for file, recording in zip(files, recordings, strict=True):
+        for note in recording.notes:
+            say(f"{file}: {note}")
+    models = {recording.info.model for recording in recordings[:known] if recording.info is not None}
+    description = _robot_file(robot, models, "the logs name")
+    payload = None if mass is None else paper_payload(description, mass)
+    return description, [Log(str(file), one, payload) for file, one in zip(files, recordings, strict=True)]
 
 
 def _draw(
@@ -218,11 +236,9 @@ def _draw(
     maps = None if true is None else workspace_map(arm, found.calibration, mass)
     words = f"{arm.robot.name}, {mass:g} kg, calibration {found.calibration.name}"
     with look.into(folder) as save:
-        drawn = (
-            {"identification": identified_figure(found.calibration.name, measured, fitted)}
-            if measured.size
-            else {}
-        )
+        drawn = {}
+        if measured.size:
+            drawn["identification"] = identified_figure(found.calibration.name, measured, fitted)
         if maps is not None:
             drawn |= {
                 f"map_{name}": workspace_map_figure(maps, key, words) for key, name in QUANTITIES.items()

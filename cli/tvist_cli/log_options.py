@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.offered import ROBOTS
 
 if TYPE_CHECKING:
@@ -31,11 +31,6 @@ class LogOptions:
     """Use this robot as the one that moves the sensor of --imu: a name that comes with the package, or the
     path of a robot file [that of the log, or ur5e]."""
 
-    @property
-    def given(self) -> bool:
-        """Whether any option was given."""
-        return self != AS_IT_IS
-
     def read(self, *files: Path, sensor: bool = False) -> "list[Recording]":
         """Read logs and join each with its sensor's log; raise Failure if a file or an option does not fit.
 
@@ -46,9 +41,9 @@ class LogOptions:
 
         for name in ("imu_columns", "robot"):
             if self.imu is None and getattr(self, name) is not None:
-                raise Failure(f"--{name.replace('_', '-')} is about --imu: give --imu FILE too", code=2)
+                raise Misuse(f"--{name.replace('_', '-')} is about --imu: give --imu FILE too")
         if self.imu is not None and len(self.imu) != len(files):
-            raise Failure(f"{len(self.imu)} --imu for {len(files)} logs: give one for each", code=2)
+            raise Misuse(f"{len(self.imu)} --imu for {len(files)} logs: give one for each")
         needs = ROBOT_OR_SENSOR if sensor and self.imu is None else ROBOT
         with failing_on(RecordingError):
             logs = [read(file, self.columns, needs) for file in files]

@@ -144,11 +144,6 @@ def _example(command: str) -> str | None:
     return f"Example: `{examples()[command]}`" if command in examples() else None
 
 
-def _known(chain: Sequence[str]) -> Mapping[str, str]:
-    """Return the commands among which an unknown one was sought."""
-    return OF_GROUPS.get(chain[0], COMMANDS) if chain else COMMANDS
-
-
 def _add(app: "cyclopts.App", package: str, commands: Mapping[str, str], called: Sequence[str]) -> None:
     for place, (name, what) in enumerate(commands.items()):
         if name in OF_GROUPS:
@@ -187,7 +182,7 @@ def _run() -> None:
             "tvist: more than the client is needed: pip install 'tvist[server]', for studies 'tvist[lab]'"
         )
     from tvist_cli.failure import Failure, failing_on
-    from tvist_cli.misuse import readable, sentence
+    from tvist_cli.misuse import message_of, readable
     from tvist_protocol.errors import harmless
 
     # Print only the message of a warning, without a line of code.
@@ -197,9 +192,9 @@ def _run() -> None:
         with failing_on(OSError):  # a folder for figures that is none, mostly
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
-        print(
-            harmless(f"tvist: {sentence(error, tuple(_known(error.command_chain or ())))}"), file=sys.stderr
-        )
+        group = (error.command_chain or ("",))[0]
+        said = message_of(error, tuple(OF_GROUPS.get(group, COMMANDS)))
+        print(harmless(f"tvist: {said}"), file=sys.stderr)
         sys.exit(2)
     except Failure as failure:
         print(harmless(f"tvist: {failure}"), file=sys.stderr)

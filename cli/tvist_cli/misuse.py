@@ -55,7 +55,7 @@ def finite(_: Any, value: Any) -> None:
         raise ValueError(f"is {value}: must be a finite number")
 
 
-def sentence(error: CycloptsError, commands: Sequence[str]) -> str:
+def message_of(error: CycloptsError, commands: Sequence[str]) -> str:
     """Return a message for a parser's error; `commands` are the names that were possible at its place."""
     command = " ".join(["tvist", *(error.command_chain or ())])
     seek = f"see {command} --help"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tvist_cli.compiling import compile_if_new
-from tvist_cli.failure import Failure, failing_on, interrupted
+from tvist_cli.failure import Failure, Misuse, failing_on, interrupted
 from tvist_cli.output import err, print_json, say
 from tvist_cli.serving import introduction, say_recorded, say_who_can_reach
 from tvist_controller.programs.checking import ProgramFinding, check_program
@@ -48,19 +48,17 @@ def read_script(file: Path, skip: Sequence[str] = ()) -> str:
     if _is_stdin(file):
         content = sys.stdin.buffer.read(LARGEST + 1)
         if len(content) > LARGEST:
-            raise Failure(
-                f"the standard input has more than {LARGEST >> 20} MiB: is it the right one?", code=2
-            )
+            raise Misuse(f"the standard input has more than {LARGEST >> 20} MiB: give a smaller program")
         try:
             return content.decode()
         except UnicodeDecodeError as error:
             why = f"the standard input is not text in UTF-8 ({error.reason} at byte {error.start})"
-            raise Failure(why, code=2) from error
+            raise Misuse(why) from error
     with failing_on(OSError, exit_code=2):
         try:
             return read_program(file, frozenset(skip))
         except UserFileError as error:
-            raise Failure(str(error), code=2) from error
+            raise Misuse(str(error)) from error
 
 
 def programs_in(files: Sequence[Path]) -> list[Path]:
@@ -70,7 +68,7 @@ def programs_in(files: Sequence[Path]) -> list[Path]:
         inside = sorted(file.rglob("*")) if file.is_dir() else [file]
         programs = [one for one in inside if one.suffix in {SCRIPT, URP}] if file.is_dir() else inside
         if not programs:
-            raise Failure(f"folder {file} has no programs: files that end with {SCRIPT} or {URP}", code=2)
+            raise Misuse(f"folder {file} has no programs: files that end with {SCRIPT} or {URP}")
         found += [one for one in programs if one.suffix != SCRIPT or one.with_suffix(URP) not in programs]
     return found
 

@@ -8,7 +8,7 @@ from cyclopts import Group, Parameter
 from msgspec import inspect as types
 from msgspec.structs import FieldInfo, fields
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.misuse import lower
 from tvist_cli.offered import PLANTS, PROFILES, ROBOTS, SHAPERS, WORLDS
 from tvist_protocol.schema import field_docs
@@ -41,6 +41,11 @@ _BOX_OF = {
 _OFFERED = {"robot": ROBOTS, "robots": ROBOTS, "shaper": SHAPERS, "plant": PLANTS, "world": WORLDS,
             "profile": PROFILES}  # fmt: skip
 """Completion of option values."""
+_READ_AS: dict[type, Any] = {
+    types.BoolType: bool, types.IntType: int, types.FloatType: float, types.VarTupleType: list[str],
+    types.StructType: list[str],
+}  # fmt: skip
+"""Types of option values by those of the fields; the others are texts."""
 _IN_ANY_CASE = ("profile", "shaper", "clock")
 
 
@@ -75,16 +80,7 @@ def content_of(file: str | None) -> dict[str, object]:
 def _option(field: FieldInfo) -> inspect.Parameter:
     may_be = types.type_info(field.type)
     kind = may_be.types[0] if isinstance(may_be, types.UnionType) else may_be
-    read: Any = str
-    match kind:
-        case types.BoolType():
-            read = bool
-        case types.IntType():
-            read = int
-        case types.FloatType():
-            read = float
-        case types.VarTupleType() | types.StructType():
-            read = list[str]
+    read: Any = _READ_AS.get(type(kind), str)
     name = "ur-port" if field.name == "ur_ports" else field.name.replace("_", "-")
     # Options that a profile may switch on need a form that switches them off.
     negative = f"--no-{name}" if read is bool and kind is not may_be else ()
@@ -117,7 +113,5 @@ def _ur_port(text: str) -> tuple[str, int]:
     """Split INTERFACE=PORT; the configuration checks the name of the interface."""
     interface, equals, port = text.partition("=")
     if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
-        raise Failure(
-            f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off", code=2
-        )
+        raise Misuse(f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off")
     return interface, 0 if port == "off" else int(port)

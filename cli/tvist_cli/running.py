@@ -1,12 +1,11 @@
 """Run URScript programs one after the other, and print how they ended."""
 
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, check_range, failing_on
 from tvist_cli.output import print_json, say
 from tvist_cli.program_runs import ProgramConsole, ProgramOutcome, Runner, named, programs_in, read_scripts
 from tvist_cli.robot_options import configuration, content_of
@@ -37,8 +36,7 @@ def run_programs(
     """Run programs as `tvist run` does without --check."""
     file = programs_in(file)
     _check_files(file, lockstep=lockstep)
-    if timeout is not None and not 0.0 < timeout < math.inf:
-        raise Failure(f"timeout is {timeout:g} s: must be finite and more than 0", code=2)
+    check_range("timeout", timeout, 0.0, unit=" s", above=True)
     _check_written(junit, baseline)
     before = None if baseline is None else _baseline(baseline, file, lockstep=lockstep)
     with failing_on(ValueError, exit_code=2):
@@ -46,7 +44,9 @@ def run_programs(
     texts = read_scripts(file, skip)
     checked = _configuration(given, config, lockstep=lockstep)
     if checked.record is not None and len(file) > 1:
-        raise Failure(f"record is {checked.record}: it keeps one run, and these are {len(file)}", code=2)
+        raise Misuse(
+            f"record is {checked.record}: it keeps one run, but there are {len(file)} programs: leave it out"
+        )
     runner = Runner(checked, inputs, timeout, limits, before, ProgramConsole(quiet=json))
     ran = _run_all(runner, file, texts)
     results = [one.result for one in ran]
@@ -114,13 +114,12 @@ def _of_several(ran: Sequence[ProgramOutcome], count: int) -> Failure | None:
 def _check_files(files: Sequence[Path], *, lockstep: bool) -> None:
     """Refuse several programs in real time, and programs that messages could not tell apart."""
     if len(files) > 1 and not lockstep:
-        raise Failure(
-            f"tvist run runs several programs only in lockstep: give --lockstep, or --check, or leave {files[1]} out",
-            code=2,
+        raise Misuse(
+            f"tvist run runs several programs only in lockstep: give --lockstep, or --check, or leave {files[1]} out"
         )
     names = [named(one) for one in files]
     if twice := next((name for name in names if names.count(name) > 1), None):
-        raise Failure(f"{twice} is given twice: give each program once", code=2)
+        raise Misuse(f"{twice} is given twice: give each program once")
 
 
 def _check_written(junit: Path | None, baseline: Path | None) -> None:
@@ -129,16 +128,14 @@ def _check_written(junit: Path | None, baseline: Path | None) -> None:
         return
     if junit.is_dir() or not junit.parent.is_dir():
         why = "that is a folder" if junit.is_dir() else f"there is no folder {junit.parent}"
-        raise Failure(f"junit is {junit}: {why}", code=2)
+        raise Misuse(f"junit is {junit}: {why}")
     if baseline is not None and junit.absolute() == baseline.absolute():
-        raise Failure("junit and baseline are the same file: give each its own", code=2)
+        raise Misuse("junit and baseline are the same file: give each its own")
 
 
 def _baseline(path: Path, files: Sequence[Path], *, lockstep: bool) -> Mapping[str, Run]:
     if not lockstep:
-        raise Failure(
-            "--baseline needs --lockstep, in which equal programs run alike to the last bit", code=2
-        )
+        raise Misuse("--baseline needs --lockstep, in which equal programs run alike to the last bit")
     with failing_on(BaselineError, OSError, exit_code=2):
         return read_baseline(path, list(map(named, files)))
 
@@ -148,12 +145,10 @@ def _configuration(given: dict[str, Any], file: str | None, *, lockstep: bool) -
     for name in ("listen", "ur", "ur_allow"):
         if lockstep and name in given:
             option = name.replace("_", "-")
-            raise Failure(
-                f"--lockstep and --{option} exclude each other: in lockstep there is no network", code=2
-            )
+            raise Misuse(f"--lockstep and --{option} exclude each other: in lockstep there is no network")
     with failing_on(StartError, exit_code=2):
         content = content_of(file)
     for key, instead in (("robots", "tvist run has one robot"), ("clock", "tvist run has --lockstep")):
         if key in content:
-            raise Failure(f"configuration {file}: leave {key} out, since {instead}", code=2)
+            raise Misuse(f"configuration {file}: leave {key} out, since {instead}")
     return configuration({**given, "clock": "free" if lockstep else "realtime"}, file, profile="ursim")

@@ -4,10 +4,10 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.output import number, out, table
 from tvist_cli.shapers_of import of_impulses
-from tvist_cli.studying import ResultFiles, give
+from tvist_cli.studying import ResultFiles, print_result
 
 if TYPE_CHECKING:
     from tvist_shaping import Shaper
@@ -30,9 +30,7 @@ def print_sensitivity(
 
     low, high = errors
     if not -90.0 <= low < high <= 900.0:
-        raise Failure(
-            f"errors is {low:g} {high:g}: must be two increasing percentages from -90 to 900", code=2
-        )
+        raise Misuse(f"errors is {low:g} {high:g}: must be two increasing percentages from -90 to 900")
     chosen = list({one.name: one for one in (of_impulses(name) for name in shapers or STANDARD)}.values())
     span = 0.01 * np.linspace(low, high, POINTS)
     curves: list[dict[str, Any]] = []
@@ -44,7 +42,7 @@ def print_sensitivity(
         curves.append({**about, "residual_percent": (100.0 * left).tolist()})
     result = {"zeta": zeta, "error_percent": (100.0 * span).tolist(), "shapers": curves}
     places.write(result, lambda: {"sensitivity": sensitivity_figure(chosen, zeta, span)})
-    give(result, lambda _: _print(chosen, zeta, curves), json=json)
+    print_result(result, lambda _: _print(chosen, zeta, curves), json=json)
 
 
 def _print(shapers: "list[Shaper]", zeta: float, curves: list[dict[str, Any]]) -> None:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 
 from tvist_cli.compiling import compile_if_new, compile_shown
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, check_range, failing_on
 from tvist_cli.main import BEGAN
 from tvist_cli.output import say
 from tvist_controller.setup import Setup
@@ -51,8 +51,7 @@ def serve_robots(config: ServeConfig) -> None:
 
 def compile_all(processes: int | None = None) -> None:
     """Compile ahead in this number of processes."""
-    if processes is not None and processes < 1:
-        raise Failure(f"compile is {processes}: must be at least 1", code=2)
+    check_range("compile", processes, 1)
     with failing_on(KernelsError):
         compile_shown(processes)
     say(f"everything is compiled, after {time.monotonic() - BEGAN:.0f} s")

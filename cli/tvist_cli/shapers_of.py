@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 
 if TYPE_CHECKING:
     from tvist_controller.sources.own_shapers import OwnShaper
@@ -36,6 +36,6 @@ def of_impulses(shaper: str) -> "Shaper":
     found = own[0].shaper if own else SHAPERS.get(name)
     if not isinstance(found, Shaper):
         if own:
-            raise Failure(f"shaper {shaper} has no impulses of one mode: give one that has", code=2)
-        raise Failure(f"shaper is {name!r}: must be FILE.py:NAME or one of {', '.join(SHAPERS)}", code=2)
+            raise Misuse(f"shaper {shaper} has no impulses of one mode: give one that has")
+        raise Misuse(f"shaper is {name!r}: must be FILE.py:NAME or one of {', '.join(SHAPERS)}")
     return found

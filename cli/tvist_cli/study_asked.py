@@ -8,10 +8,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, check_range, failing_on
 from tvist_cli.shapers_of import load_given, loaded
 from tvist_cli.study_options import StudyOptions
-from tvist_cli.studying import check_range, check_seed
+from tvist_cli.studying import check_seed
 from tvist_controller.planning.filter_planner import wanted_modes
 from tvist_controller.refusal import RefusalError
 from tvist_controller.sources import calibrations
@@ -48,7 +48,7 @@ def preset_study(name: str, options: StudyOptions) -> Study:
     of_others = {one for other in PRESETS.values() for one in other.options} - preset.options
     for option in options.given:
         if option in of_others or (option == "baselines" and preset.menu is None):
-            raise Failure(f"--{option.replace('_', '-')} is not for {name}: see tvist study --help", code=2)
+            raise Misuse(f"--{option.replace('_', '-')} is not for {name}: see tvist study --help")
     _check(options)
     with failing_on(StudyError, MovesError, DescriptionError, CandidateError, *OF_SHAPERS, exit_code=2):
         asked = _asked(preset, name, options)
@@ -71,19 +71,22 @@ def preset_study(name: str, options: StudyOptions) -> Study:
 def _check(options: StudyOptions) -> None:
     check_seed(options.seed)
     check_range("modes", options.modes, 1, 6)
-    check_range("frequency-error", options.frequency_error, -90.0, 900.0, " %")
-    check_range("payload-error", options.payload_error, -100.0, 900.0, " %")
-    check_range("stiffness-error", options.stiffness_error, 0.0, 90.0, " %")
+    for name, low, high in (
+        ("frequency", -90.0, 900.0),
+        ("payload", -100.0, 900.0),
+        ("stiffness", 0.0, 90.0),
+    ):
+        check_range(f"{name}-error", getattr(options, f"{name}_error"), low, high, " %")
     if options.streams and options.save_moves is not None:
-        raise Failure("--save-moves writes moves, but --streams follows streams: leave one out", code=2)
+        raise Misuse("--save-moves writes moves, but --streams follows streams: leave one out")
     if options.clean and options.disturbances is not None:
-        raise Failure("give either --clean or --disturbances", code=2)
+        raise Misuse("give either --clean or --disturbances")
     for name in ("wrists", "stroke"):
         if name in options.given and not options.moves.isdigit():
-            raise Failure(f"--{name} is for random moves: it does not change the moves of a file", code=2)
+            raise Misuse(f"--{name} is for random moves: it does not change the moves of a file")
     low, high = options.stroke or STROKE
     if not 0.001 <= low <= high <= 1.0:
-        raise Failure(f"stroke is {low:g} {high:g}: must be two increasing shares of 0.001 to 1", code=2)
+        raise Misuse(f"stroke is {low:g} {high:g}: must be two increasing shares of 0.001 to 1")
 
 
 def _asked(
@@ -169,15 +172,13 @@ def _calibration(
     if given is not None:
         found = calibrations.load(given)
         if modal and found.modal is None:
-            raise Failure(
-                f"calibration {found.name} has no modal model: make one with tvist identify", code=2
-            )
+            raise Misuse(f"calibration {found.name} has no modal model: make one with tvist identify")
         return found
     default = calibrations.default_for(description.robot.model)
     if default is None:
         if modal:
             model = description.robot.model
-            raise Failure(f"the package has no calibration of a {model}: give --calibration FILE", code=2)
+            raise Misuse(f"the package has no calibration of a {model}: give --calibration FILE")
         return None
     calibration = calibrations.load(default)
     source = modal_source(description, calibration) if several else None
@@ -194,7 +195,7 @@ def _masses(payload: Sequence[float] | None, description: RobotDescription) -> t
     low, high = given[0], given[-1]
     if len(given) > 2 or not 0.0 <= low <= high <= 100.0:
         said = " ".join(f"{one:g}" for one in given)
-        raise Failure(f"payload is {said}: must be a mass of 0 to 100 kg, or two increasing ones", code=2)
+        raise Misuse(f"payload is {said}: must be a mass of 0 to 100 kg, or two increasing ones")
     return low, high
 
 
@@ -271,28 +272,20 @@ def swept(path: Path) -> Study:
     """Read a sweep file and load all that it names; its paths are relative to its folder."""
     spec = read_spec(path)
     loaded_robots = [_robot(path, spec, place, named) for place, named in enumerate(spec.robots)]
-    try:
+    with failing_on(MovesError, where=f"sweep {path}: "):
         return study(spec, loaded_robots)
-    except MovesError as error:
-        raise Failure(f"sweep {path}: {error}") from error
 
 
 def _robot(path: Path, spec: Spec, place: int, named: str | NamedRobot) -> SweptRobot:
     robot, calibration = (named, None) if isinstance(named, str) else (named.robot, named.calibration)
-    try:
-        with failing_on(DescriptionError):
-            arm = load(robot if robot in robots() else path.parent / robot).disturbed_by(spec.disturbances)
-    except Failure as failure:
-        raise Failure(f"sweep {path}: robots[{place}]: {failure}") from failure
+    with failing_on(DescriptionError, where=f"sweep {path}: robots[{place}]: "):
+        arm = load(robot if robot in robots() else path.parent / robot).disturbed_by(spec.disturbances)
     if calibration is not None and (path.parent / calibration).exists():
         calibration = str(path.parent / calibration)
     recipes = []
     for number, shaper in enumerate(spec.shapers):
-        try:
-            with failing_on(*OF_SHAPERS):
-                recipes.append(_recipe(path, spec, shaper, calibration, arm))
-        except Failure as failure:
-            raise Failure(f"sweep {path}: shapers[{number}] with robots[{place}]: {failure}") from failure
+        with failing_on(*OF_SHAPERS, where=f"sweep {path}: shapers[{number}] with robots[{place}]: "):
+            recipes.append(_recipe(path, spec, shaper, calibration, arm))
     label = robot if isinstance(named, str) else f"{robot} with {named.calibration}"
     return SweptRobot(label, arm, tuple(recipes))
 

@@ -10,12 +10,11 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, check_range, failing_on
 from tvist_cli.figure_files import FigureOptions, write
 from tvist_cli.output import out, print_json, progress, say, table, typed, words, write_json, write_report
 from tvist_cli.study_asked import preset_study, swept
 from tvist_cli.study_options import StudyOptions
-from tvist_cli.studying import check_range
 from tvist_lab.figures import house_style
 from tvist_lab.report import study_figures, study_page
 from tvist_lab.runners import processes as some_processes
@@ -70,12 +69,12 @@ def _executor(
 ) -> Callable[[], AbstractContextManager[Executor]] | None:
     """Return a function that starts the requested executor; None if none was requested."""
     if number is not None and scheduler is not None:
-        raise Failure("give either --processes or --scheduler", code=2)
+        raise Misuse("give either --processes or --scheduler")
     if number is not None:
         check_range("processes", number, 1, 1024)
         return lambda: some_processes(number)
     if scheduler is not None and not ADDRESS.fullmatch(scheduler):
-        raise Failure(f"scheduler is {scheduler!r}: must be an address such as tcp://HOST:8786", code=2)
+        raise Misuse(f"scheduler is {scheduler!r}: must be an address such as tcp://HOST:8786")
     return None if scheduler is None else lambda: _cluster(scheduler)
 
 

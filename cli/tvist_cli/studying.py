@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.figure_files import FigureOptions, write
 from tvist_cli.output import print_json, table, write_json
 
@@ -17,18 +17,10 @@ if TYPE_CHECKING:
 Figures = Mapping[str, "Figure"]  # figures by file name, without suffix
 
 
-def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Refuse an option's value that is not from `low` to `high`; `unit` follows numbers in the message, like " %"."""
-    if not low <= value <= high:
-        said = f"{value:g}" if isinstance(value, float) else f"{value}"
-        most = f"{high:g}" if isinstance(high, float) else f"{high}"
-        raise Failure(f"{name} is {said}{unit}: must be {low:g} to {most}{unit}", code=2)
-
-
 def check_seed(seed: int) -> None:
     """Refuse a seed that is negative or has more than 62 bits."""
     if not 0 <= seed < 2**62:
-        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^62", code=2)
+        raise Misuse(f"seed is {seed}: must be at least 0 and less than 2^62")
 
 
 @dataclass(frozen=True)
@@ -49,7 +41,7 @@ class ResultFiles:
                     write(save, draw())
 
 
-def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, json: bool) -> None:
+def print_result(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, json: bool) -> None:
     """Print a result as one JSON object or as text."""
     if json:
         print_json(result)
@@ -57,7 +49,7 @@ def give(result: dict[str, Any], say_it: Callable[[dict[str, Any]], None], *, js
         say_it(result)
 
 
-def show(title: str, entries: "Iterable[Entry]", columns: "Sequence[Column]") -> None:
+def print_entries(title: str, entries: "Iterable[Entry]", columns: "Sequence[Column]") -> None:
     """Print a table of nested results."""
     from tvist_lab.study.columns import cells, titles
 

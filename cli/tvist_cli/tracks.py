@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from tvist_cli.compiling import compile_if_new
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, failing_on
 from tvist_cli.judging import judge
 from tvist_cli.output import progress
-from tvist_cli.pages import PageAddress, serve_page
 from tvist_controller.about import geometry_of
 from tvist_controller.refusal import RefusalError
 from tvist_lab.in_process import run_beside
@@ -27,7 +26,7 @@ from tvist_server.option_values import StartError
 from tvist_view import described
 from tvist_view.beside import MotionRecord
 from tvist_view.look import Look
-from tvist_view.playback import meet, playback, said
+from tvist_view.playback import playback, said
 from tvist_view.track import Track
 
 LEAD = 150  # ticks at rest shown before a motion
@@ -51,10 +50,6 @@ class Shows:
         """Return the page that plays the tracks back."""
         return playback(self.tracks, self.title, factor=factor, result=self.result)
 
-    def serve(self, factor: float, door: PageAddress) -> None:
-        """Serve the page until Control+C."""
-        serve_page(self.page(factor), meet, door)
-
 
 def recorded(file: Path) -> Shows:
     """Return the track of a recording."""
@@ -71,7 +66,7 @@ def repeated(file: Path) -> Shows:
         found = [one for one in pairs(measured) if one.change.less_percent is not None]
         if not found:
             raise Failure(
-                f"{file} holds no motion both without and with a shaper: make it twice, with none first"
+                f"{file} contains no motion without and with a shaper: record one with none first, then with a shaper"
             )
         best = max(found, key=lambda one: (one.change.gain_ms or 0, one.change.less_percent))
         look, shaper = _look_of(content), best.shaper or "the shaper"
@@ -94,7 +89,7 @@ def repeated(file: Path) -> Shows:
 def compared(shapers: Sequence[str], robot: str) -> Shows:
     """Simulate the same motion with each shaper."""
     if not 2 <= len(shapers) <= 3:
-        raise Failure(f"compare has {len(shapers)} shapers: give two or three", code=2)
+        raise Misuse(f"compare has {len(shapers)} shapers: give two or three")
     compile_if_new()
     tracks, runs = [], []
     with (
@@ -104,7 +99,7 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
         poses = load(robot).poses
         named = described.pairs(list(poses))
         if not named:
-            raise Failure(f"robot file {robot} names no two poses to move between", code=2)
+            raise Misuse(f"robot file {robot} names no two poses to move between")
         first, last = named[0]
         for shaper in shapers:
             info, collected = asyncio.run(run_beside(shaper, (poses[first], poses[last]), robot=robot))
@@ -130,5 +125,5 @@ def _look_of(content: RecordingFile) -> Look:
         nothing = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
         return Look(geometry, nothing if info is None else info.payload)
     raise Failure(
-        "this recording does not say what its robot looks like: record it with tvist serve --record"
+        "the recording does not contain the shape of its robot: record it with tvist serve --record"
     )

@@ -208,7 +208,7 @@ class _Check:
         del robot  # `state` has measured it
         report = self.report
         if report.overloaded is None:
-            return "not told: a client steps the time, or the server is older"
+            return "unknown: a client steps the time, or the server is older"
         if report.overloaded:
             rates = f"{report.state_rate_hz:.1f} states/s received of {report.due_per_second:g} due"
             raise ClientError(f"it is overloaded: {rates}{self.missed}. Next: {RELIEVE}")

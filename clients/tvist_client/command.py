@@ -15,9 +15,8 @@ from tvist_client.arguments import arguments, built
 from tvist_client.errors import UnexpectedReplyError
 from tvist_client.motion import Motion, MotionsByNumber
 from tvist_client.values import positive
+from tvist_protocol import Accepted, Command, Done, Posture, ToolPose
 from tvist_protocol.channels import tag
-from tvist_protocol.commands import Command
-from tvist_protocol.replies import Accepted, Done, Posture, ToolPose
 from tvist_protocol.schema import field_docs
 
 TICK = 0.002  # control period [s]
@@ -103,7 +102,7 @@ class Sent(Described):
         required = sum(field.required for field, _ in taken)
         positional = required if self._positional is None else self._positional
         found = [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)]
-        for place, (field, (kind, _)) in enumerate(taken):
+        for place, (field, kind) in enumerate(taken):
             how = Parameter.POSITIONAL_OR_KEYWORD if place < positional else Parameter.KEYWORD_ONLY
             default = Parameter.empty if field.required else field.default
             found.append(Parameter(field.name, how, default=default, annotation=kind))
@@ -115,7 +114,9 @@ class Sent(Described):
         docs, taken, extra = field_docs(self._kind), arguments(self._kind), self._extra
         lines = [f"{name}: {docs[name]}" for name in taken] + [f"{name}: {_EXTRA[name]}" for name in extra]
         errors = ["RefusedError: The robot refused it, which changed nothing."]
-        errors += ["ArgumentError: An argument has the wrong type; nothing was sent."] if lines else []
+        errors += (
+            ["ArgumentError: An argument is invalid for every robot; nothing was sent."] if lines else []
+        )
         errors += ["MotionStoppedError: The motion ended before its target."] if "wait" in extra else []
         text = _ANSWER.sub("", cleandoc(self._kind.__doc__ or ""))
         text += "" if self._carry_out.__doc__ is None else f"\n\n{self._carry_out.__doc__}"

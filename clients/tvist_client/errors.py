@@ -18,8 +18,7 @@ TvistError
 
 from typing import ClassVar
 
-from tvist_protocol.errors import TvistError
-from tvist_protocol.stream import Event
+from tvist_protocol import Event, TvistError
 
 
 class ClientError(TvistError):

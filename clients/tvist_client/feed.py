@@ -10,10 +10,9 @@ from typing import Generic, TypeVar
 from tvist_client.errors import AnswerTimeoutError, ArgumentError, ClientError, NotConnectedError
 from tvist_client.transports.base import Topic, Transport
 from tvist_client.values import whole
+from tvist_protocol import Event, Io, State, Telemetry, Truth
 from tvist_protocol.codec import decode
 from tvist_protocol.errors import ProtocolError, quoted
-from tvist_protocol.io import Io
-from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 log = logging.getLogger(__name__)
 

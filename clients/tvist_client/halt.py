@@ -1,16 +1,11 @@
 """Stops one robot, whichever client has control, and reports what was stopped."""
 
-import asyncio
-
 import msgspec
 
 from tvist_client.errors import AnswerTimeoutError
 from tvist_client.readiness import mode_name
-from tvist_client.robot import ENDPOINT, NAME, Robot
-from tvist_client.transports.certificates import Folder
-from tvist_client.transports.zenoh import only_robot
-from tvist_protocol.modes import RuntimeState
-from tvist_protocol.stream import Event, State
+from tvist_client.robot import Robot
+from tvist_protocol import Event, RuntimeState, State
 
 
 class HaltReport(msgspec.Struct, frozen=True):
@@ -26,40 +21,26 @@ class HaltReport(msgspec.Struct, frozen=True):
     why: str  # what is wrong; empty if all is well
 
 
-def halt(
-    endpoint: str = ENDPOINT,
-    name: str | None = None,
-    *,
-    security: Folder | None = None,
-    namespace: str = "",
-) -> HaltReport:
-    """Send `stop` without control and wait for rest; without a name, to the only robot at the endpoint, or `ur5e`."""
-    return asyncio.run(_halt(endpoint, name, security, namespace))
-
-
-async def _halt(endpoint: str, name: str | None, security: Folder | None, namespace: str) -> HaltReport:
-    name = name or await only_robot(endpoint, NAME, security, namespace)
-    async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
-        stopped: list[str] = []
-
-        def hear(event: Event) -> None:
-            stopped.extend(_ended(event))
-
-        robot.on_event(hear)
-        robot.watch()
-        await robot.stop()
-        info, state, why = await robot.info(), None, ""
-        if info.clock == "realtime":
-            try:
-                state = await _rest(robot, info.tick)
-            except AnswerTimeoutError:
-                why = "it has accepted the stop but publishes no state: look whether it moves"
-        if state is not None and state.runtime_state == RuntimeState.PLAYING:
-            why = f"it was stopped and moves again: {info.control or 'another client'} has control, end that first"
+async def halt(robot: Robot, endpoint: str) -> HaltReport:
+    """Send `stop` without control and wait until the arm is at rest; `endpoint` is for the report."""
+    stopped: list[str] = []
+    robot.on_event(lambda event: stopped.extend(_ended(event)))
+    robot.watch()
+    await robot.stop()
+    info, state, why = await robot.info(), None, ""
+    if info.clock == "realtime":
+        try:
+            state = await _rest(robot, info.tick)
+        except AnswerTimeoutError:
+            why = "it has accepted the stop but publishes no state: check whether it moves"
+    if state is not None and state.runtime_state == RuntimeState.PLAYING:
+        why = (
+            f"it was stopped and moves again: {info.control or 'another client'} has control, end that first"
+        )
     return HaltReport(
         ok=not why,
         endpoint=endpoint,
-        robot=name,
+        robot=info.name,
         stopped=stopped if info.clock == "realtime" else None,
         control=info.control,
         runtime_state=None if state is None else mode_name(RuntimeState, state.runtime_state),
@@ -76,11 +57,9 @@ async def _rest(robot: Robot, tick: int) -> State:
 
 
 def _ended(event: Event) -> list[str]:
-    match event.kind:
-        case "motion_stopped":
-            return [f"motion {event.id}"]
-        case "stream_stopped":
-            return ["the stream of set-points"]
-        case "program_stopped":
-            return ["a program" if event.program is None else f"the program {event.program}"]
-    return []
+    ended = {
+        "motion_stopped": f"motion {event.id}",
+        "stream_stopped": "the stream of set-points",
+        "program_stopped": "a program" if event.program is None else f"the program {event.program}",
+    }
+    return [ended[event.kind]] if event.kind in ended else []

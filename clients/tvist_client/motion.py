@@ -63,9 +63,9 @@ class Motion:
             self.started = event.tick
         elif event.kind == "motion_done":
             self.done = event.tick
-            self._ended.set()
         elif event.kind == "motion_stopped":
             self.stopped = event
+        if self.done is not None or self.stopped is not None:
             self._ended.set()
 
     def fail(self, error: ClientError) -> None:

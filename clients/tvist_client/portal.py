@@ -2,11 +2,12 @@
 
 import asyncio
 import contextlib
+import inspect
 import sys
 import threading
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractAsyncContextManager
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tvist_client.errors import MisuseError, NotConnectedError
 from tvist_protocol.errors import TvistError
@@ -23,8 +24,8 @@ class Portal:
         self._thread.start()
         self.closed = False
 
-    def call(self, function: Callable[[], Awaitable[T]]) -> T:
-        """Run a function on the loop and wait for its result in this thread; Ctrl-C cancels it.
+    def call(self, function: Callable[[], Any]) -> Any:
+        """Run a function on the loop and wait for its result, or its coroutine's, in this thread; Ctrl-C cancels it.
 
         An error of the client or protocol is raised without its traceback through the loop, which would distract.
         Raise NotConnectedError if the portal is closed, MisuseError in a callback, which would wait for itself.
@@ -34,8 +35,9 @@ class Portal:
         if threading.current_thread() is self._thread:
             raise MisuseError("a callback may not wait for the robot: pass the work to another thread")
 
-        async def awaited() -> T:
-            return await function()
+        async def awaited() -> Any:
+            result = function()
+            return await result if inspect.iscoroutine(result) else result
 
         future = asyncio.run_coroutine_threadsafe(awaited(), self._loop)
         try:
@@ -46,14 +48,6 @@ class Portal:
             future.cancel()
             raise
         raise told.with_traceback(None) from None
-
-    def run(self, function: Callable[[], T]) -> T:
-        """Call a function that does not block, on the loop."""
-
-        async def called() -> T:
-            return function()
-
-        return self.call(called)
 
     @contextlib.contextmanager
     def enter(self, context: AbstractAsyncContextManager[T]) -> Iterator[T]:

@@ -6,9 +6,7 @@ from msgspec import Struct
 
 from tvist_client.robot import ENDPOINT, NAME, Robot
 from tvist_client.transports.certificates import Folder
-from tvist_protocol.info import Info, StopReason
-from tvist_protocol.modes import RobotMode, SafetyMode
-from tvist_protocol.stream import State
+from tvist_protocol import Info, RobotMode, SafetyMode, State, StopReason
 
 _MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 """Safety modes in which a robot with power can move."""
@@ -26,8 +24,8 @@ RELIEVE = (
     "--realtime-priority"
 )
 """Remedies for an overloaded robot."""
-_AT_THE_ROBOT = "see to it at the robot, which is only watched: nothing is sent to it from here"
-_LOST = "see that the robot is on and reached by the server's machine, which tries every second by itself to connect"
+_AT_THE_ROBOT = "resolve this at the robot, which is only watched: nothing is sent to it from here"
+_LOST = "check that the robot is on and reachable from the server, which tries every second to connect"
 _POWER = "run {unlock} --power-on"
 
 

@@ -14,11 +14,9 @@ from tvist_client.transports.base import Transport
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import ZenohTransport
 from tvist_client.values import number
+from tvist_protocol import Accepted, RefusedError, ReleaseClock, ReleaseControl, TakeClock, TakeControl
 from tvist_protocol.channels import tag
-from tvist_protocol.commands import ReleaseClock, ReleaseControl, TakeClock, TakeControl
-from tvist_protocol.errors import RefusedError
 from tvist_protocol.keys import check_client_name
-from tvist_protocol.replies import Accepted
 
 ENDPOINT = "tcp/127.0.0.1:7447"
 NAME = "ur5e"

@@ -8,10 +8,8 @@ from tvist_client.command import TICK
 from tvist_client.connection import MAX_STEP, Connection, step
 from tvist_client.errors import MisuseError, StreamStoppedError
 from tvist_client.values import JointRange
+from tvist_protocol import Event, Setpoint, StepSetpoint
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import Setpoint
-from tvist_protocol.simulation import StepSetpoint
-from tvist_protocol.stream import Event
 
 
 class Servo:

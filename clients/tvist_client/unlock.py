@@ -1,17 +1,14 @@
 """Makes a robot that has stopped ready to move again, as far as a client can."""
 
-import asyncio
+from contextlib import suppress
 
 import msgspec
 
 from tvist_client.arm import UNLOCKED_TICKS, Arm
 from tvist_client.errors import ClientError, ProtectiveStopError
-from tvist_client.readiness import look, unlock_command
-from tvist_client.robot import ENDPOINT, NAME, Robot
-from tvist_client.transports.certificates import Folder
-from tvist_client.transports.zenoh import only_robot
-from tvist_protocol.info import StopReason
-from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_client.readiness import look
+from tvist_client.robot import Robot
+from tvist_protocol import RobotMode, RuntimeState, SafetyMode, StopReason
 
 CLIENT = "tvist unlock"  # name of the client that takes control
 _WHAT_IT_FOUND: dict[str | None, str] = {
@@ -36,19 +33,31 @@ class UnlockReport(msgspec.Struct, frozen=True):
     next: str  # the remedy; empty if the robot is ready
 
 
-def unlock(
-    endpoint: str = ENDPOINT,
-    name: str | None = None,
-    *,
-    power_on: bool = False,
-    security: Folder | None = None,
-    namespace: str = "",
-) -> UnlockReport:
+async def unlock(robot: Robot, endpoint: str, command: str, *, power_on: bool = False) -> UnlockReport:
     """Take control, release what a client can release, and check that the robot does not stop again.
 
-    In lockstep, time advances by some hundred ticks. Without a name, it is the only robot at the endpoint, or `ur5e`.
+    In lockstep, time advances by some hundred ticks. `endpoint`, and the `command` that does this, are for the report.
     """
-    return asyncio.run(_unlock(endpoint, name, security, namespace, power_on=power_on))
+    info, found, done = await robot.info(), await look(robot, command), list[str]()
+    if info.watched is not None:
+        raise ClientError(
+            f"{info.name} is only watched, and nothing is sent to it from here: unlock it at the robot"
+        )
+    if not found.ready:
+        async with robot.control(CLIENT) as arm:
+            done = await make_ready(robot, arm, power_on=power_on)
+        found = await look(robot, command)
+    return UnlockReport(
+        ok=found.ready,
+        endpoint=endpoint,
+        robot=info.name,
+        done=done,
+        robot_mode=found.robot_mode,
+        safety_mode=found.safety_mode,
+        stop=found.stop,
+        why=found.why,
+        next=found.next,
+    )
 
 
 async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[str]:
@@ -62,12 +71,10 @@ async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[
     if found.safety_mode == SafetyMode.PROTECTIVE_STOP.name:
         await _rest(robot)
         done.append("unlocked the protective stop")
-        try:
+        with suppress(ProtectiveStopError):  # the caller checks the result
             await arm.unlock_protective_stop()
             if await robot.clock() != "realtime":
                 await robot.advance(UNLOCKED_TICKS)
-        except ProtectiveStopError:
-            pass  # the caller checks the result
         found = await look(robot)
         if found.safety_mode == SafetyMode.PROTECTIVE_STOP.name:
             done.append("the robot stopped again at once")
@@ -84,31 +91,3 @@ async def _rest(robot: Robot) -> None:
     ticks = await robot.clock() == "realtime" or (await robot.info()).tick > 0
     if ticks and (await robot.state()).runtime_state == RuntimeState.STOPPING:
         await robot.rest()
-
-
-async def _unlock(
-    endpoint: str, name: str | None, security: Folder | None, namespace: str, *, power_on: bool
-) -> UnlockReport:
-    name = name or await only_robot(endpoint, NAME, security, namespace)
-    command = unlock_command(endpoint, name, security, namespace)
-    async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
-        if (await robot.info()).watched is not None:
-            raise ClientError(
-                f"{name} is only watched: unlock it at the robot, since nothing is sent to it from here"
-            )
-        found, done = await look(robot, command), list[str]()
-        if not found.ready:
-            async with robot.control(CLIENT) as arm:
-                done = await make_ready(robot, arm, power_on=power_on)
-            found = await look(robot, command)
-    return UnlockReport(
-        ok=found.ready,
-        endpoint=endpoint,
-        robot=name,
-        done=done,
-        robot_mode=found.robot_mode,
-        safety_mode=found.safety_mode,
-        stop=found.stop,
-        why=found.why,
-        next=found.next,
-    )

@@ -3,15 +3,11 @@
 import contextlib
 import math
 import operator
-from collections.abc import Callable, Iterable
-from typing import Any, TypeVar
+from collections.abc import Iterable
 
 from tvist_client.errors import ArgumentError
 from tvist_protocol.errors import quoted
 from tvist_protocol.info import Info
-
-T = TypeVar("T")
-Joints = tuple[float, ...]
 
 
 def number(value: float, where: str) -> float:
@@ -43,28 +39,6 @@ def whole(value: int, where: str, low: int, high: int | None = None) -> int:
     return found
 
 
-def listed(
-    values: Iterable[Any],
-    where: str,
-    convert: Callable[[Any, str], T],
-    *,
-    of: str = "numbers",
-    count: int | None = None,
-    meaning: str | None = None,
-) -> tuple[T, ...]:
-    """Convert the entries of a sequence to a tuple, and check their number if `count` is given."""
-    entries = None
-    if not isinstance(values, str | bytes):
-        with contextlib.suppress(TypeError):
-            entries = tuple(values)
-    if entries is None:
-        raise ArgumentError(where, f"{where} is {quoted(values)}: must be a list of {of}")
-    if count is not None and len(entries) != count:
-        must = f"must have {count}" if meaning is None else f"must have {count}, {meaning}"
-        raise ArgumentError(where, f"{where} has {len(entries)} {of}: {must}", count)
-    return tuple(convert(entry, f"{where}[{place}]") for place, entry in enumerate(entries))
-
-
 class JointRange:
     """The joint angles that a robot accepts; set-points are checked here because the robot does not answer them."""
 
@@ -72,9 +46,15 @@ class JointRange:
         self._joints = info.joints
         self._ranges = info.limits.position
 
-    def check(self, q: Iterable[float], where: str = "q") -> Joints:
+    def check(self, q: Iterable[float], where: str = "q") -> tuple[float, ...]:
         """Convert joint angles to floats, and check that the robot accepts them."""
-        angles = listed(q, where, number)
+        entries = None
+        if not isinstance(q, str | bytes):
+            with contextlib.suppress(TypeError):
+                entries = tuple(q)
+        if entries is None:
+            raise ArgumentError(where, f"{where} is {quoted(q)}: must be a list of numbers")
+        angles = tuple(number(angle, f"{where}[{place}]") for place, angle in enumerate(entries))
         joints, ranges = self._joints, self._ranges
         if len(angles) != len(joints):
             why = f"{where} has {len(angles)} angles; this arm has {len(joints)} joints: give one per joint"

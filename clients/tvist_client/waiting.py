@@ -29,12 +29,7 @@ class Waited(Described):
     def __call__(self, owner: "Waiting", *values: Any, **named: Any) -> Any:
         """Run the wrapped method on the loop, and wait for the result."""
         method, portal = getattr(owner._inner, self.__name__), owner._portal  # noqa: SLF001  its methods
-
-        async def called() -> Any:
-            result = method(*values, **named)
-            return await result if inspect.iscoroutine(result) else result
-
-        result = portal.call(called)
+        result = portal.call(lambda: method(*values, **named))
         return owner if result is owner._inner else _twin(portal, result)  # noqa: SLF001
 
     @cached_property
@@ -61,7 +56,7 @@ class Attribute:
         return self if owner is None else getattr(owner._inner, self._name)  # noqa: SLF001  its attribute
 
     def __set__(self, owner: object, value: object) -> None:
-        raise AttributeError(f"{self._name} is the robot's to say")
+        raise AttributeError(f"{self._name} is read-only")
 
     @property
     def kind(self) -> Any:
@@ -148,7 +143,7 @@ class Opened(Waiting):
     def over(cls, transport: Transport) -> Self:
         """Use a robot over a transport that is not yet bound to an event loop, such as the loopback's."""
         portal = Portal()
-        return cls(portal, portal.run(lambda: asynchronous.Robot.over(transport)))
+        return cls(portal, portal.call(lambda: asynchronous.Robot.over(transport)))
 
     def close(self) -> None:
         """Close the connection and end the loop's thread; a second call does nothing."""
@@ -181,7 +176,7 @@ def _twin(portal: Portal, result: Any) -> Any:
     if isinstance(result, AbstractAsyncContextManager):
         return _entered(portal, result)
     if isinstance(result, FunctionType):  # it ends a subscription
-        return lambda: portal.run(result)
+        return lambda: portal.call(result)
     return result
 
 

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 
@@ -80,17 +80,9 @@ def explain_unknown_type(name: object, types: Types) -> ProtocolError:
 
 def explain_bytes(error: Exception) -> ProtocolError:
     """Return the error of bytes that are not MessagePack."""
-    match error:
-        case RecursionError():
-            why = "the message is nested too deeply"
-        case UnicodeDecodeError():
-            why = "the message contains text that is not UTF-8"
-        case MemoryError():
-            why = "the message declares a length that exceeds memory"
-        case _:
-            said = str(error).removeprefix("MessagePack data is malformed: ")
-            why = f"the message is not valid MessagePack: {short(said)}"
-    return ProtocolError("malformed", "", why)
+    said = str(error).removeprefix("MessagePack data is malformed: ")
+    why = _BYTES.get(type(error)) or f"is not valid MessagePack: {short(said)}"
+    return ProtocolError("malformed", "", f"the message {why}")
 
 
 def _unknown_field(fault: _Fault, name: str) -> ProtocolError:
@@ -107,8 +99,13 @@ def _missing_field(fault: _Fault, name: str) -> ProtocolError:
 
 def _length(fault: _Fault, kind: str, relation: str, limit: str) -> ProtocolError:
     things, one = ("characters", "character") if kind == "str" else ("entries", "entry")
-    has = f" has {len(fault.value)} {things}:" if isinstance(fault.value, str | list) else ""
-    why = f"{fault.whole}{has} must have {_RELATIONS[relation]} {limit} {one if limit == '1' else things}"
+    has = f" has {len(fault.value)} {things}:" if isinstance(fault.value, str | list | tuple) else ""
+    kinds = (fault.place.kind, *get_args(fault.place.kind))
+    meant = next((m for kind in kinds for m in getattr(kind, "__metadata__", ()) if isinstance(m, str)), None)
+    each = "" if meant is None else f", {meant}"
+    why = (
+        f"{fault.whole}{has} must have {_RELATIONS[relation]} {limit} {one if limit == '1' else things}{each}"
+    )
     return ProtocolError("out_of_range", fault.where, why, int(limit))
 
 
@@ -152,15 +149,13 @@ _RULES: tuple[tuple[re.Pattern[str], Callable[..., ProtocolError]], ...] = (
 )
 _RELATIONS = {">= ": "at least", "<= ": "at most", "> ": "more than", "< ": "less than", "": "exactly"}
 _KINDS = {
-    "float": "a number",
-    "int": "an integer",
-    "str": "a string",
-    "array": "a list",
-    "object": "a map",
-    "bool": "a boolean",
-    "None": "null",
-    "bytes": "a byte string",
-    "ext": "an extension value",
+    "float": "a number", "int": "an integer", "str": "a string", "array": "a list", "object": "a map",
+    "bool": "a boolean", "None": "null", "bytes": "a byte string", "ext": "an extension value",
+}  # fmt: skip
+_BYTES: dict[type, str] = {
+    RecursionError: "is nested too deeply",
+    UnicodeDecodeError: "contains text that is not UTF-8",
+    MemoryError: "declares a length that exceeds memory",
 }
 
 

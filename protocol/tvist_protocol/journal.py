@@ -6,21 +6,13 @@ import msgspec
 from msgspec import Meta, Struct
 
 from tvist_protocol.commands import Command, Setpoint
+from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
-from tvist_protocol.explain import explain_content
 from tvist_protocol.lessons import PayloadLesson
 
 EntryKind = Literal[
-    "command",
-    "setpoint",
-    "setpoint_refused",
-    "client_seen",
-    "client_gone",
-    "missed",
-    "socket",
-    "gripper",
-    "lesson",
-]
+    "command", "setpoint", "setpoint_refused", "client_seen", "client_gone", "missed", "socket", "gripper", "lesson",
+]  # fmt: skip
 SocketChange = Literal["opened", "failed", "received", "closed", "expired"]
 """What happened to a program's socket: it was opened or could not be, has received bytes, or was closed by
 the peer; or a wait for it has expired in wall time."""
@@ -62,23 +54,21 @@ def entry_of(tick: int, message: Command | Setpoint, client: str | None = None) 
 
 def lesson_of(entry: Entry) -> PayloadLesson:
     """Return the lesson of an entry; raise ProtocolError if it is invalid."""
-    try:
-        lesson: PayloadLesson = msgspec.convert(entry.message, PayloadLesson)
-    except msgspec.ValidationError as error:
-        where = f"the journal's lesson before tick {entry.tick}"
-        raise ProtocolError("malformed", "message", f"{where} is invalid: {error}") from error
+    lesson: PayloadLesson = _content(entry, PayloadLesson)
     return lesson
 
 
 def message_of(entry: Entry) -> Command | Setpoint:
     """Return the message of an entry, equal to the original one; raise ProtocolError if it is invalid."""
+    message: Command | Setpoint = _content(entry, Setpoint if entry.kind == "setpoint" else Command)
+    return message
+
+
+def _content(entry: Entry, kind: Any) -> Any:
     where = f"the journal's {entry.kind} before tick {entry.tick}"
     if entry.message is None:
         raise ProtocolError("missing_field", "message", f"{where} has no message")
-    kind: Any = Setpoint if entry.kind == "setpoint" else Command
     try:
-        message: Command | Setpoint = msgspec.convert(entry.message, kind)
-    except msgspec.ValidationError as error:
-        fault = explain_content(error, entry.message, kind)
-        raise ProtocolError("malformed", "message", f"{where} is not a valid message: {fault.why}") from error
-    return message
+        return checked(entry.message, kind)
+    except ProtocolError as error:
+        raise ProtocolError("malformed", "message", f"{where} is not valid: {error.why}") from error

@@ -90,31 +90,19 @@ HAPPENINGS: dict[str, str] = {
 }
 
 _A = Activity
-_MOVING = frozenset(
-    {
-        _A.MOVING,
-        _A.PAUSED,
-        _A.STREAMING,
-        _A.GUIDED,
-        _A.ENDING,
-        _A.STOPPING,
-        _A.POWERING_OFF,
-        _A.BRAKING,
-        _A.PROTECTIVE_STOPPING,
-    }
-)
-_ROBOT_MODES = {
-    _A.POWER_OFF: RobotMode.POWER_OFF,
-    _A.BRAKING: RobotMode.POWER_OFF,
-    _A.IDLE: RobotMode.IDLE,
-}
+_FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.GUIDED, _A.ENDING, _A.STOPPING)
+"""Activities in which a motion can still be stopped."""
+_DRIVEN_ON = (
+    *_FREE_TO_END,
+    _A.POWERING_OFF,
+    _A.PROTECTIVE_STOPPING,
+)  # activities in which drives move the arm
+_ROBOT_MODES = {_A.POWER_OFF: RobotMode.POWER_OFF, _A.BRAKING: RobotMode.POWER_OFF, _A.IDLE: RobotMode.IDLE}
 for _activity in Activity:
     # Attributes, because looking up another member at every tick takes ten times as long.
     _activity.robot_mode = _ROBOT_MODES.get(_activity, RobotMode.RUNNING)
-    _activity.moving = _activity in _MOVING
+    _activity.moving = _activity in {*_DRIVEN_ON, _A.BRAKING}
     _activity.protective = _activity in {_A.PROTECTIVE_STOPPING, _A.PROTECTIVE_STOP}
-_FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.GUIDED, _A.ENDING, _A.STOPPING)
-"""Activities in which a motion can still be stopped."""
 _GUIDABLE = (_A.REST, _A.MOVING, _A.PAUSED, _A.GUIDED, _A.ENDING)
 """Activities that `servo_j`, `speed_j` and `speed_l` take over."""
 _STANDING = (_A.POWER_OFF, _A.IDLE, _A.REST, _A.PROTECTIVE_STOP)
@@ -152,11 +140,11 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition("stop_l", _FREE_TO_END, _A.STOPPING),
     Transition("interruption", _FREE_TO_END, _A.STOPPING),
     Transition("power_off", _STANDING, _A.POWER_OFF),
-    Transition("power_off", (*_FREE_TO_END, _A.POWERING_OFF, _A.PROTECTIVE_STOPPING), _A.POWERING_OFF),
+    Transition("power_off", _DRIVEN_ON, _A.POWERING_OFF),
     Transition("at_rest", (_A.POWERING_OFF,), _A.POWER_OFF),
     Transition("power_off", (_A.BRAKING,), _A.BRAKING),
     Transition("brakes", _STANDING, _A.POWER_OFF),
-    Transition("brakes", (*_FREE_TO_END, _A.POWERING_OFF, _A.PROTECTIVE_STOPPING), _A.BRAKING),
+    Transition("brakes", _DRIVEN_ON, _A.BRAKING),
     Transition("at_rest", (_A.BRAKING,), _A.POWER_OFF),
     Transition("protective_stop", (_A.REST,), _A.PROTECTIVE_STOP),
     Transition("protective_stop", _FREE_TO_END, _A.PROTECTIVE_STOPPING),

@@ -38,7 +38,7 @@ class SteppingStream(blocking.Stream[M], Generic[M]):
 
     def __next__(self) -> M:
         for _ in range(LONGEST):
-            if self._portal.run(lambda: self._inner.ready):
+            if self._portal.call(lambda: self._inner.ready):
                 return super().__next__()
             self._portal.call(lambda: self._robot.pass_time(1))
         raise AnswerTimeoutError(f"nothing came within {LONGEST} ticks of simulation")
@@ -93,7 +93,7 @@ class FixtureRobot(blocking.Robot):
         self.on_truth(self.history.on_truth)
         self.on_state(self.history.on_state)
         self.on_event(self.history.on_event)
-        self._portal.run(self._inner._ios.subscribe)  # noqa: SLF001  so that `io` has a value at once
+        self._portal.call(self._inner._ios.subscribe)  # noqa: SLF001  so that `io` has a value at once
         self.info()  # answered after the robot has received the subscriptions
         publish_state()
         self._portal.call(lambda: self._inner.until(0))
@@ -105,13 +105,13 @@ class FixtureRobot(blocking.Robot):
     def states(self, buffer: int = BUFFER) -> SteppingStream[State]:
         """Iterate over every state from now on; each one advances time by a tick."""
         return SteppingStream(
-            self._portal, self._stepping, self._portal.run(lambda: self._inner.states(buffer))
+            self._portal, self._stepping, self._portal.call(lambda: self._inner.states(buffer))
         )
 
     def events(self, buffer: int = BUFFER) -> SteppingStream[Event]:
         """Iterate over every event from now on; time advances until the next one."""
         return SteppingStream(
-            self._portal, self._stepping, self._portal.run(lambda: self._inner.events(buffer))
+            self._portal, self._stepping, self._portal.call(lambda: self._inner.events(buffer))
         )
 
 

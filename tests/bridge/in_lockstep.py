@@ -23,33 +23,24 @@ from tvist_server.moving import program as r
 from tvist_server.moving.program import MARGIN, Window, program
 from tvist_server.moving.servo_lag import ServoLag, ServoSetpoints
 
-TICK = 1e3 * PERIOD
-"""Control period [ms]."""
-COMPUTING = 0.2
-"""Time from a row's arrival until the set-point leaves [ms]."""
-LATEST = 2.0
-"""Time after a tick of the robot at which the controller ticks without its row [ms]."""
+TICK = 1e3 * PERIOD  # control period [ms]
+COMPUTING = 0.2  # time from a row's arrival until the set-point leaves [ms]
+LATEST = 2.0  # time after a tick of the robot at which the controller ticks without its row [ms]
 CLIENT = "bridge"
-RUN = 1
-"""Number of the run of the program."""
+RUN = 1  # number of the run of the program
 
 
 @dataclass(frozen=True)
 class Link:
     """A connection that delays packages, and where one that is lost comes late with all that follow it."""
 
-    delay: float = 1.0
-    """Mean time on the way [ms]."""
-    jitter: float = 0.5
-    """Largest deviation from it [ms]."""
-    loss: float = 0.001
-    """Share of packages that have to be sent again [-]."""
-    again: tuple[float, float] = (6.0, 12.0)
-    """Shortest and longest time that this takes [ms]."""
+    delay: float = 1.0  # mean time on the way [ms]
+    jitter: float = 0.5  # largest deviation from it [ms]
+    loss: float = 0.001  # share of packages that have to be sent again [-]
+    again: tuple[float, float] = (6.0, 12.0)  # shortest and longest time that this takes [ms]
 
 
-IDEAL = Link(delay=0.5, jitter=0.0, loss=0.0)
-"""A connection on which each package is there in time."""
+IDEAL = Link(delay=0.5, jitter=0.0, loss=0.0)  # a connection on which each package is there in time
 
 
 class Way:
@@ -99,8 +90,7 @@ class Side:
 class HiddenRobot(Side):
     """A hidden robot with our controller."""
 
-    late = 0
-    """Ticks by which its target is later than `wanted`."""
+    late = 0  # ticks by which its target is later than `wanted`
 
     def __init__(self, description, seed, q, payload, shaper="none"):
         self.plant = hidden_variant(seed).make(description, body(payload), seed)
@@ -128,12 +118,10 @@ class HiddenRobot(Side):
 class Counts:
     """What the link and the limits did."""
 
-    ticks: int = 0
-    """Ticks since the beginning."""
+    ticks: int = 0  # ticks since the beginning
     played: dict[int, int] = field(default_factory=dict)
     """Age of the set-points played, in ticks of the robot since the tick in which each was computed."""
-    largest_step: float = 0.0
-    """Largest step of a joint's own target between two ticks [rad]."""
+    largest_step: float = 0.0  # largest step of a joint's own target between two ticks [rad]
 
     @property
     def usual(self):

@@ -45,7 +45,7 @@ def targets(side, ticks):
 
 
 @pytest.mark.parametrize("shaper", ["zv", "auto"])
-def test_over_an_ideal_link_the_robot_s_target_is_that_of_a_shaper_inside_a_fixed_time_later(shaper):
+def test_over_an_ideal_link_an_external_shaper_equals_an_internal_one_with_a_delay(shaper):
     inside = HiddenRobot(UR5E, 3, Q1, PAYLOAD, shaper)
     bridge = Bridge(UR5E, 3, Q1, PAYLOAD, shaper, IDEAL)
     for side in (inside, bridge):
@@ -60,7 +60,7 @@ def test_over_an_ideal_link_the_robot_s_target_is_that_of_a_shaper_inside_a_fixe
     assert np.abs(through[-1, 0] - NEAR).max() < 1e-9
 
 
-def test_equal_seeds_make_equal_motions_and_other_links_other_ones():
+def test_equal_seeds_reproduce_motions_over_a_lossy_link():
     def motion(link):
         bridge = Bridge(UR5E, 5, Q1, PAYLOAD, "zv", link)
         bridge.send(MoveJ, q=tuple(NEAR.tolist()))
@@ -70,18 +70,15 @@ def test_equal_seeds_make_equal_motions_and_other_links_other_ones():
     assert motion(lossy) == motion(lossy) != motion(Link())
 
 
-PAPER = ("Q2", "Q1", "Q3", "Q1")
-"""Where the paper's motions end, from Q1."""
+PAPER = ("Q2", "Q1", "Q3", "Q1")  # where the paper's motions end, from Q1
 SPEEDS = ((1.5, 2.0, 100.0), (1.05, 1.4, 50.0), (0.8, 2.0, 200.0))
 """Velocity, acceleration and jerk of the motions [rad/s, rad/s², rad/s³]; the first are the paper's."""
-REST = 250
-"""Ticks at rest after a motion."""
+REST = 250  # ticks at rest after a motion
 TORQUE = 0.95
 """Share of the joints' torques that twice the motion's accelerations may need [-]. The simulated `servoj` is late where
 they need more than the torques: nothing smooths what a client sends, and the arm swings as far again.
 """
-BAD = ("protective_stop", "motion_stopped", "program_stopped")
-"""Kinds of events that end a motion."""
+BAD = ("protective_stop", "motion_stopped", "program_stopped")  # kinds of events that end a motion
 
 
 def asked(description, count, seed):
@@ -152,7 +149,7 @@ def peak(side):
 
 @pytest.mark.nightly
 @pytest.mark.parametrize(("name", "seed", "shaper"), [("ur5e", 11, "auto"), ("ur5-light", 12, "auto-target")])
-def test_over_a_link_that_loses_packages_a_shaper_in_front_leaves_what_one_inside_leaves(
+def test_over_a_lossy_link_an_external_shaper_is_as_effective_as_an_internal_one(
     name, seed, shaper, measured
 ):
     description = load(name)

@@ -19,14 +19,10 @@ from tvist_plant.description import load
 from tvist_plant.variants import hidden_variant
 from tvist_server.moving.servo_lag import ServoLag, ServoSetpoints
 
-SPEED = 0.5
-"""Speed cap [rad/s]."""
-STANDS = (0.2, -1.3, 1.4, -1.7, -1.5, 0.1)
-"""Where the arm stands at first [rad]."""
-BEGINS = 100
-"""Ticks until the program follows."""
-PLACES = 60
-"""Number of unseen configurations of each robot."""
+SPEED = 0.5  # speed cap [rad/s]
+STANDS = (0.2, -1.3, 1.4, -1.7, -1.5, 0.1)  # where the arm stands at first [rad]
+BEGINS = 100  # ticks until the program follows
+PLACES = 60  # number of unseen configurations of each robot
 
 
 class Rows(Port):
@@ -84,9 +80,7 @@ def unseen(description, hidden, declared, seed):
 @pytest.mark.parametrize(
     ("name", "hidden", "every"), [("ur5e", 11, 4), ("ur5e", 12, 1), ("ur5-light", 13, 1)]
 )
-def test_a_robot_that_takes_positions_alone_is_known_where_it_was_never_visited(
-    name, hidden, every, measured
-):
+def test_a_position_controlled_robot_is_identified_at_unseen_poses(name, hidden, every, measured):
     description = load(name)
     measured_jogs = asyncio.run(measured_in_lockstep(description, hidden, every))
     how = {"name": "found", "command": "tvist identify", "progress": lambda _: None}

@@ -22,8 +22,7 @@ from tvist_protocol.stream import Telemetry
 from tvist_server.gateways.base import Starting
 from tvist_server.gateways.network import Network
 
-NEAR = (0.05, *Q1[1:].tolist())
-"""A posture close to the one in which the robot starts."""
+NEAR = (0.05, *Q1[1:].tolist())  # a posture close to the one in which the robot starts
 setup_of = cache(lambda clock: free_setup(clock=clock, calibration="none", shaper="none"))
 
 

@@ -1,4 +1,4 @@
-"""What does without: the first example without our packages, and the package without libraries until it is used."""
+"""The first example uses no tvist package, and the client imports no library before it needs one."""
 
 import importlib.util
 import re
@@ -20,7 +20,7 @@ print(*(heavy & set(sys.modules)), file=sys.stderr)
 """
 
 
-def test_the_example_finds_the_delay_between_samples_and_uses_none_of_our_packages(monkeypatch):
+def test_the_bare_client_interpolates_the_delay_and_imports_no_tvist_package(monkeypatch):
     """That it runs against a robot is the system's test."""
     monkeypatch.setattr("sys.argv", ["01_bare_client.py"])
     spec = importlib.util.spec_from_file_location("bare_client", EXAMPLE)
@@ -39,13 +39,13 @@ def test_the_example_finds_the_delay_between_samples_and_uses_none_of_our_packag
 @pytest.mark.parametrize(
     "does", ["import tvist_client", "sys.argv[1:] = ['--help']; from tvist_cli.main import main; main()"]
 )
-def test_the_package_and_the_list_of_commands_load_no_library(does):
+def test_importing_the_client_and_listing_commands_load_no_library(does):
     command = [sys.executable, "-c", LOADED.format(does)]
     ended = subprocess.run(command, check=True, capture_output=True, text=True)
     assert ended.stderr.split() == []
 
 
-def test_each_name_of_the_client_is_there_when_it_is_used():
+def test_every_exported_name_of_the_client_can_be_used():
     assert dir(tvist_client) == sorted(tvist_client.__all__)
     assert all(getattr(tvist_client, name).__name__ == name for name in tvist_client.__all__)
     with pytest.raises(AttributeError, match="no attribute 'Robo'"):

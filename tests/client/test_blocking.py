@@ -1,4 +1,4 @@
-"""The blocking face: the same names, in threads that may wait."""
+"""The blocking client has the same methods as the asynchronous one."""
 
 import asyncio
 import inspect
@@ -29,7 +29,7 @@ def robot(host):
 
 
 @pytest.mark.parametrize("name", INTERNAL)
-def test_both_faces_have_the_same_methods_with_the_same_arguments(name):
+def test_blocking_and_asynchronous_methods_have_the_same_arguments(name):
     def methods(module):
         return {
             method: list(inspect.signature(function).parameters.values())
@@ -46,12 +46,12 @@ def test_both_faces_have_the_same_methods_with_the_same_arguments(name):
         assert plain(parameters) == plain(theirs[method]), method
 
 
-def test_the_stubs_are_those_that_are_made():
+def test_the_stubs_are_up_to_date():
     for path, text in stubs.generated().items():
         assert path.read_text(encoding="utf-8") == text, "run `make schemas`"
 
 
-def test_a_program_reads_as_it_should(host, robot):
+def test_a_blocking_program_moves_steps_and_streams(host, robot):
     assert robot.info().model == "UR5e"
     assert robot.clock() == "free"
     with robot.control("me") as arm:
@@ -70,7 +70,7 @@ def test_a_program_reads_as_it_should(host, robot):
     assert host.holder is None
 
 
-def test_errors_come_out_of_calls_and_of_blocks(host, robot):
+def test_blocking_calls_and_blocks_raise_errors(host, robot):
     with pytest.raises(ZeroDivisionError), robot.control("me"):
         raise ZeroDivisionError
     assert host.holder is None
@@ -86,7 +86,7 @@ def test_errors_come_out_of_calls_and_of_blocks(host, robot):
         assert motion.stopped == raised.value.event
 
 
-async def test_iterators_end_with_the_connection_also_beside_a_running_loop(host):
+async def test_blocking_iterators_end_when_the_connection_closes(host):
     await asyncio.to_thread(iterate_and_close, host)
 
 
@@ -102,7 +102,7 @@ def iterate_and_close(host):
             use()
 
 
-def test_callbacks_run_until_they_are_ended(robot):
+def test_callbacks_run_until_they_are_cancelled(robot):
     seen, threads = [], set()
 
     def callback(state):
@@ -120,7 +120,7 @@ def test_callbacks_run_until_they_are_ended(robot):
     assert threads == {"tvist-client"}
 
 
-def test_a_connection_that_fails_leaves_no_thread_behind(endpoint):
+def test_a_failed_connection_leaves_no_thread(endpoint):
     with pytest.raises(NotConnectedError):
         Robot.connect(endpoint)
     assert "tvist-client" not in {thread.name for thread in threading.enumerate()}

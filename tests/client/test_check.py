@@ -1,4 +1,4 @@
-"""`python -m tvist_client check`: tells a robot that works from one that does not."""
+"""`python -m tvist_client check` finds out whether a robot works and is ready to move."""
 
 import json
 import math
@@ -27,15 +27,17 @@ from .conftest import serve
 
 
 @pytest.fixture(autouse=True)
-def _listens_briefly(monkeypatch):
-    """States come 500 times a second here, so a rate is known soon."""
+def _waits_are_short(monkeypatch):
+    """States come 500 times a second here, and a robot that starts answers at once."""
     monkeypatch.setattr(checking, "LISTEN_S", 0.1)
+    monkeypatch.setattr(checking, "RETRY_S", 0.0)
+    monkeypatch.setattr("tvist_client.transports.zenoh.FIND_S", 0.1)
 
 
 STEPS = ["connect", "info", "state", "refusal", "ready", "load"]
 
 
-def test_a_robot_that_works_is_well_and_unchanged(realtime, endpoint):
+def test_check_passes_for_a_working_robot_and_changes_nothing(realtime, endpoint):
     report = check(endpoint, "ur5e")
     assert report.ok
     assert (report.robot, report.protocol) == ("ur5e", 1)
@@ -45,7 +47,7 @@ def test_a_robot_that_works_is_well_and_unchanged(realtime, endpoint):
     assert {type(command).__name__ for command in realtime.robot.commands} == {"MoveJ"}
 
 
-def test_a_person_reads_a_line_a_step_and_a_program_one_object(realtime, endpoint, capsys):
+def test_check_prints_a_line_for_each_step_or_one_json_object(realtime, endpoint, capsys):
     """What a robot says of itself gives a terminal no commands."""
     realtime.robot.told = {"model": "\x1b]0;owned\x07"}
     assert main(["check", endpoint]) == 0
@@ -58,7 +60,7 @@ def test_a_person_reads_a_line_a_step_and_a_program_one_object(realtime, endpoin
     assert printed["ok"] is True
 
 
-def test_nobody_there_is_a_failure_that_says_what_to_check(endpoint, capsys):
+def test_check_fails_without_a_server_and_names_the_next_step(endpoint, capsys):
     assert main(["check", endpoint]) == 1
     assert "check that it is running" in capsys.readouterr().out
     assert main(["check", endpoint, "--json"]) == 1
@@ -66,24 +68,21 @@ def test_nobody_there_is_a_failure_that_says_what_to_check(endpoint, capsys):
 
 
 @pytest.mark.parametrize(
-    ("answer", "sentence"),
-    [(Done(), "does not check control"), (Refused(code="busy", where="", why="not now"), "busy: not now")],
+    ("told", "answers", "words"),
+    [
+        ({"protocol": 2}, {}, "protocol 2"),
+        ({}, {"move_j": Done()}, "does not check control"),
+        ({}, {"move_j": Refused(code="busy", where="", why="not now")}, "busy: not now"),
+    ],
 )
-def test_a_robot_that_does_not_guard_control_is_not_well(realtime, endpoint, answer, sentence):
-    realtime.robot.answers["move_j"] = answer
+def test_check_fails_for_another_protocol_and_without_control(realtime, endpoint, told, answers, words):
+    realtime.robot.told, realtime.robot.answers = told, answers
     report = check(endpoint)
     assert not report.ok
-    assert sentence in report.findings[-1].said
+    assert words in report.findings[-1].said
 
 
-def test_a_robot_of_another_protocol_is_not_well(realtime, endpoint):
-    realtime.robot.told = {"protocol": 2}
-    report = check(endpoint)
-    assert (report.ok, report.protocol) == (False, 2)
-    assert "protocol 2" in report.findings[-1].said
-
-
-def test_a_robot_that_stands_still_is_neither_well_nor_alive(realtime, endpoint, monkeypatch):
+def test_check_fails_if_the_robot_does_not_tick(realtime, endpoint, monkeypatch):
     monkeypatch.setattr("tvist_client.connection.STATE_S", 0.1)
     monkeypatch.setattr(realtime.robot, "tick", lambda: None)
     report = check(endpoint, alive=True)
@@ -94,7 +93,7 @@ def test_a_robot_that_stands_still_is_neither_well_nor_alive(realtime, endpoint,
 STOPPED = StopReason(tick=12, code="limit_torque", why="torque of joint elbow is 171 N m")
 
 
-def test_a_robot_that_stands_is_not_ready_and_says_why_since_when_and_what_to_do(realtime, endpoint, capsys):
+def test_a_stopped_robot_is_not_ready_and_reports_reason_tick_and_remedy(realtime, endpoint, capsys):
     realtime.robot.told = {"robot_mode": 7, "safety_mode": 3, "stop": STOPPED}
     report = check(endpoint)
     assert (report.ok, report.ready, report.stop) == (False, False, STOPPED)
@@ -107,7 +106,7 @@ def test_a_robot_that_stands_is_not_ready_and_says_why_since_when_and_what_to_do
     assert json.loads(capsys.readouterr().out)["stop"]["code"] == "limit_torque"
 
 
-def test_only_an_arm_with_power_in_normal_or_reduced_mode_is_ready(host):
+def test_only_a_powered_arm_in_normal_or_reduced_mode_is_ready(host):
     info, ready = decode(Info, host.info()), {SafetyMode.NORMAL, SafetyMode.REDUCED}
     for robot, safety in product([*RobotMode, 99], [*SafetyMode, 99]):
         found = readiness(replace(info, robot_mode=robot, safety_mode=safety), None)
@@ -119,7 +118,7 @@ def test_only_an_arm_with_power_in_normal_or_reduced_mode_is_ready(host):
             assert "--power-on" in found.next
 
 
-def test_alive_looks_at_the_server_alone(realtime, endpoint, capsys):
+def test_alive_checks_only_the_server(realtime, endpoint, capsys):
     realtime.robot.told = {"robot_mode": RobotMode.POWER_OFF, "safety_mode": SafetyMode.VIOLATION}
     assert main(["check", "--alive", endpoint]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -130,9 +129,7 @@ def test_alive_looks_at_the_server_alone(realtime, endpoint, capsys):
 
 
 @pytest.mark.parametrize(("ticks", "remedy"), [(1e5, "look at the network"), (1.0, "end other programs")])
-def test_a_rate_far_from_the_due_one_is_named_with_what_to_do_next(
-    realtime, endpoint, monkeypatch, ticks, remedy
-):
+def test_a_low_rate_is_reported_with_a_remedy(realtime, endpoint, monkeypatch, ticks, remedy):
     monkeypatch.setattr("tvist_client.check.TOO_SLOW", 0.0)
     realtime.robot.promised = {"due_per_second": 1e5, "ticks_per_second": ticks}
     report = check(endpoint, alive=True)
@@ -148,9 +145,7 @@ def test_a_rate_far_from_the_due_one_is_named_with_what_to_do_next(
     ],
     ids=["it says so", "it says nothing, and its ticks show it"],
 )
-def test_an_overloaded_robot_is_alive_and_not_well_and_the_sentence_has_the_rate_measured_here(
-    realtime, endpoint, promised
-):
+def test_an_overloaded_robot_is_alive_but_fails_with_the_measured_rate(realtime, endpoint, promised):
     realtime.robot.promised = promised
     report = check(endpoint)
     assert (report.ok, report.ready, report.overloaded) == (False, True, True)
@@ -162,7 +157,7 @@ def test_an_overloaded_robot_is_alive_and_not_well_and_the_sentence_has_the_rate
 
 
 @pytest.mark.parametrize(("waited", "named"), [(45e3, True), (2e3, False)])
-def test_a_tick_that_waits_for_a_processor_for_long_is_named(realtime, endpoint, waited, named):
+def test_a_tick_that_waited_for_a_processor_is_reported(realtime, endpoint, waited, named):
     realtime.robot.promised = {"due_per_second": 10.0, "late_max_us": 40e3, "processor_wait_us": waited}
     said = check(endpoint, alive=True).findings[-1].said
     assert (
@@ -170,7 +165,7 @@ def test_a_tick_that_waits_for_a_processor_for_long_is_named(realtime, endpoint,
     ) == named
 
 
-def test_the_rate_counts_states_received_and_not_their_numbers(realtime, endpoint, monkeypatch):
+def test_the_rate_counts_received_states_not_ticks(realtime, endpoint, monkeypatch):
     """Of eight states one comes, as on a network that loses most of them."""
     tells = realtime.robot.report
     monkeypatch.setattr(realtime.robot, "report", lambda report: report.state.tick % 8 == 0 and tells(report))
@@ -186,9 +181,7 @@ def test_the_rate_counts_states_received_and_not_their_numbers(realtime, endpoin
     assert report.state_rate_hz == rate == pytest.approx(ticks / 8)
 
 
-def test_a_robot_that_tells_nothing_of_its_load_is_judged_by_the_ticks_it_promises(
-    realtime, endpoint, monkeypatch
-):
+def test_without_telemetry_the_load_is_judged_by_the_nominal_rate(realtime, endpoint, monkeypatch):
     monkeypatch.setattr("tvist_client.check.TELEMETRY_S", 0.01)
     realtime.robot.promised, realtime.robot.told = None, {"rate_hz": 1e6}
     assert check(endpoint).overloaded
@@ -196,7 +189,7 @@ def test_a_robot_that_tells_nothing_of_its_load_is_judged_by_the_ticks_it_promis
     assert check(endpoint).ok
 
 
-async def test_the_fleet_s_table_and_watch_say_which_robot_is_overloaded(realtime, endpoint):
+async def test_fleet_and_watch_show_an_overloaded_robot(realtime, endpoint):
     told = {"due_per_second": 500.0, "ticks_per_second": 60.0, "overloaded": True}
     realtime.robot.promised = told
     async with Fleet(endpoint) as fleet:
@@ -209,7 +202,7 @@ async def test_the_fleet_s_table_and_watch_say_which_robot_is_overloaded(realtim
     assert shown == "60.0 ticks/s   missed 3 of 9   late p99 7 µs   load 25.0 %   overloaded"
 
 
-def test_a_robot_that_is_starting_is_not_ready_and_says_how_far_it_is(starting, endpoint):
+def test_a_starting_robot_is_not_ready_and_reports_its_progress(starting, endpoint):
     starting.starting.note(45, 102)
     report = check(endpoint)
     assert (report.ok, report.starting, report.ready) == (False, True, None)
@@ -219,7 +212,7 @@ def test_a_robot_that_is_starting_is_not_ready_and_says_how_far_it_is(starting, 
         check_command(Connection(endpoint=endpoint))
 
 
-def test_check_waits_for_a_robot_that_starts_and_tells_what_it_hears(starting, endpoint):
+def test_check_waits_for_a_starting_robot_and_reports_its_progress(starting, endpoint):
     heard = []
 
     def tell(said):
@@ -234,7 +227,7 @@ def test_check_waits_for_a_robot_that_starts_and_tells_what_it_hears(starting, e
     assert heard == [f"the robot is starting: {share}try again" for share in shares]
 
 
-def test_it_waits_for_a_server(endpoint):
+def test_check_waits_for_a_server(endpoint):
     with ExitStack() as stack:
         report = check(
             endpoint, wait=math.inf, tell=lambda _: stack.enter_context(serve("lockstep", endpoint))
@@ -242,9 +235,7 @@ def test_it_waits_for_a_server(endpoint):
         assert report.ok, report
 
 
-def test_a_command_line_that_waits_without_a_number_waits_until_it_is_ready(
-    starting, endpoint, capsys, monkeypatch
-):
+def test_wait_without_a_number_waits_until_the_robot_is_ready(starting, endpoint, capsys, monkeypatch):
     monkeypatch.setattr(checking.time, "sleep", lambda _: starting.get_ready())
     assert main(["check", endpoint, "--wait"]) == 0
     assert capsys.readouterr().err == "the robot is starting: try again\n"

@@ -1,4 +1,4 @@
-"""Messages on their way to whoever listens: none breaks the stream, none is older than its buffer."""
+"""Messages reach listeners and iterators in order; invalid ones are dropped."""
 
 import asyncio
 import logging
@@ -41,7 +41,7 @@ def states(source):
     return Feed(source, "state", State, once_a_tick=True)
 
 
-async def test_a_slow_reader_loses_the_oldest_and_knows_how_many(source, states):
+async def test_a_slow_reader_loses_the_oldest_messages_and_counts_them(source, states):
     stream = states.stream(3)
     for tick in range(1, 11):
         source.put(encode(state(tick)))
@@ -50,7 +50,7 @@ async def test_a_slow_reader_loses_the_oldest_and_knows_how_many(source, states)
     assert stream.dropped == 7
 
 
-async def test_a_repeated_or_late_state_is_told_once(source, states):
+async def test_repeated_and_late_states_are_dropped(source, states):
     stream = states.stream(10)
     for tick in (5, 5, 6, 4, 6, 7):
         source.put(encode(state(tick)))
@@ -58,7 +58,7 @@ async def test_a_repeated_or_late_state_is_told_once(source, states):
     assert [one.tick async for one in stream] == [5, 6, 7]
 
 
-async def test_a_robot_that_comes_back_may_count_anew(source, states):
+async def test_ticks_may_restart_after_a_reconnection(source, states):
     stream = states.stream(10)
     source.put(encode(state(500)))
     states.end(NotConnectedError("gone"))
@@ -69,7 +69,7 @@ async def test_a_robot_that_comes_back_may_count_anew(source, states):
         await anext(stream)
 
 
-async def test_foreign_messages_are_left_out_counted_and_warned_of_once(source, states, caplog):
+async def test_invalid_messages_are_dropped_counted_and_logged_once(source, states, caplog):
     stream = states.stream(10)
     event = encode(Event(tick=1, kind="warning"))
     for data in (b"", b"\xc1", b"junk", event, encode(state(1)), event, encode(state(2))):
@@ -80,7 +80,7 @@ async def test_foreign_messages_are_left_out_counted_and_warned_of_once(source, 
     assert len(caplog.records) == 1
 
 
-async def test_a_listener_that_raises_disturbs_neither_the_others_nor_the_robot(source, states):
+async def test_an_exception_in_a_listener_does_not_affect_other_listeners(source, states):
     raised, seen = [], []
     asyncio.get_running_loop().set_exception_handler(lambda _, context: raised.append(context["exception"]))
 
@@ -95,7 +95,7 @@ async def test_a_listener_that_raises_disturbs_neither_the_others_nor_the_robot(
     assert [type(error) for error in raised] == [ZeroDivisionError] * 2
 
 
-async def test_what_is_no_function_or_no_buffer_is_refused_before_the_robot_is_asked(source, states):
+async def test_an_invalid_callback_or_buffer_is_refused_before_subscribing(source, states):
     with pytest.raises(ArgumentError, match="callback is None: must be a function of one state message"):
         states.listen(None)
     for size in (0, -1, "big", 1.5):
@@ -104,7 +104,7 @@ async def test_what_is_no_function_or_no_buffer_is_refused_before_the_robot_is_a
     assert not source.callbacks
 
 
-async def test_waiting_for_a_message_ends_with_it_with_time_or_with_the_robot(source, states):
+async def test_waiting_ends_with_the_message_the_timeout_or_the_connection(source, states):
     loop = asyncio.get_running_loop()
     loop.call_soon(source.put, encode(state(1)))
     loop.call_soon(source.put, encode(state(2)))
@@ -116,7 +116,7 @@ async def test_waiting_for_a_message_ends_with_it_with_time_or_with_the_robot(so
         await states.next(lambda _: True, 10.0)
 
 
-async def test_events_of_one_tick_are_all_told(source):
+async def test_all_events_of_a_tick_are_delivered(source):
     events = Feed(source, "event", Event, once_a_tick=False)
     stream = events.stream(10)
     for _ in range(3):
@@ -125,7 +125,7 @@ async def test_events_of_one_tick_are_all_told(source):
     assert len([event async for event in stream]) == 3
 
 
-async def test_messages_from_threads_reach_the_loop_in_order_and_none_is_lost():
+async def test_messages_from_threads_reach_the_loop_complete_and_in_order():
     seen, ended = [], asyncio.Event()
     mailbox = Inbox(asyncio.get_running_loop())
 
@@ -144,7 +144,7 @@ async def test_messages_from_threads_reach_the_loop_in_order_and_none_is_lost():
     assert mailbox.dropped == 0
 
 
-async def test_a_busy_loop_loses_states_but_no_events(caplog):
+async def test_a_busy_loop_drops_states_but_no_events(caplog):
     caplog.set_level(logging.WARNING)
     states, events, ended = [], [], asyncio.Event()
     mailbox = Inbox(asyncio.get_running_loop())

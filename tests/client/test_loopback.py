@@ -24,15 +24,14 @@ from tvist_protocol.simulation import SimulationStep
 
 from .conftest import NEAR
 
-SLOW = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
-"""Velocities of a motion that is guided."""
+SLOW = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)  # velocities of a motion that is guided
 
 
 def steps(host):
     return [command.ticks for command in host.commands if isinstance(command, SimulationStep)]
 
 
-async def test_a_move_is_waited_for_by_letting_a_deterministic_number_of_ticks_pass(host, robot):
+async def test_a_move_steps_a_deterministic_number_of_ticks(host, robot):
     async with robot.control("me") as arm:
         motion = await arm.move_j(NEAR)
         assert (motion.id, motion.started, motion.ended) == (1, 1, True)
@@ -55,7 +54,7 @@ async def test_a_stopped_motion_raises_with_its_event(robot, kind):
         assert motion.stopped == raised.value.event
 
 
-async def test_every_state_event_and_truth_comes_in_order_while_time_passes(host, robot):
+async def test_states_events_and_truths_arrive_in_order(host, robot):
     seen = []
     robot.on_state(lambda state: seen.append(("state", state.tick)))
     robot.on_truth(lambda truth: seen.append(("truth", truth.tick)))
@@ -70,7 +69,7 @@ async def test_every_state_event_and_truth_comes_in_order_while_time_passes(host
     assert ticks == sorted(ticks)
 
 
-async def test_time_passes_in_chunks_of_a_thousand_for_who_holds_control_and_nobody_else(host, robot):
+async def test_only_the_client_in_control_steps_time_in_steps_of_a_thousand_ticks(host, robot):
     with pytest.raises(MisuseError, match="control"):
         await robot.advance(1)
     async with robot.control("me"):
@@ -81,7 +80,7 @@ async def test_time_passes_in_chunks_of_a_thousand_for_who_holds_control_and_nob
 
 
 @pytest.mark.parametrize(("period", "ticks"), [(0.002, 1), (0.008, 4)])
-async def test_setpoints_are_stepped_through_one_a_period_and_numbered_on(host, robot, period, ticks):
+async def test_step_through_plays_one_set_point_per_period_and_numbers_them(host, robot, period, ticks):
     seen = []
     async with robot.control("me") as arm:
         q = (await robot.state()).target_q
@@ -99,7 +98,7 @@ async def test_setpoints_are_stepped_through_one_a_period_and_numbered_on(host, 
 
 
 @pytest.mark.parametrize("more", [True, False])
-async def test_a_stream_the_robot_ended_is_said_to_have_ended(robot, more):
+async def test_a_stream_ended_by_the_robot_raises_an_error(robot, more):
     async def stream(arm):
         async with arm.servo() as servo:
             await servo.step_through([(await robot.state()).target_q])
@@ -113,7 +112,7 @@ async def test_a_stream_the_robot_ended_is_said_to_have_ended(robot, more):
             await stream(arm)
 
 
-async def test_an_error_inside_a_stream_is_the_one_that_comes_out_and_control_is_released(host, robot):
+async def test_an_error_in_a_stream_is_raised_and_control_is_released(host, robot):
     async def stream(arm):
         async with arm.servo() as servo:
             with pytest.raises(MisuseError, match="no set-points"):
@@ -129,7 +128,7 @@ async def test_an_error_inside_a_stream_is_the_one_that_comes_out_and_control_is
     assert host.holder is None
 
 
-async def test_refusals_carry_the_reply_and_end_neither_control_nor_the_robot(host, robot):
+async def test_a_refusal_carries_the_reply_and_keeps_control(host, robot):
     async with robot.control("me") as arm:
         with pytest.raises(RefusedError, match="limit_position: ") as raised:
             await arm.move_j([9.0] * 6)
@@ -146,7 +145,7 @@ async def test_refusals_carry_the_reply_and_end_neither_control_nor_the_robot(ho
             pass
 
 
-async def test_with_a_duration_a_guided_motion_returns_after_that_and_the_arm_still_moves(host, robot):
+async def test_a_guided_motion_returns_after_its_duration_while_the_arm_moves(host, robot):
     async with robot.control("me") as arm:
         motion = await arm.speed_j(SLOW)
         assert (motion.id, motion.ended, host.controller.tick_number) == (1, False, 0)
@@ -162,7 +161,7 @@ async def test_with_a_duration_a_guided_motion_returns_after_that_and_the_arm_st
     assert len([one for one in host.commands if isinstance(one, m.SpeedJ)]) == 3
 
 
-async def test_where_another_client_steps_its_ticks_are_waited_for(host, robot):
+async def test_a_client_waits_for_ticks_stepped_by_another_client(host, robot):
     other = Robot.over(LoopbackTransport(host))
     async with other, other.clock_control("other") as clock, robot.control("me") as arm:
         with pytest.raises(RefusedError, match="'other'"):
@@ -176,14 +175,14 @@ async def test_where_another_client_steps_its_ticks_are_waited_for(host, robot):
 
 
 @pytest.mark.parametrize("answer", [b"\xc1", encode(Done()), b"\x81\xa4type\xa4what"])
-async def test_an_answer_that_is_none_is_an_error_that_says_so(host, robot, answer):
+async def test_an_invalid_answer_raises_an_error(host, robot, answer):
     host.answers["take_control"] = answer
     with pytest.raises(UnexpectedReplyError):
         async with robot.control("me"):
             pass
 
 
-async def test_a_closed_robot_says_that_it_is_closed_and_hears_nothing_more(host):
+async def test_a_closed_connection_raises_errors_and_delivers_nothing(host):
     robot = Robot.over(LoopbackTransport(host))
     states = robot.states()
     async with robot.control("me"):

@@ -1,4 +1,4 @@
-"""No program hangs at its end: not one that forgets to close, not one that is interrupted."""
+"""Programs end even if they do not close their connection or are interrupted."""
 
 import signal
 import subprocess
@@ -51,7 +51,7 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.parametrize("program", [ASYNCHRONOUS, ABANDONED, FAILING])
-def test_a_program_that_forgets_to_close_ends_all_the_same(realtime, endpoint, program):
+def test_a_program_that_does_not_close_its_connection_ends(realtime, endpoint, program):
     ended = subprocess.run(
         [sys.executable, "-c", program, endpoint], capture_output=True, text=True, timeout=100, check=False
     )
@@ -59,7 +59,7 @@ def test_a_program_that_forgets_to_close_ends_all_the_same(realtime, endpoint, p
     assert "Traceback" not in ended.stderr
 
 
-def test_an_interrupted_program_gives_control_back_and_ends(realtime, endpoint):
+def test_an_interrupted_program_releases_control_and_ends(realtime, endpoint):
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen([sys.executable, "-c", INTERRUPTED, endpoint], **pipes) as program:
         assert program.stdout.readline() == "listens\n"

@@ -1,4 +1,4 @@
-"""`unlock` over a network, and what becomes of an unlock that does not hold."""
+"""`unlock` over a network, also if the robot stops again."""
 
 import pytest
 
@@ -10,20 +10,25 @@ from tvist_protocol.replies import Done, Refused
 from tvist_protocol.stream import Event
 
 
-def test_a_robot_that_is_ready_is_left_alone(realtime, endpoint):
-    report = unlock(endpoint)
+async def unlocked(endpoint):
+    async with await Robot.connect(endpoint) as robot:
+        return await unlock(robot, endpoint, "tvist unlock")
+
+
+async def test_unlock_does_nothing_if_the_robot_is_ready(realtime, endpoint):
+    report = await unlocked(endpoint)
     assert (report.ok, report.done, report.robot) == (True, [], "ur5e")
     assert realtime.robot.commands == []
 
 
-def test_a_robot_that_another_controls_is_left_alone_and_the_other_is_named(realtime, endpoint):
+async def test_unlock_is_refused_while_another_client_has_control(realtime, endpoint):
     realtime.robot.told = {"robot_mode": 7, "safety_mode": 3}
     realtime.post(lambda: realtime.robot.receive(c.TakeControl(client="somebody")))
     with pytest.raises(RefusedError, match="somebody"):
-        unlock(endpoint)
+        await unlocked(endpoint)
 
 
-async def test_in_real_time_an_unlock_that_does_not_hold_is_an_error_with_the_event(realtime, endpoint):
+async def test_another_protective_stop_after_unlocking_raises_an_error(realtime, endpoint):
     host, told = realtime.robot, []
 
     def unlocks():

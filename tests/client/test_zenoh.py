@@ -19,8 +19,7 @@ from tvist_client import (
     Robot,
     ZenohTransport,
 )
-from tvist_client.fleet import Fleet
-from tvist_client.fleet_session import RobotPlace
+from tvist_client.fleet import Fleet, RobotPlace
 from tvist_client.transports import certificates
 from tvist_client.transports import zenoh as zenoh_transport
 from tvist_client.transports.zenoh import robots_at
@@ -43,7 +42,7 @@ async def robot(request, endpoint):
         yield robot
 
 
-async def test_a_connection_that_is_cancelled_while_it_opens_is_closed_again(monkeypatch):
+async def test_a_session_is_closed_if_opening_is_cancelled(monkeypatch):
     go, closed = threading.Event(), []
     monkeypatch.setattr(zenoh_transport, "open_session", lambda *_: go.wait())
     monkeypatch.setattr(zenoh_transport, "close_session", closed.append)
@@ -55,17 +54,17 @@ async def test_a_connection_that_is_cancelled_while_it_opens_is_closed_again(mon
     assert closed == [True]
 
 
-async def test_another_robots_endpoint_is_said_to_be_that(realtime, endpoint):
+async def test_connecting_to_an_unknown_robot_names_the_robots_there(realtime, endpoint, monkeypatch):
+    monkeypatch.setattr(zenoh_transport, "FIND_S", 0.1)
+    monkeypatch.setattr(zenoh_transport, "LATE_S", 0.2)
     with pytest.raises(NotConnectedError, match=r"no robot 'ur3' .*; the robots there are ur5e: check name"):
         await Robot.connect(endpoint, "ur3")
-    where = (
-        f"'ur5e' at {endpoint} in namespace hall-3; none answered in 3 s: check name, namespace and endpoint"
-    )
+    where = f"'ur5e' at {endpoint} in namespace hall-3; none answered in 0.2 s: check name, namespace and endpoint"
     with pytest.raises(NotConnectedError, match=where):
         await Robot.connect(endpoint, namespace="hall-3")
 
 
-async def test_a_token_whose_name_is_none_is_no_robot(endpoint):
+async def test_a_liveliness_token_with_an_invalid_name_is_ignored(endpoint):
     config = zenoh.Config.from_json5(f'{{mode: "router", listen: {{endpoints: ["{endpoint}"]}}}}')
     config.insert_json5("scouting/multicast/enabled", "false")
     with zenoh.open(config) as other:
@@ -79,7 +78,7 @@ async def test_a_token_whose_name_is_none_is_no_robot(endpoint):
         assert len(tokens) == 3
 
 
-async def test_an_event_that_overtakes_the_answer_is_not_lost(realtime, robot):
+async def test_an_event_that_precedes_the_answer_is_not_lost(realtime, robot):
     def begins():
         realtime.robot.put("event", Event(tick=7, kind="motion_started", id=4))
         realtime.robot.put("event", Event(tick=9, kind="motion_done", id=4))
@@ -91,18 +90,14 @@ async def test_an_event_that_overtakes_the_answer_is_not_lost(realtime, robot):
     assert (motion.id, motion.started, motion.done) == (4, 7, 9)
 
 
-async def test_presence_is_announced_before_control_is_taken_and_withdrawn_after_its_release(
-    realtime, robot, note
-):
+async def test_the_liveliness_token_exists_while_control_is_held(realtime, robot, note):
     async with robot.control("me"):
         pass
     noted = [n for n in await note(realtime, "gone me") if n != "keep_alive"]
     assert noted == ["seen me", "take_control", "release_control", "gone me"]
 
 
-async def test_the_lease_is_kept_alive_until_control_is_lost_and_the_block_ends_in_peace(
-    realtime, robot, note, caplog
-):
+async def test_the_lease_is_renewed_until_control_is_lost(realtime, robot, note, caplog):
     async with robot.control("me", lease_s=0.1):
         for _ in range(3):
             await note(realtime, "keep_alive")
@@ -112,9 +107,7 @@ async def test_the_lease_is_kept_alive_until_control_is_lost_and_the_block_ends_
     assert "control is lost" in caplog.text
 
 
-async def test_in_lockstep_nothing_is_kept_alive_and_the_ticks_are_those_of_a_robot_in_process(
-    lockstep, robot, host
-):
+async def test_lockstep_needs_no_lease_renewal_and_ticks_as_in_process(lockstep, robot, host):
     async def moves(robot):
         async with robot.control("me", lease_s=0.1) as arm:
             return [(await arm.move_j(q)).done for q in (NEAR, FAR, NEAR)]
@@ -124,7 +117,7 @@ async def test_in_lockstep_nothing_is_kept_alive_and_the_ticks_are_those_of_a_ro
     assert not any(isinstance(command, KeepAlive) for command in lockstep.robot.commands)
 
 
-async def test_in_lockstep_the_states_of_a_step_have_all_come_when_it_ends(lockstep, robot):
+async def test_all_states_of_a_lockstep_step_have_arrived_when_it_returns(lockstep, robot):
     seen, truths = [], []
     robot.on_state(lambda state: seen.append(state.tick))
     robot.on_truth(lambda truth: truths.append(truth.tick))
@@ -135,7 +128,7 @@ async def test_in_lockstep_the_states_of_a_step_have_all_come_when_it_ends(locks
     assert truths[:2499] == list(range(1, 2500))
 
 
-async def test_setpoints_arrive_numbered_and_in_order(realtime, robot):
+async def test_set_points_arrive_numbered_and_in_order(realtime, robot):
     """A network may drop some; what comes keeps its number and its place."""
     arrived, states = realtime.robot.setpoints, robot.states()
     async with robot.control("me") as arm, arm.servo(period=0.008) as servo:
@@ -151,7 +144,7 @@ async def test_setpoints_arrive_numbered_and_in_order(realtime, robot):
     assert arrived == sorted(set(arrived))
 
 
-async def test_a_stop_by_anybody_ends_the_wait_for_a_motion(realtime, robot, endpoint):
+async def test_a_stop_by_another_client_ends_the_wait_for_a_motion(realtime, robot, endpoint):
     async with robot.control("me") as arm, await Robot.connect(endpoint) as bystander:
         started = bystander.events()
         waiting = asyncio.create_task(arm.move_j(FAR, velocity=0.05))
@@ -161,7 +154,7 @@ async def test_a_stop_by_anybody_ends_the_wait_for_a_motion(realtime, robot, end
             await waiting
 
 
-async def test_everything_that_waits_fails_when_the_robot_goes_away(realtime, robot):
+async def test_pending_calls_fail_when_the_robot_disconnects(realtime, robot):
     realtime.robot.silent.add("keep_alive")
     arms, states, events = robot.control("me"), robot.states(), robot.events()
     async with arms as arm:
@@ -187,7 +180,7 @@ def serving(endpoint):
         yield lambda: stack.enter_context(serve("lockstep", endpoint))
 
 
-async def test_a_robot_that_comes_back_is_found_again(lockstep, robot, serving, note):
+async def test_a_client_reconnects_to_a_restarted_robot(lockstep, robot, serving, note):
     states = robot.states()
     async with robot.control("me"):
         assert await robot.advance(300) == 300
@@ -205,13 +198,13 @@ async def test_a_robot_that_comes_back_is_found_again(lockstep, robot, serving, 
     await note(back, "release_control")
 
 
-async def test_a_robot_that_does_not_answer_is_said_not_to(realtime, robot):
+async def test_a_request_without_an_answer_times_out(realtime, robot):
     realtime.robot.silent.add("keep_alive")
     with pytest.raises(AnswerTimeoutError, match=r"did not answer within 0\.05 s"):
         await robot.request(KeepAlive(token=""), timeout_s=0.05)
 
 
-async def test_what_is_put_on_a_wildcard_key_is_not_taken_for_the_robots(realtime, robot, endpoint):
+async def test_messages_on_wildcard_keys_are_ignored(realtime, robot, endpoint):
     transport = await ZenohTransport.open(endpoint, "ur5e")
     events = robot.events()
     for key in ("tvist/*/event", "tvist/**"):
@@ -223,7 +216,7 @@ async def test_what_is_put_on_a_wildcard_key_is_not_taken_for_the_robots(realtim
 
 
 @pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
-def test_a_connection_that_was_reset_gives_no_reason_and_is_closed(monkeypatch):
+def test_a_reset_connection_gives_no_reason_and_is_closed(monkeypatch):
     """The peer has reset each connection before its client can say a word."""
     connect = socket.create_connection
     with socket.create_server(("127.0.0.1", 0)) as server:

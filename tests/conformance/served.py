@@ -44,8 +44,7 @@ class Served:
         python: The Python of another environment that runs it; it then starts from nothing.
     """
 
-    program = ("-m", "tvist_cli", "serve")
-    """What Python runs."""
+    program = ("-m", "tvist_cli", "serve")  # what Python runs
 
     def __init__(self, *options, name="ur5e", endpoint=None, router=None, around=(), cold=False, python=None):
         self.name, self.endpoint = name, router or endpoint or free_endpoint()

@@ -1,4 +1,4 @@
-"""Every way a message can be wrong: code, field, sentence and limit of the refusal."""
+"""Invalid messages are refused with code, field, message and limit."""
 
 import math
 import struct
@@ -144,7 +144,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("message", "code", "where", "why", "limit"), WRONG)
-def test_a_wrong_command_is_refused_with_code_field_sentence_and_limit(message, code, where, why, limit):
+def test_an_invalid_command_is_refused_with_code_field_message_and_limit(message, code, where, why, limit):
     """In words of ours, not in msgspec's, and in a reply that can be sent."""
     error = refused(decode_command, message)
     assert (error.code, error.where, error.limit) == (code, where, limit)
@@ -155,7 +155,7 @@ def test_a_wrong_command_is_refused_with_code_field_sentence_and_limit(message, 
 
 
 @pytest.mark.parametrize(("before", "given"), [(3, " is 'lin':"), (300, "")])
-def test_an_unknown_part_of_a_path_is_told_its_place_and_the_four_that_there_are(before, given):
+def test_an_unknown_path_segment_is_refused_with_its_index_and_the_valid_types(before, given):
     """In a long message the value is not named."""
     error = refused(decode_command, PATH | {"segments": [LINE] * before + [LINE | {"type": "lin"}]})
     assert (error.code, error.where) == ("unknown_type", f"segments[{before}].type")
@@ -173,12 +173,12 @@ def test_an_unknown_part_of_a_path_is_told_its_place_and_the_four_that_there_are
         (STREAM | {"velocity": 1.0}, "unknown_field", "velocity"),
     ],
 )
-def test_a_wrong_setpoint_is_refused(message, code, where):
+def test_an_invalid_set_point_is_refused(message, code, where):
     error = refused(partial(decode, Setpoint), message)
     assert (error.code, error.where) == (code, where)
 
 
-def test_a_truncated_message_is_malformed_wherever_it_ends_and_so_are_trailing_bytes():
+def test_truncated_messages_and_trailing_bytes_are_malformed():
     data = msgpack.packb(MOVE)
     for length in range(len(data)):
         error = refused(decode_command, data[:length])
@@ -192,7 +192,7 @@ def test_a_truncated_message_is_malformed_wherever_it_ends_and_so_are_trailing_b
 @pytest.mark.parametrize(
     "read", [decode_command, partial(decode, Setpoint), decode_reply, partial(decode, State)]
 )
-def test_five_megabytes_are_refused_unread(read):
+def test_a_message_of_five_megabytes_is_refused_without_decoding(read):
     error = refused(read, b"\xc1" * 5_000_000)
     assert (error.code, error.where, error.limit) == ("malformed", "", MAX_BYTES)
     assert "5000000" in error.why
@@ -233,7 +233,7 @@ def with_calibration(tail):
         b"GET / HTTP/1.1\r\n\r\n",
     ],
 )
-def test_bytes_made_to_hurt_are_refused(data):
+def test_malicious_bytes_are_refused(data):
     assert refused(decode_command, data).code in {"malformed", "out_of_range"}
 
 
@@ -245,7 +245,7 @@ def test_nan_bits_of_every_kind_are_refused():
 
 
 @pytest.mark.parametrize("kind", [State, Event, Truth, Telemetry, Info, Done, Accepted, Refused], ids=tag)
-def test_what_a_client_receives_may_have_more_fields(kind):
+def test_clients_ignore_unknown_fields_of_received_messages(kind):
     name = tag(kind)
     read = decode_reply if kind in REPLIES else partial(decode, kind)
     data = (FOLDER / "fixtures" / "v1" / f"{name}.msgpack").read_bytes()
@@ -263,7 +263,7 @@ def wrong(action):
     return caught.value
 
 
-def test_check_finds_what_the_constructor_let_through():
+def test_check_validates_what_the_constructor_accepts():
     message = MoveJ(token=LEASE, q=(9e9,) * 6)
     error = wrong(lambda: check(message))
     assert (error.code, error.where, error.limit) == ("out_of_range", "q[0]", 1e3)
@@ -282,7 +282,7 @@ def test_check_finds_what_the_constructor_let_through():
         (Done(tick=object()), "tick", "object"),
     ],
 )  # fmt: skip
-def test_encode_names_the_field_that_holds_no_plain_value(message, where, kind):
+def test_encode_names_the_field_with_an_unsupported_type(message, where, kind):
     error = wrong(lambda: encode(message))
     assert (error.code, error.where) == ("malformed", where)
     assert kind in error.why
@@ -294,19 +294,19 @@ def test_an_integer_beyond_64_bits_is_out_of_range(number):
     assert (error.code, error.where) == ("out_of_range", "sequence")
 
 
-def test_half_a_surrogate_pair_is_no_text():
+def test_text_with_half_a_surrogate_pair_is_malformed():
     error = wrong(lambda: encode(MoveJ(token=HALF, q=(0.0,))))
     assert (error.code, error.where) == ("malformed", "token")
 
 
 @pytest.mark.parametrize("content", [{"a": float("nan")}, {"a": np.float32(1)}, {1: 2}, {"a": {1, 2}}])
-def test_a_calibration_that_cannot_be_sent_fails_where_it_is_built(content):
+def test_a_calibration_that_cannot_be_encoded_is_refused_by_the_constructor(content):
     assert wrong(lambda: SetEstimator(token=LEASE, name="polynomial", calibration=content)).where == (
         "calibration" if 1 in content else "calibration.a"
     )
 
 
-def test_a_named_mode_travels_as_its_number():
+def test_an_enumerated_mode_is_sent_as_a_number():
     state = decode(State, (FOLDER / "fixtures" / "v1" / "state.msgpack").read_bytes())
     idle = check(msgspec.structs.replace(state, robot_mode=RobotMode.IDLE))
     assert idle.robot_mode == 5

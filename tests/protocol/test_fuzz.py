@@ -1,4 +1,4 @@
-"""Whatever the bytes, a decoder gives a message or a ProtocolError, and nothing else."""
+"""A decoder returns a message or raises ProtocolError, whatever the bytes."""
 
 import json
 from functools import partial
@@ -71,13 +71,13 @@ def decoded(read, data):
 @pytest.mark.parametrize("read", DECODERS)
 @given(data=st.binary(max_size=200))
 @examples(60)
-def test_random_bytes(read, data):
+def test_random_bytes_decode_or_raise_a_protocol_error(read, data):
     decoded(read, data)
 
 
 @given(value=values | st.dictionaries(fields | keys, values, max_size=6))
 @examples(200)
-def test_random_messagepack(value):
+def test_random_messagepack_decodes_or_raises_a_protocol_error(value):
     for read in DECODERS:
         decoded(read, msgpack.packb(value))
 
@@ -94,7 +94,7 @@ def damaged(draw):
 
 @given(data=damaged())
 @examples(400)
-def test_golden_messages_with_damaged_bytes(data):
+def test_damaged_messages_decode_or_raise_a_protocol_error(data):
     for read in DECODERS:
         decoded(read, data)
 
@@ -125,7 +125,7 @@ def children(place):
 
 @given(value=changed())
 @examples(400)
-def test_what_a_decoder_accepts_the_schema_accepts_and_it_survives_a_round_trip(value):
+def test_accepted_messages_fit_the_schema_and_survive_a_round_trip(value):
     data = msgpack.packb(value)
     for read in (decode_command, partial(decode, Setpoint)):
         message = decoded(read, data)

@@ -48,19 +48,19 @@ def bits(values):
 
 
 @pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
-def test_a_message_comes_back_equal(message):
+def test_a_recorded_message_is_restored_equal(message):
     back = JsonReader(type(message)).read(to_json(message))
     assert type(back) is type(message)
     assert back == message
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), max_size=8))
-def test_any_finite_float_comes_back_bit_for_bit(values):
+def test_a_recorded_finite_float_is_restored_bit_for_bit(values):
     back = JsonReader(State).read(to_json(msgspec.structs.replace(STATE, target_q=values)))
     assert bits(back.target_q) == bits(values)
 
 
-def test_a_number_that_is_not_finite_comes_back_as_nan():
+def test_a_recorded_infinite_number_is_restored_as_nan():
     state = msgspec.structs.replace(
         STATE, setpoint_sequence=None, actual_q=[1.5, math.nan, math.inf], shaper_delay=-math.inf
     )
@@ -72,14 +72,14 @@ def test_a_number_that_is_not_finite_comes_back_as_nan():
 
 
 @pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
-def test_the_schema_accepts_what_is_recorded(message):
+def test_the_viewer_schema_accepts_recorded_messages(message):
     schema = viewer_schema(type(message))
     jsonschema.Draft202012Validator.check_schema(schema)
     jsonschema.validate(json.loads(to_json(message)), schema)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_schema_refuses_another_kind_of_message(kind):
+def test_the_viewer_schema_rejects_other_kinds_of_message(kind):
     for message in MESSAGES:
         if type(message) is not kind:
             with pytest.raises(jsonschema.ValidationError):
@@ -87,7 +87,7 @@ def test_the_schema_refuses_another_kind_of_message(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_schema_is_of_the_form_viewers_read(kind):
+def test_the_viewer_schema_uses_only_what_viewers_support(kind):
     """One plain type a field, properties at every object, no reference: all that Lichtblick knows."""
 
     def check(schema):
@@ -110,7 +110,7 @@ def test_the_schema_is_of_the_form_viewers_read(kind):
 @pytest.mark.parametrize(
     "data", [b"", b"{", b"[1]", b"[]", b"3", b"{}", b"\xff\xfe", b'{"type":"done"}', b"null"]
 )
-def test_what_is_no_message_is_a_protocol_error(kind, data):
+def test_invalid_recorded_bytes_raise_a_protocol_error(kind, data):
     with pytest.raises(ProtocolError) as caught:
         JsonReader(kind).read(data)
     assert caught.value.code == "malformed"
@@ -135,7 +135,7 @@ def golden_messages():
 
 
 @pytest.mark.parametrize("message", list(golden_messages()))
-def test_every_command_comes_back_equal_from_a_recorded_entry(message):
+def test_every_command_is_restored_equal_from_the_journal(message):
     entry = entry_of(17, message, client="someone")
     assert entry.kind == ("setpoint" if isinstance(message, Setpoint) else "command")
     read = JsonReader(Entry).read(to_json(entry))
@@ -146,14 +146,14 @@ def test_every_command_comes_back_equal_from_a_recorded_entry(message):
 
 
 @pytest.mark.parametrize("angle", [5e-324, -0.0, 0.1 + 0.2, 1.0, 1e-7, 1000.0, 2.0**-1074 * 3])
-def test_a_recorded_set_point_keeps_every_bit(angle):
+def test_a_recorded_set_point_is_restored_bit_for_bit(angle):
     setpoint = Setpoint(token="t", sequence=2**64 - 1, q=(angle,))
     back = message_of(JsonReader(Entry).read(to_json(entry_of(0, setpoint))))
     assert back.sequence == setpoint.sequence
     assert back.q[0].hex() == angle.hex()
 
 
-def test_a_calibration_keeps_the_difference_between_integers_and_floats():
+def test_a_recorded_calibration_distinguishes_integers_from_floats():
     command = decode_command(
         msgspec.msgpack.encode(
             {
@@ -181,7 +181,7 @@ def test_a_calibration_keeps_the_difference_between_integers_and_floats():
         ),
     ],
 )
-def test_an_entry_that_holds_no_message_says_so(entry, code, says):
+def test_a_journal_entry_without_a_valid_message_is_an_error(entry, code, says):
     with pytest.raises(ProtocolError) as caught:
         message_of(entry)
     assert caught.value.code == code

@@ -1,13 +1,17 @@
 """What `tvist completion` prints lets each shell complete commands, options, their values and files."""
 
+import contextlib
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from tvist_cli import offered
+from tvist_cli.commands.completion import completion
 from tvist_cli.main import COMMANDS, LOG
 
 ASKING_ZSH = Path(__file__).with_name("completion")
@@ -19,14 +23,22 @@ CASES = {
     "tvist run wave.script --input digital_input_1=1 --prof": {"--profile"},
     "tvist serve --no-f": {"--no-floor"},
     "tvist run wav": {"wave.script"},
-    "tvist serve --shaper zvd": {"zvd", "zvdd", "zvddd"},
-    "tvist serve --shaper ow": {"own.py"},
     "tvist serve --robot ur5": {"ur5-light", "ur5e", "ur5e_stiction"},
-    "tvist serve --robot a": {"arm.toml"},
-    "tvist move Q": {"Q1", "Q2", "Q3"},
-    "tvist study moves --shapers zvd": {"zvd", "zvdd", "zvddd"},
 }
 """Typed lines with what completes their last word."""
+OF_EACH_KIND = ("tvist log an", "tvist serve --no-f", "tvist run wav", "tvist serve --robot ur5")
+VALUES = [
+    (offered.SHAPERS, "zvd", {"zvd", "zvdd", "zvddd"}),
+    (offered.SHAPERS, "ow", {"own.py"}),
+    (offered.ROBOTS, "a", {"arm.toml"}),
+    (offered.POSES, "Q", {"Q1", "Q2", "Q3"}),
+    (offered.COMPARED, "zvd", {"zvd", "zvdd", "zvddd"}),
+    (offered.PLANTS, "stri", {"stribeck"}),
+    (offered.STUDIES, "ma", {"match"}),
+    (offered.WORLDS, "ta", {"table"}),
+    (offered.PROFILES, "re", {"real"}),
+]
+"""What completes a value of an option that is annotated so."""
 
 
 @pytest.fixture(scope="module")
@@ -36,15 +48,16 @@ def folder(tmp_path_factory):
     for name in ("wave.script", "own.py", "arm.toml"):
         (folder / name).touch()
     for shell, file in {"bash": "bash-script", "zsh": "_tvist", "fish": "fish-script"}.items():
-        words = [sys.executable, "-m", "tvist_cli", "completion", shell]
-        script = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-        (folder / file).write_text(script, encoding="utf-8")
+        with (folder / file).open("w", encoding="utf-8") as script, contextlib.redirect_stdout(script):
+            completion(shell)
     shutil.copy(ASKING_ZSH / "capture.zsh", folder)
     return folder
 
 
 def candidates(shell, folder, typed):
     """What a shell offers for the last word of a line."""
+    if shutil.which(shell) is None:
+        pytest.skip(f"there is no {shell}")
     match shell:
         case "bash":
             asks = (
@@ -64,14 +77,28 @@ def candidates(shell, folder, typed):
 
 
 @pytest.mark.parametrize("typed", CASES)
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_last_word_is_completed(shell, typed, folder):
-    if shutil.which(shell) is None:
-        pytest.skip(f"there is no {shell}")
-    assert candidates(shell, folder, typed) == CASES[typed]
+def test_bash_completes_the_last_word(typed, folder):
+    assert candidates("bash", folder, typed) == CASES[typed]
+
+
+@pytest.mark.parametrize("typed", OF_EACH_KIND)
+def test_zsh_completes_the_last_word(typed, folder):
+    assert candidates("zsh", folder, typed) == CASES[typed]
+
+
+@pytest.mark.parametrize("typed", OF_EACH_KIND)
+def test_fish_completes_the_last_word(typed, folder):
+    assert candidates("fish", folder, typed) == CASES[typed]
+
+
+@pytest.mark.parametrize(("annotation", "typed", "wanted"), VALUES)
+def test_a_value_is_completed(annotation, typed, wanted, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    names = annotation.completer(SimpleNamespace(incomplete=typed))
+    assert {name for name in names if name.startswith(typed)} == wanted
 
 
 @pytest.mark.parametrize("file", ["bash-script", "_tvist", "fish-script"])
-def test_every_command_is_in_the_script(folder, file):
+def test_the_completion_script_contains_every_command(folder, file):
     text = (folder / file).read_text(encoding="utf-8")
     assert [name for name in (*COMMANDS, *LOG) if name not in text] == []

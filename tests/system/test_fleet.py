@@ -13,8 +13,7 @@ from tests.conformance.served import PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Q1, Wire
 from zenoh.handlers import Callback
 
-from tvist_client.fleet import Fleet
-from tvist_client.fleet_session import ManyStates, RobotPlace
+from tvist_client.fleet import Fleet, ManyStates, RobotPlace
 from tvist_server.gateways import network
 
 from .keyring import forge, free_tls_endpoint, made

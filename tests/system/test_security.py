@@ -15,8 +15,7 @@ from zenoh.handlers import Callback
 from tvist_client import Robot
 from tvist_client.blocking import Robot as BlockingRobot
 from tvist_client.errors import DeniedError, NotConnectedError
-from tvist_client.fleet import Fleet
-from tvist_client.fleet_session import RobotPlace
+from tvist_client.fleet import Fleet, RobotPlace
 from tvist_client.transports import certificates
 from tvist_client.transports.session import open_session
 from tvist_protocol.codec import MAX_BYTES

@@ -1,6 +1,6 @@
-"""What a person mistypes: one sentence that says what is wrong and what is allowed, and nothing on stdout.
+"""Wrong command lines print one message with value and limit on stderr, and nothing on stdout.
 
-The program's own entry is called in this process, as the console script does; what a shell adds is nothing.
+The entry point of the program is called in this process.
 """
 
 import re
@@ -12,8 +12,7 @@ from tests.conformance.served import free_endpoint
 MSGSPEC = re.compile(
     r"Expected `|Object (missing|contains)|Invalid enum|at `\$|is malformed|Traceback|Errno|Unused"
 )
-NOWHERE = "tcp/127.0.0.1:1"
-"""Where nobody listens: port 1 is the system's."""
+NOWHERE = "tcp/127.0.0.1:1"  # where nobody listens: port 1 is the system's
 OWN = str(Path(__file__).parents[1] / "own_arm.py:OwnArm")
 SEVEN = str(Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf")
 
@@ -89,13 +88,16 @@ MISUSE = [
     (("log", "export", "x.mcap", "--to", "foxglove", "--imu", "i.csv"), ["--imu", "needs a recording"]),
     (("log", "analyze", "x.csv", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),
     (("log", "analyze", "x.csv", "--robot", "ur10e"), ["--robot is about --imu"]),
+    (("log", "report", "x.csv", "--output", "x.html", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),
+    (("log", "advise", "x.csv", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),
+    (("log", "export", "x.csv", "--to", "csv", "--imu-columns", "time=t"), ["--imu-columns is about --imu"]),
     (("log", "analyze"), ["one recording or log, or two", "not 0"]),
     (("log", "analyze", "x.csv", "y.csv", "--figures", "x"), ["--figures is for one file"]),
     (("log", "analyze", "x.csv", "y.csv", "--imu", "i.csv"), ["1 --imu for 2 logs", "one for each"]),
     (("study", "moves", "--modes", "9"), ["modes is 9", "1 to 6"]),
     (("study",), ["STUDY is missing"]),
     (("study", "sweep"), ["there is no study sweep", "moves, bench, robustness, match"]),
-    (("study", "x.toml", "--seed", "1"), ["--seed is for moves, bench", "x.toml says itself"]),
+    (("study", "x.toml", "--seed", "1"), ["--seed is for moves, bench", "x.toml defines its own"]),
     (("study", "x.toml", "--processes", "0"), ["processes is 0", "1 to 1024"]),
     (("study", "x.toml", "--scheduler", "localhost"), ["scheduler is 'localhost'", "tcp://HOST:8786"]),
     (("study", "x.toml", "--processes", "2", "--scheduler", "x"), ["either --processes or --scheduler"]),
@@ -178,10 +180,23 @@ MISUSE = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"), MISUSE, ids=[" ".join(case[0]) or "empty" for case in MISUSE]
-)
-def test_misuse_is_a_sentence_and_exit_code_2(called, arguments, words):
+STUDIES = {"study", "demo", "identify", "robots", "shapers", "bench"}
+"""Commands that import the laboratory."""
+OF_STUDIES = [case for case in MISUSE if case[0][0] in STUDIES]
+OF_ROBOTS = [case for case in MISUSE if case not in OF_STUDIES]
+
+
+def name_of(value):
+    return " ".join(value) or "empty" if isinstance(value, tuple) else ""
+
+
+@pytest.mark.parametrize(("arguments", "words"), OF_ROBOTS, ids=name_of)
+def test_misuse_of_robots_and_logs_prints_one_message_and_exits_with_code_2(called, arguments, words):
+    assert_said(called(*arguments), 2, words)
+
+
+@pytest.mark.parametrize(("arguments", "words"), OF_STUDIES, ids=name_of)
+def test_misuse_of_studies_prints_one_message_and_exits_with_code_2(called, arguments, words):
     assert_said(called(*arguments), 2, words)
 
 
@@ -213,9 +228,9 @@ def test_misuse_is_a_sentence_and_exit_code_2(called, arguments, words):
         (("shapers", "--figures", __file__), [__file__, "no folder", "another name"]),
         (("keys", __file__, "--robot", "ur5e", "--host", "x"), [__file__, "no folder", "another name"]),
     ],
-    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+    ids=name_of,
 )
-def test_what_cannot_be_done_is_a_sentence_and_exit_code_1(called, tmp_path, arguments, words):
+def test_a_failure_prints_one_message_and_exits_with_code_1(called, tmp_path, arguments, words):
     assert_said(called(*arguments), 1, words)
     assert list(tmp_path.iterdir()) == []
 
@@ -236,9 +251,7 @@ FILES = [
 
 
 @pytest.mark.parametrize(("option", "name", "content", "words"), FILES)
-def test_a_wrong_file_is_a_sentence_with_file_key_value_and_what_is_allowed(
-    called, tmp_path, option, name, content, words
-):
+def test_an_invalid_file_is_reported_with_key_value_and_limit(called, tmp_path, option, name, content, words):
     (tmp_path / name).write_text(content, encoding="utf-8")
     code = 1 if option == "--robot" or "deeply" in words[0] else 2  # these are no misuse of the options
     assert_said(called("serve", option, name), code, [name, *words])
@@ -259,7 +272,7 @@ SWEEPS = [
 
 
 @pytest.mark.parametrize(("content", "words"), SWEEPS)
-def test_a_wrong_sweep_is_a_sentence_with_file_and_line_or_key(called, tmp_path, content, words):
+def test_an_invalid_sweep_is_reported_with_file_and_line_or_key(called, tmp_path, content, words):
     (tmp_path / "x.toml").write_text(content, encoding="utf-8")
     assert_said(called("study", "x.toml"), 1, ["x.toml", *words])
     assert not (tmp_path / "x").exists()
@@ -273,7 +286,7 @@ def test_a_wrong_sweep_is_a_sentence_with_file_and_line_or_key(called, tmp_path,
         ("anna", ["not valid TOML"]),
     ],
 )
-def test_a_wrong_line_of_the_roles_is_named(called, tmp_path, line, words):
+def test_an_invalid_line_of_the_roles_is_reported(called, tmp_path, line, words):
     (tmp_path / "clients.toml").write_text(line, encoding="utf-8")
     ended = called("serve", "--security", ".", "--listen", f"tls/{free_endpoint().partition('/')[2]}")
     assert_said(ended, 2, ["clients.toml", *words])

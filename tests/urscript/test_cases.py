@@ -46,7 +46,7 @@ def script_of(case):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_case(case):
+def test_the_language_by_example(case):
     assert set(case) <= KNOWN
     dry, error, ticks = DryFunctions(), None, None
     try:
@@ -63,5 +63,5 @@ def test_case(case):
     assert dry.said == case.get("says", dry.said)
 
 
-def test_no_case_is_lost():
+def test_all_cases_are_found():
     assert len(CASES) >= 760

@@ -1,4 +1,4 @@
-"""What a checker tells, and what has limits."""
+"""Errors that the checker finds, and limits of a script's size."""
 
 import pytest
 from tests.conformance.served import finished
@@ -12,11 +12,11 @@ def places(text):
     return [(error.line, error.column, error.text) for error in check(text, KNOWN)]
 
 
-def test_a_right_script_has_no_errors():
+def test_a_valid_script_has_no_errors():
     assert places("def f():\n  textmsg(1)\nend") == []
 
 
-def test_all_unknown_names_are_told_in_the_order_of_the_text():
+def test_all_unknown_names_are_reported_in_text_order():
     found = places("def f():\n  x = b + a(c)\n  y(1)\n  textmsg(1, 2, 3)\nend")
     assert found == [
         (2, 7, "compile_error_name_not_found:b:"),
@@ -27,18 +27,17 @@ def test_all_unknown_names_are_told_in_the_order_of_the_text():
     ]
 
 
-def test_a_text_that_is_no_program_has_one_error():
+def test_a_syntax_error_is_the_only_error():
     assert [place[:2] for place in places("x = = 1\ny = unknown\nz = = 2")] == [(1, 5)]
 
 
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("x = " + "[" * 10_000 + "]" * 10_000, "levels are nested"),
         ("x = 1\nx = " + "(" * 100 + "x" + ")" * 100, None),
         ("x = 1\nx = " + "(" * 101 + "x" + ")" * 101, "levels are nested"),
         ("x = " + "(" * 100, "ends before"),
-        ("x = " + "[" * 2**17, "levels are nested"),
+        ("x = " + "[" * 10_000, "levels are nested"),
         ("x = 1\n" + "a" * 255 + " = 1", None),
         ("x = 1\n y = " + "a" * 256 + " + 1", "a name of 256 characters is too long"),
         ("x = 1\ndef f(" + ", ".join(f"a{k}" for k in range(255)) + "):\nend", None),
@@ -48,22 +47,21 @@ def test_a_text_that_is_no_program_has_one_error():
         ),
         ("x = 1\n" + "def f():\nend\n" * 2_000, "2001 functions"),
         ("textmsg(1\n end\nend", "unexpected 'end'"),
-        ("x = 1\nx = " + "not " * 10_000 + "x", "levels are nested"),
-        ("x = 1\nx = " + "x + " * 10_000 + "x", "levels are nested"),
-        ("x = 1\nx = " + "x or " * 3_000 + "x", "operations is too long"),
-        ("x = [" + "1, " * 10_000 + "1]", "too long"),
-        ("if True:\n" * 10_000 + "end\n" * 10_000, "levels are nested"),
+        ("x = 1\nx = " + "not " * 200 + "x", "levels are nested"),
+        ("x = 1\nx = " + "x + " * 200 + "x", "levels are nested"),
+        ("x = 1\nx = " + "x or " * 1_001 + "x", "operations is too long"),
+        ("x = [" + "1, " * 1_000 + "1]", "too long"),
+        ("if True:\n" * 200 + "end\n" * 200, "levels are nested"),
         ("while True:\n" * 18 + "end\n" * 18, "loops are nested"),
-        ("def f():\n" * 10_000, "ends before"),
-        ("x = " + "9" * 100_000, "too large"),
+        ("def f():\n" * 20, "ends before"),
+        ("x = " + "9" * 10_000, "too large"),
         ('x = "' + "a" * 2_000 + '"', "too long"),
-        ("x = 1\n" * 1_000, None),
-        ("def g():\n def f():\n" + "x = 1\n" * 12_000 + " end\nend", "too many in one function"),
+        ("def g():\n def f():\n" + "x = 1\n" * 4_001 + " end\nend", "too many in one function"),
         ("x = 0\nif x == 1:\n" + "elif x == 2:\n" * 1_000 + "else:\ntextmsg(1)\nend", None),
         ("x = 0\ndef f():\n" + "x = x + x * x\n" * 1_500 + "end", None),
         (
-            "x = 0\ndef f():\n" + "x = x + x * x\n" * 2_000 + "end",
-            "12000 operations and names of f are too many",
+            "x = 0\ndef f():\n" + "x = x + x * x\n" * 1_700 + "end",
+            "10200 operations and names of f are too many",
         ),
         (
             "x = 0\nif x:\n" + f"elif {' and '.join(['x'] * 90)}:\n" * 300 + "end",
@@ -73,9 +71,9 @@ def test_a_text_that_is_no_program_has_one_error():
         ("\0\1\2", "unexpected character"),
         ("é = 1", "unexpected character"),
     ],
-    ids=range(29),
+    ids=range(27),
 )
-def test_texts_of_any_shape_have_an_error_or_none(text, why):
+def test_sizes_and_nesting_are_limited(text, why):
     if why is None:
         compile_script(text, KNOWN)
         return
@@ -86,12 +84,12 @@ def test_texts_of_any_shape_have_an_error_or_none(text, why):
     assert 1 <= caught.value.column <= len(lines[caught.value.line - 1]) + 1
 
 
-def test_no_name_of_python_is_reached():
+def test_scripts_cannot_use_python_names():
     for name in ("print", "machine", "add", "SPENT", "__builtins__", "v_x", "depth"):
         assert places(f"x = {name}")[0][2] == f"compile_error_name_not_found:{name}:"
 
 
-def test_the_name_of_a_program_is_its_first_word():
+def test_a_program_without_def_is_named_after_its_first_word():
     for text, name, secondary in (
         ("def f():\nend", "f", False),
         ("sec g():\nend", "g", True),
@@ -107,14 +105,14 @@ def run(path):
     return finished("-m", "tvist_urscript", path)
 
 
-def test_a_file_without_errors_may_call_any_function_of_a_robot(tmp_path):
+def test_the_checker_accepts_calls_of_unknown_robot_functions(tmp_path):
     path = tmp_path / "hello.script"
     path.write_text("def f():\n  movej([0, 0, 0, 0, 0, 0])\n  x = sqrt(2)\nend\n")
     done = run(path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-def test_an_error_of_a_file_has_its_position(tmp_path):
+def test_the_checker_prints_errors_with_their_positions(tmp_path):
     path = tmp_path / "wrong.script"
     path.write_text("def f():\n  movej(q)\n  x = sqrt(1, 2)\nend\n")
     done = run(path)

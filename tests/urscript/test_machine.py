@@ -61,7 +61,7 @@ class Robot:
         return [self.machine.resume(budget) for _ in range(number)]
 
 
-def test_a_blocking_function_takes_its_ticks_and_gives_its_value():
+def test_a_blocking_function_takes_ticks_and_returns_a_value():
     robot = Robot("x = move(2)\nsay(x)\nx = move(speed=2, target=5)\nsay(x)")
     robot.ticks(3)
     assert robot.said == []
@@ -72,7 +72,7 @@ def test_a_blocking_function_takes_its_ticks_and_gives_its_value():
     assert not robot.machine.running
 
 
-def test_a_fault_gets_the_position_of_its_call():
+def test_a_fault_has_the_position_of_its_call():
     robot = Robot('say(1)\n  fail("no way")')
     with pytest.raises(ScriptError) as caught:
         robot.ticks(1)
@@ -81,7 +81,7 @@ def test_a_fault_gets_the_position_of_its_call():
     assert not robot.machine.running
 
 
-def test_the_end_of_a_machine_reaches_the_functions_that_wait():
+def test_ending_the_machine_ends_waiting_functions():
     robot = Robot("thread t():\n move(1)\nend\nrun t()\nmove(2)")
     robot.ticks(2)
     robot.machine.end()
@@ -90,7 +90,7 @@ def test_the_end_of_a_machine_reaches_the_functions_that_wait():
     assert robot.ticks(1) == [EVALUATIONS]
 
 
-def test_a_statement_beyond_the_budget_leaves_a_debt_and_one_that_waits_does_not():
+def test_a_statement_beyond_the_budget_is_charged_to_later_ticks():
     robot = Robot("l = make_list(1000, 0.5)\nl = l + l\nsync()")
     assert -1000 < robot.ticks(1, 100)[0] < -100
     waiting = Robot("while True:\n x = 1\nend")
@@ -108,7 +108,7 @@ def test_an_error_of_one_thread_ends_the_others():
 @pytest.mark.parametrize(
     "kind", [KeyError, AttributeError, AssertionError, NameError, RuntimeError, MemoryError]
 )
-def test_any_exception_of_a_built_in_is_an_error_at_its_call(kind):
+def test_an_exception_in_a_built_in_function_is_an_error_at_its_call(kind):
     def broken(value):
         raise kind("x" * 10_000)
 
@@ -120,7 +120,7 @@ def test_any_exception_of_a_built_in_is_an_error_at_its_call(kind):
     assert not machine.running
 
 
-def test_a_thread_finishes_before_it_waits_for_another():
+def test_finish_runs_before_a_thread_waits_for_another():
     order = []
 
     def finish():
@@ -149,7 +149,7 @@ def test_kill_reaches_threads_whose_parent_has_ended():
     assert robot.machine.living == [0]
 
 
-def test_each_thread_finishes_before_it_ends_but_no_killed_one():
+def test_finish_runs_before_a_thread_ends_but_not_if_it_is_killed():
     finished = []
 
     def finish():
@@ -178,14 +178,14 @@ def test_the_line_of_the_main_thread_is_known():
     assert lines == [2, 3, 7]
 
 
-def test_what_is_left_of_the_budget_is_told():
+def test_resume_returns_the_rest_of_the_budget():
     few, more = Robot("x = 1 + 2").ticks(1)[0], Robot("x = 1 + 2 + 3 + 4").ticks(1)[0]
     assert more == few - 2
     assert 0 < few < EVALUATIONS
     assert Robot("costly()").ticks(1)[0] < EVALUATIONS - 100
 
 
-def test_who_missed_a_tick_is_first_in_the_next():
+def test_a_thread_without_a_turn_runs_first_in_the_next_tick():
     order = []
     script = compile_script(
         "def program():\nthread busy():\n while True:\n  note(1)\n  i = 0\n  while i < 60:\n   i = i + 1\n  end\n"
@@ -214,20 +214,20 @@ def test_an_endless_loop_is_an_error_after_a_million_evaluations(budget):
     assert caught.value.line == 2
 
 
-def test_a_long_computation_goes_on_over_ticks_none_of_which_does_more_than_its_budget():
+def test_a_long_computation_continues_over_ticks_within_the_budget():
     robot = Robot("i = 0\nwhile i < 100000:\n  i = i + 1\nend\nsay(i)")
     left = robot.ticks(2 * PATIENCE // EVALUATIONS)
     assert robot.said == ["100000"]
     assert min(left) > -PIECE
 
 
-def test_an_endless_recursion_of_threads_is_an_error():
+def test_the_number_of_threads_is_limited():
     robot = Robot("thread t():\n run t()\n run t()\n sync()\nend\nrun t()\nwhile True:\n sync()\nend")
     with pytest.raises(ScriptError, match=f"at most {MOST_THREADS} threads"):
         robot.ticks(1000)
 
 
-def test_work_on_long_lists_counts_by_their_length():
+def test_operations_on_lists_cost_by_their_length():
     prepared = "a = make_list(1000, 1)\nb = 0\n"
     alone = Robot(prepared).ticks(1, budget=10_000)[0]
     for work in ("b = a + a", "b = a * 2", "b = norm(a)", "b = -a"):
@@ -236,14 +236,14 @@ def test_work_on_long_lists_counts_by_their_length():
         assert robot.machine.left <= alone - 900, work
 
 
-def test_one_statement_cannot_work_on_lists_for_long():
+def test_list_operations_of_one_statement_are_limited():
     robot = Robot("a = make_list(1000, 1)\na = " + " + ".join(["a"] * 90))
     with pytest.raises(ScriptError, match="too many list elements"):
         robot.ticks(3)
     assert robot.machine.left >= -2 * OVERDRAFT
 
 
-def test_a_spent_thread_keeps_its_critical_section_and_a_waiting_one_gives_it_up():
+def test_a_waiting_thread_leaves_its_critical_section_to_others():
     robot = Robot(
         "thread t():\n enter_critical\n say(2)\n exit_critical\nend\nenter_critical\nrun t()\ni = 0\n"
         "while i < 100:\n i = i + 1\nend\nsay(1)\nsync()\nsay(3)\nexit_critical"
@@ -252,7 +252,7 @@ def test_a_spent_thread_keeps_its_critical_section_and_a_waiting_one_gives_it_up
     assert robot.said == ["1", "2", "3"]
 
 
-def test_arguments_are_computed_in_the_order_of_the_text():
+def test_arguments_are_evaluated_in_text_order():
     for call in ('f(b=g("first"), a=g("second"))', 'move(speed=g("first"), target=g("second"))'):
         robot = Robot(
             "def g(x):\n say(x)\n return str_len(x)\nend\n"
@@ -299,7 +299,7 @@ class Added:
 PROGRAM = "def main():\n a = [1, 2]\n def twice(x, y=2):\n  return x * y\n end\n interpret()\nend"
 
 
-def test_statements_that_are_added_use_the_program_and_what_was_added_before():
+def test_added_statements_use_the_program_and_earlier_statements():
     added = Added(PROGRAM)
     assert added.add("say(a)") == ["[1, 2]"]
     assert added.add("a[0] = twice(4)\nb = [7, 8]") == ["[1, 2]"]
@@ -309,7 +309,7 @@ def test_statements_that_are_added_use_the_program_and_what_was_added_before():
     assert added.add("def sum(x):\n return 0\nend\nsay(sum(b))")[-1] == "0"
 
 
-def test_what_was_forgotten_is_unknown_to_later_statements():
+def test_forgotten_names_are_unknown_to_later_statements():
     added = Added(PROGRAM)
     first = added.last
     added.add("def sum(x):\n return x[0]\nend\na = [3]")
@@ -326,7 +326,7 @@ def test_what_was_forgotten_is_unknown_to_later_statements():
     assert added.add("say(a)\nsay(twice(2))") == ["[3]", "4"]
 
 
-def test_forgetting_ends_threads_and_variables_of_statements_and_not_those_of_the_program():
+def test_forgetting_ends_only_threads_and_variables_of_added_statements():
     beside = " def count():\n  while True:\n   b = b + 1\n   sync()\n  end\n end\n"
     added = Added(f"def main():\n b = 0\n{beside} thread t():\n  count()\n end\n run t()\n interpret()\nend")
     added.add("thread u():\n say(1)\n run t()\n while True:\n  sync()\n end\nend\nc = 7\nrun u()\nrun t()")
@@ -337,7 +337,7 @@ def test_forgetting_ends_threads_and_variables_of_statements_and_not_those_of_th
         added.add("say(c)")
 
 
-def test_many_short_statements_one_after_the_other_are_no_endless_loop():
+def test_many_short_statements_are_no_endless_loop():
     added = Added(PROGRAM)
     for number in range(200):
         text = f"i = 0\nwhile i < 200:\n i = i + 1\nend\nsay({number})"
@@ -357,14 +357,14 @@ def test_many_short_statements_one_after_the_other_are_no_endless_loop():
         "x = (1 + 2) y = -x say(y) pass z = True say(z)",
     ],
 )
-def test_one_line_has_several_statements(text):
+def test_a_line_may_contain_several_statements(text):
     assert Added(PROGRAM).add(text)
 
 
 @pytest.mark.parametrize(
     "text", ["a = 1 2", 'say "h"', "if True b = 1 end", "say(1 b)", "a = [1 b]", "a = b = 1"]
 )
-def test_not_every_line_is_several_statements(text):
+def test_invalid_lines_of_several_statements_are_refused(text):
     with pytest.raises(ScriptError, match="syntax_error"):
         Added(PROGRAM).add(text)
 
@@ -372,14 +372,14 @@ def test_not_every_line_is_several_statements(text):
 @pytest.mark.parametrize(
     ("text", "place"), [("say(nothing)", (1, 5)), ("x = (1", (1, 7)), ("sec f():\nend", (1, 5)), ("", (1, 1))]
 )
-def test_statements_that_are_not_valid_are_refused_at_their_own_place(text, place):
+def test_invalid_added_statements_have_their_own_positions(text, place):
     added = Added(PROGRAM)
     with pytest.raises(ScriptError) as caught:
         added.add(text)
     assert (caught.value.line, caught.value.column) == place
 
 
-def test_an_error_of_an_added_statement_has_its_place_in_the_statement():
+def test_a_runtime_error_of_an_added_statement_has_its_position():
     added = Added(PROGRAM)
     with pytest.raises(ScriptError) as caught:
         added.add("b = 1\nsay(a[9])")

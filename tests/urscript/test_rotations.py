@@ -1,4 +1,4 @@
-"""Rotation vectors against scipy's, and near 0 and π against what is known exactly."""
+"""Rotations agree with scipy, and near 0 and π with exact values."""
 
 import math
 
@@ -36,7 +36,7 @@ def is_near(pose, position, rotation, within=1e-12):
 
 @given(POSES, POSES)
 @examples(200)
-def test_functions_of_poses_are_those_of_scipy(a, b):
+def test_pose_functions_agree_with_scipy(a, b):
     (x, r), (y, s) = parts(a), parts(b)
     is_near(pose_trans(a, b), x + r.apply(y), r * s)
     is_near(pose_inv(a), -r.inv().apply(x), r.inv())
@@ -51,7 +51,7 @@ def test_functions_of_poses_are_those_of_scipy(a, b):
 
 @given(st.lists(NUMBERS, min_size=3, max_size=3))
 @examples(100)
-def test_roll_pitch_and_yaw_are_those_of_scipy(angles):
+def test_roll_pitch_and_yaw_agree_with_scipy(angles):
     from tvist_urscript import Array
 
     turn = Rotation.from_euler("xyz", angles)
@@ -66,7 +66,7 @@ def test_roll_pitch_and_yaw_are_those_of_scipy(angles):
 @pytest.mark.parametrize(
     "angle", [1e-300, 1e-160, 1e-16, 1e-8, 1e-4, 1.0, 3.0, math.pi - 1e-4, math.pi - 1e-8, math.pi]
 )
-def test_a_rotation_vector_keeps_its_digits_near_0_and_pi(angle):
+def test_rotation_vectors_are_accurate_near_0_and_pi(angle):
     for axis in ((1, 0, 0), (0.6, 0, 0.8), (2 / 3, -1 / 3, 2 / 3)):
         vector = [angle * x for x in axis]
         found = pose_trans(Pose([0] * 6), Pose([0, 0, 0, *vector])).items[3:]

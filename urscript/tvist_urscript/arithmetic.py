@@ -114,7 +114,7 @@ def negate(a: Value, work: Work) -> Value:
         return whole(-a)
     if type(a) is Array:
         return _scaled(a, -1, _product, work)
-    raise Fault(f"{kind(a)} has no negative")
+    raise Fault(f"{kind(a)} cannot be negated")
 
 
 def _scaled(

@@ -85,7 +85,7 @@ def program_of(text: str) -> tree.Function:
     ):
         return _together(text, statements)
     if head.kind == "thread":
-        raise no_program(head, "a thread belongs into a program")
+        raise no_program(head, "a thread must be inside a program")
     if head.parameters:
         name, _ = head.parameters[0]
         raise ScriptError(name.line, name.column, f"the program {head.name} cannot have parameters")

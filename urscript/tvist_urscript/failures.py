@@ -7,20 +7,13 @@ from types import CodeType, FrameType, TracebackType
 from typing import Any
 
 from tvist_urscript.errors import Fault, ScriptError
+from tvist_urscript.values import KINDS
 
 FILE = "<urscript>"  # file name of compiled code, which identifies its frames in a traceback
 
 LONGEST_REASON = 200  # most characters of an internal exception's text in an error
 
-_KINDS = {
-    "int": "an integer",
-    "float": "a float",
-    "bool": "a boolean",
-    "str": "a text",
-    "Array": "a list",
-    "Pose": "a pose",
-    "NoneType": "None",
-}
+_KINDS = {of.__name__: words for of, words in KINDS.items()}
 
 
 class TooDeep(Fault):

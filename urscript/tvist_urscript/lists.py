@@ -11,8 +11,8 @@ from tvist_urscript.values import (
     Array,
     Pose,
     Value,
-    array,
     check_size,
+    exactly,
     integer,
     kind,
     to_bytes,
@@ -66,7 +66,7 @@ def integer_to_binary_list(x: Value) -> Array:
 
 def binary_list_to_integer(l: Value) -> int:
     """Return the integer of at most 32 bits, the lowest first; 32 bits are a signed number."""
-    bits = array(l, "the argument of binary_list_to_integer").items
+    bits = exactly(Array, l, "the argument of binary_list_to_integer").items
     if len(bits) > _BITS:
         raise Fault(f"an integer has at most {_BITS} bits, not {len(bits)}")
     result = sum(1 << place for place, bit in enumerate(bits) if bit)
@@ -121,7 +121,7 @@ def inv(m: Value) -> Array:
 
 
 def _matrix(value: Value, name: str) -> list[list[int | float]]:
-    rows = matrix(array(value, f"the argument of {name}"))
+    rows = matrix(exactly(Array, value, f"the argument of {name}"))
     if rows is None:
         raise Fault(f"the argument of {name} has to be a matrix")
     return rows

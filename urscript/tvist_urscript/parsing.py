@@ -138,12 +138,9 @@ def _unfit(text: str, error: UnexpectedInput) -> ScriptError:
         return no_program(error, why)
     if isinstance(error, UnexpectedToken) and str(error.token):  # the end of the text is an empty token
         token: Token = error.token
-        what = "end of the line" if str(token) == "\n" else f"'{_shortened(token)}'"
+        shown = token if len(token) <= 40 else f"{token[:40]}..."
+        what = "end of the line" if str(token) == "\n" else f"'{shown}'"
         return no_program(token, f"unexpected {what}")
     lines = text.split("\n")
     line, column = len(lines), len(lines[-1]) + 1
     return ScriptError(line, column, syntax_error(line, "the text ends before the program does"))
-
-
-def _shortened(token: str) -> str:
-    return token if len(token) <= 40 else f"{token[:40]}..."

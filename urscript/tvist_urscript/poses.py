@@ -5,14 +5,14 @@ from typing import Any, TypeAlias
 
 from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
-from tvist_urscript.values import Array, Pose, Value, number, pose, vector
+from tvist_urscript.values import Array, Pose, Value, exactly, number, vector
 
 Vector: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]  # (w, x, y, z) of length 1
 
 
 def _parts(value: Any, what: str) -> tuple[Vector, Quaternion]:
-    x, y, z, rx, ry, rz = pose(value, what).numbers
+    x, y, z, rx, ry, rz = exactly(Pose, value, what).numbers
     return (x, y, z), _turn((rx, ry, rz), what)
 
 
@@ -62,7 +62,7 @@ def pose_sub(p_to: Value, p_from: Value) -> Pose:
 @costs(5)
 def pose_dist(p_from: Value, p_to: Value) -> float:
     """Return the distance of two positions [m]."""
-    return math.dist(pose(p_from, "p_from").numbers[:3], pose(p_to, "p_to").numbers[:3])
+    return math.dist(exactly(Pose, p_from, "p_from").numbers[:3], exactly(Pose, p_to, "p_to").numbers[:3])
 
 
 @costs(5)

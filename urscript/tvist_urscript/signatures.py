@@ -3,19 +3,11 @@
 import inspect
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, get_origin
+from typing import Any, get_origin
 
 from tvist_urscript.values import Value
 
-
-class _Required:
-    """Default of a parameter that has none."""
-
-    def __repr__(self) -> str:
-        return "REQUIRED"
-
-
-REQUIRED: Final = _Required()
+REQUIRED: Any = inspect.Parameter.empty  # default of a parameter that has none
 
 
 @dataclass(frozen=True)
@@ -23,7 +15,7 @@ class Parameter:
     """A parameter of a function, and its value if a call does not give one."""
 
     name: str
-    default: Value | _Required = REQUIRED
+    default: Value = REQUIRED
 
 
 @dataclass(frozen=True)
@@ -65,15 +57,10 @@ def signature(function: Callable[..., Any], *, linear: bool = False) -> Signatur
     """
     found = inspect.signature(function)
     returned = found.return_annotation
-    if returned is inspect.Signature.empty:
-        blocks = inspect.isgeneratorfunction(function)
-    else:
-        blocks = get_origin(returned) is Generator
+    plain = returned is inspect.Signature.empty
+    blocks = inspect.isgeneratorfunction(function) if plain else get_origin(returned) is Generator
     return Signature(
-        tuple(
-            Parameter(name, REQUIRED if one.default is inspect.Parameter.empty else one.default)
-            for name, one in found.parameters.items()
-        ),
+        tuple(Parameter(name, one.default) for name, one in found.parameters.items()),
         blocks,
         getattr(function, "cost", 1),
         linear,

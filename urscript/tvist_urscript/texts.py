@@ -4,8 +4,9 @@ import re
 
 from tvist_urscript.costs import costs
 from tvist_urscript.errors import Fault
-from tvist_urscript.values import Value, integer, short, text, to_bytes, to_str, to_text, whole
+from tvist_urscript.values import Value, exactly, integer, short, to_bytes, to_str, to_text, whole
 
+_TEXT = str  # parameters of URScript have the name str, too
 _INTEGER = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
 _HEXADECIMAL = re.compile(r"\s*[+-]?0[xX][0-9a-fA-F]+\s*", re.ASCII)
 DECIMAL = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
@@ -20,17 +21,17 @@ def str_cat(op1: Value, op2: Value) -> str:
 
 def str_len(str: Value) -> int:
     """Return the number of bytes."""
-    return len(to_bytes(text(str, "the argument of str_len")))
+    return len(to_bytes(exactly(_TEXT, str, "the argument of str_len")))
 
 
 def str_empty(str: Value) -> bool:
     """Return whether a string has no bytes."""
-    return not text(str, "the argument of str_empty")
+    return not exactly(_TEXT, str, "the argument of str_empty")
 
 
 def str_at(src: Value, index: Value) -> str:
     """Return the byte at a position."""
-    string, place = to_bytes(text(src, "src of str_at")), integer(index, "the index of str_at")
+    string, place = to_bytes(exactly(_TEXT, src, "src of str_at")), integer(index, "the index of str_at")
     if not 0 <= place < len(string):
         raise _outside(place, string)
     return to_text(string[place : place + 1])
@@ -38,7 +39,10 @@ def str_at(src: Value, index: Value) -> str:
 
 def str_find(src: Value, target: Value, start_from: Value = 0) -> int:
     """Return the position of a string in another one; -1 if it does not occur."""
-    string, wanted = to_bytes(text(src, "src of str_find")), to_bytes(text(target, "target of str_find"))
+    string, wanted = (
+        to_bytes(exactly(_TEXT, src, "src of str_find")),
+        to_bytes(exactly(_TEXT, target, "target of str_find")),
+    )
     start = integer(start_from, "start_from of str_find")
     _check_start(start, string)
     return string.find(wanted, start)
@@ -46,7 +50,7 @@ def str_find(src: Value, target: Value, start_from: Value = 0) -> int:
 
 def str_sub(src: Value, index: Value, len: Value = -1) -> str:
     """Return a part of a string; all of the rest if the length is negative or too large."""
-    string, start = to_bytes(text(src, "src of str_sub")), integer(index, "the index of str_sub")
+    string, start = to_bytes(exactly(_TEXT, src, "src of str_sub")), integer(index, "the index of str_sub")
     size = integer(len, "len of str_sub")
     _check_start(start, string)
     return to_text(string[start:] if size < 0 else string[start : start + size])
@@ -56,7 +60,7 @@ def to_num(str: Value) -> int | float:
     """Return the number in a string, in decimal digits or, after 0x, in hexadecimal ones."""
     if type(str) is int or type(str) is float:
         return str
-    written = text(str, "the argument of to_num")
+    written = exactly(_TEXT, str, "the argument of to_num")
     if _HEXADECIMAL.fullmatch(written):
         return whole(int(written, 16))
     if _INTEGER.fullmatch(written):

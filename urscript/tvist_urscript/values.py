@@ -161,26 +161,11 @@ def integer(value: Any, what: str) -> int:
     raise Fault(f"{what} has to be an integer, not {kind(value)}")
 
 
-def _exactly(wanted: type[T], value: Any, what: str, called: str) -> T:
-    """Return the value if its type is exactly the wanted one; else raise Fault."""
+def exactly(wanted: type[T], value: Any, what: str) -> T:
+    """Return the value if its type is exactly the wanted one, such as a list but no pose; else raise Fault."""
     if type(value) is wanted:
         return value
-    raise Fault(f"{what} has to be {called}, not {kind(value)}")
-
-
-def text(value: Any, what: str) -> str:
-    """Return the value if it is a string; else raise Fault."""
-    return _exactly(str, value, what, "a text")
-
-
-def array(value: Any, what: str) -> Array:
-    """Return the value if it is a list and no pose; else raise Fault."""
-    return _exactly(Array, value, what, "a list")
-
-
-def pose(value: Any, what: str) -> Pose:
-    """Return the value if it is a pose; else raise Fault."""
-    return _exactly(Pose, value, what, "a pose")
+    raise Fault(f"{what} has to be {KINDS[wanted]}, not {kind(value)}")
 
 
 def vector(value: Any, what: str) -> tuple[float, ...]:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from tvist_cli.failure import Failure, failing_on, interrupted
+from tvist_cli.failure import check_range, failing_on, interruptible
 from tvist_cli.offered import SHAPERS
 from tvist_cli.output import err, out, print_json, table, words
 
@@ -29,15 +29,12 @@ def bench(*, seconds: float = 10.0, shaper: Annotated[str, SHAPERS] = "zv", json
     from tvist_shaping import BUILT_IN
     from tvist_shaping.errors import ShapingError
 
-    if seconds < 0.0:
-        raise Failure(f"seconds is {seconds:g}: must be at least 0", code=2)
+    check_range("seconds", seconds, 0.0)
     with failing_on(ShapingError, exit_code=2):
         BUILT_IN.check(shaper := shaper.lower())
-    try:
-        with failing_on(StartError, exit_code=2):
-            result = speed(seconds, shaper, lambda what: err.print(f"measuring {what} ..."))
-    except KeyboardInterrupt:
-        raise interrupted("the measurements so far are lost; the served robots have stopped") from None
+    lost = "the measurements so far are lost; the served robots have stopped"
+    with failing_on(StartError, exit_code=2), interruptible(lost):
+        result = speed(seconds, shaper, lambda what: err.print(f"measuring {what} ..."))
     if json:
         print_json(result)
         return

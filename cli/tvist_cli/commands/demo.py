@@ -1,26 +1,39 @@
 """`tvist demo`: run the paper's experiment on a served robot in real time, or simulate it as fast as possible."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from tvist_cli.compiling import compile_if_new
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, check_range, failing_on
 from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, write
 from tvist_cli.offered import ROBOTS
-from tvist_cli.output import out, print_json, program, progress, words
-from tvist_cli.pages import MAGNIFY, PageAddress
-from tvist_cli.paper_tables import print_paper
-from tvist_cli.studying import give
+from tvist_cli.output import number, out, print_json, program, progress, table, words
+from tvist_cli.pages import MAGNIFY, serve_page
+from tvist_cli.studying import print_result
 
 if TYPE_CHECKING:
     from tvist_lab.studies.paper.served import ServedExperiment
 
-PORT = 8080  # port of the page that --view opens
 FOLDER = Path("tvist-demo")
 ANSWERED = "Q1-Q3"
 """Motion of the overview figure: the arm's frequency doubles along it, and the ringing is easy to see."""
+TERMS = {
+    "f_d, ζ": "frequency at which the arm vibrates, and its damping ratio: 0 rings for ever, 1 does not swing back",
+    "shaped": "the command is split into two, half a period of the vibration apart, so that their vibrations cancel",
+    "delay": "how much longer the shaped command takes",
+    "stabil.": "time from the tool's first coming within 0.03 mm of where it ends to its staying there",
+    "cycle": "time from the start of the motion until the tool stays there",
+    "overshoot": "how far the tool leaves that place again in between",
+    "RV": "residual vibration: acceleration with which the tool vibrates at the end of the command",
+    "impact": "change by shaping",
+}
+METHOD_TERMS = {
+    "peak": "largest true acceleration of the tool later than 10 ms after the end of the command; less: by how much",
+    "still": "last time at which it exceeds 0.1 m/s²",
+    "q̈/limit": "largest acceleration of a joint over its limit",
+}
 
 
 def demo(
@@ -58,16 +71,15 @@ def demo(
     """
     if runs is None:
         if robot is not None or calibration is not None or not baselines:
-            raise Failure(
-                "--robot, --calibration and --no-baselines are for --runs: give it, or leave them out", code=2
+            raise Misuse(
+                "--robot, --calibration and --no-baselines are for --runs: give it, or leave them out"
             )
         _in_real_time(FOLDER if output is None else output, seed, look, tables=tables, view=view, json=json)
         return
     if view:
-        raise Failure("--view shows what was recorded in real time: leave --runs out", code=2)
+        raise Misuse("--view shows what was recorded in real time: leave --runs out")
     look.check(output, option="--output")
-    if runs < 1:
-        raise Failure(f"runs is {runs}: must be at least 1", code=2)
+    check_range("runs", runs, 1)
     from tvist_lab.in_process import free_setup
     from tvist_lab.studies.paper.experiment import count, simulate
     from tvist_lab.studies.paper.published import ARMS
@@ -93,7 +105,7 @@ def demo(
 
         with failing_on(OSError), look.into(output) as save:
             write(save, draw(arms[0], all_figures=True))
-    give({**first, "others": others}, print_paper, json=json)
+    print_result({**first, "others": others}, _print_paper, json=json)
 
 
 def _in_real_time(
@@ -118,14 +130,15 @@ def _in_real_time(
         print_json(result.report)
     else:
         if tables:
-            print_paper(result.report)
+            _print_paper(result.report)
         _say(result, overview, recording)
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
     if view:
         from tvist_cli.tracks import recorded
+        from tvist_view.playback import meet
 
-        recorded(recording).serve(MAGNIFY, PageAddress("127.0.0.1", PORT, insecure=False))
+        serve_page(recorded(recording).page(MAGNIFY), meet)
 
 
 def _figures(result: "ServedExperiment", folder: Path, look: FigureOptions) -> Path:
@@ -159,3 +172,52 @@ def _say(result: "ServedExperiment", overview: Path, recording: Path) -> None:
     out.print("next:")
     for command, does in commands.items():
         out.print(f"  {command:{width}}  {does}", soft_wrap=True, markup=False)
+
+
+def _print_paper(result: dict[str, Any]) -> None:
+    """Print the results of `tvist demo`: the tables of each arm, and the origins of its figures."""
+    from tvist_lab.studies.paper.report import MEANINGS, beside
+
+    arms = [result, *result.get("others", ())]
+    for one in arms:
+        _print_arm(one)
+    words({**TERMS, **METHOD_TERMS})
+    headings, *rows = beside(arms)
+    table("origin of each figure", headings, rows)
+    words(MEANINGS)
+    for note in dict.fromkeys(note for one in arms for note in one["notes"]):
+        out.print(note)
+
+
+def _print_arm(result: dict[str, Any]) -> None:
+    from tvist_lab.studies.paper.published import published
+    from tvist_lab.studies.paper.report import methods, table_2
+
+    theirs, robot = published()["configurations"], result["robot"]
+    table(
+        f"{robot}: Table 1, lowest mode with 5 kg",
+        ("pose", "f_d Hz, paper", "identified", "true", "ζ, paper", "identified", "true"),
+        [_mode(name, theirs[name], row) for name, row in result["table_1"].items()],
+    )
+    runs = "one run" if result["runs"] == 1 else f"mean of {result['runs']} runs"
+    table(
+        f"{robot}: Table 2, {runs} beside the paper's 10",
+        ("motion", "delay ms", "stabil. ms", "cycle ms", "overshoot m", "RV m/s²"),
+        [(f"{motion} {what}", *figures) for motion, what, *figures in table_2(result["table_2"], 3)],
+    )
+    for motion in result["baselines"]:
+        table(
+            f"{robot}, {motion}: every method from the start of the unshaped reference (← still first)",
+            ("method", "delay ms", "RV m/s²", "peak m/s²", "less %", "still ms", "q̈/limit"),
+            methods(result, motion, "{} ←"),
+        )
+
+
+def _mode(name: str, paper: dict[str, Any], row: dict[str, float]) -> tuple[str, ...]:
+    return (
+        name,
+        *(number(value, digits) for value, digits in (
+            (paper["f_d_hz"], 1), (row["f_d_hz"], 2), (row.get("true_f_d_hz"), 2),
+            (paper["zeta"], 2), (row["zeta"], 3), (row.get("true_zeta"), 3),
+        )),
+    )  # fmt: skip

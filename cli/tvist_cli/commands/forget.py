@@ -1,10 +1,8 @@
 """`tvist forget`: discard what a served robot has learnt about its payload."""
 
-import asyncio
-
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import failing_on
 from tvist_cli.output import out, print_json
+from tvist_client.robot import Robot
 from tvist_protocol.io import Io
 
 
@@ -19,15 +17,13 @@ def forget(*, at: Connection = LOCAL, json: bool = False) -> None:
         json: Print one JSON object.
     """
 
-    async def run() -> tuple[str, Io]:
-        async with await at.robot() as robot:
-            before = await robot.io()
-            async with robot.control("tvist forget") as arm:
-                await arm.forget()
-            return (await robot.info()).name, before
+    async def run(robot: Robot) -> tuple[str, Io]:
+        before = await robot.io()
+        async with robot.control("tvist forget") as arm:
+            await arm.forget()
+        return (await robot.info()).name, before
 
-    with failing_on():
-        robot, before = asyncio.run(run())
+    robot, before = at.run(run)
     declared, assumed = before.payload.mass, before.assumed_payload
     if json:
         print_json({"robot": robot, "declared_kg": declared, "forgot_kg": assumed and assumed.mass})

@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Misuse
 from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions
 from tvist_cli.offered import ROBOTS, SOURCES
 from tvist_cli.output import default_output
@@ -82,7 +82,7 @@ def identify(
     files = [Path(one) for one in found if one not in places and one not in served]
     elsewhere = at != LOCAL and bool(places or files)
     if len(places) + len(served) + bool(files) > 1 or elsewhere or (served and at.endpoint != LOCAL.endpoint):
-        raise Failure("give one robot, or logs alone: one endpoint, one ur://ADDRESS, or files", code=2)
+        raise Misuse("give one robot, or logs alone: one endpoint, one ur://ADDRESS, or files")
     live = not files
     for name, given, needed, what in (
         ("columns", columns, files, "logs: name their files"),
@@ -95,14 +95,14 @@ def identify(
         ("payload without a mass", weigh, live and not places, "a served robot: name a mass"),
     ):
         if given and not needed:
-            raise Failure(f"{name} is for {what}", code=2)
+            raise Misuse(f"{name} is for {what}")
     if not live and masses is not None and len(masses) > 1:
-        raise Failure("payload is several masses: of logs, name the one that the arm carried", code=2)
+        raise Misuse("payload is several masses: give the one that the arm carried in the logs")
     look.check(figures)
     if output is None:
         output = default_output(Path("robot.toml")) if twin else Path("calibration.json")
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
-        raise Failure(f"output is {output}: its folder does not exist", code=2)
+        raise Misuse(f"output is {output}: its folder does not exist")
     from tvist_cli import identifying
 
     if files:
@@ -132,10 +132,9 @@ def _masses_and_sources(
             found.append(word)
             continue
         if given is not None:
-            raise Failure(f"payload is given twice, {word} at last: separate masses by commas", code=2)
+            raise Misuse(f"payload is given twice, {word} at last: separate masses by commas")
         if not all(0.0 <= mass <= HEAVIEST for mass in masses) or len(set(masses)) < len(masses):
-            raise Failure(
-                f"payload is {word}: must be different masses from 0 to {HEAVIEST:g} kg, separated by commas",
-                code=2,
+            raise Misuse(
+                f"payload is {word}: must be different masses from 0 to {HEAVIEST:g} kg, separated by commas"
             )
     return masses, found

@@ -14,7 +14,7 @@ from tvist_cli.certificates import (
     read_certificate,
     write_new,
 )
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, check_range, failing_on
 from tvist_cli.output import out, print_json
 from tvist_client.transports import certificates as of_client
 from tvist_protocol.keys import check_robot_name
@@ -59,19 +59,11 @@ def keys(
         days: Make the new certificates valid for this number of days.
         json: Print one JSON object.
     """
-    if not 1 <= days <= 3650:
-        raise Failure(f"days is {days}: must be 1 to 3650", code=2)
+    check_range("days", days, 1, 3650)
     with failing_on(ValueError, exit_code=2):
         if robot is not None:
             check_robot_name(robot)
-        asked = _roles(
-            {
-                "operator": operator or [],
-                "viewer": viewer or [],
-                "robot": member or [],
-                "router": uplink or [],
-            }
-        )
+        asked = _roles({"operator": operator, "viewer": viewer, "robot": member, "router": uplink})
         hosts = tuple(dict.fromkeys(host_of(name) for name in host or []))
     with failing_on(CertificateError, StartError, OSError):
         ring = _KeyRing(folder, days)
@@ -117,9 +109,7 @@ class _KeyRing:
                     "use another folder, or move it and robot.key away"
                 )
         elif robot is None or not hosts:
-            raise Failure(
-                f"{self.folder} has no {CERTIFICATE} yet: give --robot NAME and --host ADDRESS", code=2
-            )
+            raise Misuse(f"{self.folder} has no {CERTIFICATE} yet: give --robot NAME and --host ADDRESS")
         if (self.folder / CLIENTS).exists():
             self.roles = roles_in(self.folder)
         for name, role in asked.items():
@@ -137,22 +127,18 @@ class _KeyRing:
     def make(self, robot: str | None, hosts: tuple[Host, ...], asked: dict[str, Role]) -> None:
         """Create the files that are missing."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        authority = self._authority()
+        own = self.folder / AUTHORITY, self.folder / AUTHORITY_KEY
+        there = own[0].exists()
+        authority = CertificateAuthority.read(*own) if there else CertificateAuthority.make()
+        if not there:
+            authority.write(*own)
+            self.made.append(f"{own[0]}: authority, until {authority.until:%Y-%m-%d}")
         if robot is not None and not (self.folder / CERTIFICATE).exists():
             pair = authority.issue(robot, "robot", days=self.days, hosts=hosts)
             pair.write(self.folder / CERTIFICATE, self.folder / KEY)
             self.made.append(f"{self.folder / CERTIFICATE}: robot {robot}, until {pair.until:%Y-%m-%d}")
         for name, role in asked.items():
             self._client(authority, name, role)
-
-    def _authority(self) -> CertificateAuthority:
-        certificate, key = self.folder / AUTHORITY, self.folder / AUTHORITY_KEY
-        if certificate.exists():
-            return CertificateAuthority.read(certificate, key)
-        authority = CertificateAuthority.make()
-        authority.write(certificate, key)
-        self.made.append(f"{certificate}: authority, until {authority.until:%Y-%m-%d}")
-        return authority
 
     def _client(self, authority: CertificateAuthority, name: str, role: Role) -> None:
         own = self.folder / name
@@ -173,16 +159,13 @@ class _KeyRing:
         self.made.append(f"{own}: {role}, until {pair.until:%Y-%m-%d}")
 
 
-def _roles(names: dict[Role, list[str]]) -> dict[str, Role]:
+def _roles(names: dict[Role, list[str] | None]) -> dict[str, Role]:
     asked: dict[str, Role] = {}
-    for role, several in names.items():
-        for name in several:
-            if not NAME.fullmatch(name):
-                raise ValueError(
-                    f"client is {name!r:.80}: must be 1 to 64 of A-Z a-z 0-9 _ -, beginning with a letter or digit"
-                )
-            if asked.get(name, role) != role:
-                more = ": an operator may watch, too" if {role, asked[name]} == {"operator", "viewer"} else ""
-                raise ValueError(f"{name} cannot be both {asked[name]} and {role}{more}")
-            asked[name] = role
+    for role, name in [(role, name) for role, several in names.items() for name in several or ()]:
+        if not NAME.fullmatch(name):
+            form = "1 to 64 of A-Z a-z 0-9 _ -, the first a letter or a digit"
+            raise ValueError(f"client is {name!r:.80}: must be {form}")
+        if (other := asked.setdefault(name, role)) != role:
+            more = ": an operator may watch, too" if {role, other} == {"operator", "viewer"} else ""
+            raise ValueError(f"{name} cannot be both {other} and {role}{more}")
     return asked

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, failing_on, interrupted
+from tvist_cli.failure import Failure, Misuse, failing_on, interrupted
 from tvist_cli.offered import POSES, SHAPERS
 from tvist_cli.output import out, print_json, program
 from tvist_client.arm import Arm
@@ -100,7 +100,7 @@ def _limits(**given: float | None) -> dict[str, Any]:
     """Return the limits that the user has set, or the duration instead."""
     limits = {name: value for name, value in given.items() if value is not None}
     if "duration" in limits and len(limits) > 1:
-        raise Failure(f"--{next(iter(limits))} and --duration exclude each other: give one of them", code=2)
+        raise Misuse(f"--{next(iter(limits))} and --duration exclude each other: give one of them")
     return limits
 
 
@@ -109,7 +109,7 @@ def _checked(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float
     if line:
         return _tool_numbers(target, by=by, degrees=degrees)
     if by:
-        raise Failure("--by needs --line: only the tool is moved by a distance", code=2)
+        raise Misuse("--by needs --line: only the tool is moved by a distance")
     if "," in target or not target.strip()[:1].isalpha():
         _pose(target, {}, degrees=degrees)
     return ()
@@ -125,7 +125,7 @@ def _pose(text: str, poses: Mapping[str, tuple[float, ...]], *, degrees: bool) -
         unit = "degrees" if degrees else "rad"
         known = f"one of {', '.join(poses)}, or " if poses else ""
         why = f"target is {quoted(text)}: must be {known}joint angles in {unit} separated by commas"
-        raise Failure(why, code=2)
+        raise Misuse(why)
     return tuple(map(math.radians, angles)) if degrees else angles
 
 
@@ -136,7 +136,7 @@ def _tool_numbers(text: str, *, by: bool, degrees: bool) -> tuple[float, ...]:
         unit = "degrees" if degrees else "rad"
         pose = f"a position x,y,z in m, or x,y,z,rx,ry,rz in m and {unit}"
         wanted = "a distance dx,dy,dz in m" if by else pose
-        raise Failure(f"target is {quoted(text)}: must be {wanted}", code=2)
+        raise Misuse(f"target is {quoted(text)}: must be {wanted}")
     turn = tuple(map(math.radians, numbers[3:])) if degrees else numbers[3:]
     return numbers[:3] + turn
 

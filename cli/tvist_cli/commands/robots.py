@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, check_range, failing_on
 from tvist_cli.offered import ROBOTS
 from tvist_cli.output import out, progress, say, table, words
-from tvist_cli.studying import check_range, check_seed, give, show
+from tvist_cli.studying import check_seed, print_entries, print_result
 
 if TYPE_CHECKING:
     from tvist_plant.description import RobotDescription
@@ -43,14 +43,14 @@ def robots(
     check_range("vary", vary, 0.0, VARIED, " %")
     check_seed(seed)
     if vary and not measure:
-        raise Failure("vary needs --measure: it changes nothing in a list", code=2)
+        raise Misuse("vary needs --measure: give it, or leave --vary out")
     with failing_on(DescriptionError):
         arms = {name: load(name) for name in robot or shipped()}
     listed = [about(name, description) for name, description in arms.items()]
     for one in listed if measure else ():
         one["measured"] = _measured(one["name"], arms[one["name"]], one, random, vary, seed)
     result = {"robots": listed}
-    give(result, lambda _: _print(listed, in_full=bool(robot)), json=json)
+    print_result(result, lambda _: _print(listed, in_full=bool(robot)), json=json)
 
 
 def _measured(
@@ -69,16 +69,16 @@ def _measured(
     with progress(len(factors) * moves, f"moves of {name}") as bar:
         for factor in factors:
             try:
-                found.append(
-                    measure(
-                        description,
-                        calibration if factor == 1.0 else None,
-                        stiffness=factor,
-                        moves=moves,
-                        seed=seed,
-                        progress=lambda made: bar(made, None),
-                    )
+                own = calibration if factor == 1.0 else None
+                made = measure(
+                    description,
+                    own,
+                    stiffness=factor,
+                    moves=moves,
+                    seed=seed,
+                    progress=lambda done: bar(done, None),
                 )
+                found.append(made)
             except IdentificationError as error:
                 say(f"{name} with springs times {factor:g} is left out: {error}")
     return found
@@ -87,7 +87,7 @@ def _measured(
 def _print(listed: list[dict[str, Any]], *, in_full: bool) -> None:
     from tvist_lab.studies.arms.about import LISTED, RESULTS
 
-    show("arms", listed, LISTED)
+    print_entries("arms", listed, LISTED)
     for one in listed if in_full else ():
         out.print(one["name"], style="bold", markup=False)
         origins = one["origins"].items()
@@ -105,4 +105,4 @@ def _print(listed: list[dict[str, Any]], *, in_full: bool) -> None:
         )
     measured = [{"name": one["name"], **found} for one in listed for found in one.get("measured", ())]
     if measured:
-        show("measured", measured, RESULTS)
+        print_entries("measured", measured, RESULTS)

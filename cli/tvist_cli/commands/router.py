@@ -2,7 +2,7 @@
 
 import asyncio
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.output import say
 
 
@@ -38,7 +38,7 @@ def router(
         rates = [Rate.read(text) for text in rate or []]
         robots = [place for text in robot or [] for place in robots_of(text)]
         if robots and not rates:
-            raise Failure("robot needs --rate HZ: it says whose states are reduced", code=2)
+            raise Misuse("robot needs --rate HZ, the rate of these robots: give it, or leave --robot out")
         ending = Shutdown()
         with failing_on(GatewayError), ending.at_once():
             endpoints = listen or [DEFAULT_ENDPOINT]

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Misuse
 from tvist_cli.robot_options import with_robot_options
 from tvist_lab.programs.limits import RunLimits
 
@@ -77,16 +77,12 @@ def run(
     runs = any((given, lockstep, inputs, config, timeout is not None, limits != NO_LIMITS, junit, baseline))
     if translate:
         if runs or check or json:
-            raise Failure(
-                "--translate runs nothing, so that only --skip goes with it: leave the others out", code=2
-            )
+            raise Misuse("--translate runs nothing, so that only --skip goes with it: leave the others out")
         print_scripts(file, skip or ())
         return
     if check:
         if runs:
-            raise Failure(
-                "--check runs nothing, so that only --json goes with it: leave the others out", code=2
-            )
+            raise Misuse("--check runs nothing, so that only --json goes with it: leave the others out")
         check_scripts(file, skip or (), json=json)
         return
     run_programs(

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Misuse
 from tvist_cli.robot_options import configuration, with_robot_options
 
 
@@ -36,6 +36,6 @@ def serve(
     if compile_only is None:
         serve_robots(configuration(given, config))
     elif given or config is not None:
-        raise Failure("--compile serves nothing: leave the other options out", code=2)
+        raise Misuse("--compile serves nothing: leave the other options out")
     else:
         compile_all(*compile_only)

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions
 from tvist_cli.offered import SHAPERS as OFFERED
 from tvist_cli.output import out, table
 from tvist_cli.sensitivity import print_sensitivity
 from tvist_cli.shapers_of import load_given
-from tvist_cli.studying import Figures, ResultFiles, give
+from tvist_cli.studying import Figures, ResultFiles, print_result
 
 if TYPE_CHECKING:
     from tvist_shaping import Impulses
@@ -54,12 +54,12 @@ def shapers(
     look.check(figures, output)
     places = ResultFiles(output, figures, look)
     if sensitivity is None and (output is not None or errors != ERRORS):
-        raise Failure("--errors and --output are for --sensitivity: give it, or leave them out", code=2)
+        raise Misuse("--errors and --output are for --sensitivity: give it, or leave them out")
     if sensitivity is not None:
         if f_d != F_D:
-            raise Failure("--sensitivity is relative to any frequency: leave --f-d out", code=2)
+            raise Misuse("--sensitivity does not depend on the frequency: leave --f-d out")
         if shaper:
-            raise Failure("--sensitivity names its shapers itself: leave --shaper out", code=2)
+            raise Misuse("--sensitivity takes the shapers as its values: leave --shaper out")
         print_sensitivity(sensitivity, zeta, errors, places, json=json)
         return
     from tvist_shaping import BUILT_IN, SHAPERS, Registry, ShapingError
@@ -71,18 +71,15 @@ def shapers(
     listed: list[AnyShaper] = [*SHAPERS.values(), *own.values()]
     others = [
         {
-            "name": name,
-            "description": description,
-            "use": USES.get(name),
-            "modes": BUILT_IN.modes_of(name),
+            "name": name, "description": description, "use": USES.get(name), "modes": BUILT_IN.modes_of(name),
             "feed_forward": BUILT_IN.feed_forward_of(name),
         }
         for name, description in OF_SEVERAL_MODES.items()
-    ]
+    ]  # fmt: skip
     found = [_about(one, f_d, zeta) for one in listed]
     result = {"f_d_hz": f_d, "zeta": zeta, "shapers": found, "for_calibrated_arms": others}
     places.write(result, lambda: _figures(listed, f_d, zeta))
-    give(result, _print, json=json)
+    print_result(result, _print, json=json)
 
 
 def _figures(listed: "list[AnyShaper]", f_d: float, zeta: float) -> Figures:
@@ -163,10 +160,9 @@ def _row(about: dict[str, Any]) -> tuple[str, ...]:
     if "not_for_this_mode" in about:
         return about["name"], *("–" for _ in range(3 + len(BANDS))), limit, peak
     bands = (about[f"band_{percent}_percent"] for percent in BANDS)
-    spans = ("–" if band is None else f"{band[0]:.3f}–{_end(band[1])}" for band in bands)
+    spans = (
+        "–" if band is None else "–".join("∞" if end is None else f"{end:.3f}" for end in band)
+        for band in bands
+    )
     times = (f"{about[key]:.1f}" for key in ("duration_ms", "mean_delay_ms"))
     return about["name"], str(len(about["amplitudes"])), *times, *spans, limit, peak
-
-
-def _end(high: float | None) -> str:
-    return "∞" if high is None else f"{high:.3f}"

@@ -1,15 +1,15 @@
 """`tvist stop`: stop one robot or all, even if another client has control."""
 
 import asyncio
+from dataclasses import replace
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, failing_on, interrupted
+from tvist_cli.failure import Failure, Misuse, failing_on, interruptible
 from tvist_cli.output import out, print_json
-from tvist_client.fleet import Fleet, StopReport
-from tvist_client.fleet_session import RobotPlace, place_of
+from tvist_client.fleet import Fleet, RobotPlace, StopReport, place_of
 from tvist_client.halt import halt
 
 
@@ -38,14 +38,13 @@ def stop(
     called = robot or at.name
     if everyone:
         if called is not None:
-            raise Failure(f"give either --all or the robot {called}", code=2)
+            raise Misuse(f"give either --all or the robot {called}")
         _stop_all(at, json=json)
         return
     with failing_on(exit_code=2):
-        place = RobotPlace(at.namespace, "") if called is None else place_of(called)
-    with failing_on():
-        within = place.namespace or at.namespace
-        report = halt(at.endpoint, place.robot or None, security=at.security, namespace=within)
+        place = RobotPlace("", "") if called is None else place_of(called)
+    one = replace(at, name=place.robot or None, namespace=place.namespace or at.namespace)
+    report = one.run(lambda robot: halt(robot, at.endpoint))
     if json:
         print_json(report)
     else:
@@ -62,11 +61,8 @@ def _stop_all(at: Connection, *, json: bool) -> None:
         async with Fleet(at.endpoint, security=at.security, namespace=at.namespace) as fleet:
             return await fleet.stop(list(fleet.places))
 
-    with failing_on():
-        try:
-            reports = asyncio.run(run())
-        except KeyboardInterrupt:
-            raise interrupted("robots that had not answered may still be moving") from None
+    with failing_on(), interruptible("robots that had not answered may still be moving"):
+        reports = asyncio.run(run())
     if not reports:
         raise Failure("there are no robots, so none was stopped")
     if json:
@@ -76,4 +72,6 @@ def _stop_all(at: Connection, *, json: bool) -> None:
         out.print(f"{where}: {report.said}", soft_wrap=True, markup=False)
     failed = [report for report in reports if not report.ok]
     if failed:
-        raise Failure(f"{len(failed)} of {len(reports)} robots may still be moving: {failed[0].name} first")
+        raise Failure(
+            f"{len(failed)} of {len(reports)} robots may still be moving; the first is {failed[0].name}"
+        )

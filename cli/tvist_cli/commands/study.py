@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Misuse
 from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions
 from tvist_cli.offered import NAMES, STUDIES
 from tvist_cli.study_options import AS_SHIPPED, StudyOptions
@@ -59,12 +59,10 @@ def study(
     """
     file = None if study in NAMES else Path(study)
     if file is not None and file.suffix not in {".toml", ".py"}:
-        raise Failure(
-            f"there is no study {study}: give a TOML or Python file, or one of {', '.join(NAMES)}", code=2
-        )
+        raise Misuse(f"there is no study {study}: give a TOML or Python file, or one of {', '.join(NAMES)}")
     if file is not None and options.given:
         name = next(iter(options.given)).replace("_", "-")
-        raise Failure(f"--{name} is for {', '.join(NAMES)}: {file} says itself what it is made of", code=2)
+        raise Misuse(f"--{name} is for {', '.join(NAMES)}: {file} defines its own content")
     if file is not None and output is None:
         output = file.with_suffix("")
     from tvist_cli.study_runs import run

@@ -1,9 +1,11 @@
 """`tvist unlock`: make a stopped robot ready to move again."""
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure
 from tvist_cli.output import out, print_json
 from tvist_client import unlock as client
+from tvist_client.robot import Robot
+from tvist_client.unlock import UnlockReport
 
 
 def unlock(at: Connection = LOCAL, *, power_on: bool = False, json: bool = False) -> None:
@@ -18,10 +20,12 @@ def unlock(at: Connection = LOCAL, *, power_on: bool = False, json: bool = False
         power_on: Switch the arm on and release the brakes if it has no power.
         json: Print one JSON object.
     """
-    with failing_on():
-        report = client.unlock(
-            at.endpoint, at.name, power_on=power_on, security=at.security, namespace=at.namespace
-        )
+
+    async def run(robot: Robot) -> UnlockReport:
+        command = at.unlock_command((await robot.info()).name)
+        return await client.unlock(robot, at.endpoint, command, power_on=power_on)
+
+    report = at.run(run)
     if json:
         print_json(report)
     else:

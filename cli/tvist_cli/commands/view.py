@@ -1,19 +1,16 @@
 """`tvist view`: show a robot in three dimensions on a web page, with plots and controls."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, check_range, failing_on
 from tvist_cli.offered import ROBOTS, SHAPERS
 from tvist_cli.output import err
-from tvist_cli.pages import MAGNIFY, PageAddress, serve_page
+from tvist_cli.pages import MAGNIFY, serve_page
 from tvist_client.robot import NAME
-
-if TYPE_CHECKING:
-    from tvist_cli.tracks import Shows
 
 LONGEST_S = 120.0  # longest recording that can be written as HTML [s]
 
@@ -48,48 +45,30 @@ def view(
         port: Serve the page on this port; 0 takes a free one.
         insecure: Serve the page to other machines; anyone who opens it can move the robot.
     """
-    if not 1.0 <= magnify <= 300.0:
-        raise Failure(f"magnify is {magnify:g}: must be 1 to 300", code=2)
-    door = PageAddress(address, port, insecure)
-    shows = _recorded_or_simulated(at.endpoint, compare, robot, both=beside)
-    if shows is None:
-        if html is not None:
-            raise Failure("--html needs a recording or --compare", code=2)
-        _live(at, magnify, door)
+    check_range("magnify", magnify, 1.0, 300.0)
+    if not (compare is not None or at.endpoint.endswith(".mcap") or Path(at.endpoint).exists()):
+        if beside or html is not None:
+            raise Misuse("--beside needs a recording" if beside else "--html needs a recording or --compare")
+        from tvist_cli.judging import judge
+        from tvist_view.live import LivePage
+        from tvist_view.shown_robot import RobotPlace
+
+        place = RobotPlace(at.endpoint, at.security, at.namespace)
+        live = LivePage(place, at.name or NAME, judge, factor=magnify)
+        parts = live.meshes.content
+        serve_page(live.page, live.meet, address, port, insecure=insecure, run=live.run, parts=parts)
         return
+    from tvist_cli.tracks import compared, recorded, repeated
+    from tvist_lab.whole_file import write_whole
+    from tvist_view.playback import meet
+
+    file = Path(at.endpoint)
+    shows = compared(compare, robot) if compare is not None else repeated(file) if beside else recorded(file)
     if html is None:
-        shows.serve(magnify, door)
+        serve_page(shows.page(magnify), meet, address, port, insecure=insecure)
         return
     if shows.lasts > LONGEST_S:
-        raise Failure(
-            f"the recording lasts {shows.lasts:.0f} s: --html takes at most {LONGEST_S:.0f} s", code=2
-        )
-    from tvist_lab.whole_file import write_whole
-
+        raise Misuse(f"the recording lasts {shows.lasts:.0f} s: --html takes at most {LONGEST_S:.0f} s")
     with failing_on(OSError):
         write_whole(html, shows.page(magnify).encode())
     err.print(f"wrote {html}")
-
-
-def _recorded_or_simulated(
-    what: str, compare: tuple[str, ...] | None, robot: str, *, both: bool
-) -> "Shows | None":
-    """Return what to play back; None if a served robot is shown live."""
-    if compare is not None or what.endswith(".mcap") or Path(what).exists():
-        from tvist_cli.tracks import compared, recorded, repeated
-
-        return (
-            compared(compare, robot) if compare is not None else (repeated if both else recorded)(Path(what))
-        )
-    if both:
-        raise Failure("--beside needs a recording", code=2)
-    return None
-
-
-def _live(at: Connection, factor: float, door: PageAddress) -> None:
-    from tvist_cli.judging import judge
-    from tvist_view.live import LivePage
-    from tvist_view.shown_robot import RobotPlace
-
-    live = LivePage(RobotPlace(at.endpoint, at.security, at.namespace), at.name or NAME, judge, factor=factor)
-    serve_page(live.page, live.meet, door, live.run, live.meshes.content)

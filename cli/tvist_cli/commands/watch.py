@@ -4,28 +4,28 @@ import asyncio
 import contextlib
 import dataclasses
 import time
-from collections.abc import Coroutine
+from collections import deque
+from collections.abc import AsyncIterator, Mapping, Sequence
 from typing import Any
 
-from rich.console import Group
+from rich.console import Group, RenderableType
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, failing_on, interrupted
+from tvist_cli.failure import Misuse, check_range, failing_on, interrupted, interruptible
 from tvist_cli.output import number, out, print_json, waiting
 from tvist_client.errors import MisuseError
-from tvist_client.fleet import Fleet, FleetRobot
-from tvist_client.fleet_session import ManyStates
-from tvist_client.readiness import look, mode_name
-from tvist_client.robot import Robot
-from tvist_protocol.modes import RobotMode, SafetyMode
-from tvist_protocol.stream import Event, State, Telemetry
+from tvist_client.fleet import Fleet, FleetRobot, ManyStates, NewestState, RobotPlace
+from tvist_client.readiness import Readiness, look, mode_name
+from tvist_protocol import Event, RobotMode, SafetyMode, State, Telemetry
 
 REFRESH_S = 0.1  # time between two readings of states [s]
 FLEET_EVERY = 1.0  # time between two readings of a fleet [s]
 STALE_S = 1.0  # age above which a newest state is shown in red [s]
+
+Frame = tuple[Sequence[Any], RenderableType]  # one reading: the objects that --json prints, and the screen
 
 
 def watch(
@@ -45,20 +45,24 @@ def watch(
         json: Print each event, and the state ten times a second, as one JSON object per line; for several
             robots, one object a second.
     """
-    if seconds is not None and seconds <= 0.0:
-        raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
+    check_range("seconds", seconds, 0.0, above=True)
+    every, what = REFRESH_S, "the robots keep"
     if states is not None:
         if at.name is not None:
-            raise Failure("--states is about many robots: leave --name out", code=2)
+            raise Misuse("--states is about many robots: leave --name out")
         with failing_on(MisuseError, exit_code=2):
             many = ManyStates(states, at.endpoint, security=at.security, namespace=at.namespace)
-        _watch_for(seconds, _watch_states(many, json=json), "the robots keep running")
-        return
-    one = at if at.name is not None else _only_robot(at)
-    if one is None:
-        _watch_for(seconds, _watch_fleet(at, json=json), "the robots keep running")
+        frames = _states_frames(many)
+    elif (one := at if at.name is not None else _only_robot(at)) is None:
+        frames, every = _fleet_frames(at), FLEET_EVERY
     else:
-        _watch_for(seconds, _watch_robot(one, json=json), "the robot keeps running")
+        frames, what = _robot_frames(one, json=json), "the robot keeps"
+    began = time.monotonic()
+    with failing_on(), contextlib.suppress(TimeoutError):
+        try:
+            asyncio.run(asyncio.wait_for(_show(frames, every, json=json), seconds))
+        except KeyboardInterrupt:
+            raise interrupted(f"watched for {time.monotonic() - began:.1f} s; {what} running") from None
 
 
 def _only_robot(at: Connection) -> Connection | None:
@@ -71,93 +75,83 @@ def _only_robot(at: Connection) -> Connection | None:
             return None
         return dataclasses.replace(at, name=places[0].robot, namespace=places[0].namespace)
 
-    with failing_on():
-        try:
-            return asyncio.run(find())
-        except KeyboardInterrupt:
-            raise interrupted("no robot was watched") from None
+    with failing_on(), interruptible("no robot was watched"):
+        return asyncio.run(find())
 
 
-async def _watch_robot(at: Connection, *, json: bool) -> None:
+async def _show(frames: AsyncIterator[Frame], every: float, *, json: bool) -> None:
+    """Print each reading as JSON, or show it on the screen, with pauses [s]."""
+    with contextlib.ExitStack() as stack:
+        live: Live | None = None
+        async for objects, screen in frames:
+            for one in objects if json else ():
+                print_json(one)
+            if not json:
+                live = live or stack.enter_context(Live(console=out, auto_refresh=False))
+                live.update(screen, refresh=True)
+            await asyncio.sleep(every)
+
+
+async def _robot_frames(at: Connection, *, json: bool) -> AsyncIterator[Frame]:
     with waiting(f"waiting for {at.name} at {at.endpoint}"):
         found = await at.robot()
     async with found as robot:
-        events: list[Event] = []
-        load: list[Telemetry] = []
-        robot.on_telemetry(lambda telemetry: load.__setitem__(slice(None), [telemetry]))
-        robot.on_event(events.append)
-        standing = _Standing(robot, at.unlock_command(str(at.name)))
-        if json:
-            robot.on_event(print_json)
-        with contextlib.nullcontext() if json else Live(console=out, refresh_per_second=10) as live:
-            async for state in robot.states(buffer=1):
-                if live is not None:
-                    live.update(_robot_screen(state, events[-5:], await standing.line(state), load))
-                else:
-                    print_json(state)
-                await asyncio.sleep(REFRESH_S)
+        events, load, line = list[Event](), deque[Telemetry](maxlen=1), Text()
+        modes: tuple[int, int] | None = None
+
+        def on_event(event: Event) -> None:
+            nonlocal modes
+            events.append(event)
+            if event.kind in {"protective_stop", "safety_stop"}:
+                modes = None  # ask again why the robot cannot be moved
+
+        robot.on_telemetry(load.append)
+        robot.on_event(print_json if json else on_event)
+        async for state in robot.states(buffer=1):
+            now = (state.robot_mode, state.safety_mode)
+            if not json and now != modes:
+                modes = now  # first, since an event may come meanwhile
+                line = _standing(await look(robot, at.unlock_command(str(at.name))))
+            yield [state], _robot_screen(state, events[-5:], line, load)
 
 
-async def _watch_fleet(at: Connection, *, json: bool) -> None:
-    """Show all robots that a router or server reaches until cancelled: their state and what keeps them from moving."""
+async def _fleet_frames(at: Connection) -> AsyncIterator[Frame]:
+    """Yield all robots that a router or server reaches: their state and what keeps them from moving."""
     async with Fleet(at.endpoint, security=at.security, namespace=at.namespace) as fleet:
         await fleet.listen()
-        with contextlib.nullcontext() if json else Live(console=out, auto_refresh=False) as live:
-            while True:
-                robots = await fleet.look()
-                if live is not None:
-                    live.update(_fleet_screen(robots, at.endpoint), refresh=True)
-                else:
-                    print_json({"robots": robots})
-                await asyncio.sleep(FLEET_EVERY)
+        while True:
+            robots = await fleet.look()
+            yield [{"robots": robots}], _fleet_screen(robots, at.endpoint)
 
 
-async def _watch_states(states: ManyStates, *, json: bool) -> None:
-    """Show the newest states of all robots that a key selects until cancelled."""
+async def _states_frames(states: ManyStates) -> AsyncIterator[Frame]:
+    """Yield the newest states of all robots that a key selects."""
     async with states:
-        with contextlib.nullcontext() if json else Live(console=out, auto_refresh=False) as live:
-            since = time.monotonic()
-            while True:
-                await asyncio.sleep(REFRESH_S)
-                now, since = time.monotonic() - since, time.monotonic()
-                if live is not None:
-                    live.update(_states_table(states, now), refresh=True)
-                    continue
-                for place, newest in states.look().items():
-                    if newest.received:
-                        shown = {"namespace": place.namespace, "robot": place.robot, "state": newest.state}
-                        print_json(shown)
+        since = time.monotonic()
+        await asyncio.sleep(REFRESH_S)
+        while True:
+            now, since = time.monotonic() - since, time.monotonic()
+            newest = states.look()
+            yield (
+                [
+                    {"namespace": place.namespace, "robot": place.robot, "state": one.state}
+                    for place, one in newest.items()
+                    if one.received
+                ],
+                _states_table(newest, now),
+            )
 
 
-class _Standing:
-    """Whether the robot can be moved, and why not; asked again whenever its modes change or it stops."""
-
-    def __init__(self, robot: Robot, unlock: str) -> None:
-        self._robot, self._unlock = robot, unlock
-        self._modes: tuple[int, int] | None = None
-        self._line = Text()
-        robot.on_event(self._on_event)
-
-    async def line(self, state: State) -> Text:
-        """Return the line for the screen."""
-        modes = (state.robot_mode, state.safety_mode)
-        if modes != self._modes:
-            self._modes = modes  # first, since an event may come meanwhile
-            found = await look(self._robot, self._unlock)
-            self._line = Text(f"robot_mode {found.robot_mode}   safety_mode {found.safety_mode}")
-            if not found.ready:
-                self._line.append(f"\n{found.sentence}", style="bold red")
-        return self._line
-
-    def _on_event(self, event: Event) -> None:
-        if event.kind in {"protective_stop", "safety_stop"}:
-            self._modes = None
+def _standing(found: Readiness) -> Text:
+    """Return the modes and, if the robot cannot be moved, the reason."""
+    line = Text(f"robot_mode {found.robot_mode}   safety_mode {found.safety_mode}")
+    return line if found.ready else line.append(f"\n{found.sentence}", style="bold red")
 
 
-def _load(telemetry: list[Telemetry]) -> Text:
+def _load(telemetry: Sequence[Telemetry]) -> Text:
     one = telemetry[0] if telemetry else None
     if one is None or one.due_ticks is None or one.load is None:
-        return Text("no load is told: a client steps the time, or no telemetry has come yet", style="dim")
+        return Text("load unknown: a client steps the time, or no telemetry has come yet", style="dim")
     said = (
         f"{one.ticks_per_second:.1f} ticks/s   missed {one.missed_ticks} of {one.due_ticks}   "
         f"late p99 {one.late_p99_us:.0f} µs   load {100.0 * one.load:.1f} %"
@@ -165,7 +159,7 @@ def _load(telemetry: list[Telemetry]) -> Text:
     return Text(f"{said}   overloaded", style="bold red") if one.overloaded else Text(said)
 
 
-def _robot_screen(state: State, events: list[Event], standing: Text, telemetry: list[Telemetry]) -> Group:
+def _robot_screen(state: State, events: list[Event], standing: Text, telemetry: Sequence[Telemetry]) -> Group:
     joints = _columns("joint", "reference rad", "target rad", "actual rad", "target rad/s²", "moment N m")
     for joint in range(len(state.actual_q)):
         joints.add_row(
@@ -215,13 +209,13 @@ def _fleet_screen(robots: list[FleetRobot], endpoint: str) -> Group:
     return Group(drawn, *(Text(f"{robot.name}: {robot.said}") for robot in robots if robot.said))
 
 
-def _states_table(states: ManyStates, seconds: float) -> Table:
+def _states_table(newest: Mapping[RobotPlace, NewestState], seconds: float) -> Table:
     drawn = _columns(
         "tick", "states/s", "age s", "missed", "fastest joint rad/s", "TCP x, y, z m",
         words=("robot", "robot mode", "safety mode"),
     )  # fmt: skip
     now = asyncio.get_running_loop().time()
-    for place, (state, received, at) in states.look().items():
+    for place, (state, received, at) in newest.items():
         drawn.add_row(
             str(place),
             mode_name(RobotMode, state.robot_mode),
@@ -245,13 +239,3 @@ def _columns(*numbers: str, words: tuple[str, ...] = ()) -> Table:
     for title in numbers:
         drawn.add_column(title, justify="right", no_wrap=title == "missed")
     return drawn
-
-
-def _watch_for(seconds: float | None, watching: Coroutine[Any, Any, None], meanwhile: str) -> None:
-    """Watch for `seconds`, or with None until Control+C, which raises a Failure that tells what keeps running."""
-    began = time.monotonic()
-    with failing_on(), contextlib.suppress(TimeoutError):
-        try:
-            asyncio.run(asyncio.wait_for(watching, seconds))
-        except KeyboardInterrupt:
-            raise interrupted(f"watched for {time.monotonic() - began:.1f} s; {meanwhile}") from None

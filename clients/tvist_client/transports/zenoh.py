@@ -208,15 +208,12 @@ class ZenohTransport(Transport):
             if robots:
                 break
         there = f"the robots there are {', '.join(robots)}" if robots else f"none answered in {LATE_S:g} s"
-        # Access control denies silently, too.
-        secured = ", and that the robot lists the name of this certificate"
-        where, what = (
-            (f"{self._endpoint} in namespace {self._namespace}", "name, namespace and endpoint")
-            if self._namespace
-            else (self._endpoint, "name and endpoint")
-        )
-        check = f"check {what}{secured if self._endpoint.startswith('tls/') else ''}"
-        raise NotConnectedError(f"no robot {self._robot!r} at {where}; {there}: {check}")
+        where, what = self._endpoint, "name and endpoint"
+        if self._namespace:
+            where, what = f"{where} in namespace {self._namespace}", "name, namespace and endpoint"
+        if self._endpoint.startswith("tls/"):  # access control denies silently, too
+            what += ", and that the robot lists the name of this certificate"
+        raise NotConnectedError(f"no robot {self._robot!r} at {where}; {there}: check {what}")
 
 
 async def robots_at(endpoint: str, security: Folder | None = None, namespace: str = "") -> list[str]:

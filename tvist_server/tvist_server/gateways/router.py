@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Self
 
 import zenoh
 
-from tvist_client.fleet_session import RobotPlace, place_of
+from tvist_client.fleet import RobotPlace, place_of
 from tvist_protocol import keys
 from tvist_server.gateways.exposure import check_endpoints, guarded_router
 from tvist_server.gateways.network import REALTIME, open_router

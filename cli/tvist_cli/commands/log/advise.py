@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, failing_on
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, progress, say, table, typed, write_report
 
@@ -22,7 +22,7 @@ def advise(*files: Path, output: Path | None = None, logs: LogOptions = AS_IT_IS
         json: Print one JSON object with all figures of each shaper and motion.
     """
     if not files:
-        raise Failure("advise needs at least one recording or log: tvist log advise run.mcap", code=2)
+        raise Misuse("advise needs at least one recording or log: tvist log advise run.mcap")
     from tvist_lab.advice import advise as advised
     from tvist_lab.advice import as_dict, command, verdict
     from tvist_lab.metrics import MeasuredRecording
@@ -37,7 +37,7 @@ def advise(*files: Path, output: Path | None = None, logs: LogOptions = AS_IT_IS
     joints = sorted({log.recording.joints for log in measured})
     if len(joints) > 1:
         have = " and ".join(map(str, joints))
-        raise Failure(f"advice is about one robot: these logs have {have} joints; give the logs of one")
+        raise Failure(f"the logs have {have} joints: give logs of one robot")
     notes = [
         f"{file}: {note}" for file, log in zip(files, measured, strict=True) for note in log.recording.notes
     ]

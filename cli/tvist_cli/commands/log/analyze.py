@@ -4,7 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, failing_on
 from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, Save, write
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import number, out, print_json, progress, say, table, words
@@ -55,10 +55,10 @@ def analyze(
     look.check(figures)
     if len(files) not in (1, 2):
         why = f"analyze needs one recording or log, or two to compare, not {len(files)}: tvist log analyze run.mcap"
-        raise Failure(why, code=2)
+        raise Misuse(why)
     if len(files) == 2:
         if figures is not None:
-            raise Failure("--figures is for one file: leave it out", code=2)
+            raise Misuse("--figures is for one file: leave it out")
         _compare(*files, logs, json=json)
         return
     from tvist_lab.metrics import NotMeasurableError

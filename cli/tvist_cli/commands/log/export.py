@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.misuse import lower
 from tvist_cli.output import default_output, print_json, say
@@ -30,9 +30,9 @@ def export(
 
     kind = lower(to)
     if kind not in (*FORMATS, FOXGLOVE):
-        raise Failure(f"to is {to!r}: must be one of {', '.join((*FORMATS, FOXGLOVE))}", code=2)
-    if kind == FOXGLOVE and logs.given:
-        raise Failure("--columns and --imu are for logs: --to foxglove needs a recording", code=2)
+        raise Misuse(f"to is {to!r}: must be one of {', '.join((*FORMATS, FOXGLOVE))}")
+    if kind == FOXGLOVE and logs != AS_IT_IS:
+        raise Misuse("--columns and --imu are for logs: --to foxglove needs a recording")
     ending = f".{kind}.mcap" if kind == FOXGLOVE else f".{kind}"
     with failing_on(RecordingError):
         files = files_of(file)
@@ -41,7 +41,7 @@ def export(
     written = written_by(path, kind)
     for place in written:
         if place.exists() and any(one.exists() and place.samefile(one) for one in files):
-            raise Failure(f"{place} is the file to be exported: choose another one with --output", code=2)
+            raise Misuse(f"{place} is the file to be exported: choose another one with --output")
         if output is None:
             default_output(place)
     with failing_on(RecordingError):

@@ -5,7 +5,7 @@ from pathlib import Path
 from signal import SIGINT
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, failing_on, interrupted
+from tvist_cli.failure import Failure, check_range, failing_on, interrupted
 from tvist_cli.output import print_json, say
 
 
@@ -30,8 +30,7 @@ def record(
             files, as with tvist serve --keep.
         json: Print one JSON object at the end.
     """
-    if seconds is not None and seconds <= 0.0:
-        raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
+    check_range("seconds", seconds, 0.0, above=True)
     from tvist_server.option_values import ticks_of
     from tvist_server.recording import RecorderError
     from tvist_server.recording.recorder import Recorder

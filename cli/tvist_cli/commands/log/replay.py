@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from tvist_cli.compiling import compile_if_new
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Failure, Misuse, check_range, failing_on
 from tvist_cli.output import out, print_json, say
 from tvist_cli.shapers_of import load_given
 
@@ -48,18 +48,21 @@ def replay(
         insecure: With --publish, accept remote connections without TLS and do not authenticate clients.
         json: Print one JSON object.
     """
-    own_server = {
+    own_server: dict[str, object] = {
         "listen": listen, "name": name, "speed": speed, "loop": loop or None, "security": security,
         "insecure": insecure or None,
     }  # fmt: skip
+    unused: dict[str, object] = {"the output": output, "--shaper": shaper, "--plant": plant}
+    for option, given in (unused if publish else own_server).items():
+        if given is not None:
+            raise Misuse(
+                f"--publish computes nothing: leave out {option}"
+                if publish
+                else f"--{option} needs --publish"
+            )
     if not publish:
-        if given := [key for key, value in own_server.items() if value is not None]:
-            raise Failure(f"--{given[0]} needs --publish", code=2)
         _run_again(file, output, shaper or [], plant, json=json)
         return
-    unused = {"the output": output, "--shaper": shaper, "--plant": plant}
-    if words := [word for word, given in unused.items() if given]:
-        raise Failure(f"--publish runs nothing again: leave out {words[0]}", code=2)
     _publish(
         file, listen=listen or [DEFAULT_ENDPOINT], name=name, speed=1.0 if speed is None else speed, loop=loop,
         security=security, insecure=insecure, json=json,
@@ -106,8 +109,7 @@ def _publish(
     json: bool,
 ) -> None:
     """Publish a recording until its end or a signal; raise Failure if it cannot be read or the server cannot listen."""
-    if not 0.01 <= speed <= 100.0:
-        raise Failure(f"speed is {speed:g}: must be 0.01 to 100", code=2)
+    check_range("speed", speed, 0.01, 100.0)
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read_checked
     from tvist_lab.republish import Playback

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tvist_cli.failure import Failure, failing_on
+from tvist_cli.failure import Misuse, failing_on
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import default_output, out, print_json, typed, write_report
 
@@ -21,7 +21,7 @@ def report(*files: Path, output: Path | None = None, logs: LogOptions = AS_IT_IS
         json: Print the verdict as one JSON object.
     """
     if not files:
-        raise Failure("report needs at least one recording or log: tvist log report run.mcap", code=2)
+        raise Misuse("report needs at least one recording or log: tvist log report run.mcap")
     output = default_output(Path("report.html")) if output is None else output
     from tvist_lab.recordings import RecordingError
     from tvist_lab.report import recordings_page
