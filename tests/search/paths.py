@@ -182,6 +182,5 @@ def judge_stop(seed):
     if kind not in PAUSES:
         event = next(event for event in stop.robot.events if event.kind == "motion_stopped")
         if event.duration is not None:
-            assert event.duration == pytest.approx(
-                max(resting_after(q) - moment, 0) * PERIOD, abs=3 * PERIOD
-            ), case
+            seconds = max(resting_after(q) - moment, 0) * PERIOD
+            assert event.duration == pytest.approx(seconds, abs=3 * PERIOD), case

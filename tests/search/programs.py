@@ -16,9 +16,8 @@ DRIVEN = frozenset({Activity.MOVING, Activity.PAUSED, Activity.GUIDED})
 """Activities in which a motion with a number is running."""
 STOPPERS = frozenset({"stop", "stop_j", "stop_l", "power_off", "lose", "release", "program_stop", "reset"})
 """Commands after which no motion begins until another command asks for one."""
-STARTERS = (
-    frozenset({"move", "stream", "program_run", "program_load", "program_play", *space.SENT}) - STOPPERS
-)
+_STARTING = {"move", "stream", "program_run", "program_load", "program_play", *space.SENT}
+STARTERS = frozenset(_STARTING - STOPPERS)
 """Commands that ask for motions."""
 
 
@@ -71,9 +70,8 @@ class ProgramSequence(Sequence):
 
     def write(self):
         """Write a register."""
-        return self.robot.send(
-            SetRegisters, bank="input_int", first=0, values=(int(self._random.integers(9)),)
-        )
+        values = (int(self._random.integers(9)),)
+        return self.robot.send(SetRegisters, bank="input_int", first=0, values=values)
 
     def _tick(self, count):
         controller = self.robot.controller
@@ -139,7 +137,5 @@ _PROGRAMS: dict[str, tuple[float, Callable[[ProgramSequence], object]]] = {
 }
 _READY = {"power_on": 20.0, "unlock": 15.0, "restart_safety": 6.0}
 """Frequencies of the commands after which programs can be started again, which faults keep from starting."""
-_SENT = {
-    name: (_READY.get(name, weight), _noted(name, send))
-    for name, (weight, send) in ({**SENT, **_PROGRAMS}).items()
-}
+_ALL = SENT | _PROGRAMS
+_SENT = {name: (_READY.get(name, weight), _noted(name, send)) for name, (weight, send) in _ALL.items()}

@@ -95,12 +95,8 @@ class Author:
 
     def speedj(self):
         random = self._random
-        qd = (
-            random.choice([0.6, 1.0])
-            * random.uniform(-1, 1, len(self._q))
-            * self._fastest
-            * (random.random() > 0.15)
-        )
+        shares = random.choice([0.6, 1.0]) * random.uniform(-1, 1, len(self._q)) * (random.random() > 0.15)
+        qd = self._fastest * shares
         return [f"speedj({qd.round(3).tolist()}, {self._acceleration():.3f}{self._time()})"]
 
     def speedl(self):

@@ -180,9 +180,8 @@ class Sequence:
         robot, limits = self.robot, self.description.limits
         q = np.array(robot.references[-3:])
         activity = robot.controller.motion.activity
-        self._braked = activity is Activity.BRAKING or (
-            self._braked and not robot.controller.cycle.mode.at_rest
-        )
+        moving = not robot.controller.cycle.mode.at_rest
+        self._braked = activity is Activity.BRAKING or (self._braked and moving)
         if self._braked:
             self._ahead, self._excused = None, True  # brakes do not follow a path
         if not np.isfinite(q).all():
@@ -229,9 +228,8 @@ class Sequence:
         if robot.controller.motion.collisions.meeting(robot.references[-1]) is None:
             target = 0.98 * robot.references[-1]
             reply = robot.send(c.MoveJ, q=tuple(target.tolist()))
-            if not isinstance(reply, Accepted) and not (
-                isinstance(reply, Refused) and reply.code == "collision"
-            ):
+            collides = isinstance(reply, Refused) and reply.code == "collision"
+            if not isinstance(reply, Accepted) and not collides:
                 raise self._broken(f"a move is not accepted: {reply}")
             self._tick_until_rest()
         started = Counter(e.id for e in robot.events if e.kind == "motion_started")
@@ -255,16 +253,10 @@ class Sequence:
         """Send a command for a motion with random limits, after one with a limit above the arm's own, now and then."""
         if self._random.random() < 0.1:
             name, value = draws.above(self.description, self._random)
-            before, reply = (
-                self.robot.controller.motion.activity,
-                self.robot.send(kind, **fields, **{name: value}),
-            )
-            wanted = isinstance(reply, Refused) and reply.code in {
-                draws.CODES[name],
-                "wrong_mode",
-                "busy",
-                "limit_position",
-            }
+            before = self.robot.controller.motion.activity
+            reply = self.robot.send(kind, **fields, **{name: value})
+            codes = {draws.CODES[name], "wrong_mode", "busy", "limit_position"}
+            wanted = isinstance(reply, Refused) and reply.code in codes
             if not wanted or before is not self.robot.controller.motion.activity:
                 raise self._broken(f"{kind.__name__} with {name} {value} is not refused: {reply}")
         return self.robot.send(kind, **fields, **draws.limits(self.description, self._random))

@@ -99,13 +99,8 @@ def judge(description, case):
         description, case.start, paper_payload(description, case.mass), shaper=case.shaper,
         clock="realtime",
     )  # fmt: skip
-    reply = robot.send(
-        c.ServoStart,
-        period=case.period,
-        velocity=case.velocity,
-        acceleration=case.acceleration,
-        jerk=case.jerk,
-    )
+    limits = {"velocity": case.velocity, "acceleration": case.acceleration, "jerk": case.jerk}
+    reply = robot.send(c.ServoStart, period=case.period, **limits)
     assert not refused(reply), reply
     way, every = case.towards - case.start, max(round(case.period / PERIOD), 1)
     duration = float(np.abs(way).max()) / case.velocity * random.uniform(0.8, 2.0) + 0.1
@@ -128,9 +123,9 @@ def judge(description, case):
     robot.until_rest(5000)
     robot.tick(20)
     references = np.array(robot.references)
-    steps = (
-        np.abs(np.diff(sent, axis=0)).max(axis=1) / case.period if case.lost == 0.0 and len(sent) > 1 else []
-    )
+    steps = []
+    if case.lost == 0.0 and len(sent) > 1:
+        steps = np.abs(np.diff(sent, axis=0)).max(axis=1) / case.period
     rushed = np.count_nonzero(np.greater(steps, 1.5 * case.velocity)) > 10
     collisions = CollisionModel(description, body(paper_payload(description, case.mass)))
     assert all(collisions.meeting(q) is None for q in references), case
