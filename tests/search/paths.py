@@ -22,8 +22,7 @@ from tvist_protocol.io import SetTcp
 from tvist_protocol.motions import MovePath
 from tvist_protocol.replies import Accepted
 
-KNOWN_FAULT = 8
-"""Case of `judge_changes` that exceeds a limit."""
+KNOWN_FAULT = 8  # case of `judge_changes` that exceeds a limit
 LEAD = 1e-8
 """A pause goes through a filter whose weights follow the posture, and so may lead by nanometres [m]."""
 

@@ -17,22 +17,18 @@ DRIVEN = frozenset({Activity.MOVING, Activity.PAUSED, Activity.GUIDED})
 STOPPERS = frozenset({"stop", "stop_j", "stop_l", "power_off", "lose", "release", "program_stop", "reset"})
 """Commands after which no motion begins until another command asks for one."""
 _STARTING = {"move", "stream", "program_run", "program_load", "program_play", *space.SENT}
-STARTERS = frozenset(_STARTING - STOPPERS)
-"""Commands that ask for motions."""
+STARTERS = frozenset(_STARTING - STOPPERS)  # commands that ask for motions
 
 
 class ProgramSequence(Sequence):
     """A sequence in which programs are started, replaced, paused, played and stopped; see `Sequence`."""
 
     _texts = 0
-    _seen = 0
-    """Number of events that were looked at."""
-    _still = False
-    """Whether no motion may begin, since a stop was commanded."""
+    _seen = 0  # number of events that were looked at
+    _still = False  # whether no motion may begin, since a stop was commanded
     _earlier: frozenset[int] = frozenset()
     """Motions that were asked for before that, which may begin with the next tick's events."""
-    _number: int | None = None
-    """Number of the motion that began last."""
+    _number: int | None = None  # number of the motion that began last
 
     @property
     def sent(self):

@@ -8,10 +8,8 @@ from tests.search import space
 from tvist_controller.api.planning import Arm
 
 Random = np.random.Generator
-MOST_STATEMENTS = 7
-"""Number of statements of a program, at most."""
-HEAVY = 1.0
-"""Largest mass that programs declare [kg]."""
+MOST_STATEMENTS = 7  # number of statements of a program, at most
+HEAVY = 1.0  # largest mass that programs declare [kg]
 
 
 class Author:

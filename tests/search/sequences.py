@@ -18,10 +18,8 @@ from tvist_protocol.simulation import SimulationInject, SimulationReset
 from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
-COMMANDS = 40
-"""Number of commands in a sequence."""
-PAUSES = (0, 1, 2, 5, 20, 60, 150, 400)
-"""Possible numbers of ticks between two commands."""
+COMMANDS = 40  # number of commands in a sequence
+PAUSES = (0, 1, 2, 5, 20, 60, 150, 400)  # possible numbers of ticks between two commands
 FAULTS = (
     "protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop", "power_loss", "violation",
     "fault", "reduced", *("normal",) * 3, "nan",
@@ -42,8 +40,7 @@ places, since they often begin where a motion before was stopped at the clearanc
 """
 
 
-ROUNDING = 1e-9
-"""Differences between positions below this are rounding errors [rad]."""
+ROUNDING = 1e-9  # differences between positions below this are rounding errors [rad]
 
 
 def far_payload(random, rated):
@@ -59,10 +56,8 @@ def far_payload(random, rated):
 class Undisturbed:
     """Future references if no command comes, which no stop may get ahead of."""
 
-    references: Floats
-    """References from that moment on, one per tick, shape (k, n) [rad]."""
-    since: int
-    """Tick of that moment."""
+    references: Floats  # references from that moment on, one per tick, shape (k, n) [rad]
+    since: int  # tick of that moment
 
     def breach(self, tick, q, *, resting):
         """Return in which way a stop is off the line, ahead of the motion, or later at rest; None if it is not."""

@@ -14,8 +14,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.simulation import SimulationInject
 
-LENGTH = 3.0
-"""Duration of a stream unless something ends it [s]."""
+LENGTH = 3.0  # duration of a stream unless something ends it [s]
 
 ENDS: dict[str, Callable[[Subject], object]] = {
     "silence": lambda _: None,
@@ -49,12 +48,9 @@ class StreamCase:
     acceleration: float
     jerk: float
     end: str
-    ends_at: float
-    """Time at which it is ended [s]."""
-    lost: float
-    """Share of the set-points that are not sent [-]."""
-    wave: float
-    """Amplitude of a superimposed sine [rad]."""
+    ends_at: float  # time at which it is ended [s]
+    lost: float  # share of the set-points that are not sent [-]
+    wave: float  # amplitude of a superimposed sine [rad]
 
 
 def draw(description, seed):

@@ -3,7 +3,6 @@
 import signal
 from contextlib import suppress
 
-import pytest
 from tests.conformance.served import Served
 from tests.system.waiting import eventually
 
@@ -21,28 +20,19 @@ def first_tick(path):
     return 0
 
 
-@pytest.mark.parametrize("options", [(), ("--robots", "ur5e*2", "--workers", "2")])
-async def test_killed_and_restarted_service_loses_no_recording(options, tmp_path):
+async def test_killed_and_restarted_service_loses_no_recording(tmp_path):
     """A restart policy uses the same options and path again."""
-    robots = {"run.mcap": "ur5e"}
-    if options:
-        robots = {f"run-ur5e-{number}.mcap": f"ur5e-{number}" for number in (1, 2)}
-    path, started = tmp_path / "run.mcap", {"name": None if options else "ur5e"}
-    given = ("--clock", "lockstep", "--record", str(path), "--keep", "1s", *options)
+    path = tmp_path / "run.mcap"
     for number, ticks in ((signal.SIGKILL, TICKS), (signal.SIGTERM, 200)):
-        with Served(*given, **started) as served:
-            for name in robots.values():
-                async with await Robot.connect(served.endpoint, name) as robot, robot.control("a"):
-                    await robot.advance(ticks)
+        with Served("--clock", "lockstep", "--record", str(path), "--keep", "1s") as served:
+            async with await Robot.connect(served.endpoint) as robot, robot.control("a"):
+                await robot.advance(ticks)
             if number is signal.SIGKILL:
-                for name in robots:
-                    eventually(lambda path=tmp_path / name: first_tick(path) == FIRST)
+                eventually(lambda: first_tick(path) == FIRST)
             served.end(number)
-    for name in robots:
-        killed, ended = read(tmp_path / segment_name(name, 1, None)), read(tmp_path / name)
-        # Workers end in order when the first process is killed.
-        assert (killed.complete, ended.complete) == ("--workers" in options, True)
-        seen = [state.tick for state in killed.states]
-        assert seen == list(range(FIRST, seen[-1] + 1))
-        assert FIRST + 500 <= seen[-1] + 1 <= TICKS + 1
-        assert [state.tick for state in ended.states] == list(range(1, 201))
+    killed, ended = read(tmp_path / segment_name(path.name, 1, None)), read(path)
+    assert (killed.complete, ended.complete) == (False, True)
+    seen = [state.tick for state in killed.states]
+    assert seen == list(range(FIRST, seen[-1] + 1))
+    assert FIRST + 500 <= seen[-1] + 1 <= TICKS + 1
+    assert [state.tick for state in ended.states] == list(range(1, 201))

@@ -12,10 +12,12 @@ import psutil
 import pytest
 from tests import forked
 from tests.conformance.served import NOISE, PATIENCE, Served
+from tests.conformance.wire import Wire
 from tests.places import free_endpoint
 from tests.system.waiting import eventually
 
 from tvist_cli.main import main
+from tvist_lab.recordings.mcap_file import read
 from tvist_server.own_folder import OwnFolder
 from tvist_server.shutdown import ending_signals
 
@@ -89,14 +91,19 @@ def test_signal_ends_all_processes_of_a_study(number, to, temporary, tmp_path):
         assert not [word for word in NOISE if word in said]
 
 
-def test_workers_end_and_remove_their_folder_when_the_main_process_is_killed(temporary):
-    served = Served(*WORKERS, name=None)
+def test_workers_end_in_order_when_the_main_process_is_killed(temporary, tmp_path):
+    names = ("ur5e-1", "ur5e-2")
+    served = Served(*WORKERS, "--record", str(tmp_path / "run.mcap"), name=None)
     try:
         served.wait_until_ready()
+        for name in names:
+            with Wire(served.endpoint, name) as wire, wire.control() as token:
+                wire.step(token, 5)
         workers = psutil.Process(served.process.pid).children()
         served.process.kill()
         assert psutil.wait_procs(workers, PATIENCE)[1] == []
         assert list(temporary.iterdir()) == []
+        assert all(read(tmp_path / f"run-{name}.mcap").complete for name in names)
     finally:
         served.kill()
 
