@@ -11,6 +11,7 @@ from tests.system.test_wrong_invocations import assert_said
 
 from tvist_client import RefusedError
 from tvist_client.blocking import Robot
+from tvist_client.check import check
 from tvist_lab.metrics.motion import motions
 from tvist_lab.recordings.mcap_file import read
 from tvist_protocol import commands as c
@@ -59,12 +60,12 @@ def watched(link, *options):
     return Served("--plant", place(link), *options, name="watched")
 
 
-def move(served, change):
+def move(served, *changes):
     with Robot.connect(served.endpoint) as robot, robot.control("me") as arm:
-        q = list(robot.state().target_q)
-        q[0] += change
-        arm.move_j(q)
-        robot.advance(100)
+        for change in changes:
+            first, *others = robot.state().target_q
+            arm.move_j([first + change, *others])
+            robot.advance(100)
 
 
 @pytest.mark.parametrize("slow", [False, True])
@@ -74,8 +75,7 @@ def test_each_row_becomes_one_state_with_the_time_of_the_robot(arm, tmp_path, sl
         link.slow, link.lost, link.repeated = slow, 0.02, 0.02
         with watched(link, "--record", str(file)) as served:
             served.wait_until_said("is watched")
-            move(arm, 0.05)
-            move(arm, -0.05)
+            move(arm, 0.05, -0.05)
     passed = link.passed[-1]
     recording = read(file).recording
     rows = len(recording)
@@ -141,9 +141,9 @@ def test_stop_of_the_robot_is_reported_and_its_restart_survived():
             with Robot.connect(arm.endpoint) as robot, robot.control("me") as control:
                 control.inject("protective_stop")
             served.wait_until_said("PROTECTIVE_STOP")
-            checked = tvist("check", served.endpoint, "--name", "watched", "--json").json
-            assert checked["safety_mode"] == "PROTECTIVE_STOP"
-            assert "at the robot" in checked["next"]
+            checked = check(served.endpoint, "watched")
+            assert checked.safety_mode == "PROTECTIVE_STOP"
+            assert "at the robot" in checked.next
         served.wait_until_said("the state stands still")
         with Robot.connect(served.endpoint, "watched") as robot:
             before = robot.info().tick
