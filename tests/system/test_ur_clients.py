@@ -241,32 +241,6 @@ def beside(*changes):
 
 
 @pytest.mark.realtime
-def test_moves_servoing_and_speeds_end_at_their_targets(arm, seen):
-    near = beside((0, 0.05), (2, 0.03))
-    assert arm.moveJ(near, 1.0, 1.5)
-    eventually(lambda: seen.getActualQ() == pytest.approx(near, abs=1e-3))
-    assert arm.moveJ(HOME, 1.0, 1.5)
-    pose = seen.getActualTCPPose()
-    corner = [pose[0], pose[1], pose[2] + 0.03, *pose[3:]]
-    end = [pose[0], pose[1] - 0.03, pose[2] + 0.03, *pose[3:]]
-    assert arm.moveL([[*corner, 0.2, 0.8, 0.01], [*end, 0.2, 0.8, 0.0]], True)
-    eventually(lambda: arm.getAsyncOperationProgress() < 0)
-    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(end[:3], abs=1e-3))
-    assert arm.moveL(corner, 0.5, 1.5)
-    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(corner[:3], abs=1e-3))
-    assert arm.moveJ_IK(pose, 1.0, 1.5)
-    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(pose[:3], abs=1e-3))
-    for _ in range(60):
-        assert arm.servoJ(beside((0, 0.02)), 0.0, 0.0, 0.002, 0.03, 1000.0)
-    eventually(lambda: abs(seen.getActualQ()[0] - HOME[0] - 0.02) < 1e-3)
-    assert arm.servoStop(2.0)
-    assert arm.speedJ([0.0, 0.0, 0.0, 0.0, 0.0, 0.1], 1.0, 0.2)
-    eventually(lambda: seen.getTargetQ()[5] > HOME[5] + 0.005)
-    assert arm.speedStop(2.0)
-    eventually(lambda: max(map(abs, seen.getTargetQd())) < 1e-6)
-
-
-@pytest.mark.realtime
 def test_kinematics_payload_and_tool_equal_those_of_the_robot(arm, seen):
     assert arm.moveJ(HOME, 1.0, 1.5)
     pose = seen.getTargetTCPPose()
@@ -281,6 +255,29 @@ def test_kinematics_payload_and_tool_equal_those_of_the_robot(arm, seen):
     assert arm.setPayload(1.0, [0.0, 0.0, 0.05])
     eventually(lambda: seen.getPayload() == 1.0)
     assert arm.setPayload(0.0, [0.0, 0.0, 0.0])
+
+
+@pytest.mark.realtime
+def test_moves_servoing_and_speeds_end_at_their_targets(arm, seen):
+    near = beside((0, 0.05), (2, 0.03))
+    assert arm.moveJ(near, 1.0, 1.5)
+    eventually(lambda: seen.getActualQ() == pytest.approx(near, abs=1e-3))
+    pose = seen.getActualTCPPose()
+    corner = [pose[0], pose[1], pose[2] + 0.03, *pose[3:]]
+    end = [pose[0], pose[1] - 0.03, pose[2] + 0.03, *pose[3:]]
+    assert arm.moveL([[*corner, 0.2, 0.8, 0.01], [*end, 0.2, 0.8, 0.0]], True)
+    eventually(lambda: arm.getAsyncOperationProgress() < 0)
+    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(end[:3], abs=1e-3))
+    assert arm.moveJ_IK(pose, 1.0, 1.5)
+    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(pose[:3], abs=1e-3))
+    for _ in range(60):
+        assert arm.servoJ(beside((0, 0.02)), 0.0, 0.0, 0.002, 0.03, 1000.0)
+    eventually(lambda: abs(seen.getActualQ()[0] - HOME[0] - 0.02) < 1e-3)
+    assert arm.servoStop(2.0)
+    assert arm.speedJ([0.0, 0.0, 0.0, 0.0, 0.0, 0.1], 1.0, 0.2)
+    eventually(lambda: seen.getTargetQ()[5] > HOME[5] + 0.005)
+    assert arm.speedStop(2.0)
+    eventually(lambda: max(map(abs, seen.getTargetQd())) < 1e-6)
 
 
 @pytest.mark.realtime
