@@ -14,6 +14,7 @@ CASES ?= 30
 SEED ?= 0
 SEARCH = --cases $(CASES) --seed $(SEED)
 READY := .venv/.ready
+DOCS_READY := .venv-docs/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 # The folders of what they install.
@@ -66,8 +67,8 @@ elsewhere: setup
 bench: setup
 	$(BIN)/python -m benchmarks
 
-# The tests that take minutes each or need Podman: under an hour in two processes.
-nightly: setup elsewhere
+# The tests that take minutes each or need Podman or the site: under an hour in two processes.
+nightly: setup elsewhere $(DOCS_READY)
 	$(BESIDE) -m nightly --record-nightly --durations 20
 
 # Random cases of all that is promised of stops, streams, changes and sequences of commands, over five arms in turn.
@@ -98,7 +99,6 @@ page:
 
 # The site needs no package of tvist: it is made from the files. So its environment is a small one of its own.
 # Only the pages of the commands are made by the program, in its own environment.
-DOCS_READY := .venv-docs/.ready
 SITE := NO_MKDOCS_2_WARNING=1 .venv-docs/bin/python -m tools.site
 
 $(DOCS_READY): docs/requirements.lock

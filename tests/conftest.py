@@ -1,4 +1,4 @@
-"""What all tests share: options, the order in which they run side by side, and figures that they measure."""
+"""Options of pytest, the order of parallel tests, and measured figures."""
 
 import argparse
 import asyncio
@@ -8,6 +8,7 @@ import pytest
 import tests.examples  # noqa: F401  registers the profiles
 from hypothesis import settings
 from tests.durations import Durations, arrange, quick
+from tests.forked import NURSERY
 from tests.nightly import NightlyRecord
 from tests.skips import Skips
 
@@ -21,17 +22,11 @@ def _count(text):
 
 
 def pytest_addoption(parser):
-    parser.addoption(
-        "--keep-durations", action="store_true", help="write how long tests took: durations.json"
-    )
+    parser.addoption("--keep-durations", action="store_true", help="write durations to durations.json")
     parser.addoption("--record-nightly", action="store_true", help="write the outcome: nightly.json")
-    parser.addoption(
-        "--known-skips", action="store_true", help="fail unless skipped is what skips.json lists"
-    )
+    parser.addoption("--known-skips", action="store_true", help="fail unless skips equal skips.json")
     parser.addoption("--quick", action="store_true", help="run what is quick by durations.json")
-    parser.addoption(
-        "--cases", type=_count, default=2, help="number of cases of each test with the mark `search`"
-    )
+    parser.addoption("--cases", type=_count, default=1, help="cases of each test with the mark `search`")
     parser.addoption("--seed", type=int, default=0, help="seed of these cases")
 
 
@@ -39,18 +34,15 @@ def pytest_configure(config):
     if hasattr(config, "workerinput"):  # the first process hears what all processes report
         return
     asked = config.option
-    for wanted, plugin in (
-        (asked.keep_durations, Durations),
-        (asked.record_nightly, NightlyRecord),
-        (asked.known_skips, Skips),
-    ):
+    plugins = {Durations: asked.keep_durations, NightlyRecord: asked.record_nightly, Skips: asked.known_skips}
+    for plugin, wanted in plugins.items():
         if wanted:
             config.pluginmanager.register(plugin())
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(config, items):
-    """Mark what needs no mark of its own, see README.md, choose what is quick, and order what runs side by side."""
+    """Mark users of the fixture `realtime`, choose quick tests, and order parallel ones."""
     chosen = quick(items) if config.option.quick else items
     if len(chosen) < len(items):
         config.hook.pytest_deselected(items=list(set(items) - set(chosen)))
@@ -68,22 +60,22 @@ def pytest_collection_modifyitems(config, items):
 
 
 def pytest_sessionstart(session):
-    """Compile the kernels before tests run side by side, so that not each process does.
+    """Compile the kernels once before parallel tests, and start the process from which tests fork programs.
 
-    Programs that tests start hear signals also under nohup, as a handler, unlike SIG_IGN, is not inherited.
+    Started programs react to signals also under nohup, because they do not inherit handlers, unlike SIG_IGN.
     """
     if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
         signal.signal(signal.SIGHUP, lambda *_: None)
-    if (
-        signal.getsignal(signal.SIGINT) == signal.SIG_IGN
-    ):  # a shell does so for what it runs in the background
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # a shell sets this for background jobs
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(session.config.option, "numprocesses", None):
         compile_kernels()
+    if hasattr(session.config, "workerinput"):
+        NURSERY.start()
 
 
 def compile_kernels():
-    """Have a robot make a shaped motion, whose kernels numba then finds on disk."""
+    """Make shaped motions, so that numba finds their kernels on disk."""
     from tvist_lab.in_process import free_setup, robot_in_process
 
     async def move(shaper):
@@ -101,7 +93,7 @@ def compile_kernels():
 
 @pytest.fixture
 def measured(request):
-    """Note a figure, `measured(what, value)`, that `pytest -v` shows whether the test passes or fails."""
+    """Record a figure with `measured(what, value)`; `pytest -v` shows it."""
 
     def note(what, value):
         request.node.user_properties.append((what, str(value)))
@@ -110,7 +102,7 @@ def measured(request):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Show the figures that were measured."""
+    """Show measured figures."""
     if terminalreporter.verbosity < 1:
         return
     for report in (*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")):

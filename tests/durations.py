@@ -1,15 +1,16 @@
-"""How long tests took, kept in durations.json: it says what begins first, what is quick, and what is too slow.
+"""Durations of tests, kept in durations.json: what starts first, what is quick, what is too slow.
 
-`pytest --keep-durations`, of which `make durations` is the whole, writes the file anew: the seconds of every test
-function, set-up and end included and its cases taken together, and on which machine. When tests run side by side, what
-is longest begins first. `pytest --quick` runs of each test function as many cases as fit into a short time, spread over
-all, and none of one whose single case takes long. `python -m tests.durations` fails if a test is beyond its budget.
+`make durations` runs `pytest --keep-durations`, which writes the file: the seconds of each test
+function with set-up, teardown and all its cases. Parallel runs start with the longest tests.
+`pytest --quick` runs as many cases of each function, evenly spread, as fit into a short time.
+`python -m tests.durations` fails if a test exceeds its budget or a file has no entry.
 """
 
 import json
 import math
 import os
 import platform
+import re
 import sys
 from collections import defaultdict
 from datetime import UTC, datetime
@@ -18,26 +19,22 @@ from pathlib import Path
 import pytest
 
 KEPT = Path(__file__).with_name("durations.json")
-LEAST = 0.1
-"""Shorter test functions are kept as one sum a file [s]."""
+LEAST = 0.1  # shorter test functions are summed up for each file [s]
 OTHERS = "the others"
-UNKNOWN = 10.0
-"""What a file without figures is taken to need [s]."""
-QUICK = 0.5
-"""How long the cases of a quick test function may take together, and how long one [s]."""
+UNKNOWN = 10.0  # assumed duration of a file without an entry [s]
+QUICK = 0.5  # longest time of a quick test function's cases together, and of a single case [s]
 FUNCTION, FILE, CLOCKED = 4.0, 20.0, 450.0
-"""Budgets of a test function, of a file, and of all tests that need the clock [s]."""
-CLOCK = "clock"
-"""The group of tests that need time to pass: one process has them all, so there is only one of them at a time."""
+"""Budgets of a test function, of a file, and of all real-time tests [s]."""
+CLOCK = "clock"  # group of the real-time tests: one process runs them, one after the other
 
 
 def kept():
-    """Seconds by file and test function, of the last run that was kept."""
+    """Return the seconds by file and test function of the last kept run."""
     return json.loads(KEPT.read_text())["seconds"] if KEPT.exists() else {}
 
 
 def quick(items):
-    """The cases that `pytest --quick` runs."""
+    """Return the cases that `pytest --quick` runs."""
     seconds = kept()
     functions = defaultdict(list)
     for item in items:
@@ -55,13 +52,13 @@ def _few(cases, seconds, file, test):
 
 
 def function_of(nodeid):
-    """A test's file, and its function without case and group."""
+    """Split a test's id into its file and its function, without case and group."""
     file, _, test = nodeid.partition("::")
     return file, test.partition("[")[0].partition("@")[0]
 
 
 def arrange(items):
-    """Let one process have each file's tests, one have all that need the clock, and the longest group begin first.
+    """Group tests by file, real-time tests in one group, and start with the longest group.
 
     The cases of a search go to any process, last.
     """
@@ -78,7 +75,7 @@ def arrange(items):
 
 
 class Durations:
-    """Adds up how long the tests of a run take, and writes it at the end."""
+    """Adds up the durations of a run's tests, and writes them at its end."""
 
     def __init__(self):
         self.seconds = defaultdict(lambda: defaultdict(float))
@@ -108,8 +105,8 @@ def _rounded(tests):
     return long | {OTHERS: round(sum(took for took in tests.values() if took < LEAST), 1)}
 
 
-def beyond(content):
-    """Say of each budget that a run has exceeded by how much."""
+def exceeded(content):
+    """Yield each budget that a run exceeded, and by how much."""
     for file, tests in content["seconds"].items():
         yield from (
             f"{file}::{test} took {took:g} s: at most {FUNCTION:g} s"
@@ -119,9 +116,20 @@ def beyond(content):
         if (whole := sum(tests.values())) > FILE:
             yield f"{file} took {whole:.1f} s: at most {FILE:g} s"
     if (clocked := content["run"]["clocked"]) > CLOCKED:
-        yield f"the tests that need the clock took {clocked:g} s: at most {CLOCKED:g} s"
+        yield f"the real-time tests took {clocked:g} s: at most {CLOCKED:g} s"
+
+
+def unlisted(seconds, folder=KEPT.parent):
+    """Yield the test files without an entry, except those with nightly tests only."""
+    for path in sorted(folder.rglob("test_*.py")):
+        text, file = path.read_text(encoding="utf-8"), path.relative_to(folder.parent).as_posix()
+        tests = len(re.findall(r"^ *(?:async )?def test_", text, re.MULTILINE))
+        nightly = re.search(r"^pytestmark = .*nightly", text, re.MULTILINE)
+        if file not in seconds and not nightly and text.count("mark.nightly") < tests:
+            yield f"{file} has no entry in {KEPT.name}"
 
 
 if __name__ == "__main__":
-    found = list(beyond(json.loads(KEPT.read_text())))
-    sys.exit("\n".join([*found, "make them smaller or nightly, then `make durations`"]) if found else 0)
+    measured = json.loads(KEPT.read_text())
+    found = [*exceeded(measured), *unlisted(measured["seconds"])]
+    sys.exit("\n".join([*found, "make tests smaller or nightly, then run `make durations`"]) if found else 0)

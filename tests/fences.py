@@ -9,5 +9,5 @@ FENCE = re.compile(
 
 
 def fences(text):
-    """Kind and text of each fence."""
+    """Return kind and text of each fenced block."""
     return [(match["kind"], textwrap.dedent(match["text"])) for match in FENCE.finditer(text)]

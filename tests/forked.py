@@ -1,8 +1,8 @@
-"""`subprocess.run` and `subprocess.Popen` for Python programs, which are forked from a process that is ready.
+"""`subprocess.run` and `subprocess.Popen` for Python programs, forked from a process that has imported everything.
 
-A short test would spend most of its time with the start of Python and with imports. A forked program is a process of
-its own that does the same, with real signals, streams and an exit code, but for the clean-up at its end. Tests of how
-a program starts or ends use `subprocess`.
+Otherwise a short test would spend most of its time starting Python and importing. A forked program is a process of its
+own with real signals, streams and an exit code; only the interpreter's clean-up at its end is missing. Tests of how a
+program starts or ends use `subprocess`.
 """
 
 import atexit
@@ -17,12 +17,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PATIENCE = 600.0
-READ_AT_START = ("NUMBA_", "LD_", "XDG_")
-"""How variables begin that Python or its libraries read when they start."""
+READ_AT_START = (
+    "NUMBA_",
+    "LD_",
+    "XDG_",
+)  # prefixes of variables that Python or its libraries read when they start
 
 
 class Nursery:
-    """The process that the programs of this process of tests are forked from; it starts with the first of them."""
+    """The process from which this test process forks programs; it starts with the first of them, or before."""
 
     def __init__(self):
         self._process = None
@@ -30,16 +33,18 @@ class Nursery:
         self._lock = threading.Lock()
 
     def fork(self, request, streams):
-        """Let it fork a program; the program's number, and the socket on which its exit code will come."""
+        """Fork a program; return its process number and the socket that will receive its exit code."""
         told, theirs = socket.socketpair()
         with theirs, self._lock:
-            if self._process is None:
-                self._start()
+            self.start()
             socket.send_fds(self._requests, [json.dumps(request).encode()], [*streams, theirs.fileno()])
         told.settimeout(PATIENCE)
         return received(told), told
 
-    def _start(self):
+    def start(self):
+        """Start the process unless it runs; it takes seconds to get ready."""
+        if self._process is not None:
+            return
         self._requests, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
@@ -58,7 +63,7 @@ class Nursery:
         atexit.register(self._close)
 
     def unlike(self, environment):
-        """Variables because of which a program with this environment would not begin as the process did."""
+        """Return the variables for which a program of this environment would need a process of its own."""
         differ = environment.items() ^ self._environment.items()
         return {name for name, _ in differ if name.startswith(READ_AT_START)}
 
@@ -86,13 +91,11 @@ class Popen(subprocess.Popen):
         forkable = python == sys.executable and not (executable or preexec_fn or pass_fds)
         assert forkable, f"start {args} with subprocess"
         assert not (new := NURSERY.unlike(environment)), f"read at a program's start: {new}; use subprocess"
-        given = (rest[3], rest[6], rest[8])  # the program's ends of its standard streams, -1 if they are ours
+        given = (rest[3], rest[6], rest[8])  # the program's standard streams; -1: those of this process
         request = {
-            "words": words,
-            "environment": environment,
-            "folder": str(Path(cwd or ".").resolve()),
+            "words": words, "environment": environment, "folder": str(Path(cwd or ".").resolve()),
             "session": bool(rest[14]),
-        }
+        }  # fmt: skip
         streams = [ours if theirs < 0 else theirs for ours, theirs in enumerate(given)]
         self.pid, self._told = NURSERY.fork(request, streams)
         self._child_created = True

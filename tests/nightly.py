@@ -1,4 +1,4 @@
-"""The record of the last nightly run: `make nightly` writes nightly.json, `python -m tests.nightly` checks it."""
+"""The record of the last nightly run: `make nightly` writes nightly.json; `python -m tests.nightly` checks it."""
 
 import json
 import subprocess
@@ -9,12 +9,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 RECORD = Path(__file__).with_name("nightly.json")
-OLDEST = 150
-"""Most commits since the run that the record describes."""
+OLDEST = 150  # largest allowed number of commits since the recorded run
 
 
 class NightlyRecord:
-    """Counts the outcomes of a run, and writes them with its commit, date and seconds at the end."""
+    """Counts the outcomes of a run, and writes them at its end, with commit, date and duration."""
 
     def __init__(self):
         self.counts, self.failed, self.began = Counter(), [], time.monotonic()
@@ -43,7 +42,10 @@ class NightlyRecord:
 
 
 def complaint(run, age):
-    """What is wrong with a record that is `age` commits old (None: its commit is not in the history), or None."""
+    """Return what is wrong with a record that is `age` commits old; None if nothing is.
+
+    An `age` of None means that its commit is not in the history.
+    """
     if run["failed"]:
         return f"the nightly run of {run['date']} failed: {', '.join(run['failed'])}"
     if not run["counts"].get("passed"):
@@ -60,9 +62,8 @@ def main():
         sys.stderr.write("tests/nightly.json: not checked, since this clone has not all commits\n")
         return
     run = json.loads(RECORD.read_text())
-    known = subprocess.run(
-        ["git", "merge-base", "--is-ancestor", run["commit"], "HEAD"], check=False, capture_output=True
-    )
+    ancestor = ["git", "merge-base", "--is-ancestor", run["commit"], "HEAD"]
+    known = subprocess.run(ancestor, check=False, capture_output=True)
     age = int(_git("rev-list", "--count", f"{run['commit']}..HEAD")) if known.returncode == 0 else None
     wrong = complaint(run, age)
     if wrong is not None:

@@ -1,8 +1,8 @@
-"""The process that `tests.forked` forks Python programs from, after it has imported what they need and loaded kernels.
+"""The process from which `tests.forked` forks Python programs, after it has imported libraries and loaded kernels.
 
-`python -m tests.nursery FD` takes on the socket of that number one message for each program: JSON with its words,
-environment and folder, and with it the program's standard streams and a socket of its own, on which its number and
-later its exit code are told. Programs end at the latest with the process that asked for them.
+`python -m tests.nursery FD` reads from that socket one message per program: JSON with its words, environment and
+folder, together with the program's standard streams and a socket, which receives its process number and later its exit
+code. All programs end with the process that requested them.
 """
 
 import atexit
@@ -23,19 +23,18 @@ import types
 import warnings
 from pathlib import Path
 
-LONGEST = 1 << 17
-"""Longest message [bytes]."""
+LONGEST = 1 << 17  # longest message [bytes]
 LIBRARIES = (
     "cryptography.x509", "cyclopts", "lark", "matplotlib.pyplot", "mcap.reader", "mcap.writer", "mujoco", "polars",
     "psutil", "rich.console", "rich.live", "rich.progress", "rich.table", "scipy.linalg", "scipy.optimize",
     "scipy.signal", "scipy.stats", "tvist_client.blocking", "tvist_client.transports.zenoh", "tvist_server.server",
     "tvist_server.workers", "websockets.asyncio.server", "zenoh",
 )  # fmt: skip
-"""What takes long to import. The command line is none of it: its consoles look at the environment when they begin."""
+"""Libraries that take long to import; not the command line, whose consoles read the environment on import."""
 
 
 def warm_up():
-    """Import and load what programs will; keep garbage collections from touching, and so copying, it."""
+    """Import and load what programs need; keep garbage collections from touching, and so copying, it."""
     from tvist_testing.nursery import warm_up as move_a_robot
 
     for name in LIBRARIES:
@@ -46,7 +45,7 @@ def warm_up():
 
 
 def main(requests):
-    """Fork programs until the socket closes; what the program that this process has become is to do, or None."""
+    """Fork programs until the socket closes, then return None; return its request in a forked program."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, lambda *_: None)
     woken, wakes = os.pipe()
@@ -74,7 +73,7 @@ def main(requests):
 
 
 def tell_ended(running):
-    """Tell the exit codes of programs that have ended."""
+    """Send the exit codes of programs that have ended."""
     while running:
         child, status = os.waitpid(-1, os.WNOHANG)
         if not child:
@@ -84,7 +83,7 @@ def tell_ended(running):
 
 
 def begin(descriptors):
-    """Have signals and open files as a new process has them, and tell the number of this one."""
+    """Set signals and open files as in a new process, and send its number."""
     signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -96,11 +95,11 @@ def begin(descriptors):
 
 
 def become(words, environment, folder, session):
-    """Be `python WORDS`."""
+    """Run `python WORDS`."""
     os.environ.clear()
     os.environ.update(environment)
     os.chdir(folder)
-    tempfile.tempdir = None  # as TMPDIR says now
+    tempfile.tempdir = None  # TMPDIR may have changed
     if session:
         os.setsid()
     sys.stdin, sys.stdout, sys.stderr = open(0, closefd=False), stream(1), stream(2)  # noqa: SIM115
@@ -118,14 +117,14 @@ def become(words, environment, folder, session):
     elif first == "-c":
         sys.argv = ["-c", *rest[1:]]
         sys.modules["__main__"] = module = types.ModuleType("__main__")
-        exec(compile(rest[0], "<string>", "exec"), module.__dict__)  # noqa: S102  what was asked for
+        exec(compile(rest[0], "<string>", "exec"), module.__dict__)  # noqa: S102  the requested program
     else:
         sys.argv = words
         runpy.run_path(first, run_name="__main__")
 
 
 def stream(number):
-    """Standard output or error, as Python opens it."""
+    """Return standard output or error, as Python opens it."""
     at_once = bool(os.environ.get("PYTHONUNBUFFERED"))
     return io.TextIOWrapper(
         open(number, "wb", buffering=0 if at_once else -1, closefd=False),
@@ -137,10 +136,7 @@ def stream(number):
 
 
 def end_as(does):
-    """Do it and end as Python does, except that nothing is cleaned up that the operating system takes back anyway.
-
-    The clean-up of all that was imported, which lasts .2 s, would be that of the process that was forked.
-    """
+    """Call it and end like Python, but without the clean-up of imported modules, which takes 0.2 s."""
     code = 0
     try:
         does()

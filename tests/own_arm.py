@@ -1,4 +1,4 @@
-"""An arm as a third party connects one: it stands somewhere, gives the tick, has power and brakes, and may fail."""
+"""A plant of a third party: it has a posture, a clock, power, brakes and faults of its own."""
 
 import os
 import time
@@ -9,19 +9,15 @@ import numpy as np
 from tvist_plant.plant import PERIOD, Condition, Measurement, PlantError
 
 STANDS = np.array([0.3, -1.2, 1.5, -1.8, -1.5, 0.2])
-SWITCHES = 10
-"""Ticks that it takes to switch power and brakes."""
+SWITCHES = 10  # ticks that switching power and brakes takes
 
 
 class OwnArm:
     """Its drives follow commands exactly while they have power and the brakes are released."""
 
     def __init__(self, description, payload):
-        self.payload, self.q, self.qd = (
-            payload,
-            STANDS[: description.joints].copy(),
-            np.zeros(description.joints),
-        )
+        self.payload = payload
+        self.q, self.qd = STANDS[: description.joints].copy(), np.zeros(description.joints)
         self.fault, self.silent, self.stops, self.calls = None, False, 0, []
         self._wanted, self._left, self._ticks = (False, True), 0, 0
         self._due = time.monotonic()
@@ -31,7 +27,7 @@ class OwnArm:
     def condition(self):
         try:
             fault = self._broken.read_text()
-        except FileNotFoundError:  # a look before reading would race with a test that mends the arm
+        except FileNotFoundError:  # a check before reading would race with a test that removes the file
             fault = self.fault
         return Condition(self._wanted == (True, False) and self._left == 0, fault)
 
@@ -62,6 +58,5 @@ class OwnArm:
         return self.measure()
 
     def measure(self):
-        return Measurement(
-            self.q, self.qd, np.zeros_like(self.q), np.array([0.0, 0.0, 9.81]), timestamp=self._ticks * PERIOD
-        )
+        time, gravity = self._ticks * PERIOD, np.array([0.0, 0.0, 9.81])
+        return Measurement(self.q, self.qd, np.zeros_like(self.q), gravity, timestamp=time)

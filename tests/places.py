@@ -1,4 +1,4 @@
-"""Ports and addresses of this machine that no other process of tests has, so that tests can run side by side."""
+"""Ports and addresses of this machine that no parallel test process uses."""
 
 import itertools
 import os
@@ -6,23 +6,19 @@ import socket
 from functools import cache
 
 FIRST_PORT, PORTS, PROCESSES = 10_000, 200, 99
-"""Below the ports that systems give to outgoing connections, and below UR's own, which begin at 29999."""
+"""These ports are below those of outgoing connections, and below UR's, which start at 29999."""
 
 _count, _held = itertools.count(), []
 
 
 def own_address(last):
-    """An address of the loopback network, for servers whose ports cannot be chosen; `last` is its last byte."""
+    """Return a loopback address for servers with fixed ports; `last` is its last byte."""
     pid = os.getpid()
     return f"127.{pid // 250 % 250 + 1}.{pid % 250 + 1}.{last}"
 
 
 def free_port():
-    """A port of 127.0.0.1 on which nobody listens.
-
-    Raises:
-        OSError: Somebody listens on all that this process may take.
-    """
+    """Return a free port of 127.0.0.1; OSError if this process has none left."""
     first = _first_port()
     for _ in range(PORTS - 1):
         port = first + 1 + next(_count) % (PORTS - 1)
@@ -33,7 +29,7 @@ def free_port():
 
 @cache
 def _first_port():
-    """The first of this process's ports, which it holds until its end so that no other process takes them."""
+    """Reserve a range of ports for this process until its end; return the first one."""
     for number in range(PROCESSES):
         first = FIRST_PORT + (os.getpid() + number) % PROCESSES * PORTS
         held = socket.socket()
@@ -48,7 +44,7 @@ def _first_port():
 
 
 def free_endpoint():
-    """An endpoint of Zenoh on which a robot can be served."""
+    """Return a Zenoh endpoint for a robot."""
     return f"tcp/127.0.0.1:{free_port()}"
 
 

@@ -1,4 +1,4 @@
-"""`pytest --known-skips` fails unless what it skips is listed in skips.json, with the command that runs it."""
+"""`pytest --known-skips` fails unless it skips exactly the tests in skips.json, which names a command for each."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ KEPT = Path(__file__).with_name("skips.json")
 
 
 class Skips:
-    """Lets a run fail that skips other tests than those that are known."""
+    """Fails a run whose skipped tests differ from the known ones."""
 
     def __init__(self):
         self.skipped, self.wrong = set(), []

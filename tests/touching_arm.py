@@ -1,4 +1,4 @@
-"""The flexible arm above a surface that is a spring with damping, with a force sensor in its flange or without."""
+"""The flexible arm above a damped elastic surface, with or without a force sensor in its flange."""
 
 import numpy as np
 
@@ -6,8 +6,7 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, Measurement
 
-PARTS = 4
-"""Parts of a control period in each of which the contact force is constant: surfaces of 1e5 N/m need it."""
+PARTS = 4  # steps of constant contact force in a control period, for surfaces of up to 1e5 N/m
 
 
 class TouchingArm:
@@ -15,21 +14,16 @@ class TouchingArm:
 
     Args:
         stiffness: Stiffness of the surface [N/m].
-        damping: Its damping, which pulls nothing towards it [N s/m].
-        sensor: Whether the flange has a force sensor, with the weight and the inertia of the payload.
+        damping: Damping of the surface, which never pulls [N s/m].
+        sensor: Whether the flange has a force sensor, which also measures weight and inertia of the payload.
     """
 
     def __init__(
-        self, description, payload, *, stiffness=0.0, damping=0.0, sensor=True, parts=PARTS, noise=0.0
+        self, description, payload, *, stiffness=0.0, damping=0.0, sensor=True, parts=PARTS, noise=0
     ):
         self._arm = FlexibleArm(description, payload, period=PERIOD / parts, substeps=1)
-        self._parts, self.stiffness, self.damping, self.height, self.sensor = (
-            parts,
-            stiffness,
-            damping,
-            -1e9,
-            sensor,
-        )
+        self._parts, self.sensor = parts, sensor
+        self.stiffness, self.damping, self.height = stiffness, damping, -1e9
         self.pushed = np.zeros(3)
         self.force = np.zeros(3)
         self._noise, self._random = noise, np.random.default_rng(1)

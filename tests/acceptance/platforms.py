@@ -18,8 +18,7 @@ PLATFORMS = {
     "Windows, x86-64": "x86_64-pc-windows-msvc",
 }
 WHATS = ("tvist", "tvist[server]", "tvist[lab]", "tvist[view]", "tvist[dev]")
-PURE = ("forbiddenfruit",)
-"""Packages without any wheel whose source is Python alone."""
+PURE = ("forbiddenfruit",)  # packages without any wheel whose source is Python alone
 
 
 def missing(uv, what, python, platform):

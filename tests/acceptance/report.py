@@ -19,14 +19,10 @@ PASSED = "passed"
 
 def note(client: str, version: str, outcomes: Mapping[str, str], why: Mapping[str, str]) -> None:
     """Keep what came of each test or call of a client, and why some are known not to pass."""
-    git = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    others = {
-        name: f"{came}: {why[name]}" if name in why else came
-        for name, came in outcomes.items()
-        if came != PASSED
-    }
+    command = ["git", "rev-parse", "--short", "HEAD"]
+    git = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    failed = {name: came for name, came in outcomes.items() if came != PASSED}
+    others = {name: f"{came}: {why[name]}" if name in why else came for name, came in failed.items()}
     results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     results[client] = {
         "version": version, "date": f"{datetime.now(UTC):%Y-%m-%d}", "tvist": git.stdout.strip(),

@@ -25,7 +25,6 @@ import re
 import subprocess
 import sys
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -142,9 +141,8 @@ def server(at_robot: list[str], tvist: str) -> Iterator[subprocess.Popen[bytes]]
 
 def tests_of(program: Path) -> list[str]:
     """Return the names of the tests of a program."""
-    listed = subprocess.run(
-        [program, "--gtest_list_tests"], capture_output=True, text=True, check=True
-    ).stdout
+    command = [program, "--gtest_list_tests"]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     found, suite = [], ""
     for line in listed.splitlines():
         name = line.partition("#")[0].rstrip()
@@ -182,18 +180,13 @@ def run(command: list[str], name: str, folder: Path, log: str) -> tuple[Result, 
 
 
 def report(title: str, results: Sequence[Result], known: dict[str, str]) -> int:
-    """Print a row for a program, and a line for each that has not passed; return how many have no known reason."""
-    count = Counter(one.outcome for one in results)
-    others = ", ".join(f"{number} {outcome}" for outcome, number in count.items() if outcome != "passed")
-    seconds = sum(one.seconds for one in results)
-    print(f"| {title} | {len(results)} | {count['passed']} | {others or '-'} | {seconds:.0f} |", flush=True)
-    unknown = 0
-    for one in results:
-        if one.outcome != "passed":
-            unknown += one.name not in known
-            why = known.get(one.name, "NOT KNOWN")
-            print(f"    {one.outcome} after {one.seconds:.1f} s: {one.name}: {why}", flush=True)
-    return unknown
+    """Print the results that are no success; return how many of them have no known reason."""
+    failed = [one for one in results if one.outcome != "passed"]
+    print(f"{title}: {len(results) - len(failed)} of {len(results)} passed", flush=True)
+    for one in failed:
+        why = known.get(one.name, "NOT KNOWN")
+        print(f"    {one.outcome} after {one.seconds:.1f} s: {one.name}: {why}", flush=True)
+    return sum(one.name not in known for one in failed)
 
 
 def keep(sources: Path, what: str, results: list[Result], why: dict[str, str]) -> None:
@@ -221,7 +214,6 @@ def main() -> None:
         old.unlink()
     unknown = 0
     with machines() as (at_robot, at_client), server(at_robot, options.tvist):
-        print("| program | tests | passed | others | seconds |\n|---|---:|---:|---|---:|", flush=True)
         if options.examples:
             results: list[Result] = []
             for name, arguments in EXAMPLES.items():

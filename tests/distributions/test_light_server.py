@@ -1,4 +1,4 @@
-"""A served robot needs no scipy: numba's linear algebra would, where a kernel calls it."""
+"""A served robot needs no scipy, which numba's linear algebra would need."""
 
 import ast
 from pathlib import Path
@@ -12,7 +12,7 @@ SERVED = [
 
 
 def kernels(path):
-    """The functions that numba compiles."""
+    """Yield the functions that numba compiles."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef) and any(
             "compiled" in ast.unparse(by) for by in node.decorator_list

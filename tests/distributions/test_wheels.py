@@ -1,4 +1,4 @@
-"""The distributions: what is in each, and that one command installs it where nothing else is."""
+"""The distributions: their contents, and their installation into a new environment."""
 
 import re
 import shutil
@@ -18,7 +18,7 @@ from tools.release.environments import clean
 ROOT = Path(__file__).parents[2]
 FOLDERS = {f"tvist-{folder}": folder for folder in ("protocol", "shaping", "urscript")} | {"tvist": "."}
 CLIENT_KIB = 47 * 1000**2 // 1024
-"""Of this 1 MB is the page of `tvist lesson`, which is one file that needs nothing else."""
+"""Largest size of an installed client; 1 MB is the page of `tvist lesson`."""
 
 
 def project(folder):
@@ -31,13 +31,13 @@ def run(*words, cwd=ROOT / "docs"):
 
 @pytest.fixture(scope="module")
 def wheels(tmp_path_factory):
-    """The folder that `make dist` would fill."""
+    """Folder with the wheels of `make dist`."""
     return build(ROOT, tmp_path_factory.mktemp("dist"))
 
 
 @pytest.fixture(scope="module")
 def image_wheels(tmp_path_factory):
-    """The folder of the wheels that an image installs, built from the files that its build context has."""
+    """Folder with the wheels of an image, built from the files of its build context."""
     context = tmp_path_factory.mktemp("context")
     ignored = PathSpec.from_lines("gitignore", (ROOT / ".dockerignore").read_text().splitlines())
     for name in ignored.match_files(run("git", "ls-files", cwd=ROOT).splitlines(), negate=True):
@@ -47,7 +47,7 @@ def image_wheels(tmp_path_factory):
 
 
 def build(root, made):
-    """Build the wheel of each distribution below a folder."""
+    """Build the wheel of each distribution; return their folder."""
     for folder in FOLDERS.values():
         run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", made, cwd=root / folder)
     return made
@@ -55,7 +55,7 @@ def build(root, made):
 
 @pytest.fixture
 def fresh(tmp_path, wheels):
-    """Install what a line names into an environment of its own, for a Python of this machine; its python."""
+    """Return a function that installs a requirement into a new environment and returns its Python."""
 
     def install(what, base=sys.executable):
         run(base, "-m", "venv", tmp_path / "venv")
@@ -81,21 +81,21 @@ class TestContents:
         assert len(found) == len(set(found))
         assert set(found) == {folder.name for folder in ROOT.glob("*/tvist_*") if folder.is_dir()}
 
-    def test_no_wheel_holds_what_is_made_or_is_for_the_checkout(self, wheels):
+    def test_wheels_have_licence_and_types_but_no_generated_files_or_tests(self, wheels):
         for wheel in wheels.glob("*.whl"):
             names = zipfile.ZipFile(wheel).namelist()
             assert not [name for name in names if re.search(r"__pycache__|\.(nbc|nbi|mcap)$|^tests/", name)]
             assert [name for name in names if name.endswith("licenses/NOTICE")]
             assert [name for name in names if name.endswith("py.typed")]
 
-    def test_an_image_is_built_from_the_same_files(self, wheels, image_wheels):
+    def test_wheels_of_the_image_have_the_same_files(self, wheels, image_wheels):
         def files(folder):
             every = [zipfile.ZipFile(wheel).infolist() for wheel in folder.glob("*.whl")]
             return {info.filename: info.CRC for infos in every for info in infos}
 
         assert files(image_wheels) == files(wheels)
 
-    def test_each_has_its_name_the_common_version_and_licence_and_is_asked_for_in_it(self):
+    def test_distributions_share_version_and_licence_and_require_that_version(self):
         common = project(".")
         for name, folder in FOLDERS.items():
             own = project(folder)
@@ -112,7 +112,7 @@ class TestContents:
 @pytest.mark.nightly
 class TestFresh:
     @pytest.mark.parametrize("name", ["tvist-protocol", "tvist-shaping", "tvist-urscript"])
-    def test_the_readmes_first_examples_run(self, fresh, name):
+    def test_first_examples_of_the_readmes_run(self, fresh, name):
         python = fresh(name)
         readme = (ROOT / FOLDERS[name] / "README.md").read_text(encoding="utf-8")
         examples = [text for kind, text in fences(readme) if kind == "pycon"]
@@ -122,7 +122,7 @@ class TestFresh:
         assert not imports(python, "zenoh")
         assert imports(python, "numpy") == (name == "tvist-shaping")
 
-    def test_the_client_is_light_and_moves_a_robot(self, fresh):
+    def test_client_is_small_and_moves_a_robot(self, fresh):
         client = fresh("tvist")
         assert not imports(client, "numpy")
         site = Path(run(client, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
@@ -136,17 +136,16 @@ class TestFresh:
             assert "ok" in run(client, "-m", "tvist_client", "check", served.endpoint)
             program = blocking.replace("tcp/127.0.0.1:7447", served.endpoint)
             assert re.fullmatch(r"\d+ \d+\n", run(client, "-c", program))
-        ended = subprocess.run(
-            [client, "-m", "tvist_cli", "serve"], capture_output=True, text=True, check=False
-        )
+        command = [client, "-m", "tvist_cli", "serve"]
+        ended = subprocess.run(command, capture_output=True, text=True, check=False)
         assert (ended.returncode, ended.stderr.count("\n")) == (1, 1)
         assert "tvist[server]" in ended.stderr
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("version", ["3.11", "3.12", "3.13"])
-def test_every_python_of_this_machine_has_a_server_a_laboratory_and_a_view(fresh, version, tmp_path):
-    """With all that they bring, hundreds of megabytes; pyenv has the versions that `PYENV_VERSION` lists."""
+def test_server_laboratory_and_view_install_on_each_python(fresh, version, tmp_path):
+    """They download hundreds of megabytes. pyenv offers the versions in `PYENV_VERSION`."""
     base = shutil.which(f"python{version}")
     if base is None or subprocess.run([base, "-c", ""], capture_output=True, check=False).returncode != 0:
         pytest.skip(f"there is no Python {version}")

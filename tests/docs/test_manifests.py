@@ -1,4 +1,4 @@
-"""The files for containers of a fleet: Kubernetes' own schemas, and commands that the program understands."""
+"""Files for containers of a fleet: they match Kubernetes' schemas and have valid commands."""
 
 from pathlib import Path
 
@@ -13,17 +13,17 @@ KUBERNETES = list(yaml.safe_load_all((DOCKER / "kubernetes.yaml").read_text()))
 
 
 def understood(words):
-    """Let the parser take a command line as a container has it."""
+    """Parse a command line of a container."""
     application(words[:1]).parse_args(words, exit_on_error=False, print_error=False)
 
 
 def recorded(words, mounts):
-    """Whether a command records into a volume such that it can start again and again."""
+    """Return whether a command records into a volume so that it can be restarted."""
     places = [words[at + 1] for at, word in enumerate(words[:-1]) if word == "--record"]
     return len(places) == 1 and "--keep" in words and any(places[0].startswith(mount) for mount in mounts)
 
 
-def test_every_recorder_starts_again_by_itself_into_a_volume():
+def test_recorders_restart_and_record_into_a_volume():
     found = []
     for file in ("fleet.yaml", "compose.yaml"):
         for service in yaml.safe_load((DOCKER / file).read_text())["services"].values():
@@ -39,13 +39,13 @@ def test_every_recorder_starts_again_by_itself_into_a_volume():
     assert [*found, recorded(words, mounts)] == [True] * 5
 
 
-def test_kubernetes_takes_every_resource():
+def test_resources_match_the_schemas_of_kubernetes():
     assert {document["kind"] for document in KUBERNETES} >= {"Deployment", "StatefulSet", "Service"}
     for document in KUBERNETES:
         kubernetes_validate.validate(document, "1.34", strict=True)
 
 
-def test_its_commands_and_probes_are_the_programs():
+def test_commands_and_probes_are_valid():
     commands = []
     for document in KUBERNETES:
         template = document["spec"].get("template", {"spec": {"containers": []}})
@@ -58,7 +58,7 @@ def test_its_commands_and_probes_are_the_programs():
         understood(words)
 
 
-def test_a_router_and_three_robots_are_composed():
+def test_fleet_has_a_router_and_three_robots():
     services = yaml.safe_load((DOCKER / "fleet.yaml").read_text())["services"]
     assert len(services) == 4
     for service in services.values():
@@ -70,8 +70,7 @@ def test_a_router_and_three_robots_are_composed():
 
 
 @pytest.mark.parametrize("file", ["fleet.yaml", "compose.yaml"])
-def test_ports_are_published_on_this_machine_alone(file):
+def test_ports_are_published_on_the_local_machine_only(file):
     services = yaml.safe_load((DOCKER / file).read_text())["services"]
-    assert all(
-        port.startswith("127.0.0.1:") for service in services.values() for port in service.get("ports", [])
-    )
+    ports = [port for service in services.values() for port in service.get("ports", [])]
+    assert all(port.startswith("127.0.0.1:") for port in ports)

@@ -1,4 +1,4 @@
-"""The rehearsal of a real arm, followed literally: its files are saved, its commands are run in their order."""
+"""The page about a real arm, followed literally: its files are saved and its commands run in their order."""
 
 import re
 import shlex
@@ -13,11 +13,9 @@ pytestmark = [pytest.mark.realtime, pytest.mark.nightly]
 
 ROBOT, ARM = free_endpoint(), free_endpoint()
 PLACES = {
-    "127.0.0.10": own_address(71),
-    "127.0.0.20": own_address(72),
-    "tcp/127.0.0.1:7447": ROBOT,
+    "127.0.0.10": own_address(71), "127.0.0.20": own_address(72), "tcp/127.0.0.1:7447": ROBOT,
     "tcp/127.0.0.1:7448": ARM,
-}
+}  # fmt: skip
 UNLOCK = ("-m", "tvist_cli", "unlock", "--power-on", ARM, "--name", "arm")
 ATTEMPTS = 20
 
@@ -41,7 +39,7 @@ def served():
 
 
 def serve(served, words):
-    """Start a server in the place of the one of that name."""
+    """Start a server, which replaces the one of its name."""
     name = words[words.index("--name") + 1]
     if name in served:
         served.pop(name).__exit__(None, None, None)
@@ -51,7 +49,7 @@ def serve(served, words):
 
 
 def run(words, code, *, moves):
-    """Run a command until it ends with its exit code: a machine under load loses the moved arm now and then."""
+    """Run a command until it ends with its exit code, because a machine under load may lose the moved arm."""
     for _ in range(ATTEMPTS):
         ended = finished(*words)
         if ended.returncode == code or not moves:
@@ -62,15 +60,14 @@ def run(words, code, *, moves):
     assert "Traceback" not in ended.stderr
 
 
-def test_every_command_of_the_page_does_what_it_says(page, served, tmp_path, monkeypatch):
+def test_commands_of_the_page_work_in_their_order(page, served, tmp_path, monkeypatch):
     pytest.importorskip("rtde_control")
     monkeypatch.chdir(tmp_path)
     for name, text in re.findall(r"ave this as `(\w+\.py)`.*?```python\n(.*?)```", page, re.DOTALL):
         (tmp_path / name).write_text(text, encoding="utf-8")
     moves = False
-    for line in "".join(
-        match["text"] for match in FENCE.finditer(page) if match["kind"] == "sh"
-    ).splitlines():
+    shell = "".join(match["text"] for match in FENCE.finditer(page) if match["kind"] == "sh")
+    for line in shell.splitlines():
         program, *words = shlex.split(line, comments=True)
         code = int(re.search(r"# exit code (\d)|$", line)[1] or 0)
         if words[0] == "serve" and not code:

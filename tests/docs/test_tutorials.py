@@ -1,7 +1,10 @@
-"""The tutorials, followed literally: their files are written, their commands are run in their order; and the examples
-of all commands."""
+"""The tutorials, followed literally: their files are saved and their commands run in their order.
+
+Also the examples of all commands.
+"""
 
 import contextlib
+import io
 import re
 import shlex
 import shutil
@@ -21,7 +24,9 @@ EXAMPLES = examples()
 COMPARED = (DOCS / "how-to" / "change-a-shaper.md").read_text("utf-8")
 WAVE = ROOT / "clients" / "examples" / "wave.script"
 SERVED = ("check", "move", "watch", "log record", "stop", "unlock", "forget", "view")
-"""Commands whose examples are about the robot of `serve`'s example."""
+"""Commands whose examples need the robot of `serve`'s example."""
+SILENT = ("log report", "log export", "log record")  # commands without output
+SAVED = r"^Save this as `([\w.]+)`.*?^```\w+\n(.*?)^```$"
 
 
 def tutorial(name):
@@ -33,17 +38,15 @@ def blocks(text, kind):
 
 
 def with_files(folder, text):
-    """A folder with the files that a page has its readers save."""
-    for name, written in re.findall(
-        r"^Save this as `([\w.]+)`.*?^```\w+\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
-    ):
+    """Write the files that readers save according to a page; return the folder."""
+    for name, written in re.findall(SAVED, text, re.MULTILINE | re.DOTALL):
         (folder / name).write_text(written, encoding="utf-8")
     shutil.copy(WAVE, folder)
     return folder
 
 
 def commands(text):
-    """The words of a page's commands, and the exit code that it says."""
+    """Yield the words and the documented exit code of each command of a page."""
     for line in "".join(blocks(text, "sh")).splitlines():
         program, *words = shlex.split(line, comments=True)
         assert program == "tvist"
@@ -53,7 +56,7 @@ def commands(text):
 @pytest.mark.realtime
 @pytest.mark.nightly
 @pytest.mark.parametrize("page", ["program-in-ci", "your-log", "your-shaper"])
-def test_a_tutorial_says_and_leaves_what_its_commands_do(page, tmp_path, monkeypatch):
+def test_commands_of_a_tutorial_have_the_documented_output_and_files(page, tmp_path, monkeypatch):
     text, told, served = tutorial(page), "", None
     folder = with_files(tmp_path, text)
     monkeypatch.chdir(folder)
@@ -79,32 +82,34 @@ def test_a_tutorial_says_and_leaves_what_its_commands_do(page, tmp_path, monkeyp
 
 
 @pytest.mark.nightly
-def test_the_comparison_of_shapers_prints_what_the_page_says(tmp_path):
+def test_comparison_of_shapers_has_the_documented_output(tmp_path):
     folder = with_files(tmp_path, tutorial("your-shaper"))
     (script,) = [text for text in blocks(COMPARED, "python") if "asyncio.run" in text]
     (folder / "compare.py").write_text(script, encoding="utf-8")
     assert run("-W", "error", "compare.py", cwd=folder) == blocks(COMPARED, "text")[0]
 
 
+def help_of(words):
+    stream = io.StringIO()
+    application(words).help_print(words, console=Console(file=stream, width=80))
+    return stream.getvalue()
+
+
 @pytest.mark.parametrize("command", EXAMPLES)
-def test_help_has_an_example_in_80_columns_and_names_each_thing_once(command, tmp_path):
-    words, said = command.split(), tmp_path / "help"
-    with said.open("w", encoding="utf-8") as stream:
-        application(words).help_print(words, console=Console(file=stream, width=80))
-    told = said.read_text(encoding="utf-8")
+def test_help_has_an_example_in_80_columns_and_no_repeated_words(command):
+    words = command.split()
+    told = help_of(words)
     assert f"Example: {EXAMPLES[command]}"[:80] in told
     assert EXAMPLES[command].split()[: len(words) + 1] == ["tvist", *words]
     assert max(map(len, told.splitlines())) <= 80
     assert not re.search(r"\[default: ?(\(\))?\]|\b([A-Z]+) --(?i:\2)\b", told)
 
 
-def test_the_list_of_commands_folds_at_80_columns(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    told = finished("-m", "tvist_cli", "--help").stdout.splitlines()
-    assert 60 < max(map(len, told)) <= 80
+def test_list_of_commands_fits_into_80_columns():
+    assert 60 < max(map(len, help_of([]).splitlines())) <= 80
 
 
-def test_every_command_has_an_example():
+def test_each_command_has_an_example():
     names = [name for group in GROUPS.values() for name in group if name != "log"]
     inside = [f"{name} {one}" for name, those in OF_GROUPS.items() for one in those]
     assert sorted(EXAMPLES) == sorted(names + inside)
@@ -112,9 +117,9 @@ def test_every_command_has_an_example():
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A folder with what examples read."""
+    """A folder with the files that examples read."""
     folder = with_files(tmp_path_factory.mktemp("examples"), "")
-    # Recorded here, since the last bits of another processor's may differ.
+    # They are recorded here, because another processor's last bits may differ.
     for shaped, name in (("--shaper", "none", "--payload", "2"), "day.mcap"), ((), "first.mcap"):
         run = ("run", "wave.script", "--lockstep", *shaped, "--record", name)
         assert finished("-m", "tvist_cli", *run, cwd=folder).returncode == 0
@@ -130,7 +135,7 @@ def served(place):
 
 
 def until(sign, *words, cwd):
-    """Run a program until it says a word on stderr, then interrupt it."""
+    """Run a program until stderr has a word, then interrupt it."""
     with forked.Popen([sys.executable, "-m", "tvist_cli", *words], stderr=-1, text=True, cwd=cwd) as process:
         said = ""
         while sign not in said:
@@ -144,8 +149,8 @@ def until(sign, *words, cwd):
 @pytest.mark.realtime
 @pytest.mark.nightly
 @pytest.mark.parametrize("command", [name for name in EXAMPLES if name != "serve"])
-def test_the_example_works(command, place, request):
-    """That of `serve` is run by the fixture."""
+def test_example_works(command, place, request):
+    """A fixture runs the example of `serve`."""
     words = shlex.split(EXAMPLES[command])[1:]
     if command in SERVED:
         endpoint = request.getfixturevalue("served").endpoint
@@ -155,8 +160,4 @@ def test_the_example_works(command, place, request):
     elif command == "router":
         until("listens", *words, "--listen", free_endpoint(), cwd=place)
     else:
-        assert run("-m", "tvist_cli", *words, cwd=place) or command in (
-            "log report",
-            "log export",
-            "log record",
-        )
+        assert run("-m", "tvist_cli", *words, cwd=place) or command in SILENT

@@ -7,10 +7,8 @@ from tvist_shaping import BUILT_IN
 
 Random = np.random.Generator
 
-SHAPERS = BUILT_IN.names()
-"""Every shaper that comes with the package."""
-WITHIN = 1.003
-"""Largest velocity and acceleration of a joint, relative to its limits [-]."""
+SHAPERS = BUILT_IN.names()  # every shaper that comes with the package
+WITHIN = 1.003  # largest velocity and acceleration of a joint, relative to its limits [-]
 CODES = {"velocity": "limit_velocity", "acceleration": "limit_acceleration", "jerk": "out_of_range"}
 """Limits of a motion, and the codes with which the robot refuses values above its own."""
 

@@ -22,8 +22,7 @@ from tvist_protocol.io import SetTcp
 from tvist_protocol.motions import MovePath
 from tvist_protocol.replies import Accepted
 
-KNOWN_FAULT = 8
-"""Case of `judge_changes` that exceeds a limit."""
+KNOWN_FAULT = 8  # case of `judge_changes` that exceeds a limit
 LEAD = 1e-8
 """A pause goes through a filter whose weights follow the posture, and so may lead by nanometres [m]."""
 
@@ -182,6 +181,5 @@ def judge_stop(seed):
     if kind not in PAUSES:
         event = next(event for event in stop.robot.events if event.kind == "motion_stopped")
         if event.duration is not None:
-            assert event.duration == pytest.approx(
-                max(resting_after(q) - moment, 0) * PERIOD, abs=3 * PERIOD
-            ), case
+            seconds = max(resting_after(q) - moment, 0) * PERIOD
+            assert event.duration == pytest.approx(seconds, abs=3 * PERIOD), case

@@ -16,24 +16,19 @@ DRIVEN = frozenset({Activity.MOVING, Activity.PAUSED, Activity.GUIDED})
 """Activities in which a motion with a number is running."""
 STOPPERS = frozenset({"stop", "stop_j", "stop_l", "power_off", "lose", "release", "program_stop", "reset"})
 """Commands after which no motion begins until another command asks for one."""
-STARTERS = (
-    frozenset({"move", "stream", "program_run", "program_load", "program_play", *space.SENT}) - STOPPERS
-)
-"""Commands that ask for motions."""
+_STARTING = {"move", "stream", "program_run", "program_load", "program_play", *space.SENT}
+STARTERS = frozenset(_STARTING - STOPPERS)  # commands that ask for motions
 
 
 class ProgramSequence(Sequence):
     """A sequence in which programs are started, replaced, paused, played and stopped; see `Sequence`."""
 
     _texts = 0
-    _seen = 0
-    """Number of events that were looked at."""
-    _still = False
-    """Whether no motion may begin, since a stop was commanded."""
+    _seen = 0  # number of events that were looked at
+    _still = False  # whether no motion may begin, since a stop was commanded
     _earlier: frozenset[int] = frozenset()
     """Motions that were asked for before that, which may begin with the next tick's events."""
-    _number: int | None = None
-    """Number of the motion that began last."""
+    _number: int | None = None  # number of the motion that began last
 
     @property
     def sent(self):
@@ -71,9 +66,8 @@ class ProgramSequence(Sequence):
 
     def write(self):
         """Write a register."""
-        return self.robot.send(
-            SetRegisters, bank="input_int", first=0, values=(int(self._random.integers(9)),)
-        )
+        values = (int(self._random.integers(9)),)
+        return self.robot.send(SetRegisters, bank="input_int", first=0, values=values)
 
     def _tick(self, count):
         controller = self.robot.controller
@@ -139,7 +133,5 @@ _PROGRAMS: dict[str, tuple[float, Callable[[ProgramSequence], object]]] = {
 }
 _READY = {"power_on": 20.0, "unlock": 15.0, "restart_safety": 6.0}
 """Frequencies of the commands after which programs can be started again, which faults keep from starting."""
-_SENT = {
-    name: (_READY.get(name, weight), _noted(name, send))
-    for name, (weight, send) in ({**SENT, **_PROGRAMS}).items()
-}
+_ALL = SENT | _PROGRAMS
+_SENT = {name: (_READY.get(name, weight), _noted(name, send)) for name, (weight, send) in _ALL.items()}

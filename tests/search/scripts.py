@@ -8,10 +8,8 @@ from tests.search import space
 from tvist_controller.api.planning import Arm
 
 Random = np.random.Generator
-MOST_STATEMENTS = 7
-"""Number of statements of a program, at most."""
-HEAVY = 1.0
-"""Largest mass that programs declare [kg]."""
+MOST_STATEMENTS = 7  # number of statements of a program, at most
+HEAVY = 1.0  # largest mass that programs declare [kg]
 
 
 class Author:
@@ -95,12 +93,8 @@ class Author:
 
     def speedj(self):
         random = self._random
-        qd = (
-            random.choice([0.6, 1.0])
-            * random.uniform(-1, 1, len(self._q))
-            * self._fastest
-            * (random.random() > 0.15)
-        )
+        shares = random.choice([0.6, 1.0]) * random.uniform(-1, 1, len(self._q)) * (random.random() > 0.15)
+        qd = self._fastest * shares
         return [f"speedj({qd.round(3).tolist()}, {self._acceleration():.3f}{self._time()})"]
 
     def speedl(self):

@@ -18,10 +18,8 @@ from tvist_protocol.simulation import SimulationInject, SimulationReset
 from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
-COMMANDS = 40
-"""Number of commands in a sequence."""
-PAUSES = (0, 1, 2, 5, 20, 60, 150, 400)
-"""Possible numbers of ticks between two commands."""
+COMMANDS = 40  # number of commands in a sequence
+PAUSES = (0, 1, 2, 5, 20, 60, 150, 400)  # possible numbers of ticks between two commands
 FAULTS = (
     "protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop", "power_loss", "violation",
     "fault", "reduced", *("normal",) * 3, "nan",
@@ -42,8 +40,7 @@ places, since they often begin where a motion before was stopped at the clearanc
 """
 
 
-ROUNDING = 1e-9
-"""Differences between positions below this are rounding errors [rad]."""
+ROUNDING = 1e-9  # differences between positions below this are rounding errors [rad]
 
 
 def far_payload(random, rated):
@@ -59,10 +56,8 @@ def far_payload(random, rated):
 class Undisturbed:
     """Future references if no command comes, which no stop may get ahead of."""
 
-    references: Floats
-    """References from that moment on, one per tick, shape (k, n) [rad]."""
-    since: int
-    """Tick of that moment."""
+    references: Floats  # references from that moment on, one per tick, shape (k, n) [rad]
+    since: int  # tick of that moment
 
     def breach(self, tick, q, *, resting):
         """Return in which way a stop is off the line, ahead of the motion, or later at rest; None if it is not."""
@@ -180,9 +175,8 @@ class Sequence:
         robot, limits = self.robot, self.description.limits
         q = np.array(robot.references[-3:])
         activity = robot.controller.motion.activity
-        self._braked = activity is Activity.BRAKING or (
-            self._braked and not robot.controller.cycle.mode.at_rest
-        )
+        moving = not robot.controller.cycle.mode.at_rest
+        self._braked = activity is Activity.BRAKING or (self._braked and moving)
         if self._braked:
             self._ahead, self._excused = None, True  # brakes do not follow a path
         if not np.isfinite(q).all():
@@ -229,9 +223,8 @@ class Sequence:
         if robot.controller.motion.collisions.meeting(robot.references[-1]) is None:
             target = 0.98 * robot.references[-1]
             reply = robot.send(c.MoveJ, q=tuple(target.tolist()))
-            if not isinstance(reply, Accepted) and not (
-                isinstance(reply, Refused) and reply.code == "collision"
-            ):
+            collides = isinstance(reply, Refused) and reply.code == "collision"
+            if not isinstance(reply, Accepted) and not collides:
                 raise self._broken(f"a move is not accepted: {reply}")
             self._tick_until_rest()
         started = Counter(e.id for e in robot.events if e.kind == "motion_started")
@@ -255,16 +248,10 @@ class Sequence:
         """Send a command for a motion with random limits, after one with a limit above the arm's own, now and then."""
         if self._random.random() < 0.1:
             name, value = draws.above(self.description, self._random)
-            before, reply = (
-                self.robot.controller.motion.activity,
-                self.robot.send(kind, **fields, **{name: value}),
-            )
-            wanted = isinstance(reply, Refused) and reply.code in {
-                draws.CODES[name],
-                "wrong_mode",
-                "busy",
-                "limit_position",
-            }
+            before = self.robot.controller.motion.activity
+            reply = self.robot.send(kind, **fields, **{name: value})
+            codes = {draws.CODES[name], "wrong_mode", "busy", "limit_position"}
+            wanted = isinstance(reply, Refused) and reply.code in codes
             if not wanted or before is not self.robot.controller.motion.activity:
                 raise self._broken(f"{kind.__name__} with {name} {value} is not refused: {reply}")
         return self.robot.send(kind, **fields, **draws.limits(self.description, self._random))

@@ -14,11 +14,9 @@ from tvist_protocol.io import SetTcp
 from tvist_protocol.motions import ArcSegment, LineSegment, ProcessSegment
 
 UR5E = load("ur5e")
-BENT = np.array([0.2, -1.4, 1.7, -1.8, -1.5, 0.3])
-"""A posture far from any singular one [rad]."""
+BENT = np.array([0.2, -1.4, 1.7, -1.8, -1.5, 0.3])  # a posture far from any singular one [rad]
 NO_TOOL = (0.0,) * 6
-TOOL = (0.02, -0.03, 0.12, 0.4, -0.2, 0.9)
-"""A tool centre point, in the flange frame [m, rad]."""
+TOOL = (0.02, -0.03, 0.12, 0.4, -0.2, 0.9)  # a tool centre point, in the flange frame [m, rad]
 _MODEL = rigid_model(UR5E, Payload())
 _DATA = _MODEL.createData()
 _FLANGE = _MODEL.getFrameId(FLANGE)

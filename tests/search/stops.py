@@ -22,14 +22,12 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.simulation import SimulationInject
 
-EARLY = 17
-"""Tick before which some moves are stopped, to test moves that have barely begun."""
+EARLY = 17  # tick before which some moves are stopped, to test moves that have barely begun
 BARELY, BARELY_WAY = 3e-3, 1e-3
 """A joint that moves no faster than this [rad/s] moves no farther than this when it is stopped [rad]."""
 PAUSES = {"pause", "safeguard"}
 """Kinds of stops that slow down the motion's own time, through the filter."""
-ROUNDING = 1e-9
-"""Differences between positions below this are rounding errors [rad]."""
+ROUNDING = 1e-9  # differences between positions below this are rounding errors [rad]
 TORQUE_ROUNDING = 1e-3
 """Share by which a torque may exceed its bound between the moments that are checked in planning [-]."""
 Halt = Callable[[Subject, np.random.Generator], object]
@@ -62,8 +60,7 @@ class Case:
     acceleration: float
     jerk: float
     speed: float
-    moment: int
-    """Tick of the move at which it is stopped."""
+    moment: int  # tick of the move at which it is stopped
 
 
 def draw(description, seed, kinds=tuple(KINDS)):

@@ -14,8 +14,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.simulation import SimulationInject
 
-LENGTH = 3.0
-"""Duration of a stream unless something ends it [s]."""
+LENGTH = 3.0  # duration of a stream unless something ends it [s]
 
 ENDS: dict[str, Callable[[Subject], object]] = {
     "silence": lambda _: None,
@@ -49,12 +48,9 @@ class StreamCase:
     acceleration: float
     jerk: float
     end: str
-    ends_at: float
-    """Time at which it is ended [s]."""
-    lost: float
-    """Share of the set-points that are not sent [-]."""
-    wave: float
-    """Amplitude of a superimposed sine [rad]."""
+    ends_at: float  # time at which it is ended [s]
+    lost: float  # share of the set-points that are not sent [-]
+    wave: float  # amplitude of a superimposed sine [rad]
 
 
 def draw(description, seed):
@@ -99,13 +95,8 @@ def judge(description, case):
         description, case.start, paper_payload(description, case.mass), shaper=case.shaper,
         clock="realtime",
     )  # fmt: skip
-    reply = robot.send(
-        c.ServoStart,
-        period=case.period,
-        velocity=case.velocity,
-        acceleration=case.acceleration,
-        jerk=case.jerk,
-    )
+    limits = {"velocity": case.velocity, "acceleration": case.acceleration, "jerk": case.jerk}
+    reply = robot.send(c.ServoStart, period=case.period, **limits)
     assert not refused(reply), reply
     way, every = case.towards - case.start, max(round(case.period / PERIOD), 1)
     duration = float(np.abs(way).max()) / case.velocity * random.uniform(0.8, 2.0) + 0.1
@@ -128,9 +119,9 @@ def judge(description, case):
     robot.until_rest(5000)
     robot.tick(20)
     references = np.array(robot.references)
-    steps = (
-        np.abs(np.diff(sent, axis=0)).max(axis=1) / case.period if case.lost == 0.0 and len(sent) > 1 else []
-    )
+    steps = []
+    if case.lost == 0.0 and len(sent) > 1:
+        steps = np.abs(np.diff(sent, axis=0)).max(axis=1) / case.period
     rushed = np.count_nonzero(np.greater(steps, 1.5 * case.velocity)) > 10
     collisions = CollisionModel(description, body(paper_payload(description, case.mass)))
     assert all(collisions.meeting(q) is None for q in references), case

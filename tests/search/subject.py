@@ -31,8 +31,7 @@ from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload as Declared
 
-CLIENT, SESSION = "searcher", "5e55"
-"""Name and session of the client in control."""
+CLIENT, SESSION = "searcher", "5e55"  # name and session of the client in control
 _OF_DRIVES: tuple[Quantity, ...] = ("gear_stiffness", "rotor_inertia", "velocity_gain", "position_gain")
 _made: dict[str, Calibration] = {}
 

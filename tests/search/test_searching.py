@@ -1,4 +1,4 @@
-"""The search itself: it finds broken promises, its numbers are cases, and it draws what it should."""
+"""The search itself: it finds broken promises, and draws the same case for a number."""
 
 from pathlib import Path
 
@@ -18,13 +18,13 @@ UR5E = load("ur5e")
 SEVEN = str(Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf")
 
 
-def test_an_arm_of_two_joints_is_searched_too():
+def test_search_covers_an_arm_of_two_joints():
     arm = load("one-joint")
     streams.judge(arm, streams.draw(arm, 1))
     sequences.Sequence(arm, 1).run()
 
 
-def test_equal_numbers_are_equal_cases():
+def test_equal_numbers_give_equal_cases():
     one, other = (stops.draw(UR5E, 3) for _ in range(2))
     assert repr(one) == repr(other)
     first, second = sequences.Sequence(UR5E, 5), sequences.Sequence(UR5E, 5)
@@ -34,8 +34,8 @@ def test_equal_numbers_are_equal_cases():
     assert np.array_equal(first.robot.references, second.robot.references)
 
 
-def test_a_stop_that_overshoots_is_found(monkeypatch):
-    """A stop that goes on at its first velocity for ten ticks breaks the promise, and every search says so."""
+def test_search_finds_a_stop_that_overshoots(monkeypatch):
+    """The stop continues at its first velocity for ten ticks."""
     honest = PathStop.next
 
     def late(self):
@@ -51,7 +51,7 @@ def test_a_stop_that_overshoots_is_found(monkeypatch):
             stops.judge(UR5E, stops.draw(UR5E, number, ("plain", "power off")))
 
 
-def test_each_arm_has_its_own_calibration_and_every_shaper_is_tried():
+def test_each_arm_has_its_calibration_and_each_shaper_is_drawn():
     names = ["um_zvd", "elastic-auto"]
     for arm in map(load, (SEVEN, "ur30")):
         known = own_calibration(arm)
@@ -63,8 +63,8 @@ def test_each_arm_has_its_own_calibration_and_every_shaper_is_tried():
     assert set(names) < set(draws.SHAPERS) == set(BUILT_IN.names())
 
 
-def test_a_joint_above_its_own_limit_is_found_whatever_the_others_may():
-    arm = load("ur3e")  # whose wrist may turn twice as fast as its base
+def test_each_joint_is_compared_with_its_own_limit():
+    arm = load("ur3e")  # its wrist can be twice as fast as its base
     time = np.arange(50)[:, np.newaxis] * PERIOD
     for joint, share in ((0, 2.0), (5, 1.0)):
         references = np.where(np.arange(6) == joint, 2.0 * arm.limits.velocity[0] * time, 0.0)
@@ -72,7 +72,7 @@ def test_a_joint_above_its_own_limit_is_found_whatever_the_others_may():
 
 
 @pytest.mark.parametrize("name", ["ur30", SEVEN])
-def test_limits_are_drawn_at_the_arm_s_own_and_above_which_it_refuses(name):
+def test_limits_are_drawn_up_to_those_of_the_arm_and_above(name):
     arm, random = load(name), np.random.default_rng(1)
     drawn = [draws.limits(arm, random) for _ in range(100)]
     robot = Subject(arm, np.array(next(iter(arm.poses.values()))), paper_payload(arm, 0.0))

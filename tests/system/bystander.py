@@ -1,4 +1,4 @@
-"""A client that has nothing to do with what goes wrong, and must not notice."""
+"""A client that a fault must not disturb."""
 
 import math
 from itertools import pairwise
@@ -7,7 +7,7 @@ from tests.conformance.wire import Wire
 
 
 class Bystander(Wire):
-    """Sees every state and event of a robot, over a connection of its own."""
+    """Receives all states and events of a robot over its own connection."""
 
     def __enter__(self):
         self.listen("state", "event", "telemetry")
@@ -15,19 +15,19 @@ class Bystander(Wire):
         return self
 
     def until_later(self, ticks=0):
-        """Let ticks pass; the state after them."""
+        """Wait for a number of ticks; return the state after them."""
         return self.until(self.received["state"][-1]["tick"] + ticks)
 
     def event(self, kind, **options):
-        """The first event of a kind since this began to look."""
+        """Return the first event of a kind since the connection."""
         return self.wait(
             "event", lambda event: event["kind"] == kind and event["tick"] > self.since, **options
         )
 
     def assert_undisturbed(self, ticks=100):
-        """States have come, in order and sound, and go on coming; a question is answered.
+        """States came in order, are finite and continue to come; a query is answered.
 
-        A machine that is too busy for all of them loses some, but never most.
+        A busy machine loses some states, but never most of them.
         """
         assert self.info()["name"] == self.robot
         self.until_later(ticks)

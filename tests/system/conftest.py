@@ -1,4 +1,4 @@
-"""Served robots, each a process of its own, and sessions with them."""
+"""Served robots, each in its own process, and sessions with them."""
 
 import gc
 import signal
@@ -18,7 +18,7 @@ from .bystander import Bystander
 
 @pytest.fixture(scope="module", autouse=True)
 def collected():
-    """Put aside what earlier tests left: to look through it would stop a client for a quarter of a second."""
+    """Exclude objects of earlier tests from garbage collection, which would stop a client for 0.25 s."""
     gc.collect()
     gc.freeze()
     yield
@@ -27,7 +27,7 @@ def collected():
 
 @pytest.fixture
 def bystander(realtime):  # noqa: F811  the fixture
-    """Somebody else, and the arm at Q1."""
+    """Another client that must not be disturbed; the arm is at Q1."""
     with Wire(realtime.endpoint) as home, home.control("home"):
         pass
     with Bystander(realtime.endpoint) as bystander:
@@ -36,7 +36,7 @@ def bystander(realtime):  # noqa: F811  the fixture
 
 @pytest.fixture
 def start():
-    """Start a client process; it says when it does what it was asked to."""
+    """Return a function that starts a client process and waits until it reports that it is under way."""
     processes = []
 
     def start(*arguments):
@@ -54,9 +54,9 @@ def start():
 
 @pytest.fixture
 def called(monkeypatch, capfd, tmp_path):
-    """Run the program in this process, as the console script does; its exit code, stdout and stderr."""
+    """Return a function that runs `tvist` in this process; it returns exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(signal, "signal", lambda *_: None)  # this process keeps its own
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # this process keeps its handlers
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["tvist", *arguments])

@@ -1,4 +1,4 @@
-"""Podman with a store of its own, a base image made from the distribution, and robots in containers."""
+"""Podman with its own storage, a base image made from the distribution, and robots in containers."""
 
 import json
 import os
@@ -18,29 +18,29 @@ TOOLS = {
     "podman": "podman", "runc": "runc", "iptables": "iptables", "mmdebstrap": "mmdebstrap",
     "/usr/lib/podman/netavark": "netavark", "/usr/lib/podman/aardvark-dns": "aardvark-dns",
 }  # fmt: skip
-"""Program, and the package that brings it."""
+"""Programs, and the packages that contain them."""
 BASE = (
     "--variant=minbase", "--include=python3,python3-venv,ca-certificates", "--dpkgopt=path-exclude=/usr/share/doc/*",
     "--dpkgopt=path-exclude=/usr/share/man/*", "--dpkgopt=path-exclude=/usr/share/locale/*", "bookworm",
 )  # fmt: skip
-"""As `python:3.11-slim-bookworm`: the same Debian and Python, and little else."""
+"""Like `python:3.11-slim-bookworm`: the same Debian and Python, and little else."""
 MACHINES_OWN = ("/etc/pip.conf", "/etc/ssl/certs", "/usr/local/share/ca-certificates")
-"""How this machine reaches package indexes, lent to a build."""
+"""Files with this machine's access to package indexes, mounted in a build."""
 BUILD_TIME = 600.0
 
 
 def not_tested(why):
-    """Say loudly that nothing was tested."""
+    """Skip with a clear message."""
     pytest.skip(f"CONTAINER NOT TESTED: {why}")
 
 
 def said(result):
-    """The last that a program said."""
+    """Return the end of a program's output."""
     return " ".join((result.stderr or result.stdout).split())[-300:]
 
 
 def install(*packages):
-    """Have programs of the distribution, or say that they cannot be had."""
+    """Install packages of the distribution, or skip the test."""
     if os.geteuid() != 0:
         not_tested(f"{', '.join(packages)} missing, and only root may install")
     if shutil.which("apt-get") is None:
@@ -56,10 +56,10 @@ def install(*packages):
 
 
 class Engine:
-    """Podman as the tests use it, without any trace in the store or the networks of the machine.
+    """Podman, which leaves nothing in the storage and the networks of the machine.
 
     Args:
-        folder: Where images, containers and networks are kept.
+        folder: Storage of images, containers and networks.
     """
 
     def __init__(self, folder):
@@ -68,7 +68,7 @@ class Engine:
             install(*missing)
         self.folder = folder
         configuration = {
-            # Limits and runtime that also work where the tests are in a container or a small machine themselves.
+            # These limits and this runtime also work inside a container or a small machine.
             "containers.conf": (
                 '[containers]\ndefault_ulimits = ["nofile=1024:10000", "nproc=4096:4096"]\n'
                 '[engine]\nruntime = "runc"\ncgroup_manager = "cgroupfs"\nevents_logger = "file"\n'
@@ -80,29 +80,25 @@ class Engine:
         }
         for name, content in configuration.items():
             (folder / name).write_text(content, encoding="utf-8")
-        self.environment = {
-            **os.environ,
-            "CONTAINERS_CONF": str(folder / "containers.conf"),
-            "CONTAINERS_STORAGE_CONF": str(folder / "storage.conf"),
-        }
+        files = {"CONTAINERS_CONF": "containers.conf", "CONTAINERS_STORAGE_CONF": "storage.conf"}
+        self.environment = os.environ | {name: str(folder / file) for name, file in files.items()}
 
     def __call__(self, *command, timeout=PATIENCE, check=True):
-        """Run `podman` with a command; what it says on stdout."""
+        """Run a podman command; return its stdout."""
         return self.run("podman", *command, timeout=timeout, check=check).stdout.strip()
 
     def run(self, *command, timeout=PATIENCE, check=True, **environment):
-        """Run a program that drives podman."""
+        """Run a program that uses podman."""
         result = subprocess.run(
             list(map(str, command)),
             capture_output=True, text=True, timeout=timeout, check=False, env=self.environment | environment,
         )  # fmt: skip
-        assert not check or result.returncode == 0, (
-            f"{command}: {result.stdout[-2000:]}{result.stderr[-4000:]}"
-        )
+        said = result.stdout[-2000:] + result.stderr[-4000:]
+        assert not check or result.returncode == 0, f"{command}: {said}"
         return result
 
     def base(self, name):
-        """Make a base image out of the distribution's own packages."""
+        """Make a base image from packages of the distribution."""
         archive = self.folder / "base.tar"
         result = self.run("mmdebstrap", *BASE[:-1], BASE[-1], archive, timeout=BUILD_TIME, check=False)
         if result.returncode != 0:
@@ -111,7 +107,7 @@ class Engine:
         archive.unlink()
 
     def build(self, base, name):
-        """Build the image as docker/README.md says, over another base."""
+        """Build the image like docker/README.md, on another base."""
         lent = [f"--volume={path}:{path}:ro" for path in MACHINES_OWN if Path(path).exists()]
         self(
             "build", "--format=docker", "--network=host", *lent, f"--build-arg=BASE={base}",
@@ -119,11 +115,11 @@ class Engine:
         )  # fmt: skip
 
     def inspect(self, name, kind="container"):
-        """What podman knows of a container or an image."""
+        """Return podman's description of a container or an image."""
         return json.loads(self(kind, "inspect", name))[0]
 
     def close(self):
-        """Leave nothing running, mounted or routed."""
+        """Stop containers, and remove mounts and networks."""
         self("rm", "--all", "--force", "--time=0")
         self("network", "prune", "--force")
         self("image", "unmount", "--all", "--force", check=False)
@@ -131,12 +127,12 @@ class Engine:
 
 
 class Contained(Served):
-    """A robot in a container: nothing to write to, no capabilities, on a bridge network.
+    """A robot in a container with a read-only file system, without capabilities, on a bridge network.
 
     Args:
         engine: Podman.
         options: Of `podman run`.
-        command: What stands behind the image; without, what the image runs by itself.
+        command: Command and arguments; empty: those of the image.
     """
 
     def __init__(self, engine, *options, command=()):
@@ -157,11 +153,11 @@ class Contained(Served):
 
     @property
     def pid(self):
-        """Of the container's first process, as seen from here."""
+        """Return the number of the container's first process on this machine."""
         return self.engine.inspect(self.name)["State"]["Pid"]
 
     def end(self, number=signal.SIGTERM):
-        """Send a signal to the first process and wait for its end; the exit code."""
+        """Send a signal to the first process, wait for its end, and return the exit code."""
         watch = os.pidfd_open(self.pid)
         try:
             signal.pidfd_send_signal(watch, number)
@@ -172,6 +168,6 @@ class Contained(Served):
         return self.wait()
 
     def kill(self):
-        """Make sure that it is gone, and its network with it."""
+        """Remove the container and its network."""
         self.engine("rm", "--force", "--ignore", "--time=0", self.name)
         super().kill()

@@ -15,10 +15,8 @@ from tests.conformance.wire import Q1, Wire
 
 def main(endpoint, what, *options):
     given = dict(option.split("=") for option in options if "=" in option)
-    lease_s, amplitude, rate = (
-        float(given.get(name, usual))
-        for name, usual in (("lease_s", 30.0), ("amplitude", 0.1), ("rate", 1.0))
-    )
+    usual = {"lease_s": 30.0, "amplitude": 0.1, "rate": 1.0}
+    lease_s, amplitude, rate = (float(given.get(name, value)) for name, value in usual.items())
     with Wire(endpoint) as wire:
         if "announced" in options:
             wire.announce("dying")
@@ -29,11 +27,11 @@ def main(endpoint, what, *options):
         else:
             answer = wire.command("servo_start", token=token, period=0.008)
             assert answer == {"type": "done"}, answer
-        print("under way", flush=True)  # noqa: T201  whoever started it waits for that
+        print("under way", flush=True)  # noqa: T201  the test waits for that
         if what == "move":
             threading.Event().wait()
         tick = wire.state()["tick"]
-        for sequence in range(100_000):  # a set-point every 8 ms, by the robot's own ticks
+        for sequence in range(100_000):  # a set-point every 8 ms of the robot's time
             tick = wire.until(tick + 4)["tick"]
             offset = amplitude * (1.0 - math.cos(0.008 * rate * sequence))
             wire.setpoint(token=token, sequence=sequence, q=[offset, *Q1[1:]])

@@ -1,4 +1,4 @@
-"""Keys made by `tvist keys`, and certificates that it would not make."""
+"""Keys made by `tvist keys`, and invalid certificates."""
 
 import os
 from datetime import UTC, datetime, timedelta
@@ -19,21 +19,21 @@ def free_tls_endpoint():
 
 
 def made(folder, *options):
-    """A folder of keys for a robot on this machine."""
+    """Make keys for a robot of this machine; return their folder."""
     robot = ("--robot", "ur5e", "--host", "127.0.0.1", "--host", "localhost")
     tvist("keys", folder, *robot, *options).assert_done()
     return folder
 
 
 def leave_out(folder, name):
-    """Take a name's rights away, as a person does."""
+    """Revoke the rights of a name."""
     path = folder / "clients.toml"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(line for line in lines if f'"{name}"' not in line))
 
 
 def shown(folder, authority=None, certificate=None, key=None):
-    """Settings of a Zenoh session that shows a client's certificate; any file may be another's."""
+    """Return settings of a Zenoh session with a client's certificate; each file can be replaced."""
     return {
         f"{TLS}enable_mtls": True,
         f"{TLS}root_ca_certificate": str(authority or folder / "authority.pem"),
@@ -45,16 +45,16 @@ def shown(folder, authority=None, certificate=None, key=None):
 def forge(
     folder: Path, name, *, issuer=None, key=None, days=1.0, usage=ExtendedKeyUsageOID.CLIENT_AUTH, chain=False
 ):
-    """A folder with a client's certificate of our own making; the authority in it is the robot's.
+    """Make a folder with a client's certificate; return the folder.
 
     Args:
-        folder: Where to put it.
-        name: Its common name.
-        issuer: Certificate and key files that sign it; itself where there are none.
-        key: Key file it is made for; a new one where there is none.
-        days: When it ends, from now.
-        usage: What it is good for.
-        chain: Whether to show the issuer's certificate behind it.
+        folder: The new folder.
+        name: Common name.
+        issuer: Files of the signing certificate and key; None: self-signed.
+        key: File of its key; None: a new one.
+        days: Time until it expires [days].
+        usage: Extended key usage.
+        chain: Whether to append the issuer's certificate.
     """
     folder.mkdir()
     own = read_key(key) if key else ec.generate_private_key(ec.SECP256R1())
@@ -89,4 +89,4 @@ def read_key(path):
 
 
 def mode(path):
-    return os.stat(path).st_mode & 0o777  # noqa: PTH116  with Path.stat it reads no better
+    return os.stat(path).st_mode & 0o777  # noqa: PTH116  Path.stat reads no better

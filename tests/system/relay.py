@@ -1,4 +1,4 @@
-"""A link between whoever connects and a server, which can be cut, held up, delayed and made slow."""
+"""A TCP link between clients and a server that can be cut, stopped and slowed down."""
 
 import contextlib
 import socket
@@ -6,34 +6,34 @@ import threading
 import time
 from queue import SimpleQueue
 
-CHUNK = 4096
-"""Bytes that are passed on at once."""
-ROOM = 1 << 14
-"""Bytes that the link itself holds each way; small, so that a link that stands still is soon felt."""
-Address = tuple[str, int]
-"""IP address and port."""
+from tests.places import free_port
+
+CHUNK = 4096  # bytes passed on at once
+ROOM = 1 << 14  # bytes that the link holds each way; few, so that a stopped link has an effect soon
 
 
 class Relay:
-    """Passes bytes on between its own address and a server's, both ways and in their order."""
+    """Passes bytes on between its own address and a server's, both ways and in order.
 
-    def __init__(self, target, near):
-        self._target, self._near = target, near
+    Args:
+        target: The server's endpoint, `tcp/<host>:<port>`.
+        near: IP address and port where it listens; None for a free port of 127.0.0.1.
+    """
+
+    def __init__(self, target, near=None):
+        host, port = target.partition("/")[2].split(":")
+        self._target, self._near = (host, int(port)), near or ("127.0.0.1", free_port())
         self._flowing, self._lock = threading.Event(), threading.Lock()
         self._listening: socket.socket | None = None
         self._open = set[socket.socket]()
-        self.delay = 0.0
-        """Time that bytes take each way [s]."""
-        self.rate: float | None = None
-        """Bytes a second each way; None: as many as come."""
-        self.connections = 0
-        """Number of times that somebody has connected."""
+        self.rate: float | None = None  # bytes per second each way; None: unlimited
+        self.connections = 0  # number of connections so far
         self.flow()
         self.restore()
 
     @property
     def endpoint(self):
-        """Its address in Zenoh's notation."""
+        """Return its address in Zenoh's notation."""
         return "tcp/{}:{}".format(*self._near)
 
     def __enter__(self):
@@ -42,18 +42,16 @@ class Relay:
     def __exit__(self, *_):
         self.cut()
 
-    # ---------------------------------------------------------------- what can happen to it
-
     def hold(self):
-        """Let nothing pass, as with a cable that is pulled: connections stay, and what comes waits."""
+        """Let nothing pass, as if a cable were pulled: connections stay, and bytes wait."""
         self._flowing.clear()
 
     def flow(self):
-        """Let pass what has waited and what comes."""
+        """Pass on waiting and new bytes."""
         self._flowing.set()
 
     def cut(self):
-        """Break all connections, and refuse new ones."""
+        """Close all connections, and refuse new ones."""
         with self._lock:
             listening, self._listening = self._listening, None
             ended, self._open = self._open, set()
@@ -64,15 +62,13 @@ class Relay:
         self.flow()
 
     def restore(self):
-        """Take connections again, at the same place."""
+        """Accept connections again at the same address."""
         self._listening = listening = socket.create_server(self._near)
         threading.Thread(target=self._accept, args=(listening,), daemon=True).start()
 
     def takes(self):
         """Return the time that the next bytes take [s]."""
-        return self.delay
-
-    # ---------------------------------------------------------------- threads
+        return 0.0
 
     def _accept(self, listening):
         while True:
@@ -85,8 +81,12 @@ class Relay:
                 one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, ROOM)
                 one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, ROOM)
                 one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            with contextlib.suppress(OSError):  # its side then ends at once, as a refused one does
+            try:
                 far.connect(self._target)
+            except OSError:  # no server listens
+                near.close()
+                far.close()
+                continue
             with self._lock:
                 if self._listening is not listening:
                     near.close()

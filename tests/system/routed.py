@@ -1,11 +1,11 @@
-"""A router as a process, and a client behind it."""
+"""A router in a process, and clients behind it."""
 
 from tests.conformance.served import Served
 from tests.conformance.wire import Wire
 
 
 class Router(Served):
-    """`tvist router`, as a user starts it."""
+    """`tvist router` in a process."""
 
     program = ("-m", "tvist_cli", "router")
 
@@ -14,5 +14,5 @@ class Router(Served):
 
 
 def far(endpoint, robot, namespace):
-    """A client of a robot in a namespace."""
+    """Return a client of a robot in a namespace."""
     return Wire(endpoint, robot, {"namespace": namespace} if namespace else ())

@@ -1,34 +1,28 @@
-"""A link between a robot's RTDE interface and its reader: it delays, loses and repeats rows, and notes what passes."""
+"""A link between a robot's RTDE interface and its reader: it delays, drops, repeats and records rows."""
 
 import random
 from struct import Struct
 
-from tests.system.proxy import Proxy
+from tests.system.relay import Relay
 
 from tvist_server.rtde.codec import PackageKind, PackageReader, package
 
 _DOUBLE = Struct(">d")
 
 
-class RtdeLink(Proxy):
-    """Passes packages on.
+class RtdeLink(Relay):
+    """Passes packages on; what it drops and repeats depends on a seed."""
 
-    Args:
-        target: The robot's endpoint.
-        seed: Seed of what is lost and repeated.
-        address: See `Proxy`.
-    """
-
-    def __init__(self, target, seed=0, address=None):
+    def __init__(self, target, seed=0):
         self._random = random.Random(seed)
         self.sent, self.passed = [], []
-        """Kinds of the packages that the reader has sent; timestamps of the rows of each connection that has passed."""
+        """Kinds of the reader's packages, and for each connection the timestamps of the rows that passed."""
         self.slow, self.lost, self.repeated = False, 0.0, 0.0
-        """Whether the robot is of 125 Hz, and the shares of the rows that are lost and repeated."""
-        super().__init__(target, address)
+        """Whether the robot sends at 125 Hz, and the shares of rows that are dropped and repeated."""
+        super().__init__(target)
 
     def takes(self):
-        """1 ms ± 0.5 ms; bytes keep their order."""
+        """Return 1 ms ± 0.5 ms; bytes keep their order."""
         return self._random.uniform(5e-4, 1.5e-3)
 
     def _give(self, sink, under_way):

@@ -1,4 +1,4 @@
-"""The `tvist` program, and what it said when it ended."""
+"""The program `tvist`, and its output."""
 
 import json
 import subprocess
@@ -9,21 +9,21 @@ from tests.conformance.served import NOISE, finished
 
 
 class Ended:
-    """A program that has ended: its exit code, and what it said."""
+    """A program that has ended, with exit code and output."""
 
     def __init__(self, code, out, err):
         self.code, self.out, self.err = code, out, err
 
     @property
     def json(self):
-        """The one JSON object on stdout."""
+        """Return the only JSON object on stdout."""
         (line,) = self.out.splitlines()
         value = json.loads(line)
         assert isinstance(value, dict)
         return value
 
     def assert_failed(self, code, *words):
-        """With this exit code and one sentence on stderr in which these words stand."""
+        """It ended with this exit code and one line on stderr that has these words."""
         assert self.code == code, self.err
         assert self.err.startswith("tvist: ")
         assert self.err.count("\n") == 1, self.err
@@ -46,6 +46,6 @@ def tvist(*arguments, **options):
 
 
 def begun(*arguments, **options):
-    """The program, which goes on until it is interrupted."""
+    """Start the program, and return its process."""
     words = [sys.executable, "-m", "tvist_cli", *map(str, arguments)]
     return forked.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)

@@ -1,4 +1,4 @@
-"""The image of docker/, built and run: what it weighs, what it may, how it starts and ends, what it keeps up."""
+"""The image of docker/: its size, rights, start, end and recordings."""
 
 import os
 import shutil
@@ -27,7 +27,7 @@ from tvist_cli.main import main
 sys.argv[0] = "tvist"
 main()
 """
-"""tvist, made to believe that it runs on a processor of another name."""
+"""tvist on a processor that seems to have another name."""
 SERVE = ("serve", "--listen", "tcp/0.0.0.0:7447", "--insecure")
 
 
@@ -46,20 +46,20 @@ def engine(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def robot(engine):
-    """A robot in a container, with a client's view of it."""
+    """A robot in a container."""
     with Contained(engine) as robot:
         yield robot
 
 
 def status(engine, name):
-    """What the kernel says of a container's first process."""
+    """Return the kernel's status of a container's first process."""
     pid = engine.inspect(name)["State"]["Pid"]
     lines = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
     return {key: value.split() for key, _, value in (line.partition(":") for line in lines)}
 
 
 def drive(endpoint):
-    """Have every way of moving and every shaper compute."""
+    """Move in every way, with each shaper."""
     with Wire(endpoint) as wire, wire.control() as token:
 
         def do(type, **fields):  # noqa: A002  the wire's name
@@ -84,7 +84,7 @@ def drive(endpoint):
         wire.next("state", lambda state: state["target_qd"][0] == 0.0)
 
 
-def test_the_image_weighs_at_most_700_mb_without_what_only_building_and_looking_need(engine, measured):
+def test_image_has_at_most_700_mb_and_no_files_for_development(engine, measured):
     layers = engine.inspect("tvist", "image")["Size"]
     image = Path(engine("image", "mount", "tvist"))
     du = engine.run("du", "--summarize", "--block-size=1", "--one-file-system", image)
@@ -97,7 +97,7 @@ def test_the_image_weighs_at_most_700_mb_without_what_only_building_and_looking_
     engine("image", "unmount", "tvist")
 
 
-def test_it_is_nobody_with_no_rights_and_nothing_to_write_to(engine, robot):
+def test_process_has_no_rights_and_a_read_only_file_system(engine, robot):
     configured = engine.inspect("tvist", "image")["Config"]
     assert configured["User"] == "10001:10001"
     seen = status(engine, robot.name)
@@ -110,7 +110,7 @@ def test_it_is_nobody_with_no_rights_and_nothing_to_write_to(engine, robot):
         assert "Read-only file system" in touched.stderr
 
 
-def test_the_health_check_is_liveness_and_a_robot_that_has_stopped_is_healthy_and_not_ready(engine):
+def test_health_check_is_liveness_and_passes_for_a_stopped_robot(engine):
     assert engine.inspect("tvist", "image")["Healthcheck"]["Test"] == ["CMD", "tvist", "check", "--alive"]
     with Contained(engine) as robot:
         with Wire(robot.endpoint) as wire, wire.control() as token:
@@ -127,8 +127,8 @@ def test_the_health_check_is_liveness_and_a_robot_that_has_stopped_is_healthy_an
     [((), ()), (("--entrypoint=python",), ("-c", FOREIGN_MACHINE, *SERVE))],
     ids=["as it comes", "another machine"],
 )
-def test_on_a_processor_of_any_name_nothing_is_compiled(engine, options, command):
-    """numba files machine code under processor and features; it says what it loads, and what it compiles it saves."""
+def test_nothing_is_compiled_on_a_processor_of_another_name(engine, options, command):
+    """numba stores machine code by processor and features; it reports what it loads and saves."""
     talk = ("--env=NUMBA_DEBUG_CACHE=1", "--env=PYTHONUNBUFFERED=1")
     with Contained(engine, *talk, *options, command=command) as robot:
         drive(robot.endpoint)
@@ -140,18 +140,16 @@ def test_on_a_processor_of_any_name_nothing_is_compiled(engine, options, command
     assert "compiling" not in robot.said
 
 
-def test_with_keys_mounted_it_shows_itself_to_who_has_one_and_to_nobody_else(engine, tmp_path):
-    """As docker/README.md says: the health check is a viewer, and the authority's key stays outside."""
+def test_robot_with_mounted_keys_answers_clients_with_a_key_only(engine, tmp_path):
+    """As in docker/README.md, the health check is a viewer, and the authority's key stays outside."""
     keys = tmp_path / "keys"
     host = ("--robot", "ur5e", "--host", "127.0.0.1")
     engine.run(sys.executable, "-m", "tvist_cli", "keys", keys, *host, "--viewer", "health")
     (keys / "authority.key").unlink()
     for path in (keys, *keys.rglob("*")):
         os.chown(path, 10001, 10001)
-    options = (
-        f"--volume={keys}:/security:ro",
-        "--health-cmd=tvist check --alive tls/127.0.0.1:7447 --security /security/health",
-    )
+    health = "--health-cmd=tvist check --alive tls/127.0.0.1:7447 --security /security/health"
+    options = (f"--volume={keys}:/security:ro", health)
     command = ("serve", "--listen", "tls/0.0.0.0:7447", "--security", "/security")
     with Contained(engine, *options, command=command) as robot:
         assert engine.run("podman", "healthcheck", "run", robot.name).returncode == 0
@@ -159,7 +157,7 @@ def test_with_keys_mounted_it_shows_itself_to_who_has_one_and_to_nobody_else(eng
         assert check(robot.endpoint.replace("tcp/", "tls/"), security=keys / "health").ok
 
 
-def test_the_compose_file_brings_up_a_robot_with_a_recorder_whose_volume_stays(engine):
+def test_compose_file_starts_a_robot_that_records_into_a_volume(engine):
     if shutil.which("podman-compose") is None:
         install("podman-compose")
     port = free_endpoint().rpartition(":")[2]

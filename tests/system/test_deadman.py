@@ -1,6 +1,6 @@
-"""The deadman: a sender killed or frozen in mid-stream stops the arm, in time and inside the limits, every time.
+"""Dead-man's switch: the arm stops in time and within its limits when a streaming client is killed or suspended.
 
-Time is the robot's own, from the recording: its journal says before which tick the last set-point was taken.
+Times are those of the recording, whose journal has the tick of the last set-point.
 """
 
 import random
@@ -22,30 +22,25 @@ from .bystander import Bystander
 pytestmark = pytest.mark.realtime
 
 CLIENT = Path(__file__).with_name("dying_client.py")
-WITHIN = 0.26
-"""From the last set-point to the beginning of the stop [s]."""
-WAYS = (
-    (signal.SIGKILL, ()),
-    (signal.SIGSTOP, ()),
-    (signal.SIGKILL, ("announced",)),
-    (signal.SIGSTOP, ("announced",)),
-)
-"""How a sender ends, and whether the robot knew of its presence: where it did, a killed one is missed at once."""
-STREAM = ("amplitude=0.4", "rate=2.0")
-"""Up to 0.8 rad/s and 1.6 rad/s², within the 1.5 and 2 of such a stream."""
+WITHIN = 0.26  # longest time from the last set-point to the start of the stop [s]
+WAYS = [(how, options) for options in ((), ("announced",)) for how in (signal.SIGKILL, signal.SIGSTOP)]
+"""How a client ends, and whether it had a liveliness token, without which a killed one is noticed later."""
+STREAM = ("amplitude=0.4", "rate=2.0")  # up to 0.8 rad/s and 1.6 rad/s²; the limits are 1.5 and 2
 
 
 @pytest.mark.parametrize(
-    "times", [2, pytest.param(20, marks=[pytest.mark.nightly, pytest.mark.timeout(900)])]
+    ("times", "most"),
+    [(2, 60), pytest.param(20, 200, marks=[pytest.mark.nightly, pytest.mark.timeout(900)])],
 )
-def test_a_sender_that_dies_or_freezes_is_stopped_within_260_ms_inside_the_limits(times, tmp_path, measured):
+def test_arm_stops_within_260_ms_and_its_limits_after_a_client_dies(times, most, tmp_path, measured):
+    """Each client ends after a random number of set-points, `most` at most."""
     path, rng, ends = tmp_path / "run.mcap", random.Random(0), []
     with Served("--record", str(path)) as served:
         with Bystander(served.endpoint) as bystander:
             limits = bystander.info()["limits"]
             for number in range(times):
                 how, options = WAYS[number % len(WAYS)]
-                ends.append(stream_and_end(served.endpoint, bystander, how, options, rng.randrange(5, 200)))
+                ends.append(stream_and_end(served.endpoint, bystander, how, options, rng.randrange(5, most)))
             bystander.assert_undisturbed()
         assert served.end() == 0
     content = read(path)
@@ -55,26 +50,24 @@ def test_a_sender_that_dies_or_freezes_is_stopped_within_260_ms_inside_the_limit
     silences = [silence(content, end) for end in ends]
     measured(f"silence of {times} before the stop [s of tick time]", (min(silences), max(silences)))
     assert 0.0 < min(silences) <= max(silences) <= WITHIN
-    most, torque = (
+    hardest, torque = (
         np.max([of(content, end) for end in ends], axis=0) for of in (acceleration, target_moment)
     )
-    measured("acceleration of q* of each joint [rad per s^2]", most.round(2).tolist())
+    measured("acceleration of q* of each joint [rad per s^2]", hardest.round(2).tolist())
     measured("torque by inverse dynamics of each joint [N m]", torque.round(1).tolist())
     assert not [event for event in content.events if event.kind == "protective_stop"]
-    assert (most <= np.array(limits["acceleration"]) * (1 + 1e-6)).all()
+    assert (hardest <= np.array(limits["acceleration"]) * (1 + 1e-6)).all()
     assert (torque <= np.array(limits["torque"])).all()
 
 
 def stream_and_end(endpoint, bystander, how, options, setpoints):
-    """Have a client stream and end; ticks at which it moved, at which its stream was stopped, and of rest."""
+    """Let a client stream and end; return the ticks of its start, of the stop and of rest."""
     token = bystander.command("take_control", client="home")["token"]
     assert bystander.command("simulation.reset", token=token, q=Q1, mode="RUNNING")["type"] == "done"
     assert bystander.command("release_control", token=token) == {"type": "done"}
     began = bystander.until_later(5)["tick"]
-    client = forked.Popen(
-        [sys.executable, CLIENT, endpoint, "stream", "lease_s=1", *options, *STREAM],
-        stdout=subprocess.PIPE,
-    )
+    command = [sys.executable, CLIENT, endpoint, "stream", "lease_s=1", *options, *STREAM]
+    client = forked.Popen(command, stdout=subprocess.PIPE)
     try:
         assert client.stdout.readline() == b"under way\n"
         bystander.next("state", lambda state: (state["setpoint_sequence"] or 0) > setpoints)
@@ -92,24 +85,22 @@ def stream_and_end(endpoint, bystander, how, options, setpoints):
 
 
 def silence(content, end):
-    """From the last set-point that was taken to the stop [s]."""
+    """Return the time from the last accepted set-point to the stop [s]."""
     began, stopped, _ = end
-    taken = [
-        entry.tick for entry in content.journal if entry.kind == "setpoint" and began < entry.tick <= stopped
-    ]
+    setpoints = [entry.tick for entry in content.journal if entry.kind == "setpoint"]
+    taken = [tick for tick in setpoints if began < tick <= stopped]
     return (stopped - taken[-1]) * TICK
 
 
 def acceleration(content, end):
-    """Largest of each joint from before the stream to rest, by second differences of q* [rad/s^2], shape (6,)."""
+    """Return each joint's largest |q̈*| until rest, by second differences [rad/s^2], shape (6,)."""
     began, _, rest = end
     target = np.array([state.target_q for state in content.states if began <= state.tick <= rest])
     return np.abs(np.diff(target, 2, axis=0)).max(axis=0) / TICK**2
 
 
 def target_moment(content, end):
-    """Largest τ* of each joint meanwhile [N m], shape (6,)."""
+    """Return each joint's largest |τ*| until rest [N m], shape (6,)."""
     began, _, rest = end
-    return np.abs([state.target_moment for state in content.states if began <= state.tick <= rest]).max(
-        axis=0
-    )
+    moments = [state.target_moment for state in content.states if began <= state.tick <= rest]
+    return np.abs(moments).max(axis=0)

@@ -1,6 +1,6 @@
-"""A disk that is full under the recorder, and a file that is moved: robot and clients go on, and are told.
+"""A full disk and a moved recording are reported; the robot continues.
 
-A disk that does not answer is tests/server/test_recording.py.
+A disk that does not answer: tests/server/test_recording.py.
 """
 
 import resource
@@ -15,7 +15,7 @@ from .bystander import Bystander
 pytestmark = pytest.mark.realtime
 
 
-def test_a_disk_that_fills_up_ends_the_recording_and_is_named_and_counted(tmp_path):
+def test_full_disk_ends_the_recording_and_is_reported(tmp_path):
     path, why = tmp_path / "run.mcap", "has stopped and is incomplete: File too large"
     with Served("--record", str(path)) as served:
         with Bystander(served.endpoint) as bystander, bystander.control("mover") as token:
@@ -31,11 +31,11 @@ def test_a_disk_that_fills_up_ends_the_recording_and_is_named_and_counted(tmp_pa
         assert served.lines[-1].startswith("tvist: the recording")
     content = read(path)
     assert not content.complete
-    # What was written is there, from the first tick on and without a gap.
+    # It has all ticks from the first one on.
     assert [state.tick for state in content.states] == list(range(1, len(content.states) + 1))
 
 
-def test_a_recording_that_is_moved_goes_on_there_and_is_told_to_all(tmp_path):
+def test_moved_recording_continues_in_its_new_place(tmp_path):
     path, new = tmp_path / "run.mcap", tmp_path / "moved.mcap"
     with Served("--record", str(path)) as served:
         with Bystander(served.endpoint) as bystander:
@@ -43,7 +43,7 @@ def test_a_recording_that_is_moved_goes_on_there_and_is_told_to_all(tmp_path):
             served.wait_until_said("was moved away")
             why = f"the recording {path} was moved away: it continues in {new}"
             bystander.wait("event", lambda event: event.get("why") == why)
-            bystander.until_later(500)
+            bystander.until_later(200)
             last = bystander.received["state"][-1]["tick"]
             bystander.assert_undisturbed()
         assert served.end() == 0

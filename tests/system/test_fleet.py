@@ -1,4 +1,4 @@
-"""Robots behind a router: found, told apart by namespaces, stopped together, and back after the router was gone."""
+"""Robots behind a router are found, distinguished by namespace, stopped together, and found again after a crash."""
 
 import asyncio
 import json
@@ -22,8 +22,7 @@ from .shell import begun, tvist
 from .test_wrong_invocations import assert_said
 
 LOCKSTEP = ("--clock", "lockstep")
-MOST_ROUNDS = 50_000
-"""Rounds of messages after which a robot whose states do not come has been starved."""
+MOST_ROUNDS = 50_000  # after as many rounds of messages a robot without states is starved
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +33,7 @@ def router():
 
 @pytest.fixture(scope="module")
 def robots(router):
-    """Two robots without a namespace, and one in one that is called like the first of them."""
+    """Two robots without a namespace, and one with the first one's name in a namespace."""
     with (
         Served(*LOCKSTEP, "--robots", "ur5e*2", name=None, router=router.endpoint),
         Served(*LOCKSTEP, "--namespace", "hall-3/line-1", name="ur5e-1", router=router.endpoint) as third,
@@ -45,7 +44,7 @@ def robots(router):
 ALL = [RobotPlace("", "ur5e-1"), RobotPlace("", "ur5e-2"), RobotPlace("hall-3/line-1", "ur5e-1")]
 
 
-def test_all_are_found_and_each_is_known_by_its_namespace(router, robots):
+def test_fleet_finds_all_robots_with_their_namespaces(router, robots):
     async def look(namespace):
         async with Fleet(router.endpoint, namespace=namespace) as fleet:
             return [RobotPlace(robot.namespace, robot.name) for robot in await fleet.look() if robot.ready]
@@ -55,7 +54,7 @@ def test_all_are_found_and_each_is_known_by_its_namespace(router, robots):
     assert asyncio.run(look("hall-4")) == []
 
 
-def test_robots_of_one_name_in_two_namespaces_never_meet(router, robots):
+def test_robots_of_one_name_in_two_namespaces_are_separate(router, robots):
     with (
         far(router.endpoint, "ur5e-1", "") as here,
         far(router.endpoint, "ur5e-1", "hall-3/line-1") as there,
@@ -67,7 +66,7 @@ def test_robots_of_one_name_in_two_namespaces_never_meet(router, robots):
         assert here.command("move_j", token=other, q=Q1)["code"] == "stale_token"
 
 
-def test_stop_reaches_all_and_a_robot_that_is_not_there_is_no_success(router, robots):
+def test_stop_reaches_all_robots_and_reports_a_missing_one(router, robots):
     at = ("--endpoint", router.endpoint)
     stopped = tvist("stop", "--all", *at, "--json").assert_done().json["robots"]
     assert [report["ok"] for report in stopped] == [True] * 3
@@ -83,7 +82,7 @@ def test_stop_reaches_all_and_a_robot_that_is_not_there_is_no_success(router, ro
     assert reports == [("ur5e-9", False, "it does not answer"), ("ur5e-1", True, "stopped")]
 
 
-def test_watch_shows_all_robots_and_of_one_its_states(router, robots):
+def test_watch_shows_all_robots_or_the_states_of_one(router, robots):
     def first_line(*options):
         process = begun("watch", router.endpoint, *options, "--json")
         line = process.stdout.readline()
@@ -95,7 +94,7 @@ def test_watch_shows_all_robots_and_of_one_its_states(router, robots):
     assert first_line("--namespace", "hall-3")["type"] == "state"
 
 
-def test_states_of_many_come_by_one_key(router, robots):
+def test_states_of_many_robots_come_by_one_key(router, robots):
     async def look():
         async with ManyStates("**/tvist/*/state", router.endpoint) as states:
             while len(found := states.look()) < 3:  # noqa: ASYNC110  in lockstep a state comes once a second
@@ -105,7 +104,7 @@ def test_states_of_many_come_by_one_key(router, robots):
     assert sorted(asyncio.run(asyncio.wait_for(look(), PATIENCE))) == ALL
 
 
-def test_a_router_that_was_killed_finds_all_again_and_no_robot_has_stopped():
+def test_robots_run_on_and_are_found_again_after_a_router_was_killed():
     router = Router()
     router.wait_until_ready()
     with Served(*LOCKSTEP, "--robots", "ur5e*2", name=None, router=router.endpoint):
@@ -124,8 +123,8 @@ def test_a_router_that_was_killed_finds_all_again_and_no_robot_has_stopped():
     router.kill()
 
 
-def test_a_reduced_rate_holds_for_each_listed_robot_and_leaves_events_alone():
-    """A round follows when all events of the last one have come: nothing waits in a queue, and no link is lost."""
+def test_router_reduces_the_rate_of_states_of_each_listed_robot_but_not_of_events():
+    """Each round waits for all events of the last one, so that queues stay short and links stay up."""
     names, rounds = [f"r-{number}" for number in (1, 2, 3)], 0
     came, got = Queue(), Counter()
     with (
@@ -133,9 +132,8 @@ def test_a_reduced_rate_holds_for_each_listed_robot_and_leaves_events_alone():
         Wire(router.endpoint) as robot,
         Wire(router.endpoint) as client,
     ):
-        client.session.declare_subscriber(
-            "tvist/*/*", Callback(lambda sample: came.put(str(sample.key_expr)), indirect=False)
-        )
+        take = Callback(lambda sample: came.put(str(sample.key_expr)), indirect=False)
+        client.session.declare_subscriber("tvist/*/*", take)
         publishers = [
             robot.session.declare_publisher(
                 f"tvist/{name}/{leaf}", congestion_control=zenoh.CongestionControl.BLOCK
@@ -154,9 +152,7 @@ def test_a_reduced_rate_holds_for_each_listed_robot_and_leaves_events_alone():
     assert all(3 <= got[f"tvist/{name}/state"] < rounds for name in names), (rounds, got)
 
 
-def test_a_router_that_is_not_there_or_whose_certificate_has_expired_is_said_in_one_sentence(
-    called, monkeypatch, tmp_path
-):
+def test_missing_router_and_expired_certificate_are_reported(called, monkeypatch, tmp_path):
     monkeypatch.setitem(network.CONNECT, "connect/timeout_ms", 200)
     nowhere = free_endpoint()
     said = f"tvist: no connection to {nowhere}: no router answers within 10 s"

@@ -1,4 +1,4 @@
-"""`tvist keys`, and `tvist serve` with what it made, or without."""
+"""`tvist keys`, and `tvist serve` with and without keys."""
 
 import json
 import re
@@ -18,7 +18,7 @@ from tests.conformance.wire import PATIENCE
 from tvist_client.__main__ import main as check_alone
 
 from .keyring import forge, free_tls_endpoint, made, mode
-from .shell import tvist
+from .shell import begun, tvist
 from .test_wrong_invocations import assert_said
 
 ROOT = Path(__file__).parents[2]
@@ -34,7 +34,7 @@ def content(folder):
 
 
 class TestMaking:
-    def test_a_folder_for_the_robot_and_one_for_each_client_with_keys_for_their_owner_alone(self, ring):
+    def test_robot_and_each_client_get_keys_that_only_their_owner_can_read(self, ring):
         of_a_client = ("authority.pem", "client.pem", "client.key")
         clients = {f"{who}/{name}" for who in ("anna", "wall") for name in of_a_client}
         names = {str(path.relative_to(ring)) for path in content(ring)}
@@ -43,12 +43,10 @@ class TestMaking:
         assert {mode(key) for key in ring.rglob("*.key")} == {0o600}
         assert {mode(ring / who) for who in ("anna", "wall")} == {0o700}
 
-    def test_certificates_say_what_they_are_for_and_for_how_long(self, tmp_path):
+    def test_certificates_have_their_usage_and_validity(self, tmp_path):
         ring = made(tmp_path / "ring", "--operator", "anna", "--days", "30")
-        robot, anna = (
-            x509.load_pem_x509_certificate((ring / name).read_bytes())
-            for name in ("robot.pem", "anna/client.pem")
-        )
+        texts = ((ring / name).read_bytes() for name in ("robot.pem", "anna/client.pem"))
+        robot, anna = map(x509.load_pem_x509_certificate, texts)
         names = robot.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
         assert [str(name.value) for name in names] == ["127.0.0.1", "localhost"]
         uses = ((robot, ExtendedKeyUsageOID.SERVER_AUTH), (anna, ExtendedKeyUsageOID.CLIENT_AUTH))
@@ -59,7 +57,7 @@ class TestMaking:
             assert lasts == timedelta(days=30, hours=1)
         assert anna.subject.rfc4514_string() == "CN=anna"
 
-    def test_again_adds_clients_of_the_same_authority_and_overwrites_nothing(self, ring, called):
+    def test_second_call_adds_clients_and_overwrites_nothing(self, ring, called):
         before = content(ring)
         code, out, err = called("keys", str(ring), "--operator", "anna", "--viewer", "otto", "--json")
         assert code == 0, err
@@ -71,39 +69,33 @@ class TestMaking:
     @pytest.mark.parametrize(
         ("options", "code", "words"),
         [
-            (("--operator", "wall"), 1, ["wall already has the role viewer"]),
-            (
-                ("--robot", "other", "--host", "localhost"),
-                1,
-                ["robot.pem belongs to ur5e", "not overwritten"],
-            ),
-            (("--robot", "ur5e", "--host", "elsewhere"), 1, ["belongs to ur5e at 127.0.0.1, localhost"]),
-            (("--viewer", "../etc"), 2, ["client is '../etc'"]),
-            (("--viewer", "authority.pem"), 2, ["client is 'authority.pem'"]),
-            (("--viewer", "a", "--operator", "a"), 2, ["cannot be both operator and viewer"]),
-            (("--host", "999.1.1.1"), 2, ["host is '999.1.1.1'"]),
-            (("--robot", "UR 5"), 2, ["robot is 'UR 5'"]),
-            (("--days", "0"), 2, ["days is 0", "1 to 3650"]),
+            ("--operator wall", 1, ["wall already has the role viewer"]),
+            ("--robot other --host localhost", 1, ["robot.pem belongs to ur5e", "not overwritten"]),
+            ("--robot ur5e --host elsewhere", 1, ["belongs to ur5e at 127.0.0.1, localhost"]),
+            ("--viewer ../etc", 2, ["client is '../etc'"]),
+            ("--viewer authority.pem", 2, ["client is 'authority.pem'"]),
+            ("--viewer a --operator a", 2, ["cannot be both operator and viewer"]),
+            ("--host 999.1.1.1", 2, ["host is '999.1.1.1'"]),
+            ("--robot UR-5", 2, ["robot is 'UR-5'"]),
+            ("--days 0", 2, ["days is 0", "1 to 3650"]),
         ],
     )
-    def test_what_cannot_be_is_said_and_changes_nothing(self, ring, called, options, code, words):
+    def test_invalid_options_are_refused_and_change_nothing(self, ring, called, options, code, words):
         before = content(ring)
-        assert_said(called("keys", str(ring), "--viewer", "otto", *options), code, words)
+        assert_said(called("keys", str(ring), "--viewer", "otto", *options.split()), code, words)
         assert content(ring) == before
 
-    def test_the_first_time_it_needs_robot_and_host(self, called, tmp_path):
+    def test_first_call_needs_robot_and_host(self, called, tmp_path):
         assert_said(called("keys", "ring", "--operator", "anna"), 2, ["--robot", "--host"])
         assert not (tmp_path / "ring").exists()
 
-    def test_without_the_authority_s_key_there_is_no_new_authority(self, ring, called):
+    def test_missing_key_of_the_authority_is_refused(self, ring, called):
         (ring / "authority.key").unlink()
         before = content(ring)
         assert_said(called("keys", str(ring), "--viewer", "otto"), 1, ["authority.key", "put it back"])
         assert content(ring) == before
 
-    def test_a_name_that_was_left_out_is_not_let_in_again_and_a_folder_moved_away_is_made_anew(
-        self, ring, called
-    ):
+    def test_revoked_name_is_refused_and_a_moved_folder_is_made_again(self, ring, called):
         (ring / "anna").rename(ring.parent / "old")
         (ring / "clients.toml").write_text('"anna" = "operator"\n')
         before = content(ring)
@@ -117,7 +109,7 @@ class TestMaking:
 
 class TestServing:
     @pytest.mark.realtime
-    def test_insecure_beyond_this_machine_it_says_what_that_means(self):
+    def test_insecure_server_warns_that_anyone_can_move_the_robot(self):
         endpoint = free_endpoint().replace("127.0.0.1", "0.0.0.0")  # noqa: S104  that is the point
         with Served("--clock", "lockstep", "--insecure", endpoint=endpoint) as served:
             assert f"anyone who can reach {endpoint} can move this robot" in served.said
@@ -132,7 +124,9 @@ class TestServing:
             ("tls/127.0.0.1:7447", ("--insecure",), ["security and insecure"]),
         ],
     )
-    def test_what_does_not_go_with_security_is_refused(self, ring, called, endpoint, options, words):
+    def test_endpoints_and_options_that_contradict_security_are_refused(
+        self, ring, called, endpoint, options, words
+    ):
         assert_said(called("serve", "--listen", endpoint, "--security", str(ring), *options), 2, words)
 
     def serve(self, called, ring):
@@ -142,13 +136,13 @@ class TestServing:
         ("name", "spoilt"),
         [("authority.pem", None), ("robot.pem", b"nonsense"), ("robot.key", b""), ("clients.toml", None)],
     )
-    def test_a_file_that_is_not_there_or_not_what_it_should_be(self, ring, called, name, spoilt):
+    def test_missing_or_damaged_key_file_is_refused(self, ring, called, name, spoilt):
         (ring / name).unlink()
         if spoilt is not None:
             (ring / name).write_bytes(spoilt)
         assert_said(self.serve(called, ring), 2, [str(ring)])
 
-    def test_another_authority_s_robot_and_an_expired_one_are_refused(self, ring, called, tmp_path):
+    def test_expired_certificate_and_one_of_another_authority_are_refused(self, ring, called, tmp_path):
         issuer = (ring / "authority.pem", ring / "authority.key")
         usage = ExtendedKeyUsageOID.SERVER_AUTH
         expired = forge(tmp_path / "expired", "ur5e", issuer=issuer, days=-1, usage=usage)
@@ -160,7 +154,7 @@ class TestServing:
             (ring / f"robot.{what}").write_bytes((other / f"robot.{what}").read_bytes())
         assert_said(self.serve(called, ring), 2, ["no client would trust"])
 
-    def test_a_port_in_use_is_named_without_what_was_added_to_it(self, ring, called):
+    def test_port_in_use_is_reported_without_internal_settings(self, ring, called):
         with socket.create_server(("127.0.0.1", 0)) as taken:
             endpoint = f"tls/127.0.0.1:{taken.getsockname()[1]}"
             ended = called("serve", "--listen", endpoint, "--security", str(ring))
@@ -171,25 +165,26 @@ class TestProgram:
     @pytest.fixture(scope="class")
     @classmethod
     def robot(cls, tmp_path_factory):
-        """One in lockstep, which no busy machine overloads."""
+        """A robot in lockstep, which no busy machine overloads."""
         ring = made(tmp_path_factory.mktemp("keys") / "ring", "--operator", "anna", "--viewer", "wall")
         options = ("--security", str(ring), "--clock", "lockstep")
         with Served(*options, endpoint=free_tls_endpoint()) as served:
             yield served.endpoint, ring
 
     @pytest.mark.parametrize(("name", "said"), [("anna", "no_control"), ("wall", "the role viewer")])
-    def test_an_operator_and_a_viewer_check_it(self, robot, name, said, capsys):
+    def test_operator_and_viewer_check_the_robot(self, robot, name, said, capsys):
         endpoint, ring = robot
         assert said in tvist("check", endpoint, "--security", ring / name).assert_done().out
         assert check_alone(["check", endpoint, "--security", str(ring / name)]) == 0
         assert said in capsys.readouterr().out
 
-    def test_an_operator_moves_it_and_a_viewer_only_watches_and_records(self, robot, tmp_path):
+    def test_operator_moves_and_viewer_only_watches_and_records(self, robot, tmp_path):
         endpoint, ring = robot
         anna, wall = (("--security", ring / name) for name in ("anna", "wall"))
         tvist("move", "Q2", "--endpoint", endpoint, *anna).assert_done()
-        watched = tvist("watch", endpoint, *wall, "--seconds", "3", "--json").assert_done()
-        assert json.loads(watched.out.splitlines()[0])["type"] == "state"
+        with begun("watch", endpoint, *wall, "--json") as watching:
+            assert json.loads(watching.stdout.readline())["type"] == "state"
+            watching.kill()
         file = tmp_path / "seen.mcap"
         tvist("log", "record", file, "--endpoint", endpoint, *wall, "--seconds", "0.5").assert_done()
         assert file.stat().st_size > 1000
@@ -197,7 +192,7 @@ class TestProgram:
             ended = tvist(*command, endpoint, *wall)
             ended.assert_failed(1, "may only watch: use an operator's certificate")
 
-    def test_an_endpoint_and_keys_that_do_not_go_together(self, robot, tmp_path):
+    def test_endpoint_without_matching_keys_is_refused(self, robot, tmp_path):
         endpoint, ring = robot
         tvist("check", endpoint).assert_failed(1, endpoint, "give its folder")
         plain = endpoint.replace("tls/", "tcp/")
@@ -205,9 +200,8 @@ class TestProgram:
         tvist("check", endpoint, "--security", tmp_path).assert_failed(1, str(tmp_path), "tvist keys")
 
 
-@pytest.mark.realtime
-def test_the_how_to_works_as_it_stands(tmp_path):
-    """Its commands, in their order; those that name this machine are run here."""
+def test_commands_of_the_how_to_work_in_their_order(tmp_path):
+    """The robot is served in lockstep."""
     text = (ROOT / "docs" / "how-to" / "secure-a-robot.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
     commands = [line.partition("  #")[0] for block in blocks for line in block.splitlines() if line]
@@ -219,9 +213,8 @@ def test_the_how_to_works_as_it_stands(tmp_path):
             assert first in {"tvist", "python"}, command
             words = ["-m", "tvist_cli", *words] if first == "tvist" else words
             if "serve" in words:
-                serving = forked.Popen(
-                    [sys.executable, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True
-                )
+                words = [sys.executable, *words, "--clock", "lockstep"]
+                serving = forked.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
                 assert any("listens on" in line for line in serving.stderr)
                 continue
             ended = finished(*words, cwd=tmp_path)

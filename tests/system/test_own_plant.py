@@ -1,4 +1,4 @@
-"""An arm of one's own, given to `tvist serve` by one option: every kind of client moves it, and its faults are told."""
+"""A user's own plant, given to `tvist serve` by an option: clients move it, and its faults are reported."""
 
 import json
 import sys
@@ -14,8 +14,7 @@ from tvist_client.blocking import Robot
 pytestmark = pytest.mark.realtime
 
 PLACE = f"{sys.modules['tests.own_arm'].__file__}:OwnArm"
-CLOSE = 5e-3
-"""The drives lead by the twist of the gears that the robot file says, and this arm has none [rad]."""
+CLOSE = 5e-3  # the drives compensate for gear twist, which this arm does not have [rad]
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +34,7 @@ def beside(change):
     return [float(STANDS[0]) + change, *map(float, STANDS[1:])]
 
 
-def test_it_begins_where_the_arm_stands_and_a_client_moves_it(served):
+def test_robot_starts_at_the_posture_of_the_arm_and_a_client_moves_it(served):
     with Robot.connect(served.endpoint) as robot:
         assert robot.state().actual_q == pytest.approx(STANDS, abs=CLOSE)
         with robot.control("me") as arm:
@@ -45,7 +44,7 @@ def test_it_begins_where_the_arm_stands_and_a_client_moves_it(served):
         eventually(lambda: robot.state().tick > first)  # the arm gives the ticks
 
 
-def test_it_cannot_be_put_anywhere(served):
+def test_arm_that_cannot_be_reset_refuses_a_reset(served):
     with (
         Robot.connect(served.endpoint) as robot,
         robot.control("me") as arm,
@@ -54,7 +53,7 @@ def test_it_cannot_be_put_anywhere(served):
         arm.reset(q=beside(0.0))
 
 
-def test_its_fault_stops_the_robot_and_is_told(served, broken):
+def test_fault_of_the_arm_stops_the_robot_and_is_reported(served, broken):
     with Robot.connect(served.endpoint) as robot:
         written = broken.with_suffix(".new")
         written.write_text("joint 3 is too warm")
@@ -77,14 +76,3 @@ def _moves(arm):
     except RefusedError as refused:
         return "not ready" not in str(refused)
     return True
-
-
-def test_mujoco_s_arm_is_served_by_its_name():
-    options = ("--robot", "one-joint", "--plant", "mujoco", "--clock", "lockstep")
-    options += ("--calibration", "none", "--shaper", "none")
-    with Served(*options) as served, Robot.connect(served.endpoint) as arm, arm.control("me") as mine:
-        before = arm.state().actual_q
-        arm.advance(5)
-        target = [before[0] + 0.1, *before[1:]]
-        mine.move_j(target)
-        assert arm.state().actual_q == pytest.approx(target, abs=5e-3)

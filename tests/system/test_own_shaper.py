@@ -1,8 +1,8 @@
-"""A shaper of one's own from a shell: served, evaluated, refused in a sentence, and stopped when it fails."""
+"""A user's own shaper is listed, served and evaluated; when it fails, the arm stops."""
 
 import pytest
 from tests.conformance.served import Served
-from tests.conformance.wire import Wire
+from tests.conformance.wire import Q1, Wire
 from tests.system.shell import tvist
 
 MINE = '''
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tvist_shaping import FirShaper, Impulses, custom, zv
+from tvist_shaping import FirShaper, zv
 
 
 def mine(f_d, zeta):
@@ -20,11 +20,6 @@ def mine(f_d, zeta):
     return zv(f_d, zeta)
 
 
-def unequal(f_d, zeta):
-    return Impulses(np.array([0.5, 0.4]), np.array([0.0, 0.5 / f_d]))
-
-
-LONG = custom("long", [0.5, 0.5], [0.0, 9.0])
 MEAN = FirShaper("mean", "the mean of 40 ms", lambda f_d, zeta: np.full(20, 0.05), taps=20)
 '''
 
@@ -35,7 +30,7 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_it_stands_in_the_table_and_the_json_of_shapers(folder):
+def test_command_shapers_lists_an_own_shaper(folder):
     places = ("--shaper", "mine.py:mine", "--shaper", "mine.py:MEAN")
     listed = tvist("shapers", "--json", *places, cwd=folder).assert_done().json["shapers"]
     zv, mine, mean = (next(one for one in listed if one["name"] == name) for name in ("zv", "mine", "mean"))
@@ -45,27 +40,34 @@ def test_it_stands_in_the_table_and_the_json_of_shapers(folder):
     assert (len(mean["amplitudes"]), mean["mean_delay_ms"]) == (20, pytest.approx(19.0))
 
 
-def test_processes_that_share_the_work_load_it_again(folder):
-    """Ten motions and more are shared among processes; the shaper travels there as its file."""
-    same = ("--robot", "one-joint", "--payload", 1, "--moves", 10, "--clean", "--json")
-    mine = tvist("study", "moves", "--shapers", "mine.py:mine", *same, cwd=folder).assert_done().json
-    assert [one["name"] for one in mine["methods"]] == ["mine", "waiting"]
-    theirs = tvist("study", "moves", "--shapers", "zv", *same).assert_done().json
-    for one, other in zip(mine["moves"], theirs["moves"], strict=True):
-        assert one | {"shaper": ""} == other | {"shaper": ""}
+@pytest.mark.nightly
+def test_processes_of_a_study_load_an_own_shaper_from_its_file(folder):
+    """A study of this size uses several processes."""
+    options = ("--robot", "one-joint", "--payload", 1, "--moves", 10, "--clean", "--json")
+    study = tvist("study", "moves", "--shapers", "mine.py:mine", "zv", *options, cwd=folder)
+    found = study.assert_done().json
+    assert [one["name"] for one in found["methods"]] == ["mine", "zv", "waiting"]
+    rows = [(one["shaper"], one | {"shaper": ""}) for one in found["moves"]]
+    mine, zv = ([row for name, row in rows if name == wanted] for wanted in ("mine", "zv"))
+    assert mine == zv
+    assert mine
 
 
-class TestServed:
-    @pytest.mark.realtime
-    def test_one_that_fails_stops_the_arm_and_leaves_the_server(self, folder, monkeypatch):
-        monkeypatch.chdir(folder)
-        with Served("--shaper", "mine.py:mine", "--record", "mine.mcap") as served:
-            at = ("--endpoint", served.endpoint)
-            assert "moved to Q2" in tvist("move", "Q2", *at).assert_done().out
-            (folder / "stop").touch()
-            served.wait_until_said("there is a file called stop in line 12 of mine.py for f_d = ")
-            tvist("move", "Q1", *at).assert_failed(1, "PROTECTIVE_STOP")
-            with Wire(served.endpoint) as wire, wire.control() as token:
-                assert wire.command("set_shaper", token=token, name="zv")["type"] == "done"
-            tvist("unlock", *at).assert_done()
-            assert "moved to Q2" in tvist("move", "Q2", *at).assert_done().out
+@pytest.mark.realtime
+def test_failing_own_shaper_stops_the_arm_but_not_the_server(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    with Served("--shaper", "mine.py:mine", "--record", "mine.mcap") as served, Wire(served.endpoint) as wire:
+        wire.listen("event")
+        token = wire.command("take_control", client="mover", lease_s=600.0)["token"]
+
+        def move(angle):
+            motion = wire.command("move_j", token=token, q=[angle, *Q1[1:]])["id"]
+            wire.wait("event", lambda event: event["kind"] == "motion_done" and event["id"] == motion)
+
+        move(0.05)
+        (folder / "stop").touch()
+        served.wait_until_said("there is a file called stop in line 12 of mine.py for f_d = ")
+        assert wire.command("move_j", token=token, q=Q1)["code"] == "wrong_mode"
+        assert wire.command("set_shaper", token=token, name="zv") == {"type": "done"}
+        assert wire.command("unlock_protective_stop", token=token) == {"type": "done"}
+        move(0.0)

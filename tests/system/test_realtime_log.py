@@ -1,4 +1,4 @@
-"""A motion, logged as the paper's authors did: through UR's real-time interface, with its published layout."""
+"""The example that logs a motion through UR's real-time interface, like the authors of the paper."""
 
 import csv
 import re
@@ -33,11 +33,11 @@ COLUMNS = {
     "program_state": "runtime_state",
     "speed_scaling": "speed_scaling",
 }
-"""Of the log and of the recording."""
+"""Columns of the log, and their names in the recording."""
 
 
 def logged(path):
-    """The log as columns."""
+    """Return the columns of the log."""
     with path.open(encoding="utf-8") as file:
         rows = csv.reader(file)
         names = next(rows)
@@ -51,7 +51,7 @@ def logged(path):
 
 
 def last_time(log):
-    """Of the last whole line but one; what comes behind may still be in the script's buffer."""
+    """Return the time of the last line but one that is complete; later ones may be in the script's buffer."""
     *_, line, _, _ = ["0", "", "", *log.read_bytes()[-20_000:].decode().splitlines()]
     first, _, rest = line.partition(",")
     return float(first) if rest and first.replace(".", "").isdigit() else 0.0
@@ -59,9 +59,9 @@ def last_time(log):
 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory):
-    """The log, and the recording that the server made at the same time.
+    """The log, and the server's recording of the same time.
 
-    In lockstep, where every sample waits for the script: in real time a busy machine makes holes in it.
+    In lockstep each sample waits for the script; in real time a busy machine would lose some.
     """
     folder, host = tmp_path_factory.mktemp("logged"), own_address(1)
     log, recorded = folder / "realtime.csv", folder / "run.mcap"
@@ -71,7 +71,7 @@ def both(tmp_path_factory):
         Robot.connect(served.endpoint) as robot,
         robot.control("mover") as arm,
     ):
-        robot.advance(1)  # what stands before the first tick is not recorded
+        robot.advance(1)  # the state before the first tick is not recorded
         command = [sys.executable, EXAMPLE, host, log]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as logger:
             try:
@@ -88,13 +88,10 @@ def both(tmp_path_factory):
     return SimpleNamespace(said=said, log=logged(log), recorded=read(recorded).recording)
 
 
-def test_no_sample_is_missing(both):
+def test_log_has_every_sample_and_equals_the_recording_to_the_last_bit(both):
     assert " 0 missing" in both.said
-    assert np.all(np.diff(both.log["tick"]) == 1)
-
-
-def test_the_log_says_what_the_recording_does_to_the_last_bit(both):
     tick = both.log["tick"]
+    assert np.all(np.diff(tick) == 1)
     recorded = both.recorded.between(int(tick[0]), int(tick[-1]))
     np.testing.assert_array_equal(recorded["tick"], tick)
     np.testing.assert_array_equal(BOOTED + recorded.time, both.log["time"])
@@ -102,15 +99,14 @@ def test_the_log_says_what_the_recording_does_to_the_last_bit(both):
         np.testing.assert_array_equal(recorded[name], both.log[name], err_msg=name)
 
 
-def test_the_script_uses_nothing_but_python():
+def test_example_uses_the_standard_library_only():
     imported = re.findall(r"^(?:import|from) (\w+)", EXAMPLE.read_text(), re.MULTILINE)
     assert set(imported) <= sys.stdlib_module_names
 
 
-def test_it_says_in_a_sentence_that_nobody_listens():
-    ended = subprocess.run(
-        [sys.executable, EXAMPLE, "127.0.0.250"], capture_output=True, text=True, check=False
-    )
+def test_unreachable_robot_is_reported_in_one_line():
+    command = [sys.executable, EXAMPLE, "127.0.0.250"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 1
     assert ended.stderr.count("\n") == 1
     assert "127.0.0.250:30003" in ended.stderr

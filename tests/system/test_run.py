@@ -1,4 +1,4 @@
-"""`tvist run` and `tvist run --check`, as a robot programmer's CI starts them."""
+"""`tvist run` and `tvist run --check`, as the CI of a robot programmer calls them."""
 
 import json
 import signal
@@ -50,7 +50,7 @@ def _scripts(tmp_path):
 
 @pytest.fixture
 def waiting(tmp_path):
-    """A program that waits for a register on a robot in real time: its process, and a client of the robot."""
+    """A real-time process whose program waits for a register, and a client of its robot."""
     endpoint = free_endpoint()
     process = begun("run", "waits.script", "--listen", endpoint, cwd=tmp_path)
     try:
@@ -62,7 +62,7 @@ def waiting(tmp_path):
         process.communicate(timeout=PATIENCE)
 
 
-def test_the_program_may_come_from_a_pipe_to_a_process_of_its_own(tmp_path):
+def test_program_is_read_from_a_pipe(tmp_path):
     command = [sys.executable, "-m", "tvist_cli", "run", "-", "--lockstep"]
     said = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path, input=FAILS)
     assert (said.returncode, said.stdout) == (1, "")
@@ -70,7 +70,7 @@ def test_the_program_may_come_from_a_pipe_to_a_process_of_its_own(tmp_path):
 
 
 class TestInLockstep:
-    def test_messages_are_on_stdout_and_the_account_is_on_stderr(self, called):
+    def test_messages_go_to_stdout_and_the_summary_to_stderr(self, called):
         code, out, err = called("run", "moves.script", "--lockstep")
         first, popup, last = out.splitlines()
         assert code == 0
@@ -79,36 +79,27 @@ class TestInLockstep:
         assert "moves ran for" in err
         assert "made 2 moves" in err
 
-    def test_an_error_is_a_line_that_editors_understand_and_exit_code_1(self, called):
+    def test_error_is_reported_with_file_line_and_column_and_exit_code_1(self, called):
         code, out, err = called("run", "fails.script", "--lockstep")
         place, account = err.splitlines()
         assert (code, out) == (1, "")
         assert place.startswith("fails.script:4:9: ")
         assert account == "tvist: fails.script ended with an error after 0.100 s of robot time"
 
-    def test_a_program_that_cannot_be_compiled_is_not_started(self, called):
+    def test_program_that_does_not_compile_is_not_started(self, called):
         code, out, err = called("run", "wrong.script", "--lockstep", "--record", "x.mcap", "--json")
         assert code == 1
         assert json.loads(out)["exit_reason"] == "compile_error"
         assert err.splitlines() == [*FOUND, "tvist: wrong.script cannot run: it has 1 error"]
 
-    def test_with_json_there_is_one_object_and_the_code_is_the_same(self, called):
-        for name, ok in (("moves", True), ("fails", False)):
-            code, out, _ = called("run", f"{name}.script", "--lockstep", "--json")
-            (line,) = out.splitlines()
-            told = json.loads(line)
-            assert (told["ok"], code) == (ok, int(not ok))
-            assert (told["file"], told["lockstep"]) == (f"{name}.script", True)
-            assert told["seconds"] > 0.0
-
-    def test_inputs_and_the_timeout_are_those_of_the_command_line(self, called):
+    def test_inputs_and_timeout_of_the_command_line_apply(self, called):
         given = ("--input", "input_int_register_24=7", "--input", "digital_input_3=on")
         assert called("run", "waits.script", "--lockstep", *given)[:2] == (0, "ready\ngot 7\n")
         code, out, err = called("run", "waits.script", "--lockstep", "--timeout", "0.5")
         assert (code, out) == (1, "ready\n")
         assert "failed after 0.500 s of robot time: the program was still running" in err
 
-    def test_the_robot_is_that_of_the_options_and_of_the_configuration(self, called, tmp_path):
+    def test_robot_follows_options_and_configuration(self, called, tmp_path):
         (tmp_path / "robot.toml").write_text("start = 'Q2'\nspeed = 3.0\n", encoding="utf-8")
         program = "textmsg(get_target_joint_positions())\ntextmsg(get_target_payload())\n"
         (tmp_path / "asks.script").write_text(program, encoding="utf-8")
@@ -123,40 +114,33 @@ class TestInLockstep:
     @pytest.mark.parametrize(
         ("arguments", "words"),
         [
-            (("run", "nope.script"), ["nope.script", "No such file"]),
-            (("run", "moves.script", "--lockstep", "--ur"), ["--lockstep and --ur exclude each other"]),
-            (("run", "moves.script", "--lockstep", "--listen", "tcp/127.0.0.1:1"), ["--listen"]),
-            (("run", "moves.script", "--lockstep", "--timeout", "0"), ["timeout is 0", "more than 0"]),
-            (("run", "moves.script", "--lockstep", "--input", "x=1"), ["input is 'x=1'", "NAME=VALUE"]),
-            (("run", "moves.script", "--lockstep", "--config", "several.toml"), ["robots", "one robot"]),
-            (("run", "moves.script", "--lockstep", "--config", "clock.toml"), ["clock", "--lockstep"]),
-            (("run", "--check", "--lockstep", "moves.script"), ["--check runs nothing"]),
-            (("run", "moves.script", "wrong.script"), ["--lockstep", "--check", "wrong.script"]),
-            (("run", "moves.script", "moves.script", "--lockstep"), ["moves.script is given twice"]),
-            (
-                ("run", "moves.script", "waits.script", "--lockstep", "--record", "x"),
-                ["record is x", "these are 2"],
-            ),
-            (("run", "moves.script", "--max-shake", "0"), ["max-shake is 0 m/s²", "more than 0"]),
-            (("run", "moves.script", "--max-joint-speed", "nan"), ["max-joint-speed is nan rad/s", "finite"]),
-            (("run", "moves.script", "--junit", "no/x.xml"), ["junit is no/x.xml", "no folder no"]),
-            (("run", "moves.script", "--lockstep", "--baseline", "x", "--junit", "x"), ["the same file"]),
-            (("run", "moves.script", "--baseline", "x.json"), ["--baseline needs --lockstep"]),
-            (("run", "moves.script", "--lockstep", "--baseline", "x.json"), ["x.json", "No such file"]),
-            (
-                ("run", "moves.script", "--lockstep", "--baseline", "clock.toml"),
-                ["baseline clock.toml is not"],
-            ),
-            (("run", "--check"), ["missing"]),
+            ("nope.script", ["nope.script", "No such file"]),
+            ("moves.script --lockstep --ur", ["--lockstep and --ur exclude each other"]),
+            ("moves.script --lockstep --listen tcp/127.0.0.1:1", ["--listen"]),
+            ("moves.script --lockstep --timeout 0", ["timeout is 0", "more than 0"]),
+            ("moves.script --lockstep --input x=1", ["input is 'x=1'", "NAME=VALUE"]),
+            ("moves.script --lockstep --config several.toml", ["robots", "one robot"]),
+            ("moves.script --lockstep --config clock.toml", ["clock", "--lockstep"]),
+            ("--check --lockstep moves.script", ["--check runs nothing"]),
+            ("moves.script wrong.script", ["--lockstep", "--check", "wrong.script"]),
+            ("moves.script moves.script --lockstep", ["moves.script is given twice"]),
+            ("moves.script waits.script --lockstep --record x", ["record is x", "these are 2"]),
+            ("moves.script --max-shake 0", ["max-shake is 0 m/s²", "more than 0"]),
+            ("moves.script --max-joint-speed nan", ["max-joint-speed is nan rad/s", "finite"]),
+            ("moves.script --junit no/x.xml", ["junit is no/x.xml", "no folder no"]),
+            ("moves.script --lockstep --baseline x --junit x", ["the same file"]),
+            ("moves.script --baseline x.json", ["--baseline needs --lockstep"]),
+            ("moves.script --lockstep --baseline x.json", ["x.json", "No such file"]),
+            ("moves.script --lockstep --baseline clock.toml", ["baseline clock.toml is not"]),
+            ("--check", ["missing"]),
         ],
-        ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
     )
-    def test_misuse_is_a_sentence_and_exit_code_2(self, called, tmp_path, arguments, words):
+    def test_invalid_options_are_refused_with_exit_code_2(self, called, tmp_path, arguments, words):
         (tmp_path / "several.toml").write_text("robots = 'ur5e*2'\n", encoding="utf-8")
         (tmp_path / "clock.toml").write_text("clock = 'lockstep'\n", encoding="utf-8")
-        assert_said(called(*arguments), 2, words)
+        assert_said(called("run", *arguments.split()), 2, words)
 
-    def test_control_c_ends_it_with_exit_code_130_and_the_recording_complete(self, tmp_path):
+    def test_control_c_ends_a_run_with_exit_code_130_and_a_complete_recording(self, tmp_path):
         process = begun("run", "waits.script", "--lockstep", "--record", "x.mcap", cwd=tmp_path)
         assert process.stdout.readline() == "ready\n"
         process.send_signal(signal.SIGINT)
@@ -167,7 +151,7 @@ class TestInLockstep:
 
 
 class TestJudged:
-    def test_several_programs_have_a_result_each_and_one_that_fails_makes_exit_code_1(self, called, tmp_path):
+    def test_each_program_has_a_result_and_a_failed_one_makes_exit_code_1(self, called, tmp_path):
         files = ("moves.script", "wrong.script", "fails.script")
         code, out, err = called("run", *files, "--lockstep", "--json", "--junit", "out.xml")
         told = json.loads(out)
@@ -181,7 +165,7 @@ class TestJudged:
         (suite,) = ET.parse(tmp_path / "out.xml").getroot()  # noqa: S314  our own
         assert [case.find("failure") is None for case in suite] == [True, False, False]
 
-    def test_each_has_a_fresh_robot(self, called, tmp_path):
+    def test_each_program_runs_on_a_new_robot(self, called, tmp_path):
         (tmp_path / "again.script").write_text(MOVES, encoding="utf-8")
         code, out, err = called("run", "moves.script", "again.script", "--lockstep", "--json")
         assert err.count(" ran for ") == 2
@@ -189,19 +173,20 @@ class TestJudged:
         assert (code, one.pop("file"), other.pop("file")) == (0, "moves.script", "again.script")
         assert one == other
 
-    def test_a_broken_limit_is_a_line_with_its_place_and_exit_code_1(self, called):
-        code, out, err = called(
-            "run", "moves.script", "--lockstep", "--json", "--max-shake", "0.01", "--max-seconds", "1"
-        )
+    def test_exceeded_limit_is_reported_with_its_line_and_exit_code_1(self, called):
+        limits = ("--max-shake", "0.01", "--max-seconds", "1")
+        code, out, err = called("run", "moves.script", "--lockstep", "--json", *limits)
         told = json.loads(out)
         assert (code, told["ok"], told["exit_reason"]) == (1, False, "finished")
+        assert (told["file"], told["lockstep"]) == ("moves.script", True)
+        assert told["seconds"] > 1.0
         assert {one["kind"] for one in told["failures"]} == {"max_seconds", "max_shake"}
         first, second, *_, last = err.splitlines()
         assert first.startswith("moves.script: it ran for ")
         assert second.startswith("moves.script:3: after move 1, which stopped at ")
         assert last == "tvist: moves.script broke 3 limits"
 
-    def test_a_run_equals_its_baseline_and_another_shaper_does_not(self, called, tmp_path):
+    def test_run_equals_its_baseline_but_not_with_another_shaper(self, called, tmp_path):
         run = ("run", "moves.script", "fails.script", "--lockstep")
         for command in (("run", "moves.script", "--lockstep"), run):
             (tmp_path / "base.json").write_text(called(*command, "--json")[1], encoding="utf-8")
@@ -216,7 +201,7 @@ class TestJudged:
 class TestInRealTime:
     pytestmark = pytest.mark.realtime
 
-    def test_it_moves_the_arm_as_in_lockstep_to_the_last_bit(self, called, tmp_path):
+    def test_states_in_real_time_equal_those_in_lockstep_to_the_last_bit(self, called, tmp_path):
         options = ("--profile", "real", "--seed", "3", "--input", "input_bit_register_64=1")
         given = ("--listen", free_endpoint(), "--record", "real.mcap")
         process = begun("run", "moves.script", *options, *given, cwd=tmp_path)
@@ -228,13 +213,13 @@ class TestInRealTime:
         assert len(live.states) >= len(steps.states) > 500
         for one, other in zip(live.states, steps.states, strict=False):
             assert replace(one, missed_ticks=0) == other
-        # How busy the machine was is told by the server in real time.
+        # In real time the server also reports the load of the machine.
         ours = [event for event in live.events if "the control loop is" not in (event.why or "")]
         assert [(event.tick, event.kind, event.why) for event in ours] == [
             (event.tick, event.kind, event.why) for event in steps.events
         ]
 
-    def test_clients_write_its_registers_and_see_it_end(self, waiting):
+    def test_clients_write_registers_and_receive_the_end_of_the_program(self, waiting):
         process, wire = waiting
         wire.listen("event")
         answer = wire.command("set_registers", bank="input_int", first=24, values=[5])
@@ -244,7 +229,7 @@ class TestInRealTime:
         assert (process.returncode, out) == (0, "got 5\n"), err
         assert "waits ran for" in err
 
-    def test_urs_clients_of_this_machine_have_a_hand_in_it(self, tmp_path):
+    def test_ur_clients_write_registers_of_a_run(self, tmp_path):
         pytest.importorskip("rtde_io")
         address = own_address(3)
         (tmp_path / "ur.toml").write_text(f"ur_address = '{address}'\n", encoding="utf-8")
@@ -263,14 +248,14 @@ class TestInRealTime:
             process.communicate(timeout=PATIENCE)
         assert (process.returncode, out) == (0, "got 9\n"), err
 
-    def test_a_client_that_stops_it_makes_it_fail(self, waiting):
+    def test_run_fails_when_a_client_stops_its_program(self, waiting):
         process, wire = waiting
         assert wire.command("program.stop")["type"] == "done"
         _, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == 1
         assert err.splitlines()[-1].endswith("of robot time: the program was stopped")
 
-    def test_another_signal_is_no_success(self, waiting):
+    def test_run_ended_by_sigterm_fails(self, waiting):
         process, _ = waiting
         process.send_signal(signal.SIGTERM)
         _, err = process.communicate(timeout=PATIENCE)
@@ -278,7 +263,7 @@ class TestInRealTime:
         assert "SIGTERM ended the run" in err
 
 
-def test_what_is_wrong_with_programs_is_a_line_each_on_stdout_and_exit_code_1(called, tmp_path):
+def test_check_reports_each_error_on_a_line_and_exit_code_1(called, tmp_path):
     code, out, err = called("run", "--check", "moves.script", "wrong.script")
     assert (code, out.splitlines(), err) == (1, FOUND, "tvist: 1 error in 2 programs\n")
     code, out, _ = called("run", "--check", "wrong.script", "--json")

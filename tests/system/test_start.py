@@ -1,4 +1,4 @@
-"""A robot that is starting answers, says how far it is, and is found only when it is ready."""
+"""A starting robot answers with its progress, and is found only when it is ready."""
 
 import os
 
@@ -26,7 +26,7 @@ serving.compile_if_new = compile_slowly
 sys.argv[0] = "tvist"
 main()
 """
-"""`tvist serve` with a step of compiling that is as far as a pipe says, and over when it ends."""
+"""`tvist serve` whose compilation has the progress written into a pipe, and ends with it."""
 ONE = ("--clock", "lockstep")
 
 
@@ -34,11 +34,19 @@ class SlowlyServed(Served):
     program = ("-c", SLOW, "serve")
 
 
-def asked(endpoint, key):
-    """What plain Zenoh clients hear on a key."""
-    payload = encode(TakeControl(client="eager")) if key.endswith("command") else None
-    with plain_session(endpoint) as session:
-        return [msgpack.unpackb(reply.ok.payload.to_bytes()) for reply in session.get(key, payload=payload)]
+def asked(session, keys):
+    """Return the answers to plain queries."""
+    found = []
+    for key in keys:
+        payload = encode(TakeControl(client="eager")) if key.endswith("command") else None
+        found += [msgpack.unpackb(reply.ok.payload.to_bytes()) for reply in session.get(key, payload=payload)]
+    return found
+
+
+def all_are_starting(session, keys, words):
+    answers = asked(session, keys)
+    right = [answer["code"] == "starting" and words in answer["why"] for answer in answers]
+    return len(answers) == len(keys) and all(right)
 
 
 @pytest.mark.parametrize(
@@ -52,7 +60,7 @@ def asked(endpoint, key):
         ),
     ],
 )
-async def test_all_queries_are_answered_with_the_share_until_the_robots_are_ready(
+async def test_queries_are_answered_with_the_progress_until_the_robots_are_ready(
     options, names, place, tmp_path, monkeypatch
 ):
     pipe = tmp_path / "progress"
@@ -61,17 +69,13 @@ async def test_all_queries_are_answered_with_the_share_until_the_robots_are_read
     served = SlowlyServed(*options, name=None if "--robots" in options else "ur5e")
     within = f"{place}/tvist" if place else "tvist"
     keys = [f"{within}/{name}/{leaf}" for name in names for leaf in ("command", "info")]
-
-    def says(words):
-        return all(words in answer["why"] for key in keys for answer in asked(served.endpoint, key))
-
     try:
         with pipe.open("w", buffering=1) as progress:  # the server reads: its network is open
-            for done in (3, 5):
-                progress.write(f"{done} 7\n")
-                eventually(lambda done=done: says(f"the robot is starting: {done} of 7 kernels are compiled"))
-            for key in keys:
-                assert [answer["code"] for answer in asked(served.endpoint, key)] == ["starting"]
+            with plain_session(served.endpoint) as session:
+                for done in (3, 5):
+                    progress.write(f"{done} 7\n")
+                    words = f"the robot is starting: {done} of 7 kernels are compiled"
+                    eventually(lambda words=words: all_are_starting(session, keys, words))
             with pytest.raises(RefusedError, match="starting: the robot is starting: 5 of 7"):
                 await Robot.connect(served.endpoint, names[0], namespace=place)
             assert "listens" not in served.said
@@ -79,10 +83,8 @@ async def test_all_queries_are_answered_with_the_share_until_the_robots_are_read
         for name in names:
             async with await Robot.connect(served.endpoint, name, namespace=place) as robot:
                 assert (await robot.info()).name == name
-        for key in keys:
-            assert [answer["type"] for answer in asked(served.endpoint, key)] == [
-                "accepted" if key.endswith("command") else "info"
-            ]
+        with plain_session(served.endpoint) as session:
+            assert [answer["type"] for answer in asked(session, keys)] == ["accepted", "info"] * len(names)
         assert served.end() == 0
         served.assert_quiet()
     finally:
@@ -90,7 +92,7 @@ async def test_all_queries_are_answered_with_the_share_until_the_robots_are_read
 
 
 @pytest.mark.nightly
-def test_a_first_start_says_a_growing_share_and_nothing_is_compiled_after_it(tmp_path, monkeypatch):
+def test_first_start_reports_its_progress_and_the_next_one_compiles_nothing(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     served = Served(*ONE, cold=True)
     heard = []

@@ -1,4 +1,4 @@
-"""One client holds the clock over the network: it alone lets time pass, and others are served within its steps."""
+"""The client that holds the clock advances time; other clients are served within its steps."""
 
 import msgpack
 import pytest
@@ -19,7 +19,7 @@ def answer(replies):
 
 
 def commands(path):
-    """Tick and type of each command of a recording, whose replay is equal to the last bit."""
+    """Return tick and type of each command of a recording, and the recording, which must replay equally."""
     content = read(path)
     assert content.complete
     assert replay_file(content).first_difference is None
@@ -27,7 +27,7 @@ def commands(path):
     return told, content
 
 
-def test_a_stop_of_another_client_takes_effect_within_a_long_step_and_a_signal_ends_it(tmp_path):
+def test_stop_of_another_client_and_a_signal_take_effect_within_a_long_step(tmp_path):
     path = tmp_path / "run.mcap"
     with (
         Served("--clock", "lockstep", "--record", str(path)) as served,
@@ -50,7 +50,7 @@ def test_a_stop_of_another_client_takes_effect_within_a_long_step_and_a_signal_e
     assert 1 < told[-1][0] <= stopped["tick"] <= content.states[-1].tick < LONG
 
 
-def test_a_clock_that_is_taken_within_a_step_of_who_has_control_ends_the_step(lockstep):
+def test_taking_the_clock_ends_a_step_of_the_client_in_control(lockstep):
     with Wire(lockstep.endpoint) as mover, Wire(lockstep.endpoint) as stepper:
         mover.listen("state")
         token = mover.take("control", "mover")
@@ -65,16 +65,14 @@ def test_a_clock_that_is_taken_within_a_step_of_who_has_control_ends_the_step(lo
         refused = mover.command("simulation.step", token=token, ticks=1)
         assert (refused["code"], refused["where"]) == ("no_control", "token")
         assert "'stepper'" in refused["why"]
-        assert stepper.command("simulation.step", token=clock, ticks=5) == {
-            "type": "done",
-            "tick": ended["tick"] + 5,
-        }
+        done = {"type": "done", "tick": ended["tick"] + 5}
+        assert stepper.command("simulation.step", token=clock, ticks=5) == done
         assert stepper.command("release_clock", token=clock) == {"type": "done"}
         assert mover.command("simulation.step", token=token, ticks=1)["tick"] == ended["tick"] + 6
         assert mover.command("release_control", token=token) == {"type": "done"}
 
 
-async def test_before_the_first_tick_a_client_is_told_how_the_robot_stands():
+async def test_client_receives_a_state_before_the_first_tick():
     with Served("--clock", "lockstep", "--start", "q2") as unstepped:
         async with await Robot.connect(unstepped.endpoint) as robot:
             state, io, info = await robot.state(), await robot.io(), await robot.info()

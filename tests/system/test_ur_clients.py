@@ -1,4 +1,4 @@
-"""ur-rtde, unmodified: what it reads is what the robot tells, and what it does is done."""
+"""The unmodified client ur-rtde reads the robot's values, and its commands take effect."""
 
 import math
 import struct
@@ -20,14 +20,14 @@ from .test_ur_lockstep import lockstep
 rtde_receive = pytest.importorskip("rtde_receive")
 
 Q1 = [0.0, -math.pi, 0.0, -math.pi / 2, 0.0, 0.0]
-FAR = [0.6, -2.9, 0.3, -1.4, 0.2, 0.4]
+NEAR = [0.1, -3.1, 0.1, -1.5, 0.05, 0.1]
 HOME = [-1.60, -1.727, -2.203, -0.808, 1.595, -0.031]
 TICK, BOOTED = 0.002, 40.0
 OF_STATE = {
     "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_speed", "actual_tool_accelerometer", "robot_mode",
     "safety_mode", "runtime_state",
 }  # fmt: skip
-"""Variables that `state` carries; the instruments compute the others."""
+"""Variables of `state`; the instruments compute the others."""
 MADE_BY_THE_CLIENT = {
     "getDigitalInState": lambda of: [bool(of.actual_digital_input_bits >> bit & 1) for bit in range(18)],
     "getDigitalOutState": lambda of: [bool(of.actual_digital_output_bits >> bit & 1) for bit in range(18)],
@@ -37,27 +37,25 @@ MADE_BY_THE_CLIENT = {
     "isEmergencyStopped": lambda of: bool(of.safety_status_bits >> 7 & 1),
     "isProtectiveStopped": lambda of: bool(of.safety_status_bits >> 2 & 1),
 }
-"""Getters whose values the client makes of several."""
-
-
+"""Getters whose values the client computes."""
 SEVERAL = {
     "getDigitalInState": range(18),
     "getDigitalOutState": range(18),
     "getOutputIntRegister": range(12, 20),
     "getOutputDoubleRegister": range(12, 20),
 }
-"""Getters that are asked for one of several, and which."""
+"""Getters with a number as argument, and the numbers."""
 
 
 def bits(value):
-    """Every number as its bytes, so that equal means equal to the last bit."""
+    """Return numbers as bytes, so that equal means equal to the last bit."""
     if isinstance(value, list):
         return [bits(number) for number in value]
     return struct.pack(">d", value) if isinstance(value, float) else value
 
 
 def read(robot, getters, tick):
-    """The value of every getter at a tick, once its sample has come."""
+    """Return the value of each getter at a tick, after waiting for its sample."""
     eventually(lambda: robot.getTimestamp() == BOOTED + tick * TICK)
     return {
         name: [getattr(robot, name)(number) for number in SEVERAL[name]]
@@ -68,14 +66,11 @@ def read(robot, getters, tick):
 
 
 def variable(getter, snapshot):
-    """RTDE's name of what a getter tells: getTargetTCPPose tells target_TCP_pose."""
+    """Return RTDE's name of a getter's value: target_TCP_pose for getTargetTCPPose."""
     if getter == "getRobotStatus":
         return "robot_status_bits"
-    (name,) = (
-        name
-        for name in {*OF_STATE, *dir(snapshot)}
-        if f"get{name.replace('_', '')}".lower() == getter.lower()
-    )
+    names = {*OF_STATE, *dir(snapshot)}
+    (name,) = (name for name in names if f"get{name.replace('_', '')}".lower() == getter.lower())
     return name
 
 
@@ -89,7 +84,7 @@ def assert_told(found, snapshot):
             assert bits(value) == bits(told), getter
 
 
-def test_every_getter_tells_what_the_robot_does_to_the_last_bit(tmp_path):
+def test_each_getter_returns_the_value_of_the_robot_to_the_last_bit(tmp_path):
     of_the_client = dir(rtde_receive.RTDEReceiveInterface)
     getters = [name for name in of_the_client if name.startswith(("get", "is")) and name != "isConnected"]
     assert len(getters) > 45
@@ -100,7 +95,7 @@ def test_every_getter_tells_what_the_robot_does_to_the_last_bit(tmp_path):
         told = 0
 
         def step(ticks):
-            """Let time pass; what the instruments make of the last tick."""
+            """Advance time; return the last tick and the instruments' values at it."""
             nonlocal told
             last = wire.step(token, ticks)["tick"]
             ios = sorted(wire.received["io"], key=lambda io: io["tick"])
@@ -112,8 +107,8 @@ def test_every_getter_tells_what_the_robot_does_to_the_last_bit(tmp_path):
 
         step(1)
         with Client("rtde_receive", "RTDEReceiveInterface", host, "500.0") as robot:
-            wire.command("move_j", token=token, q=FAR)
-            for ticks in (150, 100, 2000):
+            wire.command("move_j", token=token, q=NEAR)
+            for ticks in (100, 50, 700):
                 last, snapshot = step(ticks)
                 found.append(read(robot, getters, last))
                 assert_told(found[-1], snapshot)
@@ -136,11 +131,10 @@ def test_every_getter_tells_what_the_robot_does_to_the_last_bit(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def alone():
-    """A robot whose time passes by itself, as fast as it computes: a session of who lets it, and its address."""
-    host = own_address(12)
-    options = ("--clock", "lockstep", "--profile", "real", "--start", "Q1", "--ur-address", host)
-    with Served(*options) as served, Wire(served.endpoint) as wire:
+def alone(tmp_path_factory):
+    """A robot whose time passes as fast as it computes: the session that holds its clock, and its address."""
+    path = tmp_path_factory.mktemp("alone") / "run.mcap"
+    with lockstep(12, path) as (served, host), Wire(served.endpoint) as wire:
         clock = wire.take("clock", "stepper")
         wire.step(clock, 1)
         _steps = [wire.begin("simulation.step", token=clock, ticks=100_000) for _ in range(50)]
@@ -148,18 +142,19 @@ def alone():
         assert served.end() == 0
 
 
-def test_everything_that_can_be_set_is_and_zenoh_shows_it(alone):
+def test_outputs_registers_and_slider_are_set(alone):
     wire, host = alone
     wire.listen("io")
     with (
         Client("rtde_io", "RTDEIOInterface", host) as setter,
         Client("rtde_receive", "RTDEReceiveInterface", host) as seen,
     ):
-        for call, first, count in (
+        calls = (
             ("setStandardDigitalOut", 0, 8),
             ("setConfigurableDigitalOut", 8, 8),
             ("setToolDigitalOut", 16, 2),
-        ):
+        )
+        for call, first, count in calls:
             for number in range(count):
                 assert getattr(setter, call)(number, True)
                 eventually(lambda bit=first + number: seen.getDigitalOutState(bit))
@@ -188,7 +183,7 @@ def test_everything_that_can_be_set_is_and_zenoh_shows_it(alone):
         eventually(lambda: seen.getTargetSpeedFraction() == 1.0)
 
 
-def test_the_dashboard_says_what_the_robot_is_switches_it_and_plays_a_program(alone):
+def test_dashboard_describes_switches_and_runs_the_robot(alone):
     with Client("dashboard_client", "DashboardClient", alone[1]) as dashboard:
         dashboard.connect()
         assert dashboard.polyscopeVersion().startswith("5.22.")
@@ -231,14 +226,14 @@ def seen(live):
 
 @pytest.fixture
 def arm(live):
-    """Steered by registers, by the client's own program; it waits for what the robot does by the wall clock."""
+    """A client that moves the robot by its own program; it waits by the wall clock."""
     with Client("rtde_control", "RTDEControlInterface", live) as arm:
         yield arm
         arm.stopScript()
 
 
 def beside(*changes):
-    """Joint positions beside HOME: pairs of a joint and its change."""
+    """Return HOME with changed joints, given as pairs of a joint and its change."""
     q = list(HOME)
     for joint, change in changes:
         q[joint] += change
@@ -246,32 +241,7 @@ def beside(*changes):
 
 
 @pytest.mark.realtime
-def test_moves_servoing_and_speeds_end_where_they_should(arm, seen):
-    assert arm.moveJ(beside((0, 0.2), (2, 0.1)), 1.0, 1.5)
-    eventually(lambda: seen.getActualQ() == pytest.approx(beside((0, 0.2), (2, 0.1)), abs=1e-3))
-    assert arm.moveJ(HOME, 1.0, 1.5)
-    pose = seen.getActualTCPPose()
-    corner = [pose[0], pose[1], pose[2] + 0.1, *pose[3:]]
-    end = [pose[0], pose[1] - 0.1, pose[2] + 0.1, *pose[3:]]
-    assert arm.moveL([[*corner, 0.2, 0.8, 0.03], [*end, 0.2, 0.8, 0.0]], True)
-    eventually(lambda: arm.getAsyncOperationProgress() < 0)
-    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(end[:3], abs=1e-3))
-    assert arm.moveL(corner, 0.5, 1.5)
-    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(corner[:3], abs=1e-3))
-    assert arm.moveJ_IK(pose, 1.0, 1.5)
-    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(pose[:3], abs=1e-3))
-    for _ in range(200):
-        assert arm.servoJ(beside((0, 0.02)), 0.0, 0.0, 0.002, 0.03, 1000.0)
-    eventually(lambda: abs(seen.getActualQ()[0] - HOME[0] - 0.02) < 1e-3)
-    assert arm.servoStop(2.0)
-    assert arm.speedJ([0.0, 0.0, 0.0, 0.0, 0.0, 0.1], 1.0, 0.5)
-    eventually(lambda: seen.getTargetQ()[5] > HOME[5] + 0.01)
-    assert arm.speedStop(2.0)
-    eventually(lambda: max(map(abs, seen.getTargetQd())) < 1e-6)
-
-
-@pytest.mark.realtime
-def test_kinematics_payload_and_tool_are_those_of_the_robot(arm, seen):
+def test_kinematics_payload_and_tool_equal_those_of_the_robot(arm, seen):
     assert arm.moveJ(HOME, 1.0, 1.5)
     pose = seen.getTargetTCPPose()
     q = arm.getInverseKinematics(pose)
@@ -288,7 +258,30 @@ def test_kinematics_payload_and_tool_are_those_of_the_robot(arm, seen):
 
 
 @pytest.mark.realtime
-def test_force_mode_freedrive_contacts_and_a_script_of_the_users_own(arm, seen):
+def test_moves_servoing_and_speeds_end_at_their_targets(arm, seen):
+    near = beside((0, 0.05), (2, 0.03))
+    assert arm.moveJ(near, 1.0, 1.5)
+    eventually(lambda: seen.getActualQ() == pytest.approx(near, abs=1e-3))
+    pose = seen.getActualTCPPose()
+    corner = [pose[0], pose[1], pose[2] + 0.03, *pose[3:]]
+    end = [pose[0], pose[1] - 0.03, pose[2] + 0.03, *pose[3:]]
+    assert arm.moveL([[*corner, 0.2, 0.8, 0.01], [*end, 0.2, 0.8, 0.0]], True)
+    eventually(lambda: arm.getAsyncOperationProgress() < 0)
+    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(end[:3], abs=1e-3))
+    assert arm.moveJ_IK(pose, 1.0, 1.5)
+    eventually(lambda: seen.getActualTCPPose()[:3] == pytest.approx(pose[:3], abs=1e-3))
+    for _ in range(60):
+        assert arm.servoJ(beside((0, 0.02)), 0.0, 0.0, 0.002, 0.03, 1000.0)
+    eventually(lambda: abs(seen.getActualQ()[0] - HOME[0] - 0.02) < 1e-3)
+    assert arm.servoStop(2.0)
+    assert arm.speedJ([0.0, 0.0, 0.0, 0.0, 0.0, 0.1], 1.0, 0.2)
+    eventually(lambda: seen.getTargetQ()[5] > HOME[5] + 0.005)
+    assert arm.speedStop(2.0)
+    eventually(lambda: max(map(abs, seen.getTargetQd())) < 1e-6)
+
+
+@pytest.mark.realtime
+def test_force_mode_freedrive_contacts_and_custom_script(arm, seen):
     before = seen.getActualTCPPose()
     arm.forceMode([0.0] * 6, [0, 0, 1, 0, 0, 0], [0, 0, -10.0, 0, 0, 0], 2, [2, 2, 1.5, 1, 1, 1])
     eventually(lambda: seen.getActualTCPPose()[2] < before[2] - 0.001)
@@ -306,7 +299,7 @@ def test_force_mode_freedrive_contacts_and_a_script_of_the_users_own(arm, seen):
 
 
 @pytest.mark.realtime
-def test_a_protective_stop_ends_a_move_and_the_next_program_moves_again(live, arm, seen):
+def test_arm_moves_again_after_a_protective_stop(live, arm, seen):
     arm.triggerProtectiveStop()  # False: the program is suspended before it can report that it is done
     eventually(seen.isProtectiveStopped)
     with Client("dashboard_client", "DashboardClient", live) as dashboard:

@@ -1,4 +1,4 @@
-"""The example whose figure stands in docs/how-to/connect-ur-clients.md does what the page says."""
+"""The example whose figure is in docs/how-to/connect-ur-clients.md."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,7 @@ EXAMPLE = Path(__file__).parents[2] / "clients" / "examples" / "03_ur_rtde_shapi
 pytestmark = [pytest.mark.realtime, pytest.mark.nightly]
 
 
-def test_the_same_ur_rtde_program_lets_the_tool_shake_for_a_shorter_time_with_a_shaper(tmp_path):
+def test_tool_vibrates_for_a_shorter_time_with_a_shaper(tmp_path):
     pytest.importorskip("rtde_control")
     figure = tmp_path / "figure.png"
     ended = finished(EXAMPLE, figure)

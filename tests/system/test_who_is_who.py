@@ -1,4 +1,4 @@
-"""Who is who without certificates: copies of a client, and sessions that speak in the robot's place."""
+"""Identity without certificates: clients that copy another one's name and token, or publish as the robot."""
 
 import subprocess
 import sys
@@ -26,20 +26,15 @@ with Wire(sys.argv[2]) as wire:
     sys.stdin.read()
 """
 ROOT = Path(__file__).parents[2]
-AT_ONCE = 250
-"""Half a second in ticks: a busy machine may need that, and a lease would last for 30 s."""
+AT_ONCE = 250  # ticks that a busy machine may need; a lease lasts for 15 000
 
 
 @pytest.fixture
 def holder(realtime, live):
-    """A process that has control and moves the arm: itself, its session and its token."""
+    """A process in control that moves the arm, its session and its token."""
     live.listen("state", "event", "telemetry")
-    process = forked.Popen(
-        [sys.executable, "-c", HOLDER, str(ROOT), realtime.endpoint],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    command = [sys.executable, "-c", HOLDER, str(ROOT), realtime.endpoint]
+    process = forked.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     session, token = process.stdout.readline().split()
     live.next("state", lambda state: state["target_qd"][0] > 0.2)
     yield process, session, token
@@ -62,12 +57,9 @@ def lost(live, since):
 
 
 @pytest.mark.parametrize("copied", ["its own session", "the holder's session"])
-def test_a_copy_of_name_and_token_does_not_keep_a_lease_alive(holder, copy, live, measured, copied):
+def test_copied_name_and_token_do_not_keep_a_lease_alive(holder, copy, live, measured, copied):
     process, session, token = holder
-    of = {
-        "its own session": f"/{copy.session.info.zid()}",
-        "the holder's session": f"/{session}",
-    }
+    of = {"its own session": f"/{copy.session.info.zid()}", "the holder's session": f"/{session}"}
     _alive = copy.session.liveliness().declare_token(f"tvist/ur5e/client/twin{of[copied]}")
     assert copy.command("keep_alive", token=token) == {"type": "done"}
     if copied != "the holder's session":
@@ -81,13 +73,12 @@ def test_a_copy_of_name_and_token_does_not_keep_a_lease_alive(holder, copy, live
     assert copy.command("keep_alive", token=token)["code"] == "no_control"
 
 
-def test_a_copy_that_goes_first_takes_nothing_with_it(holder, realtime, live):
+def test_copy_that_disconnects_does_not_end_the_lease(holder, realtime, live):
     process, session, token = holder
     with Wire(realtime.endpoint) as copy:
-        tokens = [
-            copy.session.liveliness().declare_token(f"tvist/ur5e/client/twin/{of}")
-            for of in (session, copy.session.info.zid())
-        ]
+        declare = copy.session.liveliness().declare_token
+        sessions = (session, copy.session.info.zid())
+        tokens = [declare(f"tvist/ur5e/client/twin/{of}") for of in sessions]
         assert len(tokens) == 2
         copy.info()
     later = live.state()["tick"] + AT_ONCE
@@ -103,8 +94,8 @@ STREAMS = ("state", "event", "truth", "telemetry", "io")
 FORGED = msgpack.packb({"type": "event", "tick": 10**9, "kind": "warning", "why": "forged"})
 
 
-def test_nobody_but_the_server_answers_or_tells(realtime, live):
-    """Another session on the machine swallows no command and makes nothing up, by any key."""
+def test_only_the_server_answers_and_publishes(realtime, live):
+    """Another session of the machine can neither intercept commands nor publish, by any key."""
     heard, told = [], []
     with Wire(realtime.endpoint) as intruder, Wire(realtime.endpoint) as victim:
         session = intruder.session

@@ -1,4 +1,4 @@
-"""Several processes behind one endpoint: a client sees one server, and the processes live and end together."""
+"""Several processes behind one endpoint act like one server, and end together."""
 
 import signal
 import urllib.request
@@ -8,7 +8,6 @@ import pytest
 from tests.conformance.served import PATIENCE, Served, refused_to_start
 from tests.conformance.wire import Q1, Wire
 from tests.places import free_port, own_address
-from tests.system.routed import Router
 from tests.system.waiting import eventually
 
 from tvist_client.check import check
@@ -20,12 +19,12 @@ NAMES = ["ur5e-1", "ur5e-2", "ur5e-3"]
 
 
 def workers(served):
-    """Processes with robots: the first one that was started is what clients connect to."""
+    """Return the processes with robots; clients connect to another one, which starts first."""
     return sorted(psutil.Process(served.process.pid).children(), key=lambda child: child.pid)[1:]
 
 
 def states(endpoint, name, ticks=200):
-    """States of a robot that is stepped, as bytes of what they say."""
+    """Return the states of a stepped robot in a motion."""
     with Wire(endpoint, name) as wire:
         wire.listen("state")
         with wire.control() as token:
@@ -41,7 +40,7 @@ def served():
         yield served
 
 
-def test_all_are_found_behind_one_endpoint_and_told_once(served):
+def test_robots_of_all_processes_are_found_at_one_endpoint(served):
     assert check(served.endpoint).robots == NAMES
     ready = [line for line in served.lines if "listens" in line]
     assert len(ready) == 1
@@ -49,7 +48,7 @@ def test_all_are_found_behind_one_endpoint_and_told_once(served):
     assert len(workers(served)) == 2
 
 
-def test_no_state_is_lost_and_all_are_those_of_one_process(served):
+def test_states_equal_those_of_a_single_process(served):
     with Served(*LOCKSTEP[:2], *LOCKSTEP[4:], name=None) as alone:
         for name in (NAMES[0], NAMES[2]):
             behind, direct = states(served.endpoint, name), states(alone.endpoint, name)
@@ -57,11 +56,11 @@ def test_no_state_is_lost_and_all_are_those_of_one_process(served):
             assert behind == direct
 
 
-def test_a_signal_to_all_processes_ends_all_in_order(tmp_path):
+def test_signal_to_all_processes_ends_them_in_order(tmp_path):
     with Served(*LOCKSTEP, "--record", str(tmp_path / "out.mcap"), name=None) as served:
         states(served.endpoint, "ur5e-3")
         children = workers(served)
-        for child in children:  # as a terminal or a supervisor does
+        for child in children:  # like a terminal or a supervisor
             child.send_signal(signal.SIGINT)
         assert served.end(signal.SIGINT) == 0
         assert psutil.wait_procs(children, PATIENCE)[1] == []
@@ -72,7 +71,7 @@ def test_a_signal_to_all_processes_ends_all_in_order(tmp_path):
     assert replay_file(recording).first_difference is None
 
 
-def test_a_dead_process_is_told_with_its_robots_and_ends_all(tmp_path):
+def test_killed_process_is_reported_with_its_robots_and_ends_the_others(tmp_path):
     served = Served(*LOCKSTEP, "--record", str(tmp_path / "out.mcap"), name=None)
     try:
         served.wait_until_ready()
@@ -81,8 +80,7 @@ def test_a_dead_process_is_told_with_its_robots_and_ends_all(tmp_path):
         second.kill()
         assert served.wait() == 1
         assert (
-            "worker 2 of 2 (ur5e-2, ur5e-3) was ended by SIGKILL: the other robots were also stopped"
-            in served.said
+            "worker 2 of 2 (ur5e-2, ur5e-3) was ended by SIGKILL: the other robots were also" in served.said
         )
         assert not first.is_running()
         assert read(tmp_path / "out-ur5e-1.mcap").complete
@@ -91,7 +89,7 @@ def test_a_dead_process_is_told_with_its_robots_and_ends_all(tmp_path):
         served.kill()
 
 
-def test_the_end_of_the_process_that_clients_connect_to_is_told_and_ends_all():
+def test_killed_front_process_is_reported_and_ends_the_others():
     served = Served(*LOCKSTEP, name=None)
     try:
         served.wait_until_ready()
@@ -105,7 +103,7 @@ def test_the_end_of_the_process_that_clients_connect_to_is_told_and_ends_all():
         served.kill()
 
 
-def test_a_port_that_is_taken_leaves_neither_processes_nor_recordings(served, tmp_path):
+def test_port_in_use_is_refused_and_leaves_no_recordings(served, tmp_path):
     options = (*LOCKSTEP, "--record", tmp_path / "out.mcap")
     code, said = refused_to_start(*options, endpoint=served.endpoint)
     assert code == 1
@@ -118,12 +116,7 @@ def test_a_port_that_is_taken_leaves_neither_processes_nor_recordings(served, tm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_through_a_router_of_a_fleet_in_a_namespace():
-    with Router() as router, Served(*LOCKSTEP, "--namespace", "hall-3", router=router.endpoint, name=None):
-        assert check(router.endpoint, NAMES[0], namespace="hall-3").robots == NAMES
-
-
-def test_one_page_has_the_figures_of_all_for_prometheus():
+def test_metrics_of_all_processes_are_on_one_page():
     port = free_port()
 
     def page():

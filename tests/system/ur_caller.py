@@ -1,9 +1,9 @@
-"""An object of ur-rtde in a process of its own, since its threads may outlive it, and the calls to it.
+"""A process with an object of ur-rtde, whose threads could outlive the test otherwise.
 
 python ur_caller.py MODULE CLASS ADDRESS [NUMBER]
 
-Reads calls, one JSON list [METHOD, ARGUMENT…] a line, and prints what each returned, {"returned": …}, or raised,
-{"raised": …}; first of all what came of making the object.
+It makes the object, then reads calls from stdin, each a line with a JSON list [METHOD, ARGUMENT…].
+For each step it prints {"returned": …} or {"raised": …}.
 """
 
 import importlib
@@ -13,12 +13,12 @@ import sys
 
 
 def answer(call, *arguments):
-    """Whether it went well."""
+    """Make a call, print its result, and return whether it succeeded."""
     try:
         said = {"returned": call(*arguments)}
-    except Exception as error:  # noqa: BLE001  whoever asked is told
+    except Exception as error:  # noqa: BLE001  the test reads it
         said = {"raised": str(error)}
-    print(json.dumps(said), flush=True)  # noqa: T201  that is how
+    print(json.dumps(said), flush=True)  # noqa: T201  the test reads it
     return "returned" in said
 
 

@@ -1,11 +1,9 @@
-"""A client that sends a program and steers the arm over a socket to which the program connects, 500 times a second.
+"""A client whose program connects to it and follows its set-points, 500 per second.
 
-`python ur_driver.py HOST MANNER`: after 150 messages something happens to it, see `MANNERS`.
+`python ur_driver.py HOST FAULT`: after 60 set-points it has a fault, see `FAULTS`.
 """
 
 import math
-import os
-import signal
 import socket
 import struct
 import sys
@@ -44,12 +42,12 @@ end
 
 
 def wave(number):
-    """Joint positions that swing [rad]."""
+    """Return joint positions that swing [rad]."""
     return [angle + 0.2 * math.sin(0.01 * number) for angle in HOME]
 
 
 def steer(stream, numbers):
-    """Send joint positions, and read what is answered."""
+    """Send joint positions, and read the answers."""
     for number in numbers:
         stream.sendall(struct.pack(">6i", *(round(1e6 * angle) for angle in wave(number))))
         stream.recv(4096)
@@ -63,31 +61,30 @@ def cut(stream):
 
 
 def jump(stream):
-    """Ask for a posture far away at once, with the base and the last joint turned."""
-    for _ in range(300):
+    """Send a distant posture, with the base and the last joint turned."""
+    for _ in range(120):
         stream.sendall(struct.pack(">6i", *(round(1e6 * angle) for angle in FAR)))
         stream.recv(4096)
         time.sleep(0.002)
 
 
-MANNERS = {
+FAULTS = {
     "cut": cut,
-    "frozen": lambda _: os.kill(os.getpid(), signal.SIGSTOP),
     "torn": lambda stream: (stream.sendall(b"\1\2\3\4\5"), time.sleep(1.0)),
     "absurd": lambda stream: (stream.sendall(struct.pack(">6i", *[2**31 - 1] * 6)), time.sleep(0.5)),
     "jumping": jump,
 }
 
 
-def main(host, manner):
+def main(host, fault):
     with socket.create_server((host, 0)) as server:
         port = server.getsockname()[1]
         with socket.create_connection((host, 30002)) as script:
             script.sendall(PROGRAM.format(host=host, port=port).encode())
             stream, _ = server.accept()
         stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        steer(stream, range(150))
-        MANNERS[manner](stream)
+        steer(stream, range(60))
+        FAULTS[fault](stream)
 
 
 if __name__ == "__main__":

@@ -9,13 +9,13 @@ HERE = Path(__file__).parent
 
 
 def started(program, *arguments):
-    """A program of this folder: a process of its own, whose threads keep nobody."""
+    """Start a program of this folder in a process of its own."""
     command = [sys.executable, str(HERE / program), *map(str, arguments)]
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
 class Client:
-    """An object of ur-rtde: has its methods. What it raises is an AssertionError."""
+    """An object of ur-rtde with its methods. What they raise becomes an AssertionError."""
 
     def __init__(self, module, kind, host, *numbers):
         self.process = started("ur_caller.py", module, kind, host, *numbers)

@@ -1,4 +1,4 @@
-"""Waiting for what no event tells."""
+"""Waiting for conditions without an event."""
 
 import time
 
@@ -6,9 +6,9 @@ from tests.conformance.served import PATIENCE
 
 
 def eventually(true):
-    """Ask until the answer is true, which is what this returns."""
+    """Repeat a question until its answer is true; return the answer."""
     deadline = time.monotonic() + PATIENCE
     while not (found := true()):
-        assert time.monotonic() < deadline, "it never was so"
+        assert time.monotonic() < deadline, "the condition was never met"
         time.sleep(0.005)
     return found
