@@ -77,9 +77,7 @@ def unseen(description, hidden, declared, seed):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize(
-    ("name", "hidden", "every"), [("ur5e", 11, 4), ("ur5e", 12, 1), ("ur5-light", 13, 1)]
-)
+@pytest.mark.parametrize(("name", "hidden", "every"), [("ur5e", 11, 4), ("ur5-light", 13, 1)])
 def test_a_position_controlled_robot_is_identified_at_unseen_poses(name, hidden, every, measured):
     description = load(name)
     measured_jogs = asyncio.run(measured_in_lockstep(description, hidden, every))
