@@ -25,7 +25,6 @@ from tvist_server.polyscope.files import read_program
 MOVING, EQUAL = 1e-9, 1e-6
 """Change per tick above which a joint moves, and largest difference of equal paths [rad]."""
 _NODE = re.compile(r"^ *# (begin|end): URCap (Installation|Program) Node")
-_OURS = re.compile(r"^ *(rq_|zero_ftsensor\(\)$|sleep\(0\.1\)$)")
 _SET_UP = re.compile(r"^  (set_tcp|set_payload|global \w+ ?= ?(p?\[|-?[\d.]+$))")
 _POSTURE = re.compile(r"global \w+_q ?= ?\[([^]]*)\]")
 

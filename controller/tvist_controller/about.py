@@ -13,7 +13,8 @@ from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.sources.calibrations import available, fits
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import PERIOD, Things
+from tvist_plant.plant import PERIOD
+from tvist_plant.surroundings import Things
 from tvist_protocol.channels import COMMANDS, tag
 from tvist_protocol.geometry import Geometry
 from tvist_protocol.info import CalibrationInfo, Info, Limits, Stopping

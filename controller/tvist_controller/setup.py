@@ -18,7 +18,8 @@ from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_plant.foreign import called, measured_standing
 from tvist_plant.model import carries_weight
-from tvist_plant.plant import Hand, Plant, RealArm, SimulatedArm
+from tvist_plant.plant import Plant, RealArm, SimulatedArm
+from tvist_plant.surroundings import Hand
 from tvist_plant.variants import hidden_variant
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.commands import SetPayload

@@ -68,10 +68,6 @@ class KernelCache:
         """Folder in which machine code is kept; numba reads this."""
         return str(own_folder())
 
-    def holds(self) -> bool:
-        """Return whether there is machine code of this kernel for this processor, for any argument types."""
-        return self in held([self])
-
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Return the kernel for these argument types; None if there is no file on disk, or it is damaged."""
         for machine in _machines(target_context):

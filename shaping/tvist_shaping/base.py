@@ -57,8 +57,7 @@ class Filter(Forked, ABC):
         """Initialize what all filters have in common; a derived class then calls `reset`."""
         if joints < 1:
             raise FilterError("joints", joints, "at least 1")
-        if not 0.0 < period < np.inf:
-            raise FilterError("period", period, "a finite number of seconds above 0")
+        FilterError.check_positive(period=period)
         self.name, self.estimator = name, estimator
         self.joints, self.period, self.peak = joints, period, peak
         self.excess, self.surplus, self.clipped = 0.0, (0.0, 0.0), False
@@ -155,7 +154,7 @@ class Filter(Forked, ABC):
         """
         samples = np.asarray(q_ref, dtype=float)
         if samples.ndim != 2:
-            raise ShapingError(f"q_ref has shape {samples.shape}, but must be (T, {self.width})")
+            raise ShapingError(f"q_ref has shape {samples.shape}: must be (T, {self.width})")
         return np.array([self.filter(sample) for sample in samples]).reshape(samples.shape)
 
     @property
@@ -199,7 +198,9 @@ class Filter(Forked, ABC):
             ShapingError: The other filter has a different number of joints.
         """
         if self.joints != other.joints:
-            raise ShapingError(f"a filter of {self.joints} joints cannot go on from one of {other.joints}")
+            raise ShapingError(
+                f"joints is {other.joints}: must be {self.joints}, as in the filter that takes over"
+            )
         if self.width != other.width:
             self._widen(other.width)
         self._posture = other._posture  # noqa: SLF001  one of its own kind

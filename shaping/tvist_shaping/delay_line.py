@@ -8,7 +8,7 @@ tick without a transient, and it reproduces cubics exactly (for fractional delay
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats, Forked
 from tvist_shaping.errors import DelayError, ShapingError
 
@@ -189,5 +189,5 @@ class DelayLine(Forked):
     def _sample(self, q: npt.ArrayLike) -> Floats:
         sample = np.asarray(q, dtype=float)
         if sample.shape != (self.joints,):
-            raise ShapingError(f"q has shape {sample.shape}, but this line holds ({self.joints},)")
+            raise ShapingError(f"q has shape {sample.shape}: must be ({self.joints},)")
         return sample

@@ -25,9 +25,6 @@ class TargetDesign(Design):
         self.taps = math.ceil(LONGEST * slower / self.period) + 3
         self._design = design
 
-    def __repr__(self) -> str:
-        return f"TargetDesign({self._design!r})"
-
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Compute the taps without a known end, for a reference at rest."""
         taps[self._design.taps :] = 0.0
@@ -63,9 +60,6 @@ class SmoothedDesign(Design):
         self.taps = design.taps + len(weights) - 1
         self._design, self._weights, self._own = design, weights, np.zeros(design.taps)
 
-    def __repr__(self) -> str:
-        return f"SmoothedDesign({self._design!r}, {len(self._weights)} weights)"
-
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Compute the taps for a reference at rest."""
         done = self._design.start(f_d, zeta, self._own)
@@ -87,9 +81,6 @@ class ConstantDesign(Design):
     def __init__(self, name: str, weights: Floats, modes: int, period: float = 0.002) -> None:
         self.name, self.weights, self.modes = name, weights, modes
         self.taps, self.period = len(weights), period
-
-    def __repr__(self) -> str:
-        return f"ConstantDesign({self.name!r}, {self.taps} weights)"
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:  # noqa: ARG002  the same for all modes
         """Return the weights."""

@@ -13,6 +13,7 @@ ShapingError
 └── DelayError            a delay exceeds the delay line
 """
 
+import math
 from collections.abc import Sequence
 
 
@@ -34,10 +35,17 @@ class ParameterError(ShapingError):
     """
 
     def __init__(self, field: str, value: object, limit: str, advice: str = "") -> None:
-        super().__init__(f"{field} is {value!r}, but must be {limit}{'; ' if advice else ''}{advice}")
+        super().__init__(f"{field} is {value!r}: must be {limit}{'; ' if advice else ''}{advice}")
         self.field = field
         self.value = value
         self.limit = limit
+
+    @classmethod
+    def check_positive(cls, **values: float) -> None:
+        """Raise this error for the first value that is not finite and above 0."""
+        for field, value in values.items():
+            if not 0.0 < value < math.inf:
+                raise cls(field, value, "a finite number above 0")
 
 
 class ShaperRangeError(ParameterError):
@@ -92,7 +100,9 @@ class DelayError(ShapingError):
     """
 
     def __init__(self, delay: float, limit: float) -> None:
-        super().__init__(f"delay is {delay!r} ticks, but this line holds 0 to {limit!r} ticks")
+        super().__init__(
+            f"delay is {delay!r} ticks: must be 0 to {limit!r} ticks, which the delay line holds"
+        )
         self.delay = delay
         self.limit = limit
 

@@ -28,28 +28,31 @@ from tvist_shaping.tabulated import Tabulated
 HIGHEST_ZERO = 1.8  # largest permitted ratio of the highest zero to the design frequency [-]
 
 
-class HumpShaper:
-    """The equations for a given number and height of humps."""
+class HumpShaper(Tabulated):
+    """The shaper with a number of humps of height V, up to a highest damping ratio; None for the highest possible."""
 
-    def __init__(self, humps: int, V: float) -> None:
-        self.humps, self.V, self.N = humps, V, humps + 2
+    def __init__(self, humps: int, V: float, instead: str = "", zeta_max: float | None = None) -> None:
+        self.V, self.N = V, humps + 2
         degree = humps + 1
         # Zeros and humps of Chebyshev's polynomial, which are those of the undamped shaper.
         x = np.cos(np.arange(1, 2 * degree) * math.pi / (2 * degree)) / widening(humps, V)
         features = 2.0 / math.pi * np.arccos(x)
-        self.start: Floats = np.concatenate(
-            [ripple(humps, V), np.arange(1, self.N) / 2.0, np.delete(features, humps)]
-        )
+        start = np.concatenate([ripple(humps, V), np.arange(1, self.N) / 2.0, np.delete(features, humps)])
+        instead = f"take {instead or f'ei_of({humps}, {V:g})'}, which leaves less"
+        if zeta_max is None:
+            super().__init__(start, self._limit(start), instead)
+        else:
+            super().__init__(start, zeta_max, instead, degree / 2.0)
 
     def follow(self, zeta: float, near: Floats) -> tuple[Floats, Floats, Floats]:
-        """Solve at ζ from the solution at a nearby ζ; return it, A [-] and τ in damped periods [-]."""
+        """Solve at ζ; see `Tabulated.follow`."""
         x = solve(lambda points: self._equations(zeta, points), near)
         A, tau, _, _ = self._split(x[None])
         return x, A[0], tau[0]
 
-    def limit(self) -> float:
-        """Return the highest damping ratio, to a hundredth [-]."""
-        zeta, x = 0.0, self.start
+    def _limit(self, x: Floats) -> float:
+        """Return the highest damping ratio, to a hundredth [-]; x has the unknowns without damping."""
+        zeta = 0.0
         while zeta < 0.9:
             try:
                 x, A, tau = self.follow(zeta + 0.01, x)
@@ -86,22 +89,9 @@ class HumpShaper:
         )
 
 
-def exact(humps: int, V: float) -> Tabulated:
-    """Return the shaper with humps of height V, up to its highest possible damping."""
-    shaper = HumpShaper(humps, V)
-    return Tabulated(
-        shaper.follow, shaper.start, shaper.limit(), f"take ei_of({humps}, {V:g}), which leaves less"
-    )
-
-
-def _known(humps: int, closed_form: str, zeta_max: float) -> Tabulated:
-    shaper, instead = HumpShaper(humps, V), f"take {closed_form}, which leaves less"
-    return Tabulated(shaper.follow, shaper.start, zeta_max, instead, (humps + 1) / 2.0)
-
-
-ei_exact = _known(1, "ei", 0.52)
+ei_exact = HumpShaper(1, V, "ei", 0.52)
 """One hump of height V = 5 % with any damping ratio below 0.52; equal to `ei` without damping."""
-ei2_exact = _known(2, "ei2", 0.32)
+ei2_exact = HumpShaper(2, V, "ei2", 0.32)
 """Two humps of height V = 5 % with any damping ratio below 0.32; equal to `ei2` without damping."""
-ei3_exact = _known(3, "ei3", 0.2)
+ei3_exact = HumpShaper(3, V, "ei3", 0.2)
 """Three humps of height V = 5 % with any damping ratio below 0.2; equal to `ei3` without damping."""

@@ -20,7 +20,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats, Forked
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import FilterError
@@ -189,9 +189,7 @@ class Fade(Forked):
             FilterError: A limit is out of range, or the filters have different periods.
             ShapingError: The filters have different numbers of joints.
         """
-        for name, value in (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk)):
-            if not 0.0 < value < math.inf:
-                raise FilterError(name, value, "a finite number above 0")
+        FilterError.check_positive(velocity=velocity, acceleration=acceleration, jerk=jerk)
         if old.period != new.period:
             raise FilterError("period", new.period, f"{old.period:g} s, as the filter's it takes over from")
         new.take_over(old)

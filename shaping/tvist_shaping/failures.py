@@ -2,15 +2,14 @@
 
 from pathlib import Path
 from traceback import walk_tb
-from typing import Final
 
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import ShaperFailureError
 
-FAILURES: Final = (Exception, SystemExit)
+FAILURES = (Exception, SystemExit)
 """Exceptions that a user's function may raise; KeyboardInterrupt is not among them."""
-ROUNDING: Final = 1e-6  # share by which rounding may let a value exceed its shaper's declaration [-]
-_HERE: Final = Path(__file__).parent
+ROUNDING = 1e-6  # share by which rounding may let a value exceed its shaper's declaration [-]
+_HERE = Path(__file__).parent
 
 
 def failure(error: BaseException, f_d: Floats, zeta: Floats) -> str:

@@ -65,10 +65,7 @@ class TvistFilter(Filter):
             EstimatorError: The estimator requires more joints.
             ShaperFailureError: The shaper's function fails for the modes at q = 0.
         """
-        if not 0.0 < period < math.inf:
-            raise FilterError("period", period, "a finite number of seconds above 0")
-        if not 0.0 < max_delay < math.inf:
-            raise FilterError("max_delay", max_delay, "a finite number of seconds above 0")
+        FilterError.check_positive(period=period, max_delay=max_delay)
         longest = estimator.modes * shaper.duration_periods / estimator.f_d_min
         if longest > max_delay and estimator.modes * longest_of(shaper, estimator.f_d_min) <= max_delay:
             longest = max_delay

@@ -8,7 +8,7 @@ damped periods [-], shape (2, N); `impulses` receives amplitudes [-], times [s] 
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.delay_line import gather
 from tvist_shaping.estimators.polynomial import evaluate

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_shaping._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import FilterError
 

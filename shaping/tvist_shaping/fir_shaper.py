@@ -52,8 +52,7 @@ class FirShaper:
             raise DesignError("modes", self.modes, "a whole number from 1 to 8")
         if not 1.0 <= self.peak < np.inf:
             raise DesignError("peak", self.peak, "finite and at least 1")
-        if not 0.0 < self.period < np.inf:
-            raise DesignError("period", self.period, "a finite number of seconds above 0")
+        DesignError.check_positive(period=self.period)
 
     def weights(self, f_d: Floats, zeta: Floats) -> Floats:
         """Call `function`, check its result and pad it with zeros, shape (taps,).
@@ -68,7 +67,7 @@ class FirShaper:
         """
         given = np.array(self.function(f_d.copy(), zeta.copy()), dtype=float)
         if given.ndim != 1 or not 1 <= given.size <= self.taps:
-            why = f"returns taps of shape {given.shape}, but must return 1 to {self.taps}"
+            why = f"returns taps of shape {given.shape}: must be 1 to {self.taps} taps"
             more = given.ndim == 1 and self.taps < given.size <= MAX_TAPS
             raise ShaperFailureError(self.name, f"{why} (give FirShaper taps={given.size})" if more else why)
         if not np.isfinite(given).all():
@@ -76,13 +75,13 @@ class FirShaper:
         if abs(given.sum() - 1.0) >= 1e-9:
             raise ShaperFailureError(
                 self.name,
-                f"returns taps that sum to {float(given.sum())!r}, but must sum to 1 within 1e-9 "
+                f"returns taps that sum to {float(given.sum())!r}: must be 1 within 1e-9 "
                 "(divide them by their sum)",
             )
         if (most := float(np.abs(given).sum())) > self.peak * (1.0 + ROUNDING):
             raise ShaperFailureError(
                 self.name,
-                f"returns taps whose magnitudes sum to {most:g}, more than its peak of {self.peak:g} "
+                f"returns taps whose magnitudes sum to {most:g}: must be at most its peak of {self.peak:g} "
                 f"(give FirShaper peak={most:g})",
             )
         return np.pad(given, (0, self.taps - given.size))
@@ -113,9 +112,6 @@ class _Weights(Design):
         self._shaper = shaper
         self.name, self.modes, self.taps = shaper.name, shaper.modes, shaper.taps
         self.period, self.peak = shaper.period, shaper.peak
-
-    def __repr__(self) -> str:
-        return f"{self.name!r}"
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Compute the taps for these modes."""

@@ -30,18 +30,16 @@ class Impulses:
     def __post_init__(self) -> None:
         A, tau = np.array(self.A, dtype=float), np.array(self.tau, dtype=float)
         if A.ndim != 1 or A.shape != tau.shape or A.size == 0:
-            raise ImpulseError(f"A has shape {A.shape} and tau {tau.shape}, but both must be (N,), N >= 1")
+            raise ImpulseError(f"A has shape {A.shape} and tau {tau.shape}: both must be (N,), N >= 1")
         for name, values in (("A", A), ("tau", tau)):
             if not np.isfinite(values).all():
-                raise ImpulseError(f"{name} is {values.tolist()}, but must be finite")
+                raise ImpulseError(f"{name} is {values.tolist()}: must be finite")
         if tau[0] != 0.0 or (np.diff(tau) < 0.0).any():
             raise ImpulseError(
-                f"tau is {tau.tolist()}, but must ascend from 0 (sort the impulses by time, and subtract the first)"
+                f"tau is {tau.tolist()}: must ascend from 0 (sort the impulses by time, and subtract the first)"
             )
         if abs(A.sum() - 1.0) >= 1e-9:
-            raise ImpulseError(
-                f"A sums to {float(A.sum())!r}, but must sum to 1 within 1e-9 (divide A by its sum)"
-            )
+            raise ImpulseError(f"A sums to {float(A.sum())!r}: must be 1 within 1e-9 (divide A by its sum)")
         self._hold(A, tau)
 
     def _hold(self, A: Floats, tau: Floats) -> None:

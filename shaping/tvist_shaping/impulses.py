@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_shaping._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.amplitudes import modified, ripple
 from tvist_shaping.impulse_train import Impulses, check_mode

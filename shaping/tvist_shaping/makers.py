@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from tvist_shaping.amplitudes import modified, ripple
 from tvist_shaping.errors import DesignError
-from tvist_shaping.exact import exact as exact_humps
+from tvist_shaping.exact import HumpShaper
 from tvist_shaping.impulse_train import Impulses, check_mode
 from tvist_shaping.impulses import Train, V
 from tvist_shaping.sensitivity import residual
@@ -58,7 +58,7 @@ def ei_of(
         description or f"extra-insensitive, {humps} hump(s) of {100.0 * V:g} %{' exactly' if exact else ''}"
     )
     if exact:
-        made = exact_humps(humps, V)
+        made = HumpShaper(humps, V)
         return Shaper(name or f"ei_exact({humps},{V:g})", what, made, made.duration_periods, made.zeta_max)
     duration = (humps + 1) / 2.0
     train = Train(a, np.linspace(0.0, duration, humps + 2))

@@ -9,7 +9,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tvist_shaping._types import Floats
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.catalogue import SHAPERS
 from tvist_shaping.designs import ConstantDesign, SmoothedDesign, TargetDesign, running_means
@@ -31,12 +30,6 @@ LIGHT = 0.040
 
 The less an arm is damped, the later its weights have to be.
 """
-
-
-def _mean_delay(f_d: Floats, zeta: Floats) -> float:
-    """Mean delay of zero-vibration shapers for the two lowest modes [s]."""
-    later = np.exp(-np.pi * zeta[:2] / np.sqrt(1.0 - zeta[:2] ** 2))
-    return float(np.sum(later / (1.0 + later) / (2.0 * f_d[:2])))
 
 
 def _brief(mean_delay: float, residual: float, third: float, name: str, slower: float) -> ShortDesign:
@@ -180,26 +173,21 @@ class Registry:
         """
         feed_forward, smoothing = self.feed_forward_of(name), _smoothing(name)
         if smoothing:
-            weights = running_means(*means_of(smoothing[1]))
-            design = ConstantDesign(name, weights, estimator.modes)
+            both = smoothing[1] // 2 + 2  # ticks of both running means
+            first = round(FIRST * both)
+            design = ConstantDesign(name, running_means(first, both - first), estimator.modes)
             return SteadyFilter(design, estimator, joints=joints, feed_forward=feed_forward)
         if name in DESIGNS:
             kind = AimedFilter if name == AIMED else SteadyFilter
-            slower = max(
-                1.0, SLOW_HZ / estimator.f_d_min, _mean_delay(*estimator.settle(np.zeros(joints))) / LIGHT
-            )
+            f_d, zeta = (values[:2] for values in estimator.settle(np.zeros(joints)))
+            later = np.exp(-np.pi * zeta / np.sqrt(1.0 - zeta**2))
+            mean_delay = float(np.sum(later / (1.0 + later) / (2.0 * f_d)))
+            slower = max(1.0, SLOW_HZ / estimator.f_d_min, mean_delay / LIGHT)
             return kind(DESIGNS[name](slower), estimator, joints=joints, feed_forward=feed_forward)
         shaper = self.own[name] if name in self.own else SHAPERS[name]
         if isinstance(shaper, FirShaper):
             return SteadyFilter(shaper.design(), estimator, joints=joints)
         return TvistFilter(shaper, estimator, joints=joints)
-
-
-def means_of(length: int) -> tuple[int, int]:
-    """Return the ticks of the two running means for a smoothing length [ms]."""
-    both = length // 2 + 2
-    first = round(FIRST * both)
-    return first, both - first
 
 
 def _smoothing(name: str) -> tuple[FeedForward, int] | None:

@@ -58,7 +58,7 @@ def band(impulses: Impulses, f_d: float, zeta: float, V: float) -> tuple[float, 
         ShaperRangeError: ζ is outside the range above.
     """
     if not 0.0 < V < 1.0:
-        raise ShapingError(f"V is {V!r}, but must be between 0 and 1")
+        raise ShapingError(f"V is {V!r}: must be between 0 and 1")
     if not 0.0 < f_d < math.inf:
         raise ShaperRangeError("f_d", f_d, "finite and above 0 Hz")
 

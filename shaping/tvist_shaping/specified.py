@@ -47,16 +47,11 @@ def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
         )
     # The equal-ripple shaper, in units of the lower end, so that its band starts at 1.
     x = np.asarray((np.arange(N) - (N - 1) / 2.0) / 2.0 * ends, dtype=float)
-    humps = _humps(N, V) / ends
+    extremes = np.cos(np.arange(1, N - 1) * math.pi / (N - 1))
+    humps = 2.0 / math.pi * np.arccos(extremes / widening(N - 2, V)) / ends  # of its residual within the band
     if N > 2 and ratio < humps[-1]:
         a, x = _followed(a, x, humps, ratio, V)
     return a, (x - x[0]) / low
-
-
-def _humps(N: int, V: float) -> Floats:
-    """Return the extremes of `ripple`'s residual within its band, in design frequencies, shape (N - 2,)."""
-    extremes = np.cos(np.arange(1, N - 1) * math.pi / (N - 1))
-    return np.asarray(2.0 / math.pi * np.arccos(extremes / widening(N - 2, V)))
 
 
 def _followed(a: Floats, x: Floats, humps: Floats, ratio: float, V: float) -> tuple[Floats, Floats]:

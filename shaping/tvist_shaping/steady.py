@@ -47,6 +47,9 @@ class Design(Forked, ABC):
     constant: bool = False
     """True if the taps do not depend on the modes, which are then estimated only to be reported."""
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r}, {self.modes} modes, {self.taps} taps)"
+
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Compute the taps for a reference that has always been at rest; return False if they miss a requirement.
@@ -93,9 +96,6 @@ class ProductDesign(Design):
         self.name, self.modes, self.mean_delay = "product", modes, mean_delay
         self.period, self.taps = period, math.ceil(longest / period) + 3
 
-    def __repr__(self) -> str:
-        return f"ProductDesign(mean_delay={self.mean_delay:g}, modes={self.modes})"
-
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Compute the taps for these modes."""
         return product_taps(f_d, zeta, self.mean_delay, self.period, taps)
@@ -131,9 +131,6 @@ class ShortDesign(Design):
         self.taps = math.ceil(wanted.longest / period) + 1
         self._programme = Programme.of(wanted, self.taps)
         self._length, self._solved = 0.0, False
-
-    def __repr__(self) -> str:
-        return f"ShortDesign(mean_delay={self.mean_delay:g}, wanted={self.wanted!r})"
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Compute taps of the shortest length with a permitted residual."""
@@ -317,8 +314,6 @@ class AimedFilter(SteadyFilter):
 
 
 def _check_times(mean_delay: float, longest: float, period: float) -> None:
-    for name, value in (("mean_delay", mean_delay), ("longest", longest), ("period", period)):
-        if not 0.0 < value < math.inf:
-            raise FilterError(name, value, "a finite number of seconds above 0")
+    FilterError.check_positive(mean_delay=mean_delay, longest=longest, period=period)
     if mean_delay >= longest:
         raise FilterError("mean_delay", mean_delay, f"less than the longest delay, {longest:g} s")

@@ -5,7 +5,7 @@ solution. The polynomial through the nodes is as exact as the solutions, smooth 
 """
 
 import math
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from functools import cached_property
 
 import numpy as np
@@ -23,30 +23,28 @@ CONVERGED = 1e-7  # largest magnitude of the last coefficients of converged poly
 MOST_NODES = 256
 
 
-class Tabulated:
+class Tabulated(ABC):
     """Impulses of one mode as polynomials in ζ."""
 
     def __init__(
-        self,
-        follow: Callable[[float, Floats], tuple[Floats, Floats, Floats]],
-        start: Floats,
-        zeta_max: float,
-        instead: str,
-        duration_periods: float | None = None,
+        self, start: Floats, zeta_max: float, instead: str, duration_periods: float | None = None
     ) -> None:
         """Compute the polynomials, or only at the first evaluation if the longest duration [periods] is given.
 
-        `follow` takes ζ and the unknowns at a slightly lower ζ, and returns the unknowns, A [-] and times in damped
-        periods [-]; `start` has the unknowns without damping. `instead` says what to use beyond `zeta_max`.
+        `start` has the unknowns without damping; `instead` says what to use beyond `zeta_max`.
         """
-        self._follow, self._start, self._instead = follow, start, instead
+        self._start, self._instead = start, instead
         self.zeta_max = zeta_max  # damping ratios must stay below this [-]
         self.duration_periods = self.longest() if duration_periods is None else duration_periods
+
+    @abstractmethod
+    def follow(self, zeta: float, near: Floats) -> tuple[Floats, Floats, Floats]:
+        """Solve at ζ from the solution at a nearby ζ; return it, A [-] and τ in damped periods [-]."""
 
     def longest(self) -> float:
         """Return the longest duration over all ζ, to within 1e-9 damped periods [-]."""
         ends = ((0.0, self._start), (self.zeta_max, self._polynomials[1]))
-        durations = [float(self._follow(end, x)[2][-1]) for end, x in ends]
+        durations = [float(self.follow(end, x)[2][-1]) for end, x in ends]
         zetas = np.linspace(0.0, self.zeta_max, 33)[1:-1]
         return round(max(*durations, *(float(self._at(zeta)[1][-1]) for zeta in zetas)), 9)
 
@@ -67,7 +65,7 @@ class Tabulated:
         slope = np.zeros(last.size)
         for node in nodes:
             step, zeta = 0.5 * zeta_max * (1.0 + float(node)) - zeta, 0.5 * zeta_max * (1.0 + float(node))
-            x, A, periods = self._follow(zeta, last + step * slope)
+            x, A, periods = self.follow(zeta, last + step * slope)
             slope, last = (x - last) / step, x
             values.append(np.concatenate([A, periods]))
         terms = np.cos(np.outer(np.arccos(nodes), k))  # T_k at the nodes, which are orthogonal

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from tvist_shaping._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats
 
 MATTERS = 1e-12  # magnitude below which a tap does not count [-]

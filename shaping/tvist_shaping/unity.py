@@ -16,19 +16,22 @@ from tvist_shaping._types import Floats
 from tvist_shaping.newton import solve
 from tvist_shaping.tabulated import Tabulated
 
+ZETA_MAX = 0.5  # highest damping ratio [-]
 
-class UnityShaper:
+
+class UnityShaper(Tabulated):
     """The equations E(1) = 0, and with `derivative` E'(1) = 0, where E(r) = Σ ±exp(r s τ_j), T_d = 1 (see `exact`)."""
 
-    def __init__(self, *, derivative: bool) -> None:
-        """Set up three impulses, or five with `derivative`."""
+    def __init__(self, positive: str, duration_periods: float, *, derivative: bool) -> None:
+        """Set up three impulses, or five with `derivative`; `positive` is the shaper for higher damping ratios."""
         self.derivative = derivative
         self.A = np.array([1.0, -1.0, 1.0, -1.0, 1.0] if derivative else [1.0, -1.0, 1.0])
         # Without damping; for five impulses, four digits are enough as a starting point.
-        self.start: Floats = np.array([0.0895, 0.3662, 0.643, 0.7325] if derivative else [1 / 6, 1 / 3])
+        start = np.array([0.0895, 0.3662, 0.643, 0.7325] if derivative else [1 / 6, 1 / 3])
+        super().__init__(start, ZETA_MAX, f"take {positive}", duration_periods)
 
     def follow(self, zeta: float, near: Floats) -> tuple[Floats, Floats, Floats]:
-        """Solve at ζ from the solution at a nearby ζ; return it, A [-] and τ in damped periods [-]."""
+        """Solve at ζ; see `Tabulated.follow`."""
         s = 2.0 * math.pi * (zeta / math.sqrt(1.0 - zeta * zeta) + 1j)
 
         def equations(points: Floats) -> Floats:
@@ -43,18 +46,12 @@ class UnityShaper:
         return x, self.A, np.concatenate([[0.0], x])
 
 
-def _solved(positive: str, duration_periods: float, *, derivative: bool) -> Tabulated:
-    shaper = UnityShaper(derivative=derivative)
-    return Tabulated(shaper.follow, shaper.start, ZETA_MAX, f"take {positive}", duration_periods)
-
-
-ZETA_MAX = 0.5  # highest damping ratio [-]
-um_zv = _solved("zv", 0.353461707, derivative=False)
+um_zv = UnityShaper("zv", 0.353461707, derivative=False)
 """Unity-magnitude zero-vibration shaper: up to 3 times the acceleration, for ζ < 0.5.
 
 A = (1, -1, 1) [-]; without damping τ = (0, 1/6, 1/3)/f_d [s].
 """
-um_zvd = _solved("zvd", 0.790878917, derivative=True)
+um_zvd = UnityShaper("zvd", 0.790878917, derivative=True)
 """Unity-magnitude zero-vibration-and-derivative shaper: up to 5 times the acceleration, for ζ < 0.5.
 
 A = (1, -1, 1, -1, 1) [-]; without damping τ = (0, 0.0895, 0.3662, 0.6430, 0.7325)/f_d [s].

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_plant._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_plant.chain import SCRATCH, WIDTH
 from tvist_plant.drives import JointParameters
 from tvist_plant.model import Floats

@@ -1,8 +1,9 @@
 """One control period of the simulated arm, compiled: integration, dynamics, sensors."""
 
 import math
+from functools import partial
 
-from tvist_plant._compiled import compiled, compiled_for_long
+from tvist_kernels.compiling import compiled
 from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, NOW, ArmMemory, of_joint, parts
 from tvist_plant.chain import collect_inertia, collect_torques, sweep
 from tvist_plant.integrator import advance, balance
@@ -87,7 +88,7 @@ def tick(memory: Floats, q: Floats, qd: Floats, torque: Floats, out: Floats) -> 
     return evaluate(memory, out)
 
 
-@compiled_for_long
+@partial(compiled, nogil=True)  # so that other threads can tick
 def play(
     memory: Floats,
     commands: Floats,  # rows q_r, q̇_r and τ_ff of each, shape (T, 3, n)

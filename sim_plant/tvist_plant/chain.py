@@ -15,7 +15,7 @@ import math
 import numpy as np
 import pinocchio as pin
 
-from tvist_plant._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_plant.model import Floats
 
 AXES = {

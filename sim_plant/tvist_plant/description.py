@@ -4,7 +4,7 @@ import tomllib
 from hashlib import sha256
 from importlib import resources
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 
@@ -38,8 +38,8 @@ __all__ = [
     "robots",
 ]
 
-_ROBOTS: Final = resources.files("tvist_plant") / "robots"
-_VIBRATING: Final = (
+_ROBOTS = resources.files("tvist_plant") / "robots"
+_VIBRATING = (
     "gear_stiffness", "gear_damping", "rotor_inertia", "velocity_gain", "position_gain", "integral_gain",
     "coulomb_friction", "friction_width",
 )  # fmt: skip

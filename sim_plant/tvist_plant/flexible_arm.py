@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pinocchio as pin
 
@@ -53,7 +54,8 @@ class FlexibleArm(SimulatedArm):
     ) -> None:
         self.description = description
         self.period = period
-        usual = SUBSTEPS_IF_IMPERFECT if description.imperfections.keys() - STICTION else SUBSTEPS_OF_A_PERIOD
+        more = msgspec.to_builtins(description.imperfections).keys() - STICTION
+        usual = SUBSTEPS_IF_IMPERFECT if more else SUBSTEPS_OF_A_PERIOD
         self._substeps = usual if substeps is None else substeps
         self._imperfections = Imperfections.of(description, imperfections)
         n = description.joints
@@ -249,12 +251,3 @@ class FlexibleArm(SimulatedArm):
             links[:] = 0.0
             links[self._flexible.joints] = q
         return modes(self._flexible, self._joints, self.description, links)
-
-    def energy(self) -> float:
-        """Return kinetic, gravitational and elastic energy, to check the integrator [J]."""
-        model, data = self._flexible.model, self._data
-        kinetic = pin.computeKineticEnergy(model, data, self._q, self._qd)
-        rotors = 0.5 * self._joints.rotor_inertia @ self._speed**2
-        gears = 0.5 * self._joints.gear_stiffness @ (self._q[self._flexible.joints] - self._motor) ** 2
-        links = 0.5 * self._flexible.flex_stiffness @ self._q[self._flexible.flexes] ** 2
-        return float(kinetic + pin.computePotentialEnergy(model, data, self._q) + rotors + gears + links)

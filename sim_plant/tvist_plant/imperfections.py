@@ -23,91 +23,16 @@ x and y axes and carries a ring with mass under the arm. A tilted arm leans in t
 knowledge; the truth is given in the upright world.
 """
 
-import math
-from dataclasses import dataclass, fields, replace
-
-import msgspec
 import numpy as np
 import pinocchio as pin
 
 from tvist_plant.model import FLANGE, FlexibleModel, flexible_model
-from tvist_plant.robot_tables import Payload, RobotDescription
+from tvist_plant.robot_tables import Imperfections, Payload, RobotDescription, YieldingBase
+
+__all__ = ["STICTION", "Imperfections", "YieldingBase", "imperfect_model", "on_base"]
 
 STICTION = frozenset({"stiction", "stiction_load", "stiction_speed", "stiction_stiffness"})
 """Keys of the motors' stiction."""
-STEEPEST = math.pi / 6  # largest tilt of an arm [rad]
-
-
-@dataclass(frozen=True)
-class YieldingBase:
-    """A base on springs; raise ValueError unless each value is positive (`damping_time` may be 0)."""
-
-    stiffness: float = 1.5e5  # stiffness about each of the two axes [N m/rad]
-    damping_time: float = 1e-3  # damping divided by stiffness [s]
-    mass: float = 20.0  # mass of the ring under the arm [kg]
-    radius: float = 0.25  # radius of the ring, for its inertia [m]
-
-    def __post_init__(self) -> None:
-        for name in ("stiffness", "mass", "radius"):
-            _check(f"base.{name}", getattr(self, name), 0.0, math.inf, above=True)
-        _check("base.damping_time", self.damping_time, 0.0, math.inf)
-
-
-_RANGES = {
-    "breakaway": (1.0, math.inf, False), "stribeck_speed": (0.0, math.inf, True),
-    "rotor": (0.0, math.inf, True), "hysteresis": (0.0, math.inf, False),
-    "hysteresis_torque": (0.0, math.inf, True), "soft": (0.0, 1.0, True),
-    "soft_torque": (0.0, math.inf, False), "stiction": (0.0, math.inf, False),
-    "stiction_load": (0.0, math.inf, False), "stiction_speed": (0.0, math.inf, True),
-    "stiction_stiffness": (0.0, math.inf, True), "torsion": (0.0, math.inf, True),
-    "backlash": (0.0, math.inf, False), "tilt": (-STEEPEST, STEEPEST, False),
-}  # fmt: skip
-"""Limits of each value, and whether the lower one is excluded."""
-
-
-@dataclass(frozen=True)
-class Imperfections:
-    """Deviations from the description; the defaults add none. Raise ValueError if a value is out of range."""
-
-    breakaway: float = 1.0  # f_s divided by F_c, at least 1 [-]
-    stribeck_speed: float = 0.05  # v_s, above 0 [rad/s]
-    rotor: float = 1.0
-    """Rotor inertia divided by the description's, above 0; the feed-forward does not know it [-]."""
-    hysteresis: float = 0.0  # r: relative stiffness added to a gear when its twist reverses, at least 0 [-]
-    hysteresis_torque: float = 0.02  # z_max divided by the joint's torque limit, above 0 [-]
-    soft: float = 1.0  # k₁ divided by K, above 0 and at most 1 [-]
-    soft_torque: float = 0.1  # k₁ δ₁ divided by the joint's torque limit, at least 0 [-]
-    stiction: tuple[float, ...] = ()
-    """F_s of the torque d that holds each motor near standstill, at least 0; empty for none [N m]."""
-    stiction_load: float = 0.0  # μ_s: increase of d per torque in the gear, at least 0 [-]
-    stiction_speed: float = 0.03  # v_s: speed over which d decays, above 0 [rad/s]
-    stiction_stiffness: float = 27.0
-    """σ: stiffness of d before it breaks away, divided by the gear's, above 0 [-]."""
-    base: YieldingBase | None = None  # the yielding base; None for a rigid one
-    torsion: float | None = None
-    """Torsional stiffness of each link that bends, above 0; None for rigid in torsion [N m/rad]."""
-    backlash: tuple[float, ...] = ()  # b of each joint, half its backlash, at least 0; empty for none [rad]
-    tilt: float = 0.0
-    """Angle by which the arm leans about the world's x axis, at most 30 degrees either way [rad]."""
-
-    def __post_init__(self) -> None:
-        for name, (least, most, above) in _RANGES.items():
-            value = getattr(self, name)
-            if isinstance(value, tuple):
-                for joint, one in enumerate(value):
-                    _check(f"{name}[{joint}]", one, least, most, above=above)
-            elif value is not None:
-                _check(name, value, least, most, above=above)
-
-    @classmethod
-    def of(cls, description: RobotDescription, more: "Imperfections | None" = None) -> "Imperfections":
-        """Return the robot file's imperfections, overridden by values of `more` other than the defaults."""
-        own = msgspec.convert(description.imperfections, cls)
-        if more is None:
-            return own
-        none, names = cls(), [one.name for one in fields(cls)]
-        given = {name: getattr(more, name) for name in names if getattr(more, name) != getattr(none, name)}
-        return replace(own, **given)
 
 
 def imperfect_model(
@@ -150,13 +75,3 @@ def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
         flange=whole.getFrameId(FLANGE),
         bare=arm.bare,
     )
-
-
-def _check(name: str, value: float, least: float, most: float, *, above: bool = False) -> None:
-    """Raise ValueError unless a value is finite and within its limits; `above` excludes the lower one."""
-    if math.isfinite(value) and (least < value if above else least <= value) and value <= most:
-        return
-    limit = f"{'above' if above else 'at least'} {least:g}" + (
-        f" and at most {most:g}" if most < math.inf else ""
-    )
-    raise ValueError(f"{name} is {value}: must be {limit}, and finite")

@@ -19,7 +19,7 @@ is factorised.
 import math
 from typing import NamedTuple
 
-from tvist_plant._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_plant.arm_memory import LAST, NOW, PERIOD, SUBSTEPS, ArmMemory, of_joint
 from tvist_plant.drives import JointParameters
 from tvist_plant.model import Floats

@@ -69,7 +69,11 @@ def flexible_model(
         joints.append(model.nv - 1)
         frame = link_frame(description, number)
         if number not in stiffness_of:
-            model.appendBodyToJoint(parent, _link_inertia(description, number), frame)
+            links = description.links
+            inertia = pin.Inertia(
+                links.mass[number], np.array(links.com[number]), _matrix(links.inertia[number])
+            )
+            model.appendBodyToJoint(parent, inertia, frame)
             placement = frame
             continue
         near, far = _lumps(description, number)
@@ -139,11 +143,6 @@ def rotation_of(roll: float, pitch: float, yaw: float) -> Floats:
 def _matrix(tensor: Tensor) -> Floats:
     xx, xy, xz, yy, yz, zz = tensor
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _link_inertia(description: RobotDescription, number: int) -> pin.Inertia:
-    links = description.links
-    return pin.Inertia(links.mass[number], np.array(links.com[number]), _matrix(links.inertia[number]))
 
 
 def _lumps(description: RobotDescription, number: int) -> tuple[pin.Inertia, pin.Inertia]:

@@ -6,7 +6,7 @@ works (`foreign.arm_of`).
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -16,9 +16,10 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
 from tvist_plant.modes import Modes
+from tvist_plant.surroundings import Hand, Things
 
 PERIOD = 0.002  # control period [s]
-GRAVITY = 9.81  # Gravitational acceleration, along the base's negative z axis [m/s²]
+GRAVITY = 9.81  # gravitational acceleration, along the base's negative z axis [m/s²]
 
 
 class PlantError(ArithmeticError):
@@ -111,48 +112,6 @@ class Sight:
     told: tuple[str, ...] = ()  # messages for users
 
 
-@dataclass(frozen=True)
-class Shape:
-    """A primitive shape."""
-
-    kind: str  # `plane`, `sphere`, `capsule`, `ellipsoid`, `cylinder` or `box`
-    size: tuple[float, ...]
-    """Size as in MuJoCo: radius and half length along z, or half lengths; 0 for an infinite side of a plane [m]."""
-    pose: tuple[float, ...]  # pose in the body's frame: x y z [m] and rotation vector [rad]
-    body: int | None  # number of the body that carries it; None if fixed in the arm's base frame
-    colour: tuple[float, ...]  # Red, green, blue and opacity, 0 to 1
-
-
-@dataclass(frozen=True)
-class Things:
-    """The objects around an arm."""
-
-    name: str  # name of the scene
-    bodies: tuple[str, ...]  # names of the moving bodies
-    shapes: tuple[Shape, ...]  # shapes of the moving bodies and of everything fixed
-    areas: Mapping[str, Shape]  # named areas in which a test can check for a body
-    unseen: int = 0  # number of shapes left out, such as meshes
-
-
-@dataclass(frozen=True)
-class Hand:
-    """A gripper whose two fingers close along y of the tool centre point."""
-
-    stroke: float  # distance between open fingers [m]
-    position: Floats  # position of the tool centre point in the flange frame, shape (3,) [m]
-    rotation: Floats  # orientation of the tool centre point in the flange frame, shape (3, 3)
-
-    @property
-    def direction(self) -> Floats:
-        """Direction of the fingers, away from the flange, shape (3,)."""
-        return np.asarray(self.rotation[:, 2])
-
-    @property
-    def root(self) -> Floats:
-        """Root of the fingers in the flange frame, shape (3,) [m]."""
-        return np.asarray(self.position - 0.05 * self.direction)
-
-
 class Plant(ABC):
     """An arm with its drives, simulated or real, as a controller uses it.
 
@@ -191,8 +150,6 @@ class Plant(ABC):
         found = getattr(self, method.__name__)
         return callable(found) and getattr(found, "__func__", found) is not method
 
-    # ------------------------------------------------------------------ payload and gripper
-
     def load(self, payload: Payload) -> None:
         """Carry another payload from now on; positions and velocities stay."""
         self._lacks("load")
@@ -213,8 +170,6 @@ class Plant(ABC):
     def opening(self) -> float:
         """Return the measured distance between the fingers [m]."""
         self._lacks("opening")
-
-    # ------------------------------------------------------------------ power and ticks
 
     @property
     def condition(self) -> Condition:
@@ -245,8 +200,6 @@ class Plant(ABC):
     def supervised(self) -> bool:
         """Whether tvist moves it through its own controller; see `RealArm.seen`."""
         return False
-
-    # ------------------------------------------------------------------ simulation only
 
     def truth(self) -> PlantTruth | None:
         """Return what a real robot cannot measure, after the last step or reset; None if unknown."""
@@ -281,8 +234,6 @@ class Plant(ABC):
     def make_nan(self) -> None:
         """Make the state NaN for the fault `nan`; the next step then raises `PlantError`."""
         self._lacks("make_nan")
-
-    # ------------------------------------------------------------------ world
 
     def things(self) -> Things | None:
         """Return the objects around the arm, which do not change; None if there are none."""

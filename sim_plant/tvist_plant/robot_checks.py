@@ -3,18 +3,24 @@
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import fields
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 import numpy as np
 
-from tvist_plant.robot_tables import MAX_JOINTS, ORIGINS, RobotDescription, RobotFileError, Tensor
+from tvist_plant.robot_tables import (
+    MAX_JOINTS,
+    ORIGINS,
+    Imperfections,
+    RobotDescription,
+    RobotFileError,
+    Tensor,
+)
 from tvist_plant.user_file import LONGEST_NAME, is_name
 
-MAX_POSITION: Final = 20.0 * math.pi
+MAX_POSITION = 20.0 * math.pi
 """Largest position limit accepted as radians: ten turns in either direction [rad]."""
-MAX_VELOCITY: Final = 16.0 * math.pi
+MAX_VELOCITY = 16.0 * math.pi
 """Largest velocity limit accepted as radians: eight turns per second [rad/s]."""
 
 
@@ -60,7 +66,7 @@ def _joints(description: RobotDescription) -> Iterator[str]:
     """Check for one entry per joint, and that link frames and bending links are given in one way only."""
     joints, kinematics, flexible = description.joints, description.kinematics, description.link_flexibility
     if not 1 <= joints <= MAX_JOINTS:
-        yield f"robot.joints has {joints} names; 1 to {MAX_JOINTS} are supported"
+        yield f"robot.joints has {joints} names: must be 1 to {MAX_JOINTS}"
     given = [key for key in ("a", "d", "alpha") if getattr(kinematics, key)]
     if kinematics.placement and given:
         yield f"kinematics has placement and {', '.join(given)}: give one or the other"
@@ -75,17 +81,17 @@ def _joints(description: RobotDescription) -> Iterator[str]:
     sized |= {f"poses.{name}": pose for name, pose in description.poses.items()}
     for key, value in sized.items():
         if len(value) != joints:
-            yield f"{key} has {len(value)} entries; robot.joints has {joints}"
+            yield f"{key} has {len(value)} entries: must be {joints}, one for each of robot.joints"
     if len(flexible.links) != len(flexible.stiffness):
         yield (
-            f"link_flexibility.stiffness has {len(flexible.stiffness)} entries; "
-            f"link_flexibility.links has {len(flexible.links)}"
+            f"link_flexibility.stiffness has {len(flexible.stiffness)} entries: must be {len(flexible.links)}, "
+            "one for each of link_flexibility.links"
         )
     possible = [link for link, length in enumerate(kinematics.a) if length != 0.0]
     if len(set(flexible.links)) < len(flexible.links) or not set(flexible.links).issubset(possible):
         yield (
-            f"link_flexibility.links is {list(flexible.links)}; "
-            f"each may occur only once and must be one of {possible}, whose length kinematics.a is not 0"
+            f"link_flexibility.links is {list(flexible.links)}: must be different ones of {possible}, "
+            "whose length kinematics.a is not 0"
         )
 
 
@@ -94,18 +100,13 @@ def _collision(description: RobotDescription) -> Iterator[str]:
     names = [body.name for body in description.collision.bodies]
     known = {*names, "payload"}
     if len(known) <= len(names):
-        yield (
-            f"collision.bodies has the names {names}; "
-            "each may occur only once, and the names payload and floor are reserved"
-        )
+        yield f"collision.bodies has the names {names}: must all differ, also from payload"
     for body in description.collision.bodies:
         if body.link >= description.joints:
-            yield (
-                f"collision.bodies: {body.name} has link {body.link}; it must be below {description.joints}"
-            )
+            yield (f"collision.bodies: {body.name} has link {body.link}: must be below {description.joints}")
     for pair in description.collision.apart:
         if not known.issuperset(pair):
-            yield f"collision.apart has {list(pair)}; the bodies are {sorted(known)}"
+            yield f"collision.apart has {list(pair)}: must be two of {sorted(known)}"
 
 
 def _limits(description: RobotDescription) -> Iterator[str]:
@@ -118,8 +119,8 @@ def _limits(description: RobotDescription) -> Iterator[str]:
         for joint, value in enumerate(values):
             if value > most:
                 yield (
-                    f"limits.{key}[{joint}] is {value:g} {unit}, and at most {most:.1f} {unit} are "
-                    f"supported: if degrees were meant, write {math.radians(value):.6g} {unit}"
+                    f"limits.{key}[{joint}] is {value:g} {unit}: must be at most {most:.1f} {unit}; "
+                    f"if you mean degrees, write {math.radians(value):.6g} {unit}"
                 )
 
 
@@ -128,8 +129,8 @@ def _bodies(description: RobotDescription) -> Iterator[str]:
     for key, inertia in {**links, "payload.inertia": description.payload.inertia}.items():
         if not is_real_body(inertia):
             yield (
-                f"{key} is {list(inertia)}; no body can have this: "
-                "a principal moment is negative or larger than the other two together"
+                f"{key} is {list(inertia)}: must be possible for a body, with no principal moment negative or larger "
+                "than the other two together"
             )
 
 
@@ -150,44 +151,31 @@ def _provenance(description: RobotDescription) -> Iterator[str]:
 
 
 def _imperfections(description: RobotDescription) -> Iterator[str]:
-    """Check that the imperfections are valid and possible for this arm."""
+    """Check that the imperfections are possible for this arm."""
     given = description.imperfections
-    if not given:
+    if given == Imperfections():
         return
     from tvist_plant.drives import joint_parameters  # pinocchio is slow to import
-    from tvist_plant.imperfections import Imperfections, imperfect_model
+    from tvist_plant.imperfections import imperfect_model
 
     try:
-        made = Imperfections.of(description)
-        for name in sorted(_keys(given) - _keys(msgspec.to_builtins(made))):
-            table = getattr(made, name.rpartition(".")[0], made)
-            keys = ", ".join(one.name for one in fields(table))
-            yield f"imperfections.{name:.200} is not a key of a robot file: must be one of {keys}"
-        joint_parameters(description, made)
-        imperfect_model(description, description.payload, made)
-    except msgspec.ValidationError as error:
-        yield in_words(error, {"imperfections": given}, "imperfections")
+        joint_parameters(description, given)
+        imperfect_model(description, description.payload, given)
     except ValueError as error:
         yield f"imperfections: {error}"
 
 
-def _keys(table: dict[str, Any]) -> set[str]:
-    """Return the keys of a table, and those of its tables joined by a dot."""
-    inner = {f"{key}.{one}" for key, value in table.items() if isinstance(value, dict) for one in value}
-    return inner | table.keys()
-
-
-_KINDS: Final = {
+_KINDS = {
     "float": "a number", "int": "a whole number", "str": "text", "array": "a list", "object": "a table",
     "bool": "true or false", "null": "nothing",
 }  # fmt: skip
-_RELATIONS: Final = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than", "": "exactly"}
+_RELATIONS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than", "": "exactly"}
 
 
-def in_words(error: msgspec.ValidationError, content: Any, table: str = "") -> str:
+def in_words(error: msgspec.ValidationError, content: Any) -> str:
     """Turn msgspec's message into one with the key, the value and the permitted values."""
     said, _, path = str(error).partition(" - at `$")
-    key = f"{table}{path.rstrip('`')}".removeprefix(".")
+    key = path.rstrip("`").removeprefix(".")
     value = content
     for name, index in re.findall(r"([A-Za-z_][^.\[]*)|\[(\d+)\]", key):
         try:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta, Struct
@@ -147,6 +147,45 @@ class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     torque_offset: NotNegative = 0.3  # largest constant torque error per axis [N m]
 
 
+class YieldingBase(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """A base on springs."""
+
+    stiffness: Positive = 1.5e5  # stiffness about each of the two axes [N m/rad]
+    damping_time: NotNegative = 1e-3  # damping divided by stiffness [s]
+    mass: Positive = 20.0  # mass of the ring under the arm [kg]
+    radius: Positive = 0.25  # radius of the ring, for its inertia [m]
+
+
+class Imperfections(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """Deviations of the simulated arm from the other tables, see `imperfections`; the defaults add none."""
+
+    breakaway: Annotated[float, Meta(ge=1, le=1e7)] = 1.0  # f_s divided by F_c [-]
+    stribeck_speed: Positive = 0.05  # v_s [rad/s]
+    rotor: Positive = 1.0  # rotor inertia divided by the drives', which the feed-forward does not know [-]
+    hysteresis: NotNegative = 0.0  # r: relative stiffness added to a gear when its twist reverses [-]
+    hysteresis_torque: Positive = 0.02  # z_max divided by the joint's torque limit [-]
+    soft: Annotated[float, Meta(gt=0, le=1)] = 1.0  # k₁ divided by K [-]
+    soft_torque: NotNegative = 0.1  # k₁ δ₁ divided by the joint's torque limit [-]
+    stiction: tuple[NotNegative, ...] = ()
+    """F_s of the torque d that holds each motor near standstill; empty for none [N m]."""
+    stiction_load: NotNegative = 0.0  # μ_s: increase of d per torque in the gear [-]
+    stiction_speed: Positive = 0.03  # v_s: speed over which d decays [rad/s]
+    stiction_stiffness: Positive = 27.0  # σ: stiffness of d before it breaks away, divided by the gear's [-]
+    base: YieldingBase | None = None  # the yielding base; None for a rigid one
+    torsion: Positive | None = None
+    """Torsional stiffness of each link that bends; None for rigid in torsion [N m/rad]."""
+    backlash: tuple[NotNegative, ...] = ()  # b of each joint, half its backlash; empty for none [rad]
+    tilt: Annotated[float, Meta(ge=-math.pi / 6, le=math.pi / 6)] = 0.0
+    """Angle by which the arm leans about the world's x axis, at most 30 degrees either way [rad]."""
+
+    @classmethod
+    def of(cls, description: "RobotDescription", more: "Imperfections | None" = None) -> "Imperfections":
+        """Return the robot file's imperfections, overridden by values of `more` other than the defaults."""
+        parts = (description.imperfections, cls() if more is None else more)
+        own, given = (msgspec.to_builtins(part) for part in parts)
+        return msgspec.convert(own | given, cls)
+
+
 class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A capsule that encloses a part of the arm."""
 
@@ -193,8 +232,9 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
     drives: Drives
     link_flexibility: LinkFlexibility = LinkFlexibility()
     sensors: Sensors = Sensors()
-    imperfections: dict[str, Any] = {}
-    """Fields of `imperfections.Imperfections` for the simulated arm; a controller knows only the stiction."""
+    imperfections: Imperfections = (
+        Imperfections()
+    )  # of the simulated arm; a controller knows only the stiction
     collision: Collision = Collision()
     meshes: tuple[Mesh, ...] = ()
     poses: dict[str, tuple[Number, ...]] = {}

@@ -20,19 +20,19 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 
 from tvist_plant.robot_tables import ArmLimits, Kinematics, RobotDescription
 from tvist_plant.user_file import toml
 
-RULE: Final = "assumed: the UR5e's, scaled by dynamic similarity to this arm's torques and length"
+RULE = "assumed: the UR5e's, scaled by dynamic similarity to this arm's torques and length"
 """Provenance of the values computed here."""
-WRIST: Final = 3  # number of joints at the end that correspond to the UR5e's wrist
-DIGITS: Final = 4  # number of significant digits of scaled values
+WRIST = 3  # number of joints at the end that correspond to the UR5e's wrist
+DIGITS = 4  # number of significant digits of scaled values
 
-_POWERS: Final = {
+_POWERS = {
     "gear_stiffness": (1.0, 0.0),
     "coulomb_friction": (1.0, 0.0),
     "rotor_inertia": (1.0, 1.0),
@@ -124,7 +124,7 @@ class Scale:
         }
 
 
-BENDING_LENGTH: Final = 0.2  # length above which a link bends, in an arm as long as the UR5e [m]
+BENDING_LENGTH = 0.2  # length above which a link bends, in an arm as long as the UR5e [m]
 
 
 def completed(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -183,7 +183,7 @@ def with_limits(content: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-_POSES: Final = {"Q1": 0.0, "Q2": 0.5}  # poses of an arm from a URDF: one angle for all joints [rad]
+_POSES = {"Q1": 0.0, "Q2": 0.5}  # poses of an arm from a URDF: one angle for all joints [rad]
 
 
 def _rounded(value: float) -> float:

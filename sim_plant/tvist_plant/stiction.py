@@ -2,7 +2,7 @@
 
 import math
 
-from tvist_plant._compiled import compiled
+from tvist_kernels.compiling import compiled
 
 MIN_TORQUE = 1e-9  # remaining stiction of a fast motor, to avoid a division by zero [N m]
 

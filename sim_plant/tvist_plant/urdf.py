@@ -9,7 +9,7 @@ import math
 from collections import Counter
 from itertools import product
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
@@ -19,16 +19,16 @@ from tvist_plant.model import Floats
 from tvist_plant.robot_tables import MAX_JOINTS, RobotFileError
 from tvist_plant.user_file import LONGEST_NAME, UserFileError, is_name, read_text, xml
 
-TURNING: Final = ("revolute", "continuous")
-FLANGES: Final = ("tool0", "flange")
+TURNING = ("revolute", "continuous")
+FLANGES = ("tool0", "flange")
 """Names of a link that marks the flange if it is fixed to the last joint; otherwise that joint's link is the flange."""
-CONTINUOUS: Final = 4.0 * math.pi  # position limit of a joint without end stops [rad]
-UPRIGHT: Final = 1e-6  # deviation of the first axis from the vertical that counts as rounding [-]
-DEEPEST: Final = 200
+CONTINUOUS = 4.0 * math.pi  # position limit of a joint without end stops [rad]
+UPRIGHT = 1e-6  # deviation of the first axis from the vertical that counts as rounding [-]
+DEEPEST = 200
 """Largest number of joints from the base to a link, fixed ones included, because URDF parsers recurse."""
-LARGEST: Final = 1e7  # largest number, as in other robot files
-_ORIGIN: Final = {"xyz": (0.0, 0.0, 0.0), "rpy": (0.0, 0.0, 0.0)}
-NUMBERS: Final[dict[tuple[str, str], dict[str, tuple[float, ...]]]] = {
+LARGEST = 1e7  # largest number, as in other robot files
+_ORIGIN = {"xyz": (0.0, 0.0, 0.0), "rpy": (0.0, 0.0, 0.0)}
+NUMBERS: dict[tuple[str, str], dict[str, tuple[float, ...]]] = {
     ("joint", "origin"): {**_ORIGIN},
     ("joint", "axis"): {"xyz": (1.0, 0.0, 0.0)},
     ("joint", "limit"): dict.fromkeys(("lower", "upper", "effort", "velocity"), (0.0,)),

@@ -5,15 +5,15 @@ import re
 import stat
 import tomllib
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
-LARGEST: Final = 4 << 20  # largest file size, a hundred times the largest useful one [bytes]
-DEEPEST: Final = 100
+LARGEST = 4 << 20  # largest file size, a hundred times the largest useful one [bytes]
+DEEPEST = 100
 """Deepest nesting of XML elements and TOML brackets, and most parts of a dotted TOML key, since the parser
 takes quadratic time. TOML files need five levels."""
-LONGEST_NAME: Final = 100  # largest number of characters of a name
-LONGEST_LINE: Final = 500  # largest number of characters quoted from a file or a library's message
+LONGEST_NAME = 100  # largest number of characters of a name
+LONGEST_LINE = 500  # largest number of characters quoted from a file or a library's message
 
 
 def named(error: BaseException, said: str | None = None) -> str:
@@ -136,7 +136,7 @@ def _is_deeper(text: str, most: int) -> bool:
     return False
 
 
-_TOKENS: Final = re.compile(
+_TOKENS = re.compile(
     r'"""(?:\\.|[^"\\]|"(?!""))*+(?:""")?'  # strings, which an invalid file may not terminate
     r"|'''(?:[^']|'(?!''))*+(?:''')?"
     r'|"(?:\\.|[^"\\\n])*+"?'
@@ -155,7 +155,7 @@ def _check_kind(path: str | os.PathLike[str], what: str, status: os.stat_result)
     raise UserFileError(f"{what} {path} is {kind}, not a file")
 
 
-_KINDS: Final = (
+_KINDS = (
     (stat.S_ISDIR, "a directory"),
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),

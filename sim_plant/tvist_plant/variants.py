@@ -5,13 +5,13 @@ A hidden robot deviates in all parameters, as a real one would: each by an indep
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import radians
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
-from msgspec import structs
+from msgspec import convert, structs, to_builtins
 
 from tvist_plant.flexible_arm import SUBSTEPS_IF_IMPERFECT, FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
@@ -19,17 +19,17 @@ from tvist_plant.plant import SimulatedArm
 from tvist_plant.robot_tables import Drives, LinkFlexibility, Payload, RobotDescription
 from tvist_plant.similar import counterpart
 
-SCATTER: Final = 0.15
+SCATTER = 0.15
 """Relative deviation of each stiffness and gain from the description, with random sign [-]."""
 MASS_SCATTER, COM_SCATTER = 0.07, 0.010
 """Relative deviation of each link's mass [-] and deviation of its centre of mass per axis [m] in `blind`,
 with random signs."""
-TORSION: Final = 2e4  # torsional stiffness of links that twist [N m/rad]
-BACKLASH: Final = (5e-5, 1e-4, 1e-4, 2e-4, 2e-4, 2e-4)
+TORSION = 2e4  # torsional stiffness of links that twist [N m/rad]
+BACKLASH = (5e-5, 1e-4, 1e-4, 2e-4, 2e-4, 2e-4)
 """Half the backlash of each gear, by the corresponding joint of the UR5e [rad]."""
-SPRINGS: Final = ("gear_stiffness",)  # Stiffnesses among the drives' parameters
-LOOPS: Final = (*SPRINGS, "velocity_gain", "position_gain")  # springs and loop gains
-DRIVES: Final = {
+SPRINGS = ("gear_stiffness",)  # Stiffnesses among the drives' parameters
+LOOPS = (*SPRINGS, "velocity_gain", "position_gain")  # springs and loop gains
+DRIVES = {
     "gear_stiffness": 0.2,
     "gear_damping": 0.2,
     "velocity_gain": 0.3,
@@ -38,12 +38,12 @@ DRIVES: Final = {
     "friction_width": 0.2,
 }
 """Largest relative deviation per joint of a hidden robot's drives; the width is common to all joints [-]."""
-LINKS: Final = {"stiffness": 0.2, "damping_time": 0.2}
+LINKS = {"stiffness": 0.2, "damping_time": 0.2}
 """Largest relative deviation per bending link; the damping time is common to all links [-]."""
-MASS: Final = 0.15  # largest relative deviation of the carried mass from the declared one [-]
-CENTRE: Final = 0.015  # largest deviation of the carried centre of mass per flange axis [m]
+MASS = 0.15  # largest relative deviation of the carried mass from the declared one [-]
+CENTRE = 0.015  # largest deviation of the carried centre of mass per flange axis [m]
 
-HEAVIER: Final[Mapping[str, float | tuple[float, ...]]] = {
+HEAVIER: Mapping[str, float | tuple[float, ...]] = {
     "coulomb_friction": (1.21, 1.3, 1.02, 1.22, 1.29, 1.06),
     "stiction": (1.56, 1.49, 1.63, 2.32, 2.14, 2.04),
     "stiction_load": 1.85,
@@ -81,7 +81,7 @@ class Variant:
         if self.backlash:
             joints = description.joints
             widths = (self.backlash * BACKLASH[counterpart(joint, joints)] for joint in range(joints))
-            found = replace(found or Imperfections(), backlash=tuple(widths))
+            found = structs.replace(found or Imperfections(), backlash=tuple(widths))
         substeps = None if found is None else SUBSTEPS_IF_IMPERFECT
         return FlexibleArm(arm, carried, imperfections=found, substeps=substeps, carries=self.carries)
 
@@ -105,16 +105,15 @@ def _changed(
     )
 
 
-def _signs(*seed: int) -> Factors:
-    random = np.random.default_rng(seed)
-    return lambda share, shape: random.choice([1.0 - share, 1.0 + share], shape)
-
-
 def _off(
     share: float, number: int, description: RobotDescription, seed: int, names: tuple[str, ...] = LOOPS
 ) -> RobotDescription:
     """Change each gear, link and loop gain by a share, up or down at random."""
-    return _changed(description, dict.fromkeys(names, share), {"stiffness": share}, _signs(seed, number))
+    random = np.random.default_rng((seed, number))
+    return _changed(
+        description, dict.fromkeys(names, share), {"stiffness": share},
+        lambda share, shape: random.choice([1.0 - share, 1.0 + share], shape),
+    )  # fmt: skip
 
 
 def stiffer(factor: float, description: RobotDescription, _seed: int = 0) -> RobotDescription:
@@ -136,10 +135,10 @@ def rubbed(
     factors: Mapping[str, float | tuple[float, ...]], description: RobotDescription, _seed: int = 0
 ) -> RobotDescription:
     """Return an arm with stiction, its friction multiplied by factors such as `HEAVIER`."""
-    own = {"coulomb_friction": description.drives.coulomb_friction, **description.imperfections}
+    own = {"coulomb_friction": description.drives.coulomb_friction, **to_builtins(description.imperfections)}
     new = {name: (np.array(value) * factors.get(name, 1.0)).tolist() for name, value in own.items()}
     drives = structs.replace(description.drives, coulomb_friction=tuple(new.pop("coulomb_friction")))
-    return structs.replace(description, drives=drives, imperfections=new)
+    return structs.replace(description, drives=drives, imperfections=convert(new, Imperfections))
 
 
 def in_file(file: RobotDescription, _description: RobotDescription, _seed: int) -> RobotDescription:
@@ -194,7 +193,7 @@ def hidden_payload(declared: Payload, seed: int) -> Payload:
     return _other_payload(declared, factor, random.uniform(-CENTRE, CENTRE, 3))
 
 
-AS_DESCRIBED: Final = Variant("calibrated", "as described")  # the arm exactly as described
+AS_DESCRIBED = Variant("calibrated", "as described")  # the arm exactly as described
 _ALL = (
     AS_DESCRIBED,
     Variant(
@@ -249,7 +248,7 @@ _ALL = (
     Variant("springs-30", "springs 30 % softer", partial(stiffer, 0.7)),
     Variant("springs+30", "springs 30 % stiffer", partial(stiffer, 1.3)),
 )
-VARIANTS: Final = {one.name: one for one in _ALL}
+VARIANTS = {one.name: one for one in _ALL}
 
 
 def variant(name: str) -> Variant:

@@ -141,11 +141,12 @@ def assert_within_limits(
                     (f"joint {joint}: angle [rad]", figure(row.q[joint]), bounds, f"{row.time:.3f}")
                 )
         for what, quantity, limits in rules:
-            value, at = largest(rows, quantity, joint)
+            value, at = max((abs(getattr(row, quantity)[joint]), row.time) for row in rows)
             if value > limits[joint]:
                 beyond.append((f"joint {joint}: {what}", figure(value), figure(limits[joint]), f"{at:.3f}"))
-    if tool_speed is not None and (tool := fastest_tool(rows))[0] > tool_speed:
-        beyond.append(("tool: speed [m/s]", figure(tool[0]), figure(tool_speed), f"{tool[1]:.3f}"))
+    fastest, at = max((math.hypot(*row.tool_speed[:3]), row.time) for row in rows)
+    if tool_speed is not None and fastest > tool_speed:
+        beyond.append(("tool: speed [m/s]", figure(fastest), figure(tool_speed), f"{at:.3f}"))
     if beyond:
         raise AssertionError(
             f"{robot.name} was beyond its limits\n" + table(("what", "largest", "limit", "at [s]"), beyond)
@@ -215,18 +216,6 @@ def vibration(rows: "Sequence[HistoryRow]", until: float) -> list[tuple[float, f
     up = [upward(row.pose[3:6]) for row in late]
     alpha = [math.hypot(*tool_acceleration(row.acceleration, one)) for row, one in zip(late, up, strict=True)]
     return [(row.time - stop, one) for row, one in zip(late, alpha, strict=True)]
-
-
-def largest(rows: "Sequence[HistoryRow]", quantity: str, joint: int) -> tuple[float, float]:
-    """Return the largest |value| of a joint's quantity, an attribute of `HistoryRow`, and its time [s]."""
-    row = max(rows, key=lambda one: abs(getattr(one, quantity)[joint]))
-    return abs(getattr(row, quantity)[joint]), row.time
-
-
-def fastest_tool(rows: "Sequence[HistoryRow]") -> tuple[float, float]:
-    """Return the largest speed of the tool centre point [m/s], and its time [s]."""
-    row = max(rows, key=lambda one: math.hypot(*one.tool_speed[:3]))
-    return math.hypot(*row.tool_speed[:3]), row.time
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

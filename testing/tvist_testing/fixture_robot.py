@@ -1,6 +1,5 @@
 """The robot of a test: a blocking client in lockstep whose calls advance time while they wait."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Generic, Self, TypeVar
 
@@ -47,29 +46,41 @@ class SteppingStream(blocking.Stream[M], Generic[M]):
 class FixtureRobot(blocking.Robot):
     """A test's own robot; in lockstep, each call that waits for it advances its time.
 
+    A robot with UR's interfaces is in real time, since clients of UR robots wait by the wall clock.
+
     Attributes:
         name: Name of the robot on the network.
         endpoint: Zenoh endpoint for programs in other processes.
         pid: Number of its process, for tests that kill or stop it.
         log: File with the robot's log.
         recording: File that the robot records into; after the test it remains only if the test failed.
+        host: IP address of UR's interfaces; empty if they are closed. On Linux they have UR's usual ports.
+        ports: Port of each interface: `dashboard`, `primary`, `secondary`, `realtime`, `rtde`, and so on.
         seed: Seed of sensor noise and gear errors.
         history: Measurements of the robot since the test began.
     """
 
-    def __init__(self, portal: Portal, robot: SteppingRobot) -> None:
+    def __init__(
+        self,
+        portal: Portal,
+        robot: SteppingRobot,
+        served: RobotProcess,
+        name: str,
+        seed: int,
+        recording: Path,
+    ) -> None:
         super().__init__(portal, robot)
-        self._stepping = robot
-        self.name = self.endpoint = ""
-        self.pid = self.seed = 0
-        self.log = self.recording = Path()
+        self._stepping, self.name, self.seed = robot, name, seed
+        self.endpoint, self.pid = served.endpoint, served.pid
+        self.host, self.ports = served.host, served.ports
+        self.recording, self.log = recording, recording.with_suffix(".log")
         self.history = History()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name} at {self.endpoint}>"
 
     @classmethod
-    def of(cls, served: RobotProcess, name: str, seed: int, log: Path, recording: Path) -> Self:
+    def of(cls, served: RobotProcess, name: str, seed: int, recording: Path) -> Self:
         """Connect to a served robot, and wait for its present state."""
         portal = Portal()
         try:
@@ -77,26 +88,20 @@ class FixtureRobot(blocking.Robot):
         except BaseException:
             portal.close()
             raise
-        self = cls(portal, robot)
-        self.name, self.endpoint, self.pid, self.seed = name, served.endpoint, served.pid, seed
-        self.log, self.recording = log, recording
+        self = cls(portal, robot, served, name, seed, recording)
         try:
-            self._begin(served.publish_state)
+            self.history.joint_limits = self.info().limits
+            self.on_truth(self.history.on_truth)
+            self.on_state(self.history.on_state)
+            self.on_event(self.history.events.append)
+            portal.call(self._inner._ios.subscribe)  # noqa: SLF001  so that `io` has a value at once
+            self.info()  # answered after the robot has received the subscriptions
+            served.publish_state()  # before the first tick
+            portal.call(lambda: self._inner.until(0))
         except BaseException:
             self.close()
             raise
         return self
-
-    def _begin(self, publish_state: Callable[[], None]) -> None:
-        """Subscribe, and have the robot publish its state before the first tick."""
-        self.history.joint_limits = self.info().limits
-        self.on_truth(self.history.on_truth)
-        self.on_state(self.history.on_state)
-        self.on_event(self.history.on_event)
-        self._portal.call(self._inner._ios.subscribe)  # noqa: SLF001  so that `io` has a value at once
-        self.info()  # answered after the robot has received the subscriptions
-        publish_state()
-        self._portal.call(lambda: self._inner.until(0))
 
     def settle_messages(self) -> None:
         """Wait for everything that the robot has published before now, such as the truth of the last tick."""
@@ -113,24 +118,3 @@ class FixtureRobot(blocking.Robot):
         return SteppingStream(
             self._portal, self._stepping, self._portal.call(lambda: self._inner.events(buffer))
         )
-
-
-class UrRobot(FixtureRobot):
-    """A test's own robot with UR's interfaces, in real time, since clients of UR robots wait by the wall clock.
-
-    Attributes:
-        host: IP address of UR's interfaces; on Linux they have UR's usual ports.
-        ports: Port of each interface: `dashboard`, `primary`, `secondary`, `realtime`, `rtde`, and so on.
-    """
-
-    def __init__(self, portal: Portal, robot: SteppingRobot) -> None:
-        super().__init__(portal, robot)
-        self.host = ""
-        self.ports: dict[str, int] = {}
-
-    @classmethod
-    def of(cls, served: RobotProcess, name: str, seed: int, log: Path, recording: Path) -> Self:
-        """Connect to a served robot, and wait for a state."""
-        self = super().of(served, name, seed, log, recording)
-        self.host, self.ports = served.host, served.ports
-        return self

@@ -17,15 +17,14 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from tvist_controller.controller import Controller
 from tvist_controller.instruments.report import Sink
 from tvist_controller.sources.own_plants import load_plant
 from tvist_plant.plant import PERIOD
 from tvist_plant.variants import Variant
-from tvist_protocol.commands import Command, ReleaseControl, TakeControl
+from tvist_protocol.commands import ReleaseControl, TakeControl
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.programs import ProgramLoad
 from tvist_protocol.replies import Accepted, Refused, Reply
@@ -37,7 +36,7 @@ from tvist_server.robot import ServedRobot
 from tvist_server.server import Server
 from tvist_server.shutdown import Shutdown
 from tvist_server.ur_ports import UrPorts
-from tvist_testing.wanted import WantedFault, WantedRobot
+from tvist_testing.markers import WantedFault, WantedRobot
 
 LOOK = 0.05  # time between two checks whether the last client is gone [s]
 COMPLETING = 20.0  # longest wait for the end of the recording [s]
@@ -55,24 +54,17 @@ class Preparation(Sink):
         self._later = sorted(
             (fault for fault in wanted.faults if fault.after > 0.0), key=lambda one: one.after
         )
-        self._controller: Controller | None = None
-        self._post: Callable[[Callable[[], None]], None] | None = None
-        self._request: Callable[[Command], Reply] | None = None
-
-    def observe(self, controller: Controller) -> Sink:
-        """Return the observer of the robot's messages; the server calls this."""
-        self._controller = controller
-        return self
+        self._robot: ServedRobot | None = None
 
     def on(self, robot: ServedRobot) -> None:
         """Do everything that precedes the first tick."""
-        self._post, self._request = robot.driven.post, robot.request
+        self._robot = robot
         if self._wanted.program is not None:
             name, text = self._wanted.program
             _accepted(robot.request(ProgramLoad(name=name, text=text)))
         for fault in self._wanted.faults:
             if fault.after == 0.0:
-                self._inject(fault)
+                _inject(robot, fault)
 
     def event(self, event: Event) -> None:
         """Log an event."""
@@ -81,34 +73,32 @@ class Preparation(Sink):
 
     def state(self, state: State) -> None:
         """Inject the faults that are due after a tick; called in the controller's thread."""
-        while self._later and state.tick * PERIOD >= self._later[0].after - 0.5 * PERIOD:
-            fault = self._later.pop(0)
-            assert self._post is not None
-            self._post(lambda fault=fault: self._inject_or_say(fault))  # type: ignore[misc]
+        robot = self._robot
+        while robot and self._later and state.tick * PERIOD >= self._later[0].after - 0.5 * PERIOD:
+            robot.driven.post(partial(_inject_or_log, robot, self._later.pop(0)))
 
-    def _inject_or_say(self, fault: WantedFault) -> None:
-        try:
-            self._inject(fault)
-        except RefusedError as error:
-            log.warning("the fault %s was refused: %s", fault.fault, error)
 
-    def _inject(self, fault: WantedFault) -> None:
-        assert self._controller is not None
-        assert self._request is not None
-        lease = self._controller.session.lease
-        if lease is not None:
-            token = lease.token
-        else:
-            reply = _accepted(self._request(TakeControl(client=CLIENT, lease_s=60.0)))
-            assert isinstance(reply, Accepted)
-            assert reply.token is not None
-            token = reply.token
-        injected = SimulationInject(
-            token=token, fault=fault.fault, joint=fault.joint, seconds=fault.seconds, value=fault.value
-        )
-        _accepted(self._request(injected))
-        if lease is None:
-            _accepted(self._request(ReleaseControl(token=token)))
+def _inject_or_log(robot: ServedRobot, fault: WantedFault) -> None:
+    try:
+        _inject(robot, fault)
+    except RefusedError as error:
+        log.warning("the fault %s was refused: %s", fault.fault, error)
+
+
+def _inject(robot: ServedRobot, fault: WantedFault) -> None:
+    lease = robot.controller.session.lease
+    if lease is None:
+        reply = _accepted(robot.request(TakeControl(client=CLIENT, lease_s=60.0)))
+        assert isinstance(reply, Accepted)
+        token = str(reply.token)
+    else:
+        token = lease.token
+    injected = SimulationInject(
+        token=token, fault=fault.fault, joint=fault.joint, seconds=fault.seconds, value=fault.value
+    )
+    _accepted(robot.request(injected))
+    if lease is None:
+        _accepted(robot.request(ReleaseControl(token=token)))
 
 
 def _accepted(reply: Reply) -> Reply:
@@ -159,7 +149,7 @@ def _listening(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, d
             options |= {"ur": True, "ur_address": address, "ur_ports": ports}
         config = from_mapping(options, "robot")
         try:
-            server = Server(config, preparation.observe)
+            server = Server(config, lambda _: preparation)
         except GatewayError:
             if attempt == ATTEMPTS - 1:
                 raise

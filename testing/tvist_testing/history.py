@@ -77,10 +77,6 @@ class History:
             self._early.popleft()
         self.rows.append(row)
 
-    def on_event(self, event: "Event") -> None:
-        """Add an event."""
-        self.events.append(event)
-
     def since_rest(self) -> list[HistoryRow]:
         """Return the rows since the shaped reference last came to rest; all if it never moved.
 

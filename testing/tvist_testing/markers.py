@@ -2,16 +2,37 @@
 
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tvist_testing.wanted import WantedFault
-
-if TYPE_CHECKING:
-    import pytest
+import pytest
 
 Part = dict[str, Any]  # what a marker adds to the description of a robot
 FILES = (".toml", ".json")  # suffixes of files with a state
+ROBOTS = pytest.StashKey[list[Any]]()  # a test's robots, each a `serving.RobotOfTest`
+
+
+@dataclass(frozen=True)
+class WantedFault:
+    """A fault to inject, with the fields of `simulation.inject`."""
+
+    fault: str
+    joint: int | None = None
+    seconds: float | None = None
+    value: float | None = None
+    after: float = 0.0  # simulation time of the injection [s]; 0 is before the first tick
+
+
+@dataclass(frozen=True)
+class WantedRobot:
+    """One robot, in the form sent as JSON to the process that makes robots."""
+
+    options: dict[str, Any]  # options of `tvist serve`, as in a configuration file
+    program: tuple[str, str] | None = None  # name and text of the program to load
+    faults: tuple[WantedFault, ...] = ()
+    ur: bool = False  # whether UR's interfaces are open, on their own address if the system has several
+    log: str = ""  # path of the robot's log
 
 
 class MarkerError(ValueError):
@@ -128,7 +149,7 @@ def described() -> list[str]:
     return lines
 
 
-def combined(item: "pytest.Item") -> Part:
+def combined(item: pytest.Item) -> Part:
     """Return the combined description of all markers of a test; the nearest of equal ones counts, but faults add up."""
     found: Part = {}
     injected: list[WantedFault] = []
@@ -144,7 +165,7 @@ def combined(item: "pytest.Item") -> Part:
     return found
 
 
-def _called(name: str, function: Callable[..., Part], marker: "pytest.Mark") -> Part:
+def _called(name: str, function: Callable[..., Part], marker: pytest.Mark) -> Part:
     try:
         inspect.signature(function).bind(*marker.args, **marker.kwargs)
     except TypeError as error:

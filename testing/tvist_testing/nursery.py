@@ -45,8 +45,8 @@ def warm_up() -> None:
     from tvist_protocol.commands import MoveJ, TakeControl
     from tvist_protocol.replies import Accepted
     from tvist_protocol.simulation import SimulationStep
-    from tvist_server import server  # noqa: F401  what a robot imports before it serves
     from tvist_server.config import ServeConfig
+    from tvist_testing import forked_robot  # noqa: F401  what a robot imports before it serves
 
     setup = ServeConfig(clock="lockstep", truth=True).setup()
     host = LoopbackHost(setup)
@@ -72,7 +72,7 @@ def _receive(requests: socket.socket) -> tuple[bytes, list[int]]:
 def _become_robot(line: bytes, descriptor: int) -> None:
     """Serve a robot in this forked process, and end the process."""
     from tvist_testing.forked_robot import serve
-    from tvist_testing.wanted import WantedRobot
+    from tvist_testing.markers import WantedRobot
 
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     code = 1

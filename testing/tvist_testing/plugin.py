@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tvist_testing.markers import ROBOTS, described
+
 if TYPE_CHECKING:
-    from tvist_testing.fixture_robot import FixtureRobot, UrRobot
+    from tvist_testing.fixture_robot import FixtureRobot
     from tvist_testing.serving import RobotOfTest, Serving
 
-_ROBOTS = pytest.StashKey[list["RobotOfTest"]]()
 _SERVING = pytest.StashKey["Serving"]()
 _TOLD = pytest.StashKey[bool]()
 
@@ -43,8 +44,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Register the markers."""
-    from tvist_testing.markers import described
-
     for line in described():
         config.addinivalue_line("markers", line)
 
@@ -77,17 +76,12 @@ def tvist_robots(
     request: pytest.FixtureRequest, _tvist_serving: "Serving"
 ) -> Iterator[Callable[[int], "list[FixtureRobot]"]]:
     """Make robots: `tvist_robots(3)` returns three like `tvist_robot` with different names, endpoints and seeds."""
-    from tvist_testing.fixture_robot import FixtureRobot
-
     made: list[FixtureRobot] = []
 
     def make(count: int) -> "list[FixtureRobot]":
-        robots = _tvist_serving.robots(FixtureRobot, request.node, count, len(made))
-        of_test = request.node.stash.setdefault(_ROBOTS, [])
-        for robot, one in robots:
-            of_test.append(one)
-            made.append(robot)
-        return [robot for robot, _ in robots]
+        robots = _tvist_serving.robots(request.node, count, len(made))
+        made.extend(robots)
+        return robots
 
     yield make
     for robot in made:
@@ -97,21 +91,15 @@ def tvist_robots(
 @pytest.fixture
 def tvist_robot(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Iterator["FixtureRobot"]:
     """The test's own robot in lockstep, ready to be read and moved."""
-    from tvist_testing.fixture_robot import FixtureRobot
-
-    robot, one = _tvist_serving.robot(FixtureRobot, request.node)
-    request.node.stash.setdefault(_ROBOTS, []).append(one)
+    robot = _tvist_serving.robot(request.node)
     yield robot
     robot.close()
 
 
 @pytest.fixture
-def tvist_ur(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Iterator["UrRobot"]:
+def tvist_ur(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Iterator["FixtureRobot"]:
     """The test's own robot in real time, with UR's interfaces on its own address."""
-    from tvist_testing.fixture_robot import UrRobot
-
-    robot, one = _tvist_serving.robot(UrRobot, request.node, ur=True)
-    request.node.stash.setdefault(_ROBOTS, []).append(one)
+    robot = _tvist_serving.robot(request.node, ur=True)
     yield robot
     robot.close()
 
@@ -122,7 +110,7 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Report where a failed test's recordings are; at the end of the test, keep or remove them."""
     report = yield
-    robots = item.stash.get(_ROBOTS, [])
+    robots: list[RobotOfTest] = item.stash.get(ROBOTS, [])
     if not robots:
         return report
     told = item.stash.get(_TOLD, False)
@@ -140,7 +128,7 @@ def pytest_runtest_makereport(
                 robot.keep()
             else:
                 robot.discard()
-        del item.stash[_ROBOTS]
+        del item.stash[ROBOTS]
         item.stash[_TOLD] = False  # a test may run again
     return report
 

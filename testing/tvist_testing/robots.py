@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from tvist_testing.wanted import WantedRobot
+from tvist_testing.markers import WantedRobot
 
 PATIENCE = 300.0
 """Longest wait for an answer of the process [s]; the first start compiles, for minutes on a slow machine."""
@@ -185,11 +185,7 @@ def unavailable() -> str | None:
 
 def _line(connection: socket.socket) -> dict[str, Any]:
     """Return the next line of JSON; empty if the connection has ended."""
-    line = b""
-    while not line.endswith(b"\n"):
-        more = connection.recv(65536)
-        if not more:
-            return {}
-        line += more
-    content: dict[str, Any] = json.loads(line)
+    with connection.makefile("rb") as stream:
+        line = stream.readline()
+    content: dict[str, Any] = json.loads(line) if line.endswith(b"\n") else {}
     return content

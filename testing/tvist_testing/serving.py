@@ -6,20 +6,18 @@ import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import pytest
 
 from tvist_protocol.errors import TvistError
 from tvist_server.own_folder import OwnFolder
 from tvist_testing.fixture_robot import FixtureRobot
-from tvist_testing.markers import MarkerError, combined
+from tvist_testing.markers import ROBOTS, MarkerError, WantedRobot, combined
 from tvist_testing.robots import CannotServeError, RobotProcess, Robots
-from tvist_testing.wanted import WantedRobot
 
 NAME = "ur5e"  # name of a single robot, for which clients look by default
 MAX_ROBOTS = 100  # most robots of a test
-R = TypeVar("R", bound=FixtureRobot)
 LONGEST_NAME = 120  # longest name of a test's folder [characters]
 LOG_LINES = 10  # lines of the log that a report shows
 
@@ -30,15 +28,19 @@ class RobotOfTest:
 
     served: RobotProcess
     recording: Path  # in a folder that is removed after the test
-    log: Path  # beside the recording
     kept: Path  # folder to which both are moved if the test fails
     seed: int
+
+    @property
+    def files(self) -> tuple[Path, Path]:
+        """Recording and log."""
+        return self.recording, self.recording.with_suffix(".log")
 
     def keep(self) -> None:
         """End the robot in order, and move its files to `kept`."""
         self.served.close()
         self.kept.mkdir(parents=True, exist_ok=True)
-        for file in (self.recording, self.log):
+        for file in self.files:
             if file.exists():
                 (self.kept / file.name).unlink(missing_ok=True)
                 shutil.move(file, self.kept / file.name)
@@ -46,36 +48,28 @@ class RobotOfTest:
     def discard(self) -> None:
         """End the robot at once, and remove its files."""
         self.served.discard()
-        for file in (self.recording, self.log):
+        for file in self.files:
             file.unlink(missing_ok=True)
 
     def properties(self) -> list[tuple[str, str]]:
         """Names and values for JUnit."""
-        return [
-            ("tvist_recording", str(self.kept / self.recording.name)),
-            ("tvist_log", str(self.kept / self.log.name)),
-            ("tvist_seed", str(self.seed)),
-        ]
+        recording, log = (str(self.kept / file.name) for file in self.files)
+        return [("tvist_recording", recording), ("tvist_log", log), ("tvist_seed", str(self.seed))]
 
     def described(self) -> str:
         """Return the section of a failed test's report about the robot."""
-        recording = self.kept / self.recording.name
+        (_, recording), (_, log), (_, seed) = self.properties()
         lines = [
             f"recording: {recording}",
-            f"log:       {self.kept / self.log.name}",
-            f"seed:      {self.seed}",
+            f"log:       {log}",
+            f"seed:      {seed}",
             f"next:      tvist log analyze {recording}; tvist log replay {recording}",
         ]
         try:
-            told = self.log.read_text(encoding="utf-8", errors="replace").splitlines()
+            told = self.files[1].read_text(encoding="utf-8", errors="replace").splitlines()
         except OSError:
             told = []
         return "\n".join([*lines, *(["its log ends with:", *told[-LOG_LINES:]] if told else [])])
-
-
-def folder_of(nodeid: str) -> str:
-    """Return the name of a test's folder, made from the test's name."""
-    return re.sub(r"[^A-Za-z0-9_.-]+", "-", nodeid).strip("-")[-LONGEST_NAME:]
 
 
 class Serving:
@@ -93,31 +87,29 @@ class Serving:
         self._robots.close()
         self._own.close()
 
-    def robots(
-        self, kind: type[R], item: pytest.Item, count: int, before: int
-    ) -> list[tuple[R, RobotOfTest]]:
+    def robots(self, item: pytest.Item, count: int, before: int) -> list[FixtureRobot]:
         """Make several robots of a test."""
         if not isinstance(count, int) or not 1 <= count <= MAX_ROBOTS - before:
             pytest.fail(
                 f"tvist_robots({count!r}): the number of a test's robots is 1 to {MAX_ROBOTS}", pytrace=False
             )
         numbers = range(before, before + count)
-        return [self.robot(kind, item, f"{NAME}-{number + 1}", number) for number in numbers]
+        return [self.robot(item, f"{NAME}-{number + 1}", number) for number in numbers]
 
     def robot(
-        self, kind: type[R], item: pytest.Item, name: str = NAME, number: int = 0, *, ur: bool = False
-    ) -> tuple[R, RobotOfTest]:
+        self, item: pytest.Item, name: str = NAME, number: int = 0, *, ur: bool = False
+    ) -> FixtureRobot:
         """Make a robot of a test; fail the test with one line if that is impossible."""
         folder = self._own.path / str(next(self._numbers))
         folder.mkdir()
-        recording, log = folder / f"{name}.mcap", folder / f"{name}.log"
+        recording = folder / f"{name}.mcap"
         failure = ""
         try:
             part = combined(item)
             seed = part.pop("seed", self._seed) + number
-            served = self._robots.serve(self._wanted(part, folder, name, seed, ur=ur))
+            served = self._robots.serve(self._wanted(part, recording, seed, ur=ur))
             try:
-                robot = kind.of(served, name, seed, log, recording)
+                robot = FixtureRobot.of(served, name, seed, recording)
             except BaseException:
                 served.kill()
                 raise
@@ -127,14 +119,16 @@ class Serving:
             failure = f"the robot of this test does not answer: {error}"
         if failure:
             pytest.fail(failure, pytrace=False)
-        return robot, RobotOfTest(served, recording, log, self._kept / folder_of(item.nodeid), seed)
+        kept = self._kept / re.sub(r"[^A-Za-z0-9_.-]+", "-", item.nodeid).strip("-")[-LONGEST_NAME:]
+        item.stash.setdefault(ROBOTS, []).append(RobotOfTest(served, recording, kept, seed))
+        return robot
 
     @staticmethod
-    def _wanted(part: dict[str, Any], folder: Path, name: str, seed: int, *, ur: bool) -> WantedRobot:
+    def _wanted(part: dict[str, Any], recording: Path, seed: int, *, ur: bool) -> WantedRobot:
         faults, program = part.pop("faults"), part.pop("program", None)
         fields = part.pop("fields", None)
         if fields is not None:
-            state = folder / f"{name}.json"
+            state = recording.with_suffix(".json")
             try:
                 state.write_text(json.dumps(fields, default=list), encoding="utf-8")
             except TypeError:
@@ -142,11 +136,11 @@ class Serving:
             part["state"] = str(state)
         options = {
             **part,
-            "name": name,
+            "name": recording.stem,
             "seed": seed,
             "clock": "realtime" if ur else "lockstep",
             "truth": True,
-            "record": str(folder / f"{name}.mcap"),
-            "dump": str(folder),
+            "record": str(recording),
+            "dump": str(recording.parent),
         }
-        return WantedRobot(options, program, faults, ur, str(folder / f"{name}.log"))
+        return WantedRobot(options, program, faults, ur, str(recording.with_suffix(".log")))

@@ -9,7 +9,7 @@ from benchmarks.figure import figure, in_alternation, median_interval
 from benchmarks.lateness import compared, mean_interval
 
 
-def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
+def test_median_interval_has_its_coverage():
     chance = np.random.default_rng(0)
     held = [
         low <= 0.0 <= high for _, low, high in (median_interval(chance.normal(size=20)) for _ in range(2000))
@@ -17,17 +17,17 @@ def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
     assert 0.95 <= np.mean(held) <= 0.98  # order statistics hold it a little more often
 
 
-def test_a_ratio_is_that_of_each_repetition_so_that_a_drift_of_the_machine_cancels_out():
+def test_drift_of_the_machine_cancels_out_of_a_ratio():
     drift = np.linspace(1.0, 3.0, 20)
     one = figure("ours", "µs", 0.5 * drift, "theirs", drift)
     assert (one.compared, one.low, one.high) == (0.5, 0.5, 0.5)
 
 
-def test_there_is_no_ratio_to_nothing():
+def test_there_is_no_ratio_to_zero():
     assert figure("ours", "", [1.0, 2.0], "theirs", [0.0, 0.0]).compared is None
 
 
-def test_repetitions_alternate_forwards_and_backwards_after_a_first_one_that_does_not_count():
+def test_repetitions_alternate_after_a_warm_up():
     order = []
     taken = in_alternation({name: lambda name=name: order.append(name) or len(order) for name in "ab"}, 2)
     assert "".join(order) == "ababba"
@@ -35,7 +35,7 @@ def test_repetitions_alternate_forwards_and_backwards_after_a_first_one_that_doe
 
 
 @pytest.mark.parametrize(("often", "ticks"), [(0.02, 1.0), (0.3, 5.0)])
-def test_the_interval_of_rare_misses_holds_their_mean(often, ticks):
+def test_mean_interval_of_rare_misses_has_its_coverage(often, ticks):
     chance, held = np.random.default_rng(0), []
     for _ in range(60):
         missed = 0.05 * chance.poisson(often, 200) * chance.geometric(1.0 / ticks, 200)
@@ -44,13 +44,13 @@ def test_the_interval_of_rare_misses_holds_their_mean(often, ticks):
     assert np.mean(held) >= 0.85
 
 
-def test_that_nothing_was_missed_proves_only_what_the_rule_of_three_says():
+def test_mean_interval_of_zeros_follows_the_rule_of_three():
     low, high = mean_interval([0.0] * 300, 0.05)
     assert -low == pytest.approx(high)
     assert high == pytest.approx(0.05 * 3 / 300, rel=0.01)
 
 
-def test_a_robot_is_compared_with_the_thread_by_the_mean_of_the_pairs():
+def test_robot_and_thread_are_compared_by_the_mean_of_pairs():
     found = compared([(0.2, 0.1), (0.1, 0.1)], 4.0)
     assert found["pairs"] == 2
     assert (found["robot_percent"], found["bare_percent"]) == pytest.approx((0.15, 0.1))
@@ -62,7 +62,7 @@ def test_a_robot_is_compared_with_the_thread_by_the_mean_of_the_pairs():
     ("words", "why"),
     [(["--only", "lines"], "invalid choice: 'lines'"), (["--seconds", "-1"], "is -1: must be 0 to 86400")],
 )
-def test_what_cannot_be_measured_is_refused(words, why, capsys):
+def test_invalid_arguments_are_refused(words, why, capsys):
     with pytest.raises(SystemExit) as ended:
         main(words)
     assert ended.value.code == 2
@@ -81,7 +81,7 @@ def _few(monkeypatch):
 
 @pytest.mark.nightly
 @pytest.mark.usefixtures("_few")
-def test_each_figure_of_what_is_computed_comes_with_its_reference(capsys):
+def test_each_computed_figure_has_its_reference(capsys):
     assert main(["--seconds", "0", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert {"plant_us_per_tick", "filter_us_per_tick", "line_us_per_tick", "realtime_factor"} <= said.keys()
@@ -94,7 +94,7 @@ def test_each_figure_of_what_is_computed_comes_with_its_reference(capsys):
 @pytest.mark.realtime
 @pytest.mark.usefixtures("_few")
 @pytest.mark.parametrize("part", ["reader", "rtde", "lateness", "bridge"])
-def test_the_parts_that_serve_robots_measure_something(part, capsys):
+def test_served_parts_measure_something(part, capsys):
     assert main(["--only", part, "--seconds", "2", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["figures"] or said[part]

@@ -67,7 +67,7 @@ def unseen(description, hidden, declared, seed):
 
     It is linearised at rest. There a gear whose twist has turned back is as stiff as its hysteresis makes it.
     """
-    stiffer = 1.0 + description.imperfections.get("hysteresis", 0.0)
+    stiffer = 1.0 + description.imperfections.hysteresis
     drives = description.drives
     stiff = with_fields(drives, gear_stiffness=tuple(stiffer * K for K in drives.gear_stiffness))
     arm: Any = hidden_variant(hidden).make(with_fields(description, drives=stiff), body(declared), 0)

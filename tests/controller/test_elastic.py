@@ -269,7 +269,7 @@ def rigid(description: RobotDescription) -> RobotDescription:
         description,
         drives=stiff,
         link_flexibility=replace(links, stiffness=tuple(100.0 * value for value in links.stiffness)),
-        imperfections=own | {"stiction_stiffness": 0.01 * own["stiction_stiffness"]},
+        imperfections=replace(own, stiction_stiffness=0.01 * own.stiction_stiffness),
     )
 
 

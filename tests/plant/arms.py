@@ -63,6 +63,17 @@ def rested(arm, command: DriveCommand, ticks: int):
     return measured
 
 
+def energy(arm: FlexibleArm) -> float:
+    """Kinetic, gravitational and elastic energy [J]."""
+    model, data, flexible, joints = arm._flexible.model, arm._data, arm._flexible, arm._joints
+    kinetic = (
+        pin.computeKineticEnergy(model, data, arm._q, arm._qd) + 0.5 * joints.rotor_inertia @ arm._speed**2
+    )
+    gears = 0.5 * joints.gear_stiffness @ (arm._q[flexible.joints] - arm._motor) ** 2
+    links = 0.5 * flexible.flex_stiffness @ arm._q[flexible.flexes] ** 2
+    return float(kinetic + pin.computePotentialEnergy(model, data, arm._q) + gears + links)
+
+
 def chain(joints: int) -> RobotDescription:
     """An arm of equal links, every second joint turned by a right angle, whose first link bends."""
 

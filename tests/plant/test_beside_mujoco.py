@@ -22,7 +22,7 @@ def other_angles(description, drive, timestep):
 
 
 @pytest.mark.parametrize("kind", ["friction", "clean"])
-def test_link_angles_are_those_of_mujoco_from_Q1_to_Q3(ur5e, kind, measured):
+def test_link_angles_from_Q1_to_Q3_match_mujoco(ur5e, kind, measured):
     """MuJoCo's rule is of first order: half a step off, and right when extrapolated to a step of none."""
     arm = quiet(ur5e) if kind == "friction" else ur5e.clean()
     drive = commands(arm, arm.poses["Q1"], arm.poses["Q3"], 1400)
@@ -39,7 +39,7 @@ def test_link_angles_are_those_of_mujoco_from_Q1_to_Q3(ur5e, kind, measured):
 FIELDS = ("q", "qd", "moment", "accelerometer")
 
 
-def test_static_equilibrium_is_that_of_mujoco(ur5e):
+def test_static_equilibrium_matches_mujoco(ur5e):
     arm = ur5e.disturbed_by(["friction"])
     for pose in arm.poses.values():
         command = hold(arm, pose)
@@ -50,7 +50,7 @@ def test_static_equilibrium_is_that_of_mujoco(ur5e):
             np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0.0, atol=1e-9)
 
 
-def test_it_carries_what_a_reset_says(ur5e):
+def test_reset_changes_the_payload(ur5e):
     arm, still = MujocoArm(ur5e, ur5e.payload), hold(ur5e, ur5e.poses["Q1"])
     arm.reset(still)
     loaded = arm.truth().gear_deflection[1]
@@ -62,7 +62,7 @@ def test_it_carries_what_a_reset_says(ur5e):
 
 
 @pytest.mark.parametrize("joints", [1, 3, 7])
-def test_other_arms_agree_too(joints):
+def test_link_angles_of_other_arms_match_mujoco(joints):
     arm = quiet(chain(joints))
     q = np.linspace(0.3, -0.4, joints)
     drive = commands(arm, q, q + 0.5, 800)
@@ -71,7 +71,7 @@ def test_other_arms_agree_too(joints):
     np.testing.assert_allclose(2.0 * fine - coarse, ours, rtol=0.0, atol=2e-6)
 
 
-def test_a_time_step_must_divide_the_period(ur5e):
+def test_time_step_must_divide_the_period(ur5e):
     for timestep in (0.0003, 0.004):
         with pytest.raises(ValueError, match="timestep"):
             MujocoArm(ur5e, ur5e.payload, timestep=timestep)

@@ -43,7 +43,7 @@ MODELS = dict(models())
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_dynamics_are_those_of_pinocchio(name):
+def test_dynamics_match_pinocchio(name):
     model, end = MODELS[name]
     data, links, random = model.createData(), model.nv, np.random.default_rng(3)
     chain, scratch = chain_of(model, end), np.full((links + 1, SCRATCH), np.nan)
@@ -58,7 +58,7 @@ def test_dynamics_are_those_of_pinocchio(name):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_the_end_moves_as_in_pinocchio(name):
+def test_motion_of_the_end_frame_matches_pinocchio(name):
     model, end = MODELS[name]
     data, links = model.createData(), model.nv
     q, qd, qdd = np.random.default_rng(5).uniform(-3.0, 3.0, (3, links))
@@ -88,7 +88,7 @@ def test_torques_are_linear_in_the_parameters_of_the_last_body():
     np.testing.assert_allclose(found[2], 0.75 * found[0] + 0.25 * found[1], atol=1e-10)
 
 
-def test_what_is_no_chain_of_turning_joints_is_refused():
+def test_model_that_is_no_chain_of_revolute_joints_is_refused():
     model = pin.Model()
     model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
     model.addFrame(pin.Frame("end", 1, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))

@@ -32,7 +32,7 @@ MASS = "mass = [3.761, 8.058, 2.846, 1.37, 1.3, 0.365]"
 NAMES = 'joints = ["base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"]'
 
 
-def test_a_file_by_its_path_is_the_same_as_the_name(tmp_path, ur5e):
+def test_robot_file_by_path_equals_the_robot_by_name(tmp_path, ur5e):
     file = tmp_path / "mine.toml"
     file.write_text(TEXT, encoding="utf-8")
     assert load(file) == load(str(file)) == ur5e
@@ -76,7 +76,7 @@ def test_a_file_by_its_path_is_the_same_as_the_name(tmp_path, ur5e):
         ("a     = [", "b     = [", "kinematics.b"),
     ],
 )
-def test_a_wrong_file_is_one_sentence_that_names_file_and_key(tmp_path, old, new, key):
+def test_invalid_robot_file_is_refused_with_file_and_key(tmp_path, old, new, key):
     assert TEXT.count(old) == 1
     file = tmp_path / "wrong.toml"
     file.write_text(TEXT.replace(old, new), encoding="utf-8")
@@ -88,12 +88,12 @@ def test_a_wrong_file_is_one_sentence_that_names_file_and_key(tmp_path, old, new
     assert "\n" not in sentence
 
 
-def test_an_unknown_robot_is_answered_with_the_known_ones():
+def test_unknown_robot_lists_the_known_ones():
     with pytest.raises(DescriptionError, match=r"ur6e.*ur5e"):
         load("ur6e")
 
 
-def test_what_cannot_be_read_is_named(tmp_path):
+def test_unreadable_robot_file_is_named(tmp_path):
     with pytest.raises(UserFileError, match="is a directory"):
         load(tmp_path)
     file = tmp_path / "binary.toml"
@@ -105,12 +105,12 @@ def test_what_cannot_be_read_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("key", "degrees", "said"),
     [
-        ("position", 360, r"limits\.position\[1\] is 360 rad, .* 62\.8 rad .*degrees.* 6\.28319 rad"),
-        ("position", 120, r"limits\.position\[1\] is 120 rad, .* 2\.0944 rad"),
-        ("velocity", 180, r"limits\.velocity\[1\] is 180 rad/s, .* 50\.3 rad/s .*degrees.* 3\.14159 rad/s"),
+        ("position", 360, r"limits\.position\[1\] is 360 rad: .* 62\.8 rad; .*degrees.* 6\.28319 rad"),
+        ("position", 120, r"limits\.position\[1\] is 120 rad: .* 2\.0944 rad"),
+        ("velocity", 180, r"limits\.velocity\[1\] is 180 rad/s: .* 50\.3 rad/s; .*degrees.* 3\.14159 rad/s"),
     ],
 )
-def test_limits_in_degrees_are_refused_with_what_they_are_in_radians(tmp_path, key, degrees, said):
+def test_limits_in_degrees_are_refused_with_the_value_in_radians(tmp_path, key, degrees, said):
     file = tmp_path / "degrees.toml"
     text, count = re.subn(rf"(\n{key} +=) \[([^,]+), [^,]+,", rf"\1 [\2, {degrees}.0,", TEXT)
     assert count == 1
@@ -120,7 +120,7 @@ def test_limits_in_degrees_are_refused_with_what_they_are_in_radians(tmp_path, k
     assert "degrees.toml" in str(refused.value)
 
 
-def test_a_body_of_points_is_real_and_one_with_a_too_large_moment_is_not():
+def test_impossible_moments_of_inertia_are_detected():
     assert is_real_body((0.0,) * 6)
     assert is_real_body((1.0, 0.0, 0.0, 1.0, 0.0, 2.0))  # a thin disc: the limit
     assert not is_real_body((1.0, 0.0, 0.0, 1.0, 0.0, 2.1))
@@ -154,7 +154,7 @@ def scaled(table: str, key: str, factor: float = 1.001) -> RobotDescription:
     changed(UR5E, "link_flexibility", links=(), stiffness=()),
     changed(UR5E, "kinematics", a=(0.0, -0.5, -0.4, 0.0, 0.0, 0.0)),
 ])  # fmt: skip
-def test_another_arm_has_another_one(description):
+def test_fingerprint_changes_with_parameters_that_change_vibration(description):
     assert fingerprint(description) != fingerprint(UR5E)
 
 
@@ -165,7 +165,7 @@ def test_another_arm_has_another_one(description):
     changed(UR5E, "drives", gear_error_amplitude=0.0), changed(UR5E, "drives", friction_feedforward=0.0),
     msgspec.structs.replace(UR5E, poses={}), UR5E.clean(), UR5E.quiet(),
 ])  # fmt: skip
-def test_the_same_arm_under_another_name_with_other_limits_has_the_same(description):
+def test_fingerprint_ignores_names_limits_and_sensors(description):
     assert fingerprint(description) == fingerprint(UR5E)
 
 
@@ -176,7 +176,7 @@ def file_of(name):
     return (resources.files("tvist_plant") / "robots" / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def test_the_ur5e_is_similar_to_itself():
+def test_scaling_the_ur5e_to_itself_changes_nothing():
     scale = Scale(UR5E.kinematics, UR5E.limits.torque)
     assert {
         key: list(value) if isinstance(value, tuple) else value for key, value in asdict(UR5E.drives).items()
@@ -189,21 +189,21 @@ def test_the_ur5e_is_similar_to_itself():
 
 
 @pytest.mark.parametrize("name", UR)
-def test_a_file_leaves_springs_and_drives_to_the_rule_and_says_so(name):
+def test_scaled_robots_have_drives_by_the_similarity_rule(name):
     assert not {"drives", "link_flexibility"} & set(tomllib.loads(file_of(name)))
     arm = load(name)
     assert arm.provenance["drives"] == arm.provenance["link_flexibility"] == RULE
 
 
 @pytest.mark.parametrize("name", UR)
-def test_a_gear_twists_by_the_ur5e_s_angle_at_its_largest_torque(name):
+def test_scaled_gears_twist_by_the_same_angle_at_their_largest_torque(name):
     arm = load(name)
     twist = np.divide(arm.limits.torque, arm.drives.gear_stiffness)
     np.testing.assert_allclose(twist, np.divide(UR5E.limits.torque, UR5E.drives.gear_stiffness), rtol=1e-3)
 
 
 @pytest.mark.parametrize("name", UR)
-def test_a_loaded_arm_is_damped_like_the_ur5e_and_slower_if_it_is_longer(name, measured):
+def test_scaled_arm_is_damped_like_the_ur5e_and_slower_if_longer(name, measured):
     arm = load(name)
     found, own = (FlexibleArm(a, a.payload).modes(np.array(a.poses["Q1"])) for a in (arm, UR5E))
     measured(f"{name}: f_d at Q1 [Hz]", found.f_d[0])
@@ -233,7 +233,7 @@ ARMS = [
 
 
 @pytest.mark.parametrize(("path", "base"), ARMS)
-def test_torques_and_the_flange_are_those_of_pinocchio_s_reader(path, base):
+def test_urdf_torques_and_flange_match_pinocchios_reader(path, base):
     own, other = rigid_model(load(path), Payload()), pin.buildModelFromUrdf(str(path))
     own_data, data = own.createData(), other.createData()
     placed = other.frames[other.getFrameId(base)].placement.translation
@@ -251,7 +251,7 @@ def test_torques_and_the_flange_are_those_of_pinocchio_s_reader(path, base):
 
 
 @pytest.mark.parametrize(("path", "base"), ARMS)
-def test_it_vibrates_and_says_what_was_assumed(path, base):
+def test_urdf_arm_has_modes_and_names_assumed_values(path, base):
     arm = load(path)
     found = FlexibleArm(arm, arm.payload).modes(np.array(arm.poses["Q2"]))
     assert 1.0 < found.f_d[0] < 40.0
@@ -273,12 +273,12 @@ BRANCH = '<link name="x"/><joint name="jx" type="{}"><parent link="elbow"/><chil
     ('<parent link="wrist"/>', '<parent link="wirst"/>', "joint j7: there is no link 'wirst'"),
     ('<parent link="base"/>', '<parent link="tool0"/>', "in a circle"),
     ('rpy="0 0 0.4"', 'rpy="1.5 0 0"', "the axis of joint j1 must point straight up"),
-    ('ixx="0.03"', 'ixx="3.0"', "no body can have this"),
+    ('ixx="0.03"', 'ixx="3.0"', "must be possible for a body"),
     ('<joint name="j7"', '<joint name="j5"', "two of joint j5: give each a name of its own"),
     ('<robot name="seven">', "<!DOCTYPE x><robot>", "it has a document type"),
     ('<robot name="seven">', '<robot name="seven"', "it is not valid XML"),
 ])  # fmt: skip
-def test_what_cannot_be_simulated_is_refused_in_a_sentence(old, new, said, tmp_path):
+def test_urdf_that_cannot_be_simulated_is_refused(old, new, said, tmp_path):
     text = SEVEN.read_text(encoding="utf-8")
     assert old in text
     path = tmp_path / "mine.urdf"
@@ -289,7 +289,7 @@ def test_what_cannot_be_simulated_is_refused_in_a_sentence(old, new, said, tmp_p
     assert "\n" not in str(error.value)
 
 
-def test_limits_that_are_not_symmetric_are_widened_and_told(tmp_path):
+def test_asymmetric_urdf_limits_are_widened_and_recorded(tmp_path):
     path = tmp_path / "mine.urdf"
     text = SEVEN.read_text(encoding="utf-8")
     path.write_text(text.replace('lower="-3.05" upper="3.05"', 'lower="-1" upper="3.05"'), encoding="utf-8")
@@ -298,7 +298,7 @@ def test_limits_that_are_not_symmetric_are_widened_and_told(tmp_path):
     assert arm.provenance["limits.position"] == "assumed: j7 -1 to 3.05 rad in the URDF, here ±3.05"
 
 
-def test_numbers_are_read_whatever_blanks_stand_around_them(tmp_path):
+def test_urdf_numbers_may_have_blanks_around_them(tmp_path):
     """pinocchio's parser alone would leave the whole body out."""
     path, text = tmp_path / "seven.urdf", SEVEN.read_text(encoding="utf-8")
     for old, new in (('mass value="2.7"', 'mass value=" 2.7 "'), ('ixx="0.03"', 'ixx=" 0.03 "')):

@@ -65,7 +65,7 @@ def linear(q):
 
 
 @pytest.mark.parametrize("name", STOPS)
-def test_a_recorded_stop_rings_with_its_frequency_and_damping_and_a_second_mode(name, measured):
+def test_stop_rings_with_the_recorded_frequency_and_damping(name, measured):
     _, end, _, wanted, second = STOPS[name]
     (size, f_d, zeta), (other, beside, _) = modes(ringing(name), 0.12, 0.55, linear(end))
     measured(f"{name}: f_d [Hz], recorded {wanted}", f_d)
@@ -78,7 +78,7 @@ def test_a_recorded_stop_rings_with_its_frequency_and_damping_and_a_second_mode(
 
 
 @pytest.mark.parametrize("name", ["A fast", "B fast"])
-def test_f_d_rises_and_the_damping_ratio_falls_as_it_decays(name, measured):
+def test_frequency_rises_and_damping_falls_during_the_decay(name, measured):
     alpha, guesses = ringing(name), linear(STOPS[name][1])
     _, early, damped = modes(alpha, 0.0, 0.25, guesses)[0]
     _, late, less = modes(alpha, 0.42, 0.25, guesses)[0]
@@ -87,45 +87,44 @@ def test_f_d_rises_and_the_damping_ratio_falls_as_it_decays(name, measured):
     assert less < 0.85 * damped
 
 
-def test_the_file_s_imperfections_are_the_plant_s_and_more_may_be_added():
+def test_given_imperfections_override_those_of_the_robot_file():
     assert Imperfections.of(ARM) == Imperfections(hysteresis=0.14, hysteresis_torque=0.003, rotor=3.0)
     both = Imperfections.of(ARM, Imperfections(breakaway=1.5, hysteresis=0.3))
     assert both == Imperfections(hysteresis=0.3, hysteresis_torque=0.003, rotor=3.0, breakaway=1.5)
-    assert Imperfections.of(replace(ARM, imperfections={})) == Imperfections()
+    assert Imperfections.of(replace(ARM, imperfections=Imperfections())) == Imperfections()
 
 
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("hysteresis = -1", "hysteresis is -1.0: must be at least 0"),
-        ("hysteresis_torque = 0", "hysteresis_torque is 0.0: must be above 0"),
+        ("hysteresis = -1", "hysteresis is -1: must be at least 0"),
+        ("hysteresis_torque = 0", "hysteresis_torque is 0: must be more than 0"),
         ("breakaway = 0.9", "breakaway is 0.9: must be at least 1"),
-        ("stribeck_speed = 0", "stribeck_speed is 0.0: must be above 0"),
-        ("soft = 0", "soft is 0.0: must be above 0 and at most 1"),
-        ("soft = 1.5", "soft is 1.5"),
+        ("stribeck_speed = 0", "stribeck_speed is 0: must be more than 0"),
+        ("soft = 0", "soft is 0: must be more than 0"),
+        ("soft = 1.5", "soft is 1.5: must be at most 1"),
         ("soft_torque = nan", "soft_torque is nan"),
         ("base = {stiffness = inf}", "base.stiffness is inf"),
         ("base = {damping_time = -1e-3}", "base.damping_time is -0.001: must be at least 0"),
-        ("tilt = 1", "tilt is 1.0: must be at least -0.523599 and at most 0.523599"),
+        ("tilt = 1", "tilt is 1: must be at most 0.523599"),
         ("backlash = [0.1, -1e-4]", r"backlash\[1\] is -0.0001: must be at least 0"),
-        ("torsion = 0", "torsion is 0.0: must be above 0"),
+        ("torsion = 0", "torsion is 0: must be more than 0"),
         ("hysteresi = 1", "imperfections.hysteresi is not a key"),
-        ("hysteresi = 1", "must be one of breakaway, .*, stiction, stiction_load, stiction_speed"),
         ("stiction = [0.5, 0.5, 0.5, 0.1, 0.1, -0.1]", r"stiction\[5\] is -0.1: must be at least 0"),
         ("stiction = [0.5]", "imperfections: stiction has 1 values: must have 6, one per joint"),
         ("stiction_load = -0.01", "stiction_load is -0.01: must be at least 0"),
-        ("stiction_speed = 0", "stiction_speed is 0.0: must be above 0"),
-        ("stiction_stiffness = inf", "stiction_stiffness is inf: must be above 0, and finite"),
+        ("stiction_speed = 0", "stiction_speed is 0: must be more than 0"),
+        ("stiction_stiffness = inf", "stiction_stiffness is inf: must be at most 1e"),
         ("stictions = [0.5]", "imperfections.stictions is not a key"),
         ("hysteresis = 'a'", "imperfections.hysteresis is text, 'a': must be a number"),
-        ("rotor = 0", "rotor is 0.0: must be above 0"),
+        ("rotor = 0", "rotor is 0: must be more than 0"),
         ("base = {stiff = 1}", "imperfections.base.stiff is not a key"),
-        ("base = {mass = 0}", "base.mass is 0.0: must be above 0"),
+        ("base = {mass = 0}", "base.mass is 0: must be more than 0"),
         ("backlash = [1e-4]", "imperfections: backlash has 1 values: must have 6"),
         ("torsion = 1e4", "imperfections: torsion is 10000 N m/rad, but no link"),
     ],
 )
-def test_a_wrong_imperfection_is_refused_by_its_name(tmp_path, line, said):
+def test_invalid_imperfection_is_refused_by_name(tmp_path, line, said):
     robot = "one-joint" if "torsion" in line else "ur5e"
     text = (resources.files("tvist_plant") / "robots" / f"{robot}.toml").read_text(encoding="utf-8")
     (tmp_path / "wrong.toml").write_text(f"{text}\n[imperfections]\n{line}\n", encoding="utf-8")

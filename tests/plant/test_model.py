@@ -29,13 +29,13 @@ def symmetric(M):
     ("pose", "elbow", "place"),
     [("Q1", 1, (0.917, -0.233, 0.163)), ("Q3", 1, (0.233, -0.246, 0.162)), ("Q3", -1, (0.233, 0.246, 0.162))],
 )
-def test_the_flange_is_where_the_paper_moves_it(ur5e, pose, elbow, place):
+def test_flange_is_at_the_positions_of_the_paper(ur5e, pose, elbow, place):
     q = np.array(ur5e.poses[pose]) * [1, 1, elbow, 1, 1, 1]
     np.testing.assert_allclose(forward_kinematics(ur5e, q)[:3, 3], place, atol=6e-4)
 
 
 @pytest.mark.parametrize("arm", ["ur5e", "chain"])
-def test_both_models_have_the_flange_where_denavit_and_hartenberg_put_it(ur5e, arm):
+def test_flange_of_both_models_matches_denavit_hartenberg(ur5e, arm):
     description = ur5e if arm == "ur5e" else chain(7)
     rigid = rigid_model(description, description.payload)
     flexible = flexible_model(description, description.payload)
@@ -64,7 +64,7 @@ def test_bending_links_keep_mass_centre_and_gravity(ur5e):
         )
 
 
-def test_lumps_change_the_mass_matrix_by_the_inertia_they_change_and_nothing_else(ur5e, measured):
+def test_lumps_change_the_mass_matrix_only_by_their_inertia(ur5e, measured):
     """Two lumps have Iyy and Izz of Iyy + Ixx and no products; the rest of the arm is untouched."""
     rigid, flexible = rigid_model(ur5e, ur5e.payload), flexible_model(ur5e, ur5e.payload)
     largest = 0.0
@@ -87,6 +87,6 @@ def test_lumps_change_the_mass_matrix_by_the_inertia_they_change_and_nothing_els
     assert largest < 0.05
 
 
-def test_an_arm_with_vertical_axes_alone_carries_no_weight():
+def test_arm_with_vertical_axes_carries_no_weight():
     assert carries_weight(load("ur5e"))
     assert not carries_weight(load("one-joint"))

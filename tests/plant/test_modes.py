@@ -32,7 +32,7 @@ def oscillations(t, f_d, zeta):
 
 
 @pytest.mark.parametrize("pose", TABLE_1)
-def test_table_1_of_the_paper(ur5e, plant, pose, measured):
+def test_modes_match_table_1_of_the_paper(ur5e, plant, pose, measured):
     """Calibrated to it; the pair of coinciding modes at Q1 and Q2 lies there as a whole."""
     f_d, zeta = TABLE_1[pose]
     found = modes(plant, ur5e.poses[pose])
@@ -79,7 +79,7 @@ def fitted(alpha, guess, period):
     ("Q1", 0, 20.0, 0.15, (7.5, 0.4)), ("Q1", 1, 20.0, 0.15, (7.5, 0.4)), ("Q2", 0, 20.0, 0.15, (7.5, 0.4)),
     ("Q3", 2, 40.0, 0.08, (17.0, 22.0, 0.2, 0.2)),
 ])  # fmt: skip
-def test_a_ring_down_of_the_nonlinear_arm_has_the_declared_mode(
+def test_ring_down_of_the_simulated_arm_has_the_declared_mode(
     ur5e, plant, pose, joint, push, pulse, guess, measured
 ):
     """The base rings the horizontal mode of Q1, the shoulder its vertical one."""
@@ -92,7 +92,7 @@ def test_a_ring_down_of_the_nonlinear_arm_has_the_declared_mode(
     assert declared.zeta[nearest] == pytest.approx(zeta, rel=0.01)
 
 
-def test_without_a_pose_the_modes_are_those_where_the_arm_is(ur5e, plant):
+def test_modes_without_a_pose_are_those_of_the_present_one(ur5e, plant):
     plant.reset(hold(plant.description, ur5e.poses["Q3"]))
     here, there = plant.modes(), modes(plant, ur5e.poses["Q3"])
     assert plant.modes(np.array(ur5e.poses["Q1"])).f_d[0] < 0.5 * here.f_d[0]
@@ -137,7 +137,7 @@ def simulated_participation(description, pose, joint, found):
     return [np.linalg.norm(weights[[k, 5 + k]]) for k in range(2)]
 
 
-def test_participation_is_the_amplitude_that_a_step_of_the_reference_excites(ur5e, plant, measured):
+def test_participation_is_the_response_to_a_step_of_acceleration(ur5e, plant, measured):
     pose, clean = ur5e.poses["Q3"], plant.description
     found = modes(plant, pose)
     simulated = np.array([simulated_participation(clean, pose, joint, found) for joint in range(6)])

@@ -36,7 +36,7 @@ def where(flexible, body):
 
 
 @pytest.mark.parametrize("joints", [1, 3, 7])
-def test_a_wrench_on_any_body_is_what_pinocchio_makes_of_it(joints):
+def test_wrench_on_any_body_matches_pinocchio(joints):
     """Its recursive algorithm takes forces in the frames of the joints, and has no Jacobian in it."""
     description = chain(joints)
     flexible = flexible_model(description, description.payload)
@@ -59,7 +59,7 @@ def test_a_wrench_on_any_body_is_what_pinocchio_makes_of_it(joints):
         np.testing.assert_allclose(outside.generalized_force(q), expected, rtol=0.0, atol=1e-11)
 
 
-def test_a_weight_hung_on_the_flange_bends_the_arm_as_a_payload_does(arm):
+def test_weight_at_the_flange_bends_the_arm_like_a_payload(arm):
     """In the end: a payload has inertia, too."""
     loaded, command, expected = standing(arm, arm.poses["Q1"])
     bare, *_ = standing(arm, arm.poses["Q1"], carries=Payload())
@@ -71,7 +71,7 @@ def test_a_weight_hung_on_the_flange_bends_the_arm_as_a_payload_does(arm):
     assert np.abs(bent).max() > 1e-5
 
 
-def test_a_moment_about_a_joint_and_its_reaction_are_a_torque_on_the_joint(arm):
+def test_moment_about_a_joint_with_its_reaction_is_a_joint_torque(arm):
     q = np.array(arm.poses["Q3"])
     (pushed, command, _), (twisted, *_) = (standing(arm, q) for _ in range(2))
     axis = placed(pushed._flexible, pushed._q).oMi[2].rotation[:, 2]
@@ -83,7 +83,7 @@ def test_a_moment_about_a_joint_and_its_reaction_are_a_torque_on_the_joint(arm):
     assert np.abs(a.q - q).max() > 1e-4
 
 
-def test_a_push_ends_with_zeros_or_a_reset(arm):
+def test_push_ends_with_zeros_or_a_reset(arm):
     one, command, rest = standing(arm, arm.poses["Q1"])
     one.push_body("flange", FORCE)
     one.push_body("elbow", FORCE)
@@ -97,7 +97,7 @@ def test_a_push_ends_with_zeros_or_a_reset(arm):
     assert one._outside.rests
 
 
-def test_the_ring_of_a_base_that_yields_is_a_body_too(arm):
+def test_yielding_base_can_be_pushed(arm):
     one, command, _ = standing(arm, arm.poses["Q1"], base=YieldingBase())
     before = one._q[1]
     one.push_body("base_y", moment=(0.0, 150.0, 0.0))
@@ -111,12 +111,12 @@ def test_the_ring_of_a_base_that_yields_is_a_body_too(arm):
     ({"body": "flange", "moment": (0.0, np.nan, 0.0)}, "moment is"),
     ({"body": "flange", "point": (0.0, np.inf, 0.0)}, "point is"),
 ])  # fmt: skip
-def test_a_wrench_without_sense_is_refused(ur5e, arguments, said):
+def test_invalid_wrench_is_refused(ur5e, arguments, said):
     with pytest.raises(ValueError, match=said):
         FlexibleArm(ur5e, ur5e.payload).push_body(**arguments)
 
 
 @pytest.mark.parametrize("torque", [np.ones(5), np.array(1.0), np.array([1.0, np.nan, 0.0, 0.0, 0.0, 0.0])])
-def test_torques_without_sense_are_refused(ur5e, torque):
+def test_invalid_torques_are_refused(ur5e, torque):
     with pytest.raises(ValueError, match=r"torque is .*: must be 6 finite numbers"):
         FlexibleArm(ur5e, ur5e.payload).push(torque)

@@ -30,7 +30,7 @@ def drive(ur5e):
     return commands(ur5e, ur5e.poses["Q1"], ur5e.poses["Q3"], 1000)
 
 
-def test_ten_seconds_of_holding_still_move_nothing(ur5e):
+def test_arm_that_holds_still_does_not_drift(ur5e):
     arm = changed(ur5e, "sensors", accelerometer_noise=0.0)
     plant, command, first = standing(arm, arm.poses["Q1"])
     last = rested(plant, command, 5000)
@@ -39,7 +39,7 @@ def test_ten_seconds_of_holding_still_move_nothing(ur5e):
     np.testing.assert_allclose(last.accelerometer, first.accelerometer, rtol=0.0, atol=1e-6)
 
 
-def test_at_rest_the_motors_carry_the_arm(ur5e):
+def test_motors_carry_the_arm_at_rest(ur5e):
     arm = quiet(ur5e)
     plant, command, measured = standing(arm, arm.poses["Q1"])
     assert measured.moment[1] == pytest.approx(command.torque[1], abs=0.2)
@@ -47,7 +47,7 @@ def test_at_rest_the_motors_carry_the_arm(ur5e):
     np.testing.assert_allclose(plant.truth().gear_deflection, twist, atol=1e-8)
 
 
-def test_a_wrong_declared_payload_is_carried_by_the_integrators(ur5e):
+def test_integrators_carry_a_wrongly_declared_payload(ur5e):
     """The command feeds forward gravity of 5 kg, the arm carries none: it still starts at rest."""
     plant, command, first = standing(ur5e, ur5e.poses["Q1"], carries=Payload())
     last = rested(plant, command, 500)
@@ -55,7 +55,7 @@ def test_a_wrong_declared_payload_is_carried_by_the_integrators(ur5e):
     assert abs(last.moment[1]) < abs(command.torque[1]) - 40.0
 
 
-def test_a_reset_starts_the_same_run_again(ur5e, drive):
+def test_reset_repeats_the_same_run_bit_for_bit(ur5e, drive):
     """To the last bit, also after other motions and payloads."""
     first, plant = run(FlexibleArm(ur5e, ur5e.payload), drive, seed=9), FlexibleArm(ur5e, ur5e.payload)
     run(plant, drive[300:500], seed=1)
@@ -76,7 +76,7 @@ def test_seeds_differ_in_noise_and_gear_error(ur5e, drive):
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 @pytest.mark.parametrize("field", ["q", "qd", "torque"])
-def test_a_command_without_sense_raises_and_a_reset_heals(ur5e, field, bad):
+def test_non_finite_command_raises_until_a_reset(ur5e, field, bad):
     plant, command, first = standing(ur5e, ur5e.poses["Q1"])
     values = {name: getattr(command, name).copy() for name in ("q", "qd", "torque")}
     values[field][1] = bad
@@ -88,7 +88,7 @@ def test_a_command_without_sense_raises_and_a_reset_heals(ur5e, field, bad):
         np.testing.assert_array_equal(a, b)
 
 
-def test_a_gear_error_turns_the_link_by_its_amplitude_and_wave(ur5e):
+def test_gear_error_turns_the_link_by_its_amplitude_and_wave(ur5e):
     """Where the arm stands, the links are off by ε sin(n_w θ + φ) against those of a perfect gear."""
     plant = FlexibleArm(ur5e, ur5e.payload)
     perfect = FlexibleArm(quiet(ur5e), ur5e.payload)
@@ -116,7 +116,7 @@ def readings(noise, seed, count=1500):
     return np.array([sensor.read(np.zeros(3)) for _ in range(count)])
 
 
-def test_noise_is_white_with_the_rms_asked_for():
+def test_accelerometer_noise_is_white_with_the_given_rms():
     noise = readings(0.03, 1, 20000)
     np.testing.assert_allclose(np.sqrt(np.mean(noise**2, axis=0)), 0.03, rtol=0.02)
     np.testing.assert_allclose(np.mean(noise, axis=0), 0.0, atol=4 * 0.03 / np.sqrt(20000))
@@ -125,7 +125,7 @@ def test_noise_is_white_with_the_rms_asked_for():
 
 
 @pytest.mark.parametrize("case", range(6))
-def test_at_rest_it_points_up_with_9_81_in_the_flange_frame(ur5e, case):
+def test_accelerometer_at_rest_measures_gravity_upwards(ur5e, case):
     arm = quiet(ur5e)
     q = np.random.default_rng(case).uniform(-np.pi, np.pi, 6)
     plant, _, measured = standing(arm, q)
@@ -142,7 +142,7 @@ LIGHT, HEAVY = (
 )
 
 
-def test_an_arm_settles_as_if_it_had_carried_the_payload_from_the_start(ur5e):
+def test_arm_with_a_changed_payload_settles_as_if_carried_from_the_start(ur5e):
     arm, other = FlexibleArm(ur5e, LIGHT), FlexibleArm(ur5e, HEAVY)
     command = DriveCommand(np.array(ur5e.poses["Q1"]), np.zeros(6), np.zeros(6))
     assert arm.can(Plant.load)

@@ -46,13 +46,13 @@ def no_file(request, tmp_path, monkeypatch):
     return path
 
 
-def test_what_is_no_file_is_named_and_not_read(no_file):
+def test_directories_pipes_sockets_and_devices_are_refused(no_file):
     for read in (read_bytes, read_text, read_toml):
         with pytest.raises(UserFileError, match=f"robot file {no_file} is a (directory|pipe|socket|device)"):
             read(no_file, "robot file")
 
 
-def test_one_that_is_too_large_is_not_read_to_its_end(tmp_path):
+def test_file_that_is_too_large_is_refused(tmp_path):
     path = tmp_path / "large"
     with path.open("wb") as stream:
         stream.truncate(LARGEST)
@@ -62,7 +62,7 @@ def test_one_that_is_too_large_is_not_read_to_its_end(tmp_path):
         read_bytes(path, "state")
 
 
-def test_what_is_no_text_is_named(tmp_path):
+def test_file_that_is_not_utf_8_is_refused(tmp_path):
     path = tmp_path / "binary"
     path.write_bytes(b"x = 1\xff")
     with pytest.raises(UserFileError, match=f"state {path} is not text in UTF-8 .* at byte 5"):
@@ -71,7 +71,7 @@ def test_what_is_no_text_is_named(tmp_path):
 
 @pytest.mark.parametrize("levels", [DEEPEST + 1, 100_000])
 @pytest.mark.parametrize("form", NESTED)
-def test_one_that_is_nested_too_deeply_is_not_parsed(form, levels, tmp_path):
+def test_file_that_is_nested_too_deeply_is_refused(form, levels, tmp_path):
     path = tmp_path / "deep.toml"
     path.write_text(NESTED[form](levels))
     with pytest.raises(UserFileError, match=rf"deep\.toml is nested too deeply: at most {DEEPEST} levels"):
@@ -79,7 +79,7 @@ def test_one_that_is_nested_too_deeply_is_not_parsed(form, levels, tmp_path):
 
 
 @pytest.mark.parametrize("form", NESTED)
-def test_as_many_levels_as_there_may_be_are_read(form, tmp_path):
+def test_deepest_permitted_nesting_is_read(form, tmp_path):
     path = tmp_path / "deep.toml"
     text = NESTED[form](DEEPEST - 1)
     path.write_text(text)
@@ -99,13 +99,13 @@ def test_as_many_levels_as_there_may_be_are_read(form, tmp_path):
         "[a]\n[b]\n[c]\n[[d]]\n",
     ],
 )
-def test_brackets_and_dots_in_strings_comments_and_side_by_side_are_no_levels(text):
+def test_brackets_in_strings_and_comments_do_not_count_as_nesting(text):
     assert tomllib.loads(text)
     assert not _is_deeper(text, 2)
 
 
 @given(st.text(alphabet="[]{}.,='\"\\#\nax1 ", max_size=200))
-def test_what_the_parser_reads_is_no_deeper_than_it_is_found_to_be(text):
+def test_parsed_content_is_no_deeper_than_the_computed_depth(text):
     def levels(content):
         if isinstance(content, dict):
             return 1 + max(map(levels, content.values()), default=0)
@@ -127,7 +127,7 @@ def test_what_the_parser_reads_is_no_deeper_than_it_is_found_to_be(text):
     ['x = "' + '\\"' * 2_000_000, "x = '''" + "''a" * 1_000_000, "." * 4_000_000],
     ids=lambda text: text[:7],
 )
-def test_a_text_that_is_made_to_be_slow_is_not(text, tmp_path):
+def test_depth_check_takes_linear_time(text, tmp_path):
     """Time that grew with the square of its length would not end before the test's."""
     path = tmp_path / "slow.toml"
     path.write_text(text)

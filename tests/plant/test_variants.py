@@ -35,7 +35,7 @@ def test_every_plant_moves_and_differs_from_the_described_arm(ur5e, name):
     assert bool(np.abs(felt[0] - felt[1]).max() > 1e-7) == (name != "calibrated")
 
 
-def test_names_stand_for_the_numbers_of_their_labels(ur5e):
+def test_plants_have_the_parameters_of_their_labels(ur5e):
     """Friction, springs, torsion and backlash are those that tables of perturbations quote."""
     stribeck = variant("stribeck").make(ur5e, ur5e.payload, 0)
     assert stribeck.description.drives.friction_width == pytest.approx(0.3 * ur5e.drives.friction_width)
@@ -59,7 +59,7 @@ def test_names_stand_for_the_numbers_of_their_labels(ur5e):
 
 
 @pytest.mark.parametrize("name", ["combined", "hidden-8"])
-def test_what_is_carried_is_never_what_was_said(ur5e, name):
+def test_plant_carries_another_payload_than_declared(ur5e, name):
     """At the start, at a reset and in motion the arm carries the other payload, and tells the one it was told."""
     told, lighter = ur5e.payload, Payload(mass=2.0, com=(0.0, 0.0, 0.05))
     arm, truly = variant(name).make(ur5e, told, 0), variant(name).carries
@@ -79,7 +79,7 @@ def test_what_is_carried_is_never_what_was_said(ur5e, name):
     assert carried() == pytest.approx(0.0, abs=1e-12)
 
 
-def test_other_arms_have_backlash_like_the_joints_of_a_ur5e():
+def test_backlash_of_other_arms_is_that_of_the_corresponding_joints():
     """Seven joints, and a chain of three, get a width for each joint; an arm with rigid links cannot twist."""
     for joints in (3, 7):
         arm = chain(joints)
@@ -89,7 +89,7 @@ def test_other_arms_have_backlash_like_the_joints_of_a_ur5e():
 
 
 @pytest.mark.parametrize("name", ["stribek", "hidden", "hidden-", "hidden--1", "hidden-1e3", "hidden-²", ""])
-def test_an_unknown_plant_is_refused_with_the_names_there_are(name):
+def test_unknown_plant_is_refused_with_the_known_names(name):
     with pytest.raises(ValueError, match=r"must be hidden-SEED or one of calibrated, coulomb"):
         variant(name)
 
@@ -98,7 +98,7 @@ UR5E = load("ur5e")
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "one-joint"])
-def test_a_hidden_robot_differs_from_its_file_within_the_shares_and_nowhere_else(robot: str) -> None:
+def test_hidden_robot_differs_from_its_file_only_within_the_shares(robot: str) -> None:
     """All drawn values are within their shares over many seeds, reach both halves, and nothing else changes."""
     known = load(robot)
     assert hidden(known, 11) == hidden(known, 11) != hidden(known, 12)
@@ -123,7 +123,7 @@ def test_a_hidden_robot_differs_from_its_file_within_the_shares_and_nowhere_else
             assert max(ratios[name]) > 1.0 + 0.8 * share
 
 
-def test_what_is_carried_is_a_real_body_near_the_declared_one() -> None:
+def test_hidden_payload_is_a_possible_body_near_the_declared_one() -> None:
     """Mass and centre are within their limits, no payload stays none, and inertia grows with the mass."""
     for seed in range(60):
         carried = hidden_payload(UR5E.payload, seed)

@@ -67,8 +67,8 @@ WRONG_NAMES = {
     "FIR": "has a peak of 3, more than the declared 1: give peak=3 to FirShaper",
     "lists": "returns tuple instead of Impulses(A, tau) of tvist_shaping",
     "early": "must ascend from 0 (sort the impulses by time, and subtract the first) in line 30 of mine.py",
-    "unsummed": "must sum to 1 within 1e-9 (divide A by its sum) in line 32 of mine.py",
-    "zvd": "name is 'zvd', but must be a name that no other shaper has",
+    "unsummed": "must be 1 within 1e-9 (divide A by its sum) in line 32 of mine.py",
+    "zvd": "name is 'zvd': must be a name that no other shaper has",
     "": "the name of the shaper is missing",
 }
 WRONG_FILES = {
@@ -202,7 +202,7 @@ FAILING = {
     "exits": (lambda _f_d, _zeta: sys.exit(1), "raises SystemExit"),
     "NaN": (lambda _f_d, _zeta: Impulses(np.array([np.nan]), np.array([0.0])), "must be finite"),
     "nothing": (lambda _f_d, _zeta: None, "returns NoneType"),
-    "sum": (lambda _f_d, _zeta: Impulses(np.array([2.0]), np.array([0.0])), "must sum to 1"),
+    "sum": (lambda _f_d, _zeta: Impulses(np.array([2.0]), np.array([0.0])), "must be 1 within"),
     "too long": (lambda f_d, zeta: zv(1e-3 * f_d, zeta), "beyond"),
 }
 

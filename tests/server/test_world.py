@@ -12,7 +12,7 @@ from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.running import run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
-from tvist_plant.plant import Shape
+from tvist_plant.surroundings import Shape
 from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_plant.world.scene_file import find_scene
 from tvist_protocol import commands as c

@@ -26,14 +26,14 @@ def read(line, delay):
 
 
 @given(samples, st.integers(0, 17))
-def test_a_whole_delay_gives_the_sample_itself(values, delay):
+def test_whole_delay_gives_the_sample_itself(values, delay):
     x, minus_x = read(filled(values), delay)
     assert x == values[-1 - delay]
     assert minus_x == -x
 
 
 @given(st.lists(st.floats(-2.0, 2.0), min_size=4, max_size=4), st.floats(0.0, 17.0))
-def test_a_cubic_comes_through_exactly_at_any_delay(coefficients, delay):
+def test_cubic_is_reproduced_exactly_at_any_delay(coefficients, delay):
     t = np.arange(-30.0, 1.0) / 10.0
     line = filled(np.polyval(coefficients, t))
     assert read(line, delay)[0] == pytest.approx(np.polyval(coefficients, -delay / 10.0), abs=1e-12)
@@ -45,7 +45,7 @@ def test_a_cubic_comes_through_exactly_at_any_delay(coefficients, delay):
     st.floats(0.0, 0.99),
     st.floats(0.01, 8.0),
 )
-def test_a_constant_comes_out_bit_for_bit_at_any_delay(value, name, zeta, spacing):
+def test_constant_is_reproduced_bit_for_bit_at_any_delay(value, name, zeta, spacing):
     line = DelayLine(1, 20)
     line.fill([value])
     impulses = shaper(name).function(1.0, zeta)
@@ -55,7 +55,7 @@ def test_a_constant_comes_out_bit_for_bit_at_any_delay(value, name, zeta, spacin
 
 
 @given(samples, st.floats(0.0, 17.0), st.floats(0.0, 0.99))
-def test_fractional_delays_pass_the_samples_by_no_more_than_a_cubic_can(values, delay, zeta):
+def test_fractional_delay_overshoots_no_more_than_a_cubic_can(values, delay, zeta):
     line = filled(values)
     A = shaper("zv").function(1.0, zeta).A
     out = np.zeros(2)
@@ -66,7 +66,7 @@ def test_fractional_delays_pass_the_samples_by_no_more_than_a_cubic_can(values, 
 
 
 @given(samples, st.integers(0, 16))
-def test_the_delayed_value_is_continuous_in_the_delay(values, delay):
+def test_output_is_continuous_in_the_delay(values, delay):
     line = filled(values)
     step = 1e-9
     assert read(line, delay)[0] == pytest.approx(read(line, delay + step)[0], abs=1e-6)
@@ -78,7 +78,7 @@ def test_the_delayed_value_is_continuous_in_the_delay(values, delay):
     # Half a sample late at 500 Hz, from the cubic's frequency response.
     [(6.7, 0.0001), (15.0, 0.003), (33.0, 0.068), (62.5, 0.85)],
 )
-def test_a_tone_loses_as_much_as_the_cubic_must(f, loss_percent):
+def test_attenuation_of_a_tone_matches_the_cubics_frequency_response(f, loss_percent):
     h = 0.002
     omega = 2.0 * np.pi * f
     t = h * np.arange(-40, 1)
@@ -90,10 +90,10 @@ def test_a_tone_loses_as_much_as_the_cubic_must(f, loss_percent):
 
 
 @pytest.mark.parametrize("delay", [-1e-9, 17.0000001, 1e300, math.nan, math.inf])
-def test_a_delay_the_line_does_not_hold_is_refused_and_nothing_written(delay):
+def test_delay_beyond_the_line_is_refused_without_output(delay):
     line = filled(np.arange(30.0))
     out = np.full(2, 5.0)
-    with pytest.raises(DelayError, match="holds 0 to 17 ticks") as error:
+    with pytest.raises(DelayError, match="must be 0 to 17 ticks") as error:
         line.gather(np.array([0.5, 0.5]), np.array([0.0, delay]), out)
     assert error.value.delay == pytest.approx(delay, nan_ok=True)
     assert error.value.limit == line.max_delay == 17
@@ -101,6 +101,6 @@ def test_a_delay_the_line_does_not_hold_is_refused_and_nothing_written(delay):
 
 
 @pytest.mark.parametrize(("joints", "capacity"), [(0, 10), (1, 3)])
-def test_a_line_that_could_not_interpolate_is_refused(joints, capacity):
+def test_line_too_short_to_interpolate_is_refused(joints, capacity):
     with pytest.raises(ShapingError, match="joints >= 1 and capacity >= 4"):
         DelayLine(joints, capacity)

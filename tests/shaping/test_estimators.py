@@ -32,13 +32,13 @@ def polynomial(degree=2, joints=(1, 2, 3), seed=0, **changes):
     ([math.inf], [0.1], "f_d"), ([7.0], [0.1, 0.1], "zeta"), ([7.0], [-0.1], "zeta"), ([7.0], [1.0], "zeta"),
     ([7.0], [math.nan], "zeta"),
 ])  # fmt: skip
-def test_bad_fixed_modes_are_refused_by_name(f_d, zeta, field):
+def test_invalid_fixed_modes_are_refused_by_name(f_d, zeta, field):
     with pytest.raises(EstimatorError, match=f"{field} is") as error:
         Fixed(f_d, zeta)
     assert error.value.field == field
 
 
-def test_trigonometric_terms_are_all_combinations_up_to_the_degree_once():
+def test_terms_are_all_combinations_up_to_the_degree_once():
     q = np.random.default_rng(1).normal(size=(9, 3))
     a, b = q[:, 0], q[:, 2]
     phases = [a, b, 2 * a, a + b, a - b, 2 * b]
@@ -48,7 +48,7 @@ def test_trigonometric_terms_are_all_combinations_up_to_the_degree_once():
 
 
 @given(configurations, st.integers(0, 4))
-def test_the_fast_evaluation_equals_the_design_matrix_times_the_coefficients(q, degree):
+def test_kernel_equals_the_design_matrix_times_the_coefficients(q, degree):
     estimator, p = polynomial(degree, centre=[0.1, -0.2, 0.3])
     row = terms([q], joints=p["joints"], degree=degree, centre=[0.1, -0.2, 0.3])[0]
     f_d, zeta = row @ p["f_d_coefficients"], row @ p["zeta_coefficients"]
@@ -68,7 +68,7 @@ def wave(**changes):
 
 
 @given(st.floats(-1e6, 1e6))
-def test_an_estimate_never_leaves_its_range_and_says_when_it_would_have(q):
+def test_estimate_is_clamped_to_its_range_and_reports_saturation(q):
     estimator, wanted = wave(), 10.5 + 20.0 * math.sin(q)
     f_d, _ = estimator.estimate(np.array([q]))
     assert estimator.f_d_min == 6.0 <= f_d[0] <= 15.0
@@ -78,7 +78,7 @@ def test_an_estimate_never_leaves_its_range_and_says_when_it_would_have(q):
 
 
 @given(st.floats(6.0, 15.0))
-def test_well_inside_the_range_an_estimate_is_left_alone(f_d):
+def test_estimate_well_inside_the_range_is_unchanged(f_d):
     bent = 9.0 * MARGIN
     found = wave().estimate(np.array([math.asin((f_d - 10.5) / 20.0)]))[0][0]
     inside = min(f_d - 6.0, 15.0 - f_d) - bent
@@ -86,7 +86,7 @@ def test_well_inside_the_range_an_estimate_is_left_alone(f_d):
     assert (found == pytest.approx(f_d, rel=1e-12)) == (inside >= 0.0)
 
 
-def test_the_saturation_has_two_derivatives_without_a_jump():
+def test_saturation_has_two_continuous_derivatives():
     x = np.linspace(4.0, 17.0, 130001)
     step = x[1] - x[0]
     y = np.array([saturate(value, 6.0, 15.0) for value in x])
@@ -109,7 +109,7 @@ def test_the_saturation_has_two_derivatives_without_a_jump():
     ({"f_d_range": (6.0, math.inf)}, "f_d_range"), ({"zeta_range": (-0.1, 0.3)}, "zeta_range"),
     ({"zeta_range": (0.1, 1.0)}, "zeta_range"),
 ])  # fmt: skip
-def test_bad_parameters_are_refused_by_name(changes, field):
+def test_invalid_polynomial_parameters_are_refused_by_name(changes, field):
     with pytest.raises(EstimatorError, match=f"^{field} is") as error:
         polynomial(**changes) if not changes.keys() & {"joints", "degree"} else Polynomial(
             **polynomial()[1] | changes
@@ -117,7 +117,7 @@ def test_bad_parameters_are_refused_by_name(changes, field):
     assert error.value.field == field
 
 
-def test_a_configuration_with_too_few_joints_is_refused():
+def test_configuration_with_too_few_joints_is_refused():
     estimator, p = polynomial()
     with pytest.raises(EstimatorError, match="q is"):
         estimator.estimate(np.zeros(3))

@@ -15,7 +15,7 @@ EXAMPLES = sorted(FOLDER.glob("*.py"))
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
-def test_an_example_imports_numpy_and_the_library_alone(example):
+def test_example_imports_only_numpy_and_the_library(example):
     imported = set()
     for node in ast.walk(ast.parse(example.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -25,7 +25,7 @@ def test_an_example_imports_numpy_and_the_library_alone(example):
     assert imported == {"numpy", "tvist_shaping"}
 
 
-def test_the_one_joint_example_shows_that_zv_needs_the_right_frequency():
+def test_one_joint_example_shows_that_zv_needs_the_right_frequency():
     ended = forked.run(
         [sys.executable, FOLDER / "one_joint.py"], capture_output=True, text=True, check=True, timeout=300
     )

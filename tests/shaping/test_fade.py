@@ -60,9 +60,7 @@ def excess(output, alone, order, limit):
 
 @examples(30)
 @given(names, names, seeds, st.floats(0.0, 1.0), st.sampled_from([1.0, 1.0, 0.8, 0.5]))
-def test_a_change_anywhere_in_a_motion_keeps_its_limits_and_ends_at_its_target(
-    first, then, seed, when, share
-):
+def test_fade_in_a_motion_keeps_the_limits_and_reaches_the_target(first, then, seed, when, share):
     random = np.random.default_rng(seed)
     reference = double_s(random.uniform(-1, 1, 3) * random.uniform(0.05, 3.0), share)
     switch = int(when * (len(reference) - 250))
@@ -97,7 +95,7 @@ def stream(random, joints, ticks):
 
 @examples(25)
 @given(names, names, seeds, st.integers(1, 6))
-def test_in_a_stream_whose_joints_want_different_things_every_one_keeps_its_limits(first, then, seed, joints):
+def test_fade_in_a_stream_of_independent_joints_keeps_the_limits(first, then, seed, joints):
     random = np.random.default_rng(seed)
     reference = stream(random, joints, 1500)
     old, new = a_filter(random, first, joints), a_filter(random, then, joints)
@@ -110,7 +108,7 @@ def test_in_a_stream_whose_joints_want_different_things_every_one_keeps_its_limi
 
 @examples(30)
 @given(names, names, seeds)
-def test_whatever_the_reference_does_the_output_is_between_the_two(first, then, seed):
+def test_output_is_between_both_filters_for_any_reference(first, then, seed):
     random = np.random.default_rng(seed)
     reference = np.cumsum(random.normal(size=(300, 3)), axis=0) * random.choice([1e-4, 1e-2, 1.0])
     output, shares, alone = run(reference, a_filter(random, first), a_filter(random, then), 100)
@@ -120,7 +118,7 @@ def test_whatever_the_reference_does_the_output_is_between_the_two(first, then, 
     assert ((shares >= 0.0) & (shares <= 1.0)).all()
 
 
-def test_longer_delays_come_in_a_cruise_at_the_limit_and_shorter_ones_wait_until_there_is_room():
+def test_only_fades_to_longer_delays_finish_in_a_cruise_at_the_limit():
     reference = double_s([3.0])
     cruise = slice(500, 1000)
     names = [("none", "zv"), ("zv", "none")]
@@ -134,7 +132,7 @@ def test_longer_delays_come_in_a_cruise_at_the_limit_and_shorter_ones_wait_until
     assert shares[1] < 1e-3
 
 
-def test_a_joint_does_not_turn_back_for_a_fade():
+def test_fade_never_turns_a_joint_back():
     reference = double_s([1.0])
     old, new = (TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=1) for name in ("none", "ei3"))
     for switch in range(0, len(reference) - 250, 40):
@@ -143,7 +141,7 @@ def test_a_joint_does_not_turn_back_for_a_fade():
         old.reset([0.0])
 
 
-def test_it_begins_as_the_old_filter_and_ends_as_the_new_bit_for_bit():
+def test_fade_starts_as_the_old_filter_and_ends_as_the_new_one():
     random = np.random.default_rng(0)
     reference = double_s([0.5, -0.8, 0.3], 0.5)
     old, new = a_filter(random, "zv"), a_filter(random, "ei")
@@ -164,7 +162,7 @@ def test_it_begins_as_the_old_filter_and_ends_as_the_new_bit_for_bit():
             np.testing.assert_array_equal(shaped, other)
 
 
-def test_at_rest_a_fade_is_over_at_once_and_nothing_moves():
+def test_fade_at_rest_finishes_at_once_without_motion():
     old = TvistFilter(shaper("ei3"), Fixed([7.0], [0.1]), joints=2)
     old.reset([1.0, 2.0])
     fading = fade(old, TvistFilter(shaper("zv"), VARYING, joints=2))
@@ -174,7 +172,7 @@ def test_at_rest_a_fade_is_over_at_once_and_nothing_moves():
     assert fading.finished
 
 
-def test_a_filter_that_takes_over_goes_on_as_if_it_had_been_there_all_along():
+def test_filter_that_takes_over_continues_the_history():
     reference = double_s([1.0, -0.5], 0.7)[:400]
     for capacity in (1.0, 0.5, 2.0):
         there, other = (
@@ -193,15 +191,15 @@ def test_a_filter_that_takes_over_goes_on_as_if_it_had_been_there_all_along():
 @pytest.mark.parametrize(
     "limits", [{"velocity": 0.0}, {"acceleration": float("nan")}, {"jerk": float("inf")}]
 )
-def test_limits_out_of_range_are_refused_by_name(limits):
+def test_fade_limits_out_of_range_are_refused_by_name(limits):
     old, new = (TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=1) for _ in range(2))
     with pytest.raises(FilterError, match=next(iter(limits))):
         fade(old, new, **limits)
 
 
-def test_filters_that_do_not_go_together_are_refused():
+def test_incompatible_filters_are_refused():
     one, two = (TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=joints) for joints in (1, 2))
-    with pytest.raises(ShapingError, match="2 joints cannot go on from one of 1"):
+    with pytest.raises(ShapingError, match="joints is 1: must be 2"):
         fade(one, two)
     slow = TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=1, period=0.004)
     with pytest.raises(FilterError, match="period"):

@@ -59,7 +59,7 @@ def jumping(name, seed, joints):
 @given(names, st.integers(0, 2**32 - 1), st.lists(st.floats(-7.0, 7.0), min_size=3, max_size=3))
 @example("product", 0, [1.1, -2.0, 6.9])
 @example("short", 0, [1.1, -2.0, 6.9])
-def test_a_reference_at_rest_passes_bit_for_bit_whatever_the_parameters_do(name, seed, q):
+def test_reference_at_rest_passes_unchanged_while_the_modes_jump(name, seed, q):
     tvist = jumping(name, seed, 3)
     tvist.reset(q)
     for shaped in shaped_by(tvist, [q] * 50):
@@ -70,7 +70,7 @@ def test_a_reference_at_rest_passes_bit_for_bit_whatever_the_parameters_do(name,
 @given(names, st.integers(0, 2**32 - 1))
 @example("product", 0)
 @example("short", 0)
-def test_the_end_of_a_motion_is_reached_bit_for_bit_whatever_the_parameters_do(name, seed):
+def test_end_of_a_motion_is_reached_exactly_while_the_modes_jump(name, seed):
     random = np.random.default_rng(seed)
     tvist = jumping(name, seed, 2)
     shaped_by(tvist, np.cumsum(random.normal(size=(200, 2)), axis=0))
@@ -78,7 +78,7 @@ def test_the_end_of_a_motion_is_reached_bit_for_bit_whatever_the_parameters_do(n
     np.testing.assert_array_equal(shaped_by(tvist, [end] * (tvist._reach + 1))[-1], end)
 
 
-def test_the_output_is_the_convolution_with_the_impulses():
+def test_output_is_the_convolution_with_the_impulses():
     h, f_d, zeta = 0.002, 7.3, 0.2
     t = h * np.arange(600)
     smooth = np.sin(3.0 * t) * t**2
@@ -89,7 +89,7 @@ def test_the_output_is_the_convolution_with_the_impulses():
     np.testing.assert_allclose(shaped, direct, atol=1e-7)
 
 
-def test_the_estimator_reads_the_previous_shaped_reference():
+def test_estimator_gets_the_previous_shaped_reference():
     estimator = Jumping(0)
     tvist = TvistFilter(shaper("zv"), estimator, joints=1)
     estimator.seen.clear()
@@ -106,7 +106,7 @@ def test_all_joints_get_the_same_weights(name):
         np.testing.assert_allclose(shaped, shaped[0] * direction, atol=1e-13)
 
 
-def test_the_modes_impulses_and_delay_of_the_last_tick_can_be_read():
+def test_filter_reports_modes_impulses_and_delay_of_the_last_tick():
     tvist = TvistFilter(shaper("zv"), Fixed([6.7, 15.0], [0.34, 0.14]), joints=6)
     tvist.filter(np.zeros(6))
     np.testing.assert_array_equal(tvist.f_d, [6.7, 15.0])
@@ -116,7 +116,7 @@ def test_the_modes_impulses_and_delay_of_the_last_tick_can_be_read():
     assert tvist.delay == both.duration == pytest.approx(0.5 / 6.7 + 0.5 / 15.0)
 
 
-def test_a_mode_that_its_estimator_does_not_believe_is_said_and_no_longer_when_it_does():
+def test_clamped_mode_is_reported_only_while_it_is_clamped():
     """The filter goes on with the held mode: it is inside what was checked when it was made."""
 
     class Holds(Estimator):
@@ -139,7 +139,7 @@ def test_a_mode_that_its_estimator_does_not_believe_is_said_and_no_longer_when_i
     assert not tvist.replace(estimator=Fixed([7.0], [0.1])).clipped
 
 
-def test_what_the_filter_returned_is_the_callers_own():
+def test_output_is_a_copy():
     tvist = TvistFilter(shaper("zv"), Fixed([10.0], [0.1]), joints=1)
     first = tvist.filter([1.0])
     kept = first.copy()
@@ -149,14 +149,14 @@ def test_what_the_filter_returned_is_the_callers_own():
     assert tvist.filter([2.0])[0] < 3.0
 
 
-def test_a_shaper_too_long_for_the_line_is_refused_with_what_to_do():
+def test_shaper_longer_than_max_delay_is_refused_with_advice():
     with pytest.raises(FilterError, match=r"'ei3' lasts 2 periods .* 1 Hz: take a shorter shaper") as error:
         TvistFilter(shaper("ei3"), Fixed([1.0], [0.1]), joints=6)
     assert error.value.field == "duration"
     assert error.value.value == 2.0
 
 
-def test_a_damping_beyond_the_shaper_is_refused_with_what_to_do():
+def test_damping_above_the_shapers_range_is_refused_with_advice():
     mine = Shaper("mine", "valid to 0.2", zv, 0.5, zeta_max=0.2)
     with pytest.raises(
         FilterError, match=r"less than 0.2, as shaper 'mine' demands; take a shaper with"
@@ -169,12 +169,12 @@ def test_a_damping_beyond_the_shaper_is_refused_with_what_to_do():
 @pytest.mark.parametrize(
     "numbers", [{"joints": 0}, {"period": 0.0}, {"period": float("nan")}, {"max_delay": float("inf")}]
 )
-def test_numbers_out_of_range_are_refused_by_name(numbers):
+def test_filter_arguments_out_of_range_are_refused_by_name(numbers):
     with pytest.raises(FilterError, match=next(iter(numbers))):
         TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), **({"joints": 1} | numbers))
 
 
-def test_an_estimator_of_more_joints_than_there_are_is_refused_at_construction():
+def test_estimator_that_needs_more_joints_is_refused():
     elbow = Polynomial(
         joints=[2],
         degree=0,
@@ -187,7 +187,7 @@ def test_an_estimator_of_more_joints_than_there_are_is_refused_at_construction()
         TvistFilter(shaper("zv"), elbow, joints=2)
 
 
-def test_a_sample_of_another_size_is_refused():
+def test_sample_of_another_size_is_refused():
     tvist = TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=2)
     for wrong in (0.0, [0.0], [0.0] * 3):
         with pytest.raises(ShapingError, match=r"shape"):
@@ -223,7 +223,7 @@ def assert_equal(one, other):
 
 @pytest.mark.parametrize("name", SHAPERS)
 @pytest.mark.parametrize("modes", [1, 2])
-def test_many_samples_at_once_are_what_they_are_one_by_one_with_every_shaper(name, modes):
+def test_filter_all_equals_filter_with_every_shaper(name, modes):
     shaper = SHAPERS[name]
     made = estimator() if modes == 1 else Fixed([7.0, 15.0], [0.1, 0.15])
     one, other = (TvistFilter(shaper, made.fork(), joints=4) for _ in range(2))
@@ -238,14 +238,14 @@ def test_many_samples_at_once_are_what_they_are_one_by_one_with_every_shaper(nam
 
 
 @pytest.mark.parametrize(("name", "modes"), [("auto", 4), ("elastic", 1)])
-def test_so_they_are_with_filters_that_are_no_shapers(name, modes):
+def test_filter_all_equals_filter_with_designs(name, modes):
     known = Fixed([7.0, 15.0, 21.0, 33.0][:modes], [0.1] * modes)
     one, other = (make_filter(name, known, joints=4) for _ in range(2))
     samples = walk(300)
     np.testing.assert_array_equal(one.filter_all(samples), [other.filter(sample) for sample in samples])
 
 
-def test_so_they_are_along_a_path():
+def test_filter_all_equals_filter_along_a_path():
     one, other = (TvistFilter(SHAPERS["zv"], estimator(), joints=4) for _ in range(2))
     for tvist in (one, other):
         tvist.reset(np.zeros(1), lambda s: np.array([s[0], s[0] ** 2, 0.5 * s[0], 0.0]))
@@ -253,7 +253,7 @@ def test_so_they_are_along_a_path():
     np.testing.assert_array_equal(one.filter_all(samples), [other.filter(sample) for sample in samples])
 
 
-def test_no_samples_are_none_and_wrong_shapes_are_refused():
+def test_filter_all_accepts_no_samples_and_refuses_wrong_shapes():
     tvist = TvistFilter(SHAPERS["zv"], estimator(), joints=4)
     assert tvist.filter_all(np.empty((0, 4))).shape == (0, 4)
     with pytest.raises(ShapingError, match="shape"):
@@ -262,7 +262,7 @@ def test_no_samples_are_none_and_wrong_shapes_are_refused():
         tvist.filter_all(np.zeros((3, 5)))
 
 
-def test_where_the_compiled_run_cannot_go_on_the_filter_does(monkeypatch):
+def test_filter_all_continues_where_the_kernel_stops(monkeypatch):
     """A mode that a kernel refuses is the business of the function of the shaper, at that sample only."""
     tvist, plain = (TvistFilter(SHAPERS["zv"], estimator(), joints=4) for _ in range(2))
     samples, whole = walk(200), module.shape_all
@@ -291,7 +291,7 @@ def played(tvist, q):
     return np.array([(tvist.filter(sample)[0], tvist.f_d[0], tvist.zeta[0]) for sample in q])
 
 
-def test_a_jump_of_the_modes_is_followed_at_a_limited_rate():
+def test_jump_of_the_modes_is_followed_at_a_limited_rate():
     q = np.linspace(0.0, 4.0, 700)[:, None]
     shaped, f_d, zeta = played(TvistFilter(shaper("zvd"), Jump(), joints=1), q).T
     assert 0.9 < np.abs(np.diff(f_d) / f_d[:-1]).max() / H / QUICKEST[0] <= 1.0 + 1e-6
@@ -301,7 +301,7 @@ def test_a_jump_of_the_modes_is_followed_at_a_limited_rate():
     assert f_d[-1] > 8.5
 
 
-def test_where_the_arm_rests_the_modes_are_exact():
+def test_modes_are_exact_at_rest():
     q = np.concatenate((np.linspace(0.0, 1.2, 200), np.full(400, 1.2)))[:, None]
     tvist = TvistFilter(shaper("zv"), Jump(), joints=1)
     shaped, *_ = played(tvist, q).T
@@ -338,20 +338,20 @@ def shape(position, name, modes):
     return shaped_by(tvist, position[:, None])[:, 0]
 
 
-def test_while_the_frequency_sweeps_the_acceleration_stays_near_its_limit(modes):
+def test_acceleration_stays_near_its_limit_while_the_frequency_changes(modes):
     assert peak_acceleration(shape(MOVE, "zv", modes)) < 2.1
     assert peak_acceleration(shape(MOVE[::-1], "zv", modes)) < 2.1
 
 
 @pytest.mark.parametrize("name", ["zv", "zvd", "ei", "ei_exact", "mzv", "si", "zvdd", "ei2", "zvddd", "ei3"])
-def test_no_shaper_of_the_catalogue_kicks_the_arm_or_leaves_the_way_between_start_and_end(name, modes):
+def test_positive_shapers_keep_the_limit_and_do_not_overshoot(name, modes):
     shaped = shape(MOVE, name, modes)
     assert peak_acceleration(shaped) < 2.2
     assert shaped.min() >= -1e-6
     assert shaped.max() <= STROKE + 1e-6
 
 
-def test_the_shaped_move_ends_where_the_reference_does_half_a_period_of_the_end_later(modes):
+def test_shaped_move_ends_half_a_period_after_the_reference(modes):
     shaped = shape(MOVE, "zv", modes)
     assert shaped[-1] == MOVE[-1]
     last = [np.flatnonzero(np.abs(np.diff(position)) > 1e-9)[-1] for position in (MOVE, shaped)]

@@ -41,7 +41,7 @@ class Programme:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_solution_is_optimal(seed):
+def test_solution_is_optimal(seed):
     """Karush, Kuhn and Tucker: feasible, and every weight is what its price allows, none where that is negative."""
     random = np.random.default_rng(seed)
     mean = random.uniform(0.026, 0.034)
@@ -64,7 +64,7 @@ def test_the_solution_is_optimal(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_it_does_not_matter_where_it_begins(seed):
+def test_solution_does_not_depend_on_the_initial_guess(seed):
     """From the solution for any other arm, and from nothing: the dual has one maximum."""
     random = np.random.default_rng(seed)
     arm, length = modes(random), random.uniform(0.055, 0.15)
@@ -78,7 +78,7 @@ def test_it_does_not_matter_where_it_begins(seed):
     np.testing.assert_allclose(warm_left, cold_left, atol=1e-9)
 
 
-def test_a_multiplier_that_is_no_number_is_got_over():
+def test_solver_recovers_from_a_non_finite_initial_guess():
     programme = Programme(np.array([7.0, 9.0, 20.0, 40.0]), np.full(4, 0.05), 0.1, 0.028)
     right, _, _ = programme.solve()
     for wrong in (np.nan, np.inf, 1e300):
@@ -88,7 +88,7 @@ def test_a_multiplier_that_is_no_number_is_got_over():
         np.testing.assert_allclose(taps, right, atol=1e-9)
 
 
-def test_what_cannot_be_is_not_called_solved():
+def test_infeasible_programme_is_reported_as_not_solved():
     """A mean delay behind the last weight."""
     programme = Programme(np.array([7.0, 9.0, 20.0, 40.0]), np.full(4, 0.05), 0.05, 0.06)
     _, _, solved = programme.solve()
@@ -102,7 +102,7 @@ def test_what_cannot_be_is_not_called_solved():
     ({"residual": (0.0, 0.05, 0.05, 0.05)}, "residual"), ({"shortest": 0.2}, "shortest"),
     ({"shortest": 0.01}, "shortest"),
 ])  # fmt: skip
-def test_numbers_that_do_not_fit_are_refused_before_compiled_code_sees_them(numbers, field):
+def test_invalid_design_is_refused_by_field(numbers, field):
     with pytest.raises(FilterError) as error:
         FirDesign(**numbers)
     assert error.value.field == field

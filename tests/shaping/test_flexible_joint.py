@@ -18,7 +18,7 @@ SHARE = st.floats(0.0, 0.99)
 
 @examples(100)
 @given(INERTIA, STIFFNESS, SHARE)
-def test_it_is_the_eigenvalue_of_the_equation_of_motion(inertia, stiffness, share):
+def test_mode_is_the_eigenvalue_of_the_equation_of_motion(inertia, stiffness, share):
     damping = share * 2.0 * math.sqrt(stiffness * inertia)
     f_d, zeta = flexible_joint(inertia, stiffness, damping)
     poles = np.linalg.eigvals([[0.0, 1.0], [-stiffness / inertia, -damping / inertia]])
@@ -29,7 +29,7 @@ def test_it_is_the_eigenvalue_of_the_equation_of_motion(inertia, stiffness, shar
 
 @examples(100)
 @given(INERTIA, st.floats(1.0, 30.0), STIFFNESS, SHARE)
-def test_no_inertia_of_the_range_has_a_mode_beyond_the_bounds(low, factor, stiffness, share):
+def test_modes_of_the_inertia_range_stay_within_the_bounds(low, factor, stiffness, share):
     damping = share * 2.0 * math.sqrt(stiffness * low)
     joint = FlexibleJoint(lambda q: q[0], (low, factor * low), stiffness, damping)
     for inertia in np.linspace(low, factor * low, 40):
@@ -38,7 +38,7 @@ def test_no_inertia_of_the_range_has_a_mode_beyond_the_bounds(low, factor, stiff
         assert zeta[0] <= joint.zeta_max * (1.0 + 1e-12)
 
 
-def test_an_inertia_beyond_the_range_is_held_there_and_said():
+def test_inertia_beyond_the_range_is_clamped_and_reported():
     joint = FlexibleJoint(lambda q: q[0], (0.1, 0.5), 420.0, 1.05)
     within, beyond = joint.estimate(np.array([0.5])), joint.estimate(np.array([2.0]))
     assert joint.clipped
@@ -47,7 +47,7 @@ def test_an_inertia_beyond_the_range_is_held_there_and_said():
     assert not joint.clipped
 
 
-def test_a_filter_takes_its_delay_from_the_inertia_at_the_shaped_reference():
+def test_filter_delay_follows_the_inertia_at_the_shaped_reference():
     joint = FlexibleJoint(lambda q: 0.27 + 0.18 * math.cos(q[1]), (0.09, 0.45), 420.0, 1.05)
     tvist = TvistFilter(shaper("zv"), joint, joints=2)
     for elbow in (0.0, 1.0, 2.5):
@@ -61,12 +61,12 @@ def test_a_filter_takes_its_delay_from_the_inertia_at_the_shaped_reference():
     ((0.0, 1.0, 0.0), "inertia"), ((math.nan, 1.0, 0.0), "inertia"), ((1.0, -1.0, 0.0), "stiffness"),
     ((1.0, math.inf, 0.0), "stiffness"), ((1.0, 1.0, -0.1), "damping"), ((1.0, 1.0, 2.0), "damping"),
 ])  # fmt: skip
-def test_what_does_not_vibrate_is_refused_with_the_field(arguments, field):
+def test_joint_that_does_not_vibrate_is_refused_by_field(arguments, field):
     with pytest.raises(EstimatorError) as caught:
         flexible_joint(*arguments)
     assert caught.value.field == field
 
 
-def test_a_range_the_wrong_way_round_is_refused():
+def test_reversed_inertia_range_is_refused():
     with pytest.raises(EstimatorError, match="inertia_range"):
         FlexibleJoint(lambda _: 0.2, (0.5, 0.1), 420.0, 1.05)

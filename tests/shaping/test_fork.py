@@ -115,18 +115,18 @@ def check(make, runs, seen):
         for column, make in enumerate(ESTIMATORS)
     ],
 )
-def test_a_fork_of_a_filter_repeats_it_to_the_bit_and_leaves_it_alone(kind, estimator, ticks):
+def test_fork_of_a_filter_repeats_it_bit_for_bit_and_is_independent(kind, estimator, ticks):
     check(lambda: FILTERS[kind](ESTIMATORS[estimator]), (ticks, 150), said)
 
 
-def test_a_fork_of_a_filter_of_several_modes_does_the_same():
+def test_fork_of_a_filter_of_several_modes_repeats_it():
     for make in (fixed, modal, mistaken):
         check(lambda make=make: TvistFilter(shaper("zv"), make(2), joints=JOINTS), (200, 100), said)
         check(lambda make=make: SteadyFilter(product(3), make(3), joints=JOINTS), (200, 100), said)
         check(lambda make=make: SteadyFilter(short(2), make(2), joints=JOINTS), (200, 100), said)
 
 
-def test_a_fork_of_an_aimed_filter_goes_on_to_the_end_that_was_told():
+def test_fork_of_an_aimed_filter_keeps_its_target():
     def make():
         tvist = AimedFilter(short(1), modal(1), joints=JOINTS)
         tvist.aim([1.0, 0.5])
@@ -136,7 +136,7 @@ def test_a_fork_of_an_aimed_filter_goes_on_to_the_end_that_was_told():
 
 
 @pytest.mark.parametrize(("estimator", "ticks"), [*zip(ESTIMATORS, (0, 1, 100, 400), strict=True)])
-def test_a_fork_of_a_fade_repeats_it_to_the_bit(estimator, ticks):
+def test_fork_of_a_fade_repeats_it_bit_for_bit(estimator, ticks):
     """In its first tick, under way, and finished; also where both filters ask one estimator."""
 
     def make(shared):
@@ -183,7 +183,7 @@ def on(kind, make, posture, start=0.0):
 
 
 @pytest.mark.parametrize(("kind", "make"), EVERY)
-def test_on_a_straight_line_it_is_to_shape_the_joints(kind, make):
+def test_shaping_a_line_parameter_equals_shaping_the_joints(kind, make):
     along, joints = on(kind, make, straight), FILTERS[kind](ESTIMATORS[make])
     joints.reset(straight(np.zeros(1)))
     for x in parameter():
@@ -192,7 +192,7 @@ def test_on_a_straight_line_it_is_to_shape_the_joints(kind, make):
 
 
 @pytest.mark.parametrize("make", ["polynomial", "modal"])
-def test_the_modes_are_those_at_the_joints_of_the_shaped_parameter_a_tick_before(make):
+def test_modes_are_those_at_the_posture_of_the_previous_parameter(make):
     tvist, estimator, before = on("one mode", make, round_about), ESTIMATORS[make](1), np.zeros(1)
     estimator.settle(round_about(before))
     for x in parameter()[:300]:
@@ -201,7 +201,7 @@ def test_the_modes_are_those_at_the_joints_of_the_shaped_parameter_a_tick_before
         before = shaped
 
 
-def test_an_aimed_filter_has_the_modes_where_the_parameter_ends():
+def test_aimed_filter_has_the_modes_at_the_end_of_the_path():
     tvist, other = on("aimed", "polynomial", round_about), FILTERS["aimed"](ESTIMATORS["polynomial"])
     tvist.aim([2.0])
     other.aim(round_about([2.0]))
@@ -209,7 +209,7 @@ def test_an_aimed_filter_has_the_modes_where_the_parameter_ends():
 
 
 @pytest.mark.parametrize("kind", FILTERS)
-def test_a_fade_goes_on_with_the_parameter_of_the_filter_before(kind):
+def test_fade_continues_along_the_path(kind):
     old, new, x = on("one mode", "fixed", round_about), FILTERS[kind](ESTIMATORS["polynomial"]), parameter()
     output(old, x[:150])
     fade = Fade(old, new, **LIMITS)
@@ -221,7 +221,7 @@ def test_a_fade_goes_on_with_the_parameter_of_the_filter_before(kind):
 
 
 @pytest.mark.parametrize(("kind", "make"), EVERY)
-def test_put_back_to_the_joints_it_is_as_it_was(kind, make):
+def test_reset_to_joint_angles_leaves_nothing_of_the_path(kind, make):
     tvist, fresh = on(kind, make, round_about), FILTERS[kind](ESTIMATORS[make])
     output(tvist, parameter()[:100])
     q = np.ones(JOINTS)

@@ -35,14 +35,14 @@ shares = st.floats(0.0, 1.0, exclude_max=True)
 shapers = st.sampled_from(list(SHAPERS.values()))
 
 
-def test_amplitudes_and_times_equal_the_golden_values(golden):
+def test_amplitudes_and_times_match_the_golden_values(golden):
     for entry in golden["shapers"]:
         impulses = SHAPERS[entry["name"]].function(entry["f_d"], entry["zeta"])
         np.testing.assert_allclose(impulses.A, entry["A"], rtol=0, atol=1e-6, err_msg=str(entry))
         np.testing.assert_allclose(impulses.tau, entry["tau"], rtol=0, atol=1e-6, err_msg=str(entry))
 
 
-def test_zv_equals_equations_4_to_7_of_the_paper():
+def test_zv_matches_equations_4_to_7_of_the_paper():
     K = math.exp(-0.34 * math.pi / math.sqrt(1.0 - 0.34**2))
     impulses = zv(6.7, 0.34)
     assert pytest.approx(0.321163, abs=1e-6) == K
@@ -51,7 +51,7 @@ def test_zv_equals_equations_4_to_7_of_the_paper():
 
 
 @given(shapers, frequencies, shares)
-def test_every_train_passes_the_constructors_own_checks_and_sums_to_one(shaper, f_d, share):
+def test_every_shaper_gives_valid_impulses_with_sum_one(shaper, f_d, share):
     impulses = shaper.function(f_d, share * shaper.zeta_max)
     checked = Impulses(impulses.A, impulses.tau)
     assert abs(checked.A.sum() - 1.0) < 1e-14
@@ -59,21 +59,21 @@ def test_every_train_passes_the_constructors_own_checks_and_sums_to_one(shaper, 
 
 
 @given(shapers, st.floats(1.0, 100.0), shares)
-def test_no_train_lasts_longer_than_the_catalogue_says(shaper, f_d, share):
+def test_no_shaper_lasts_longer_than_its_catalogue_duration(shaper, f_d, share):
     assert shaper.function(f_d, share * shaper.zeta_max).duration <= shaper.duration_periods / f_d * (
         1 + 1e-8
     )
 
 
 @pytest.mark.parametrize("name", SHAPERS)
-def test_the_duration_that_the_catalogue_says_is_reached(name):
+def test_catalogue_duration_is_reached(name):
     entry = SHAPERS[name]
     longest = max(entry.function(1.0, share * entry.zeta_max).duration for share in (0.0, 1.0 - 1e-9))
     assert longest == pytest.approx(entry.duration_periods, rel=1e-8)
 
 
 @pytest.mark.parametrize("name", SHAPERS)
-def test_a_bad_mode_is_named_with_its_value_and_limit(name):
+def test_mode_out_of_range_is_refused_with_value_and_limit(name):
     entry = SHAPERS[name]
     for f_d in (0.0, -1.0, math.nan, math.inf, 1e-7, 1e7):
         with pytest.raises(ShaperRangeError) as error:
@@ -88,7 +88,7 @@ def test_a_bad_mode_is_named_with_its_value_and_limit(name):
 
 
 @pytest.mark.parametrize("name", [name for name, entry in SHAPERS.items() if entry.zeta_max < 1.0])
-def test_a_damping_beyond_a_shapers_validity_is_refused_with_what_to_take(name):
+def test_damping_above_zeta_max_is_refused_with_an_alternative(name):
     entry = SHAPERS[name]
     entry.function(10.0, entry.zeta_max * (1 - 1e-12))
     with pytest.raises(ShaperRangeError, match=r"beyond it take (ei|zv)"):
@@ -99,14 +99,14 @@ def test_a_damping_beyond_a_shapers_validity_is_refused_with_what_to_take(name):
     ([0.5, 0.5], [0.0], "shape"), ([], [], "shape"), ([[1.0]], [[0.0]], "shape"),
     ([0.5, math.nan], [0.0, 1.0], "A is .* finite"), ([0.5, 0.5], [0.0, math.inf], "tau is .* finite"),
     ([0.5, 0.5], [0.1, 1.0], "ascend from 0"), ([0.4, 0.3, 0.3], [0.0, 1.0, 0.5], "ascend from 0"),
-    ([0.5, 0.5 + 2e-9], [0.0, 1.0], "sum to 1"),
+    ([0.5, 0.5 + 2e-9], [0.0, 1.0], "must be 1 within"),
 ])  # fmt: skip
-def test_what_is_no_train_of_impulses_is_refused(A, tau, why):
+def test_invalid_impulses_are_refused(A, tau, why):
     with pytest.raises(ImpulseError, match=why):
         Impulses(A, tau)
 
 
-def test_impulses_are_read_only_and_their_own():
+def test_impulses_are_read_only_copies():
     A = np.array([0.5, 0.5])
     made = Impulses(A, [0.0, 1.0])
     A[0] = 7.0
@@ -119,7 +119,7 @@ def test_impulses_are_read_only_and_their_own():
             train.A = A
 
 
-def test_a_product_is_the_convolution():
+def test_product_is_the_convolution_of_the_trains():
     three = product([zv(7.0, 0.3), zvd(7.0, 0.3), zv(19.0, 0.1)])
     Impulses(three.A, three.tau)
     assert three.A.size == 12
@@ -132,12 +132,12 @@ def test_a_product_is_the_convolution():
     np.testing.assert_allclose(spectrum(three), factors, atol=1e-14)
 
 
-def test_the_catalogue_stands_shortest_first():
+def test_catalogue_is_sorted_by_duration():
     durations = [entry.duration_periods for entry in SHAPERS.values()]
     assert durations == sorted(durations)
 
 
-def test_an_unknown_name_lists_those_there_are_and_the_nearest():
+def test_unknown_shaper_lists_all_names_and_the_nearest():
     with pytest.raises(
         UnknownShaperError, match=r"did you mean 'zvddd'.*there are none, um_zv, zv, mzv"
     ) as error:
@@ -147,7 +147,7 @@ def test_an_unknown_name_lists_those_there_are_and_the_nearest():
     assert error.value.nearest == "zvddd"
 
 
-def test_what_is_left_at_the_design_equals_the_golden_values(golden):
+def test_residual_at_the_design_frequency_matches_the_golden_values(golden):
     for entry in golden["shapers"]:
         left = residual(
             entry["f_d"], entry["zeta"], SHAPERS[entry["name"]].function(entry["f_d"], entry["zeta"])
@@ -155,7 +155,7 @@ def test_what_is_left_at_the_design_equals_the_golden_values(golden):
         assert left == pytest.approx(entry["V_at_design"], abs=5e-5), entry
 
 
-def test_figure_4_comes_out_to_a_two_hundredth_of_a_percent(golden):
+def test_sensitivity_matches_figure_4_of_the_paper(golden):
     for name, row in golden["sensitivity_undamped_10_5_hz"].items():
         f = np.array([float(f) for f in row])
         percent = 100.0 * residual(f, 0.0, SHAPERS[name].function(10.5, 0.0))
@@ -163,7 +163,7 @@ def test_figure_4_comes_out_to_a_two_hundredth_of_a_percent(golden):
 
 
 @given(st.floats(0.0, 40.0))
-def test_the_undamped_curves_equal_their_closed_forms(f):
+def test_undamped_residual_matches_the_closed_forms(f):
     r = np.pi * f / 10.0
     assert residual(f, 0.0, zv(10.0, 0.0)) == pytest.approx(abs(math.cos(r / 2.0)), abs=1e-13)
     assert residual(f, 0.0, zvd(10.0, 0.0)) == pytest.approx(math.cos(r / 2.0) ** 2, abs=1e-13)
@@ -172,14 +172,14 @@ def test_the_undamped_curves_equal_their_closed_forms(f):
 
 @pytest.mark.parametrize("name", ["zv", "mzv", "zvd", "ei", "zvdd", "ei2", "zvddd", "ei3"])
 @pytest.mark.parametrize("percent", [5, 10])
-def test_the_bands_are_those_of_the_golden_table(name, percent, golden):
+def test_bands_match_the_golden_table(name, percent, golden):
     low, high = golden["bands_undamped"][name][str(percent)]
     impulses = SHAPERS[name].function(8.0, 0.0)
     assert band(impulses, 8.0, 0.0, percent / 100) == pytest.approx((8.0 * low, 8.0 * high), abs=1e-3)
     assert SHAPERS[name].band(percent / 100) == pytest.approx((low, high), abs=1e-4)
 
 
-def test_bad_input_is_named():
+def test_invalid_arguments_of_residual_and_band_are_refused_by_name():
     train = zv(1.0, 0.0)
     for f in (-1.0, math.nan, math.inf):
         with pytest.raises(ShaperRangeError, match="f is"):
@@ -218,7 +218,7 @@ def valid(names):
 
 
 @pytest.mark.parametrize(("name", "f_d", "zeta"), valid(ZERO_AT_THE_DESIGN))
-def test_a_shaped_step_leaves_the_designed_mode_at_rest(name, f_d, zeta):
+def test_shaped_step_leaves_the_designed_mode_at_rest(name, f_d, zeta):
     impulses = SHAPERS[name].function(f_d, zeta)
     limit = 1e-7 if name == "ei2_exact" else 1e-9
     assert residual(f_d, zeta, impulses) < limit
@@ -227,7 +227,7 @@ def test_a_shaped_step_leaves_the_designed_mode_at_rest(name, f_d, zeta):
 
 @pytest.mark.parametrize("name", SHAPERS)
 @pytest.mark.parametrize(("f", "zeta"), [(5.0, 0.0), (7.1, 0.2), (14.0, 0.14), (9.0, 0.6)])
-def test_the_sensitivity_formula_is_what_an_oscillator_of_another_mode_keeps(name, f, zeta):
+def test_residual_is_the_amplitude_of_a_simulated_oscillator(name, f, zeta):
     impulses = SHAPERS[name].function(9.0, 0.1)
     one_step = amplitude_after_steps(SHAPERS["none"].function(f, zeta), f, zeta)
     left = residual(f, zeta, impulses) * one_step
@@ -236,7 +236,7 @@ def test_the_sensitivity_formula_is_what_an_oscillator_of_another_mode_keeps(nam
 
 @pytest.mark.parametrize("name", [name for name in ZERO_AT_THE_DESIGN if SHAPERS[name].peak == 1.0])
 @pytest.mark.parametrize(("f_d", "zeta"), [(6.7, 0.02), (15.0, 0.14), (7.93, 0.05)])
-def test_the_sampled_filter_brings_the_oscillator_to_rest_after_a_motion(name, f_d, zeta):
+def test_sampled_filter_brings_an_oscillator_to_rest(name, f_d, zeta):
     t = np.clip(H * np.arange(500) / 0.1, 0.0, 1.0)  # a motion of 0.1 s: about a period, it rings
     reference = t**4 * (35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3)
     tvist = TvistFilter(shaper(name), Fixed([f_d], [zeta]), joints=1, period=H)
@@ -250,7 +250,7 @@ def test_the_sampled_filter_brings_the_oscillator_to_rest_after_a_motion(name, f
 dampings = st.floats(0.0, 0.4999)
 
 
-def test_the_damped_times_are_the_golden_ones(golden):
+def test_unity_magnitude_times_match_the_golden_values(golden):
     for entry in golden["um_zv"]:
         zeta = entry["zeta"]
         in_undamped_periods = um_zv(1.0, zeta).tau / math.sqrt(1.0 - zeta**2)
@@ -259,7 +259,7 @@ def test_the_damped_times_are_the_golden_ones(golden):
 
 
 @given(dampings, st.floats(0.5, 50.0))
-def test_nothing_is_left_and_with_a_derivative_nothing_near_either(zeta, f_d):
+def test_unity_magnitude_shapers_leave_no_vibration_at_the_design(zeta, f_d):
     one, two = um_zv(f_d, zeta), um_zvd(f_d, zeta)
     assert residual(f_d, zeta, one) < 1e-9
     assert residual(f_d, zeta, two) < 1e-9
@@ -270,7 +270,7 @@ def test_nothing_is_left_and_with_a_derivative_nothing_near_either(zeta, f_d):
 
 
 @pytest.mark.parametrize("name", ["um_zv", "um_zvd", "zv", "ei3"])
-def test_the_peak_in_the_catalogue_bounds_what_a_filter_makes_of_an_acceleration_and_is_reached(name):
+def test_catalogue_peak_bounds_the_shaped_acceleration_and_is_reached(name):
     tvist = TvistFilter(shaper(name), Fixed([2.0], [0.0]), joints=1)
     # The acceleration turns round with the impulses: the worst there is.
     impulses = tvist.impulses
@@ -292,7 +292,7 @@ MODE = Fixed([10.0], [0.1])
 
 @pytest.mark.parametrize("kind", ["elastic", "elastic-position"])
 @pytest.mark.parametrize("length", SMOOTHINGS)
-def test_the_length_is_that_of_the_name(kind, length):
+def test_smoothing_length_is_taken_from_the_name(kind, length):
     smooth = make_filter(f"{kind}-{length}", MODE, joints=1)
     assert (smooth.name, smooth.feed_forward) == (f"{kind}-{length}", kind)
     assert smooth.delay == pytest.approx(length / 1000.0)
@@ -302,14 +302,14 @@ def test_the_length_is_that_of_the_name(kind, length):
     assert weights == pytest.approx(weights[::-1])
 
 
-def test_without_a_length_it_is_40_ms():
+def test_smoothing_without_a_length_takes_40_ms():
     reference = np.cumsum(np.random.default_rng(1).normal(size=(200, 1)), axis=0)
     short, long = (make_filter(name, MODE, joints=1) for name in ("elastic", "elastic-40"))
     assert np.array_equal(short.filter_all(reference), long.filter_all(reference))
 
 
 @pytest.mark.parametrize("name", ["elastic-7", "elastic-6", "elastic-62", "elastic-position-9", "elastic-0"])
-def test_a_length_that_no_filter_has_is_refused_with_the_lengths_that_there_are(name):
+def test_unsupported_smoothing_length_is_refused_with_the_range(name):
     with pytest.raises(DesignError, match=r"even, from 8 to 60 ms, as in elastic(-position)?-16"):
         BUILT_IN.check(name)
 
@@ -318,6 +318,6 @@ def test_a_length_that_no_filter_has_is_refused_with_the_lengths_that_there_are(
     "elastic-", "elastic-x", "elastic-16-16", "auto-16", "zv-16", "elastic-016", "elastic-\uff11\uff16",
     f"elastic-{'9' * 5000}",
 ])  # fmt: skip
-def test_any_other_name_is_unknown(name):
+def test_malformed_smoothing_name_is_unknown(name):
     with pytest.raises(UnknownShaperError):
         BUILT_IN.check(name)

@@ -45,7 +45,7 @@ def by_pseudo_inverse(n, t):
     ("n", "t"),
     [(3, 0.75), (3, 2 / 3), (3, 0.8), (3, 0.99), (4, 0.75), (4, 1.0), (5, 1.0), (5, 1.5), (8, 2.0)],
 )
-def test_a_modified_shaper_has_its_zeros_where_it_should(n, t):
+def test_mzv_has_its_zeros_at_the_specified_frequencies(n, t):
     impulses = mzv_of(n, t).function(1.0, 0.0)
     np.testing.assert_allclose(impulses.A, by_pseudo_inverse(n, t), atol=1e-9)
     assert impulses.duration == pytest.approx(t)
@@ -55,7 +55,7 @@ def test_a_modified_shaper_has_its_zeros_where_it_should(n, t):
 
 
 @given(st.floats(0.002, 0.4), st.floats(0.0, 0.9))
-def test_a_height_of_ones_own_is_left_at_the_frequency_without_damping_and_less_with_it(V, zeta):
+def test_ei_leaves_v_without_damping_and_less_with_it(V, zeta):
     made = ei_of(1, V)
     assert residual(9.0, 0.0, made.function(9.0, 0.0)) == pytest.approx(V, abs=1e-12)
     assert residual(9.0, zeta, made.function(9.0, zeta)) <= V + 1e-12
@@ -63,7 +63,7 @@ def test_a_height_of_ones_own_is_left_at_the_frequency_without_damping_and_less_
     assert residual(np.linspace(low, high, 500), 0.0, made.function(1.0, 0.0)).max() <= V + 1e-8
 
 
-def test_a_users_own_impulses_are_a_shaper_like_any_other():
+def test_custom_impulses_work_like_any_shaper():
     train = zv(8.0, 0.0)
     mine = custom("mine", train.A, train.tau, 8.0)
     assert (mine.name, mine.duration_periods, mine.peak) == ("mine", 0.5, 1.0)
@@ -76,7 +76,7 @@ def test_a_users_own_impulses_are_a_shaper_like_any_other():
     np.testing.assert_array_equal(tvist.filter([0.0]), [0.0])
 
 
-def test_a_custom_shaper_keeps_to_the_validity_it_was_given():
+def test_custom_shaper_keeps_its_range_of_damping():
     mine = custom("mine", [0.5, 0.5], [0.0, 0.5], zeta_max=0.1)
     with pytest.raises(ShaperRangeError, match=r"less than 0\.1"):
         mine.function(10.0, 0.1)
@@ -108,7 +108,7 @@ def least_that_a_train_must_leave(low, high, duration):
 
 @examples(25)
 @given(st.floats(0.01, 1.2), st.sampled_from([0.02, 0.05, 0.1]))
-def test_it_leaves_what_it_may_in_its_band_and_no_shorter_train_does(width, V):
+def test_si_leaves_v_in_its_band_and_is_the_shortest_train(width, V):
     low, high = 1.0 - width / 2.0, 1.0 + width / 2.0
     a, tau = specified(low, high, V)
     left = np.abs(np.exp(2j * np.pi * np.outer(np.linspace(low, high, 4001), tau)) @ a)
@@ -123,7 +123,7 @@ def test_it_leaves_what_it_may_in_its_band_and_no_shorter_train_does(width, V):
 
 
 @pytest.mark.parametrize("name", ["zv", "ei", "ei2", "ei3"])
-def test_asked_for_the_band_of_a_known_shaper_it_is_that_shaper(name):
+def test_si_for_the_band_of_a_known_shaper_is_that_shaper(name):
     low, high = SHAPERS[name].band()
     a, tau = specified(low + 1e-7, high - 1e-7, 0.05)
     known = SHAPERS[name].function(1.0, 0.0)
@@ -133,14 +133,14 @@ def test_asked_for_the_band_of_a_known_shaper_it_is_that_shaper(name):
 
 @examples(25)
 @given(st.floats(0.55, 0.97), st.floats(1.03, 1.4), st.sampled_from([0.05, 0.1]), st.floats(0.0, 0.999))
-def test_with_damping_it_keeps_its_word_as_far_as_it_says(low, high, V, share):
+def test_si_leaves_at_most_v_up_to_its_zeta_max(low, high, V, share):
     made = si_of(low, high, V)
     zeta = share * made.zeta_max
     left = residual(np.linspace(low, high, 500), zeta, made.function(1.0, zeta))
     assert left.max() <= V * (1.0 + 1e-3)
 
 
-def test_where_it_would_leave_more_it_says_so():
+def test_si_refuses_damping_at_which_it_would_leave_more():
     wide = si_of(0.5, 1.5)
     assert 0.0 < wide.zeta_max < 0.3
     with pytest.raises(ShaperRangeError, match=r"zeta is 0\.34.*take a higher V or ei_of"):
@@ -159,8 +159,8 @@ HUMPS = [((0, 0.05), "humps"), ((11, 0.05), "humps"), ((1, 0.0), "V"), ((1, 0.9)
     (si_of, (0.75, math.inf), "high"), (si_of, (0.75, 1.25, 0.0), "V"), (si_of, (0.75, 1.25, 0.6), "V"),
     (si_of, (0.1, 3.0), "band"),
 ])  # fmt: skip
-def test_numbers_out_of_range_are_refused_by_name(make, numbers, field):
-    with pytest.raises(DesignError, match=rf"{field} is .*, but must be") as error:
+def test_design_parameters_out_of_range_are_refused_by_name(make, numbers, field):
+    with pytest.raises(DesignError, match=rf"{field} is .*: must be") as error:
         make(*numbers)
     assert error.value.field == field
 
@@ -189,7 +189,7 @@ def fitted(table, zeta):
     return A, np.concatenate([[0.0], t])
 
 
-def test_the_damped_ei_is_the_golden_one(golden):
+def test_ei_exact_matches_the_golden_values(golden):
     for entry in golden["ei_exact"]:
         impulses = ei_exact(1.0, entry["zeta"])
         np.testing.assert_allclose(impulses.A, entry["A"], rtol=0, atol=1e-6, err_msg=str(entry))
@@ -199,7 +199,7 @@ def test_the_damped_ei_is_the_golden_one(golden):
 
 
 @pytest.mark.parametrize(("name", "table", "highest"), [("ei2_exact", TWO, 0.3), ("ei3_exact", THREE, 0.19)])
-def test_two_and_three_humps_are_the_published_fits_in_undamped_periods(name, table, highest):
+def test_exact_humps_match_the_published_fits(name, table, highest):
     for zeta in np.linspace(0.0, highest, 8):
         A, t = fitted(table, zeta)
         impulses = SHAPERS[name].function(1.0, zeta)
@@ -211,7 +211,7 @@ def test_two_and_three_humps_are_the_published_fits_in_undamped_periods(name, ta
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_without_damping_they_are_the_shapers_with_closed_forms(name):
+def test_exact_humps_without_damping_match_the_closed_forms(name):
     exact, closed = (SHAPERS[n].function(7.0, 0.0) for n in (name, name.removesuffix("_exact")))
     np.testing.assert_allclose(exact.A, closed.A, atol=1e-7)
     np.testing.assert_allclose(exact.tau, closed.tau, atol=1e-7)
@@ -219,7 +219,7 @@ def test_without_damping_they_are_the_shapers_with_closed_forms(name):
 
 @examples(40)
 @given(st.sampled_from(NAMES), st.floats(0.0, 0.98), st.floats(0.5, 50.0))
-def test_every_hump_is_five_percent_high_and_between_them_it_is_zero(name, share, f_d):
+def test_exact_humps_have_height_v_and_zeros_between(name, share, f_d):
     zeta = share * SHAPERS[name].zeta_max
     impulses = SHAPERS[name].function(f_d, zeta)
     low, high = band(impulses, f_d, zeta, 0.05 * (1.0 + 1e-5))
@@ -233,7 +233,7 @@ def test_every_hump_is_five_percent_high_and_between_them_it_is_zero(name, share
 
 
 @pytest.mark.parametrize("V", [0.2, 0.2245, 0.225, 0.22509])
-def test_the_hump_has_its_height_where_the_equations_end_just_beyond_the_highest_damping(V):
+def test_exact_hump_keeps_its_height_near_the_highest_damping(V):
     made = ei_of(1, V, exact=True)
     for part in np.linspace(0.0, 0.999, 41):
         assert residual(1.0, part * made.zeta_max, made.function(1.0, part * made.zeta_max)) == pytest.approx(
@@ -244,7 +244,7 @@ def test_the_hump_has_its_height_where_the_equations_end_just_beyond_the_highest
 @examples(10)
 @given(st.integers(1, 4), st.floats(0.005, 0.3))
 @example(1, 0.225)
-def test_any_number_of_humps_of_any_height_can_be_had(humps, V):
+def test_exact_humps_of_any_number_and_height(humps, V):
     made = ei_of(humps, V, exact=True)
     zeta = 0.7 * made.zeta_max
     impulses = made.function(1.0, zeta)
@@ -261,7 +261,7 @@ def test_any_number_of_humps_of_any_height_can_be_had(humps, V):
 
 
 @given(st.integers(1, 3), st.floats(0.001, 0.4))
-def test_equal_ripples_are_the_closed_forms_of_the_literature(humps, V):
+def test_ripple_matches_the_closed_forms_of_the_literature(humps, V):
     X = math.cbrt(V * V * (math.sqrt(1.0 - V * V) + 1.0))
     two = (3.0 * X * X + 2.0 * X + 3.0 * V * V) / (16.0 * X)
     three = (1.0 + 3.0 * V + 2.0 * math.sqrt(2.0 * (V + V * V))) / 16.0
@@ -282,6 +282,6 @@ def test_equal_ripples_are_the_closed_forms_of_the_literature(humps, V):
         lambda x: np.full_like(x, np.nan),
     ],
 )
-def test_where_there_is_none_it_says_so(equations):
+def test_newton_reports_equations_without_a_solution(equations):
     with pytest.raises(ConvergenceError, match="1 equations"):
         solve(equations, np.array([0.3]))

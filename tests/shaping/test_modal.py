@@ -55,7 +55,7 @@ def crossing(x):
 TWO = Drivetrain((9e3, 9e3), (0.3, 0.3), (150.0, 150.0), (15.0, 15.0))
 
 
-def test_each_pole_is_an_eigenvalue_of_the_whole_system_along_any_path():
+def test_poles_are_eigenvalues_of_the_system_along_any_path():
     estimator, mass, drivetrain = arm()
     for path in paths(8, seed=1):
         for number, q in enumerate(path):
@@ -68,14 +68,14 @@ def test_each_pole_is_an_eigenvalue_of_the_whole_system_along_any_path():
                 assert len(set(apart.argmin(axis=0))) == len(found)
 
 
-def test_the_first_estimate_is_the_lowest_modes_in_order():
+def test_first_estimate_is_the_lowest_modes_in_order():
     rng = np.random.default_rng(2)
     for q in rng.uniform(LOW, HIGH, (20, 6)):
         estimator, mass, drivetrain = arm()
         np.testing.assert_array_equal(estimator.poles(q), drivetrain.poles(mass(q))[0][:4])
 
 
-def test_no_mode_jumps_and_half_the_step_is_half_the_change():
+def test_modes_change_continuously_with_the_configuration():
     changes = []
     for steps in (400, 800):
         largest = 0.0
@@ -88,7 +88,7 @@ def test_no_mode_jumps_and_half_the_step_is_half_the_change():
     assert changes[1] < 0.6 * changes[0]
 
 
-def test_modes_that_cross_go_on_as_what_they_were():
+def test_crossing_modes_keep_their_identity():
     estimator = Modal(crossing, TWO, modes=2)
     for x in np.linspace(0.0, 2.5, 200):  # q in radians: no step is a jump
         poles = estimator.poles(np.array([x]))
@@ -98,7 +98,7 @@ def test_modes_that_cross_go_on_as_what_they_were():
     assert poles.imag[0] > poles.imag[1]
 
 
-def test_two_modes_that_are_almost_one_stay_two_at_the_stretched_arm():
+def test_nearly_equal_modes_of_the_stretched_arm_stay_distinct():
     estimator, mass, drivetrain = arm()
     rng = np.random.default_rng(4)
     for _ in range(5):
@@ -110,7 +110,7 @@ def test_two_modes_that_are_almost_one_stay_two_at_the_stretched_arm():
         np.testing.assert_allclose(np.sort(f_d[:2]), expected, rtol=1e-6)
 
 
-def test_a_step_away_from_where_two_modes_are_almost_one_finds_both():
+def test_step_away_from_nearly_equal_modes_finds_both():
     """There the shapes turn by a right angle in one step, and Newton's first step may vanish by chance."""
     rng = np.random.default_rng(4)
     for away in [np.full(6, 0.01), *rng.uniform(-0.02, 0.02, (50, 6))]:
@@ -120,7 +120,7 @@ def test_a_step_away_from_where_two_modes_are_almost_one_finds_both():
         np.testing.assert_allclose(found[np.argsort(found.imag)], exact, rtol=1e-6)
 
 
-def test_with_the_plant_s_own_parameters_they_are_the_plant_s_modes():
+def test_modes_with_the_plants_parameters_are_the_plants_modes():
     # without what the estimator leaves out: the integrator and gravity's little stiffness
     drives = msgspec.structs.replace(ROBOT.drives, integral_gain=(0.0,) * 6)
     plant = FlexibleArm(msgspec.structs.replace(ROBOT, drives=drives), ROBOT.payload)
@@ -133,7 +133,7 @@ def test_with_the_plant_s_own_parameters_they_are_the_plant_s_modes():
         np.testing.assert_allclose(zeta, true.zeta[:3], rtol=0.03)
 
 
-def test_settling_takes_the_lowest_and_an_estimate_never_does_not_even_a_second_one_in_one_place():
+def test_only_settle_switches_to_the_lowest_modes():
     estimator, there = Modal(crossing, TWO, modes=1), np.array([2.0])
     for x in np.linspace(0.0, 2.0, 200):
         following = estimator.poles(np.array([x]))[0]
@@ -153,7 +153,7 @@ def vanishing(x):
 DAMPED = Drivetrain((9e3,), (1e-3,), (40.0,), (1e-3,))
 
 
-def test_a_mode_that_vibrates_no_longer_stays_where_it_was_until_it_does_again():
+def test_overdamped_mode_is_held_until_it_vibrates_again():
     estimator = Modal(vanishing, DAMPED, modes=1)
     out, lost = np.linspace(0.3, 1.2, 200), []
     for x in [*out, *out[::-1]]:
@@ -172,7 +172,7 @@ def test_a_mode_that_vibrates_no_longer_stays_where_it_was_until_it_does_again()
     assert np.isfinite([f_d, zeta]).all()
 
 
-def test_where_a_pole_is_lost_all_stay_and_all_are_followed_on_once_it_is_found(monkeypatch):
+def test_all_poles_are_held_while_one_is_lost(monkeypatch):
     estimator, mass, drivetrain = arm()
     there = estimator.poles(Q1)
     with monkeypatch.context() as patched:
@@ -188,7 +188,7 @@ def test_where_a_pole_is_lost_all_stay_and_all_are_followed_on_once_it_is_found(
     assert not estimator.clipped
 
 
-def test_a_kernel_that_fails_leaves_poles_and_shapes_as_they_were():
+def test_failing_kernel_leaves_poles_and_shapes_unchanged():
     """The last of three poles leads nowhere: the two before it have been moved by then."""
     for follow in (kernels.follow, kernels.follow.py_func):
         estimator, mass, drivetrain = arm(modes=3)
@@ -201,7 +201,7 @@ def test_a_kernel_that_fails_leaves_poles_and_shapes_as_they_were():
         np.testing.assert_array_equal(shapes, before[1])
 
 
-def test_what_is_not_believed_is_held_and_said():
+def test_modes_beyond_the_bounds_are_clamped_and_reported():
     estimator, *_ = arm(f_d_min=8.0, zeta_max=0.2)
     f_d, zeta = estimator.estimate(Q1)
     assert estimator.clipped
@@ -212,7 +212,7 @@ def test_what_is_not_believed_is_held_and_said():
     assert not free.clipped
 
 
-def test_equal_paths_give_equal_bits_and_no_estimate_changes_afterwards():
+def test_equal_paths_give_equal_bits_and_estimates_are_copies():
     path = next(paths(1, seed=7))
     first, second = (arm()[0] for _ in range(2))
     estimates = [first.estimate(q) for q in path]
@@ -225,7 +225,7 @@ def test_equal_paths_give_equal_bits_and_no_estimate_changes_afterwards():
     ({"modes": 0}, "modes"), ({"modes": 3}, "modes"), ({"f_d_min": 0.0}, "f_d_min"),
     ({"f_d_min": np.nan}, "f_d_min"), ({"zeta_max": 1.0}, "zeta_max"), ({"zeta_max": np.nan}, "zeta_max"),
 ])  # fmt: skip
-def test_a_bad_parameter_is_refused_by_name(change, field):
+def test_invalid_modal_parameter_is_refused_by_name(change, field):
     with pytest.raises(EstimatorError, match=f"{field} is") as error:
         Modal(crossing, TWO, **({"modes": 2} | change))
     assert error.value.field == field
@@ -240,13 +240,13 @@ def test_a_bad_parameter_is_refused_by_name(change, field):
     (((1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (np.nan, 0.0)), "damping"),
     (((), (), (), ()), "stiffness"),
 ])  # fmt: skip
-def test_springs_and_motors_that_cannot_be_are_refused_by_name(rows, field):
+def test_invalid_drivetrain_is_refused_by_name(rows, field):
     with pytest.raises(EstimatorError, match=f"{field} is") as error:
         Drivetrain(*rows)
     assert error.value.field == field
 
 
-def test_a_mass_matrix_of_other_size_or_none_at_all_is_refused():
+def test_invalid_mass_matrix_is_refused():
     with pytest.raises(EstimatorError, match="of shape"):
         Modal(lambda _: np.eye(3), TWO, modes=1).estimate(np.zeros(1))
     estimator = Modal(crossing, TWO, modes=1)
@@ -255,7 +255,7 @@ def test_a_mass_matrix_of_other_size_or_none_at_all_is_refused():
     assert np.isfinite(estimator.estimate(np.zeros(1))).all()  # nothing of it is left
 
 
-def test_more_modes_than_vibrate_are_refused_where_it_shows():
+def test_more_modes_than_vibrate_are_refused():
     # A light motor with K_d = √(Km)/2.4 takes all there is of a vibration.
     overdamped = Drivetrain((9e3, 9e3), (0.3, 1e-3), (150.0, 40.0), (15.0, 1e-3))
     with pytest.raises(EstimatorError, match="at most 1"):

@@ -62,9 +62,9 @@ WRONG_TAPS = {
     "NaN": (lambda _f_d, _zeta: [np.nan, 1.0], "not finite"),
     "sum": (lambda _f_d, _zeta: [0.5, 0.4], "sum to 0.9"),
     "shape": (lambda _f_d, _zeta: [[1.0]], "shape (1, 1)"),
-    "many": (lambda _f_d, _zeta: np.full(21, 1 / 21), "must return 1 to 20"),
+    "many": (lambda _f_d, _zeta: np.full(21, 1 / 21), "must be 1 to 20 taps"),
     "none": (lambda _f_d, _zeta: [], "shape (0,)"),
-    "peak": (lambda _f_d, _zeta: [2.0, -1.0], "sum to 3, more than its peak of 1"),
+    "peak": (lambda _f_d, _zeta: [2.0, -1.0], "sum to 3: must be at most its peak of 1"),
     "words": (lambda _f_d, _zeta: "taps", "raises ValueError"),
 }
 
@@ -79,12 +79,12 @@ class Turning:
         return (self.wrong if self.failing else self.right)(f_d, zeta)
 
 
-def test_a_shaper_of_the_library_keeps_its_name_and_description():
+def test_shaper_of_a_built_in_keeps_its_name_and_description():
     assert shaper_of(zv).name == "zv"
     assert shaper_of(zv).description == SHAPERS["zv"].description
 
 
-def test_a_function_gives_the_bits_of_the_built_in_shaper_that_it_imitates():
+def test_own_function_equals_the_built_in_shaper_bit_for_bit():
     fixed = Fixed([7.0], [0.1])
     own, built_in = (make_filter(one, fixed, joints=1) for one in (shaper_of(fine, name="mine"), "zv"))
     assert isinstance(own, TvistFilter)
@@ -92,7 +92,7 @@ def test_a_function_gives_the_bits_of_the_built_in_shaper_that_it_imitates():
     np.testing.assert_array_equal(shaped(own), shaped(built_in))
 
 
-def test_a_fir_filter_is_the_convolution_with_its_taps():
+def test_fir_filter_is_the_convolution_with_its_taps():
     random = np.random.default_rng(1)
     taps = random.random(30)
     taps /= taps.sum()
@@ -107,7 +107,7 @@ def test_a_fir_filter_is_the_convolution_with_its_taps():
     assert tvist.mean_delay == pytest.approx(0.002 * taps @ np.arange(30))
 
 
-def test_duration_and_peak_are_found_by_trying_out():
+def test_duration_and_peak_of_a_function_are_determined_by_trials():
     made = shaper_of(
         lambda f_d, _zeta: Impulses(np.array([1.2, -0.2]), np.array([0.0, 0.7 / f_d])), name="mine"
     )
@@ -119,7 +119,7 @@ def test_duration_and_peak_are_found_by_trying_out():
 
 
 @pytest.mark.parametrize("name", list(SHAPERS))
-def test_every_shaper_of_the_catalogue_passes_the_trial(name):
+def test_every_catalogued_shaper_passes_the_check(name):
     check_shaper(SHAPERS[name])
 
 
@@ -127,14 +127,14 @@ def test_every_shaper_of_the_catalogue_passes_the_trial(name):
     *((*one, None) for one in WRONG.values()),
     *((*one, 20) for key, one in WRONG_TAPS.items() if key != "peak"),
 ])  # fmt: skip
-def test_a_function_that_is_wrong_is_refused_with_the_mode(function, words, taps):
+def test_failing_function_is_refused_with_the_mode(function, words, taps):
     with pytest.raises(ShaperFailureError, match=r"'mine'.* for f_d = 10 Hz and ζ = 0\.1") as error:
         check_shaper(FirShaper("mine", "", function, taps)) if taps else shaper_of(function, name="mine")
     assert words in str(error.value)
     assert error.value.name == "mine"
 
 
-def test_a_function_that_is_wrong_somewhere_only_may_be_used_elsewhere():
+def test_function_that_fails_for_some_modes_is_usable_for_others():
     mine = shaper_of(
         lambda f_d, zeta: zv(f_d, zeta) if 5.0 < f_d < 30.0 and zeta < 0.5 else None, name="mine"
     )
@@ -150,7 +150,7 @@ def test_a_function_that_is_wrong_somewhere_only_may_be_used_elsewhere():
     [lambda f_d: 0.5 / min(max(f_d, 5.0), 20.0), lambda _: 0.3],
     ids=["a table that is clipped, as a message advises", "the same time for all modes"],
 )
-def test_times_need_not_be_proportional_to_1_over_f_d(time):
+def test_impulse_times_need_not_be_proportional_to_1_over_f_d(time):
     mine = shaper_of(lambda f_d, _: Impulses(np.array([0.5, 0.5]), np.array([0.0, time(f_d)])), name="mine")
     for f_d in (0.5, 4.4, 100.0):
         tvist = make_filter(mine, Fixed([f_d], [0.1]), joints=1)
@@ -163,7 +163,7 @@ def test_times_need_not_be_proportional_to_1_over_f_d(time):
 
 
 @pytest.mark.parametrize(("field", "declared"), [("duration_periods", 0.4), ("peak", 2.0)])
-def test_a_shaper_that_declares_less_than_it_does_is_refused(field, declared):
+def test_shaper_beyond_its_declared_duration_or_peak_is_refused(field, declared):
     values = {"duration_periods": 0.5, "peak": 3.0} | {field: declared}
     mine = Shaper(
         "mine", "", lambda f_d, _zeta: Impulses(np.array([2.0, -1.0]), np.array([0.0, 0.5 / f_d])), **values
@@ -175,7 +175,7 @@ def test_a_shaper_that_declares_less_than_it_does_is_refused(field, declared):
 @pytest.mark.parametrize(
     "changes", [{"taps": 0}, {"taps": 501}, {"modes": 0}, {"peak": 0.5}, {"period": 0.0}]
 )
-def test_a_fir_shaper_that_declares_what_cannot_be_is_refused(changes):
+def test_fir_shaper_with_an_invalid_declaration_is_refused(changes):
     with pytest.raises(DesignError, match=next(iter(changes))):
         FirShaper(**({"name": "mine", "description": "", "function": zv, "taps": 20} | changes))
 
@@ -183,7 +183,7 @@ def test_a_fir_shaper_that_declares_what_cannot_be_is_refused(changes):
 @pytest.mark.parametrize("changes", [
     {"duration_periods": "0.5"}, {"duration_periods": np.nan}, {"zeta_max": 1.5}, {"zeta_max": 0}, {"peak": 0.5},
 ])  # fmt: skip
-def test_a_shaper_that_declares_what_cannot_be_is_refused(changes):
+def test_shaper_with_an_invalid_declaration_is_refused(changes):
     values = {"name": "mine", "description": "", "function": zv, "duration_periods": 0.5} | changes
     with pytest.raises(DesignError, match=next(iter(changes))):
         check_shaper(Shaper(**values))
@@ -202,7 +202,7 @@ FAILURES = [*(("impulses", name) for name in WRONG), *(("taps", name) for name i
 
 
 @pytest.mark.parametrize(("kind", "name"), FAILURES)
-def test_a_filter_in_motion_goes_on_with_its_last_weights_and_says_why(kind, name):
+def test_failing_filter_continues_with_its_last_weights_and_reports_why(kind, name):
     turning, mine = turned(kind, name)
     tvist, other = (make_filter(mine, Fixed([7.0], [0.1]), joints=1) for _ in range(2))
     right = shaped(other)
@@ -222,14 +222,14 @@ def test_a_filter_in_motion_goes_on_with_its_last_weights_and_says_why(kind, nam
 
 
 @pytest.mark.parametrize("kind", ["impulses", "taps"])
-def test_a_filter_that_fails_at_once_is_not_made(kind):
+def test_filter_that_fails_at_the_start_is_refused(kind):
     turning, mine = turned(kind, "raises")
     turning.failing = True
     with pytest.raises(ShaperFailureError, match="shaper 'mine' raises ZeroDivisionError"):
         make_filter(mine, Fixed([7.0], [0.1]), joints=1)
 
 
-def test_impulses_that_last_longer_than_was_declared_are_not_used():
+def test_impulses_beyond_the_declared_duration_are_not_used():
     turning = Turning(zv, lambda f_d, zeta: zv(0.5 * f_d, zeta))
     tvist = make_filter(Shaper("mine", "", turning, 0.5), Fixed([7.0], [0.1]), joints=1)
     turning.failing = True
@@ -238,7 +238,7 @@ def test_impulses_that_last_longer_than_was_declared_are_not_used():
     assert tvist.impulses.duration == pytest.approx(0.5 / 7.0)
 
 
-def test_what_fails_in_a_copy_that_runs_ahead_leaves_the_filter_as_it_is():
+def test_failure_in_a_fork_leaves_the_filter_unchanged():
     turning, mine = turned("impulses", "raises")
     tvist = make_filter(mine, Fixed([7.0], [0.1]), joints=1)
     ahead = tvist.fork()
@@ -249,13 +249,13 @@ def test_what_fails_in_a_copy_that_runs_ahead_leaves_the_filter_as_it_is():
 
 
 class TestRegistry:
-    def test_own_shapers_stand_behind_the_others_and_go_by_their_names(self):
+    def test_own_shapers_are_listed_last_and_made_by_name(self):
         registry = Registry([shaper_of(zv, name="mine"), mean()])
         assert registry.names() == (*BUILT_IN.names(), "mine", "mean")
         assert registry.make_filter("mean", Fixed([7.0], [0.1]), joints=2).name == "mean"
         assert "mine" not in BUILT_IN.names()
 
-    def test_how_many_modes_each_wants(self):
+    def test_modes_of_each_kind_of_filter(self):
         two = FirShaper("two", "", lambda _f_d, _zeta: [1.0], taps=1, modes=2)
         registry = Registry([shaper_of(zv, name="mine"), two])
         assert [registry.modes_of(name, 3) for name in ("zv", "mine", "two", "auto")] == [3, 3, 2, 4]
@@ -263,18 +263,18 @@ class TestRegistry:
     @pytest.mark.parametrize(
         "name", ["zv", "auto", "", "Mine", "mine.py:mine", "a b", "ζ", "x" * 65, None, 3]
     )
-    def test_a_name_that_cannot_be_one_or_is_taken_is_refused(self, name):
+    def test_invalid_or_taken_name_is_refused(self, name):
         with pytest.raises(DesignError, match="name is "):
             Registry([mean(name=name)])
 
-    def test_a_filter_for_another_period_is_refused(self):
+    def test_fir_shaper_with_another_period_is_refused(self):
         with pytest.raises(DesignError, match=r"period is 0\.004"):
             Registry([FirShaper("mine", "", lambda _f_d, _zeta: [1.0], taps=1, period=0.004)])
 
-    def test_two_of_one_name_are_refused(self):
+    def test_two_shapers_of_one_name_are_refused(self):
         with pytest.raises(DesignError, match="must be a name that no other shaper has"):
             Registry([mean(), custom("mean", [1.0], [0.0])])
 
-    def test_an_unknown_name_lists_the_own_ones_too(self):
+    def test_unknown_name_lists_own_shapers_too(self):
         with pytest.raises(UnknownShaperError, match=r"did you mean 'mean'.* elastic-position, mean"):
             Registry([mean()]).check("meen")

@@ -17,7 +17,7 @@ def row(shaper):
     return f"| `{shaper.name}` | {cells} |"
 
 
-def test_the_table_of_shapers_is_the_catalogue_as_computed():
+def test_readme_table_matches_the_catalogue():
     table = [line for line in README.read_text().splitlines() if line.startswith("| `")]
     assert table == [row(shaper) for shaper in SHAPERS.values()]
 
@@ -39,7 +39,7 @@ sys.meta_path.insert(0, Refusing())
 """
 
 
-def test_the_first_example_shapes_a_signal_in_ten_lines_with_numpy_and_this_distribution_alone(tmp_path):
+def test_first_readme_example_needs_only_numpy_and_ten_lines(tmp_path):
     example = first_example()
     assert len(example.splitlines()) <= 10
     package = README.parent / "tvist_shaping"

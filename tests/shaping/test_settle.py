@@ -67,7 +67,7 @@ def motion(random):
 
 @examples(25)
 @given(st.sampled_from(sorted(FILTERS)), st.integers(0, 2**32 - 1))
-def test_a_mode_jumps_only_where_the_output_stays_what_it_is_whatever_the_weights(name, seed):
+def test_mode_jumps_only_while_the_reference_rests(name, seed):
     """Wherever the frequency jumps, the reference has been one sample for as long as any delay may be."""
     reference = motion(np.random.default_rng(seed))
     tvist = FILTERS[name]()
@@ -80,7 +80,7 @@ def test_a_mode_jumps_only_where_the_output_stays_what_it_is_whatever_the_weight
 
 
 @pytest.mark.parametrize("name", FILTERS)
-def test_after_a_rest_the_lowest_mode_is_in_force_and_the_output_has_not_moved(name):
+def test_lowest_mode_is_used_after_a_rest_without_moving_the_output(name):
     tvist = FILTERS[name]()
     out = np.concatenate([way(0.0, 2.0, 0.8), np.full(900, 2.0)])
     shaped, f_d = run(tvist, out)
@@ -90,7 +90,7 @@ def test_after_a_rest_the_lowest_mode_is_in_force_and_the_output_has_not_moved(n
     assert (shaped[ended:] == 2.0).all()
 
 
-def test_a_pause_in_which_the_shaped_reference_rests_and_an_older_sample_does_not_exchanges_no_mode():
+def test_short_pause_does_not_switch_modes():
     """The case the others may miss: two equal outputs while a longer delay would still read the motion."""
     tvist = FILTERS["zv"]()
     rests = 50  # ticks: longer than zv lasts with this mode, shorter than it may get
@@ -105,7 +105,7 @@ def test_a_pause_in_which_the_shaped_reference_rests_and_an_older_sample_does_no
 
 
 @pytest.mark.parametrize("name", FILTERS)
-def test_a_filter_begins_with_the_lowest_mode_wherever_its_estimator_was_before(name):
+def test_filter_starts_with_the_lowest_mode(name):
     """At a reset, and where it takes over a motion: then nothing of its output is in force yet."""
     for begin in ("reset", "take over"):
         tvist = FILTERS[name]()

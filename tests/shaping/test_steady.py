@@ -57,7 +57,7 @@ def a_filter(kind, estimator=None, joints=1, **numbers):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(2))
-def test_a_constant_velocity_stays_what_it_is_whatever_the_modes_do(kind, seed):
+def test_constant_velocity_is_kept_while_the_modes_change(kind, seed):
     """The mean delay is the same at every tick: a ramp comes out as itself, that much later."""
     tvist = a_filter(kind, Jumping(3 if kind == "product" else 4, seed))
     ramp = VELOCITY * H * np.arange(2000.0)[:, None]
@@ -70,7 +70,7 @@ def test_a_constant_velocity_stays_what_it_is_whatever_the_modes_do(kind, seed):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("stroke", [0.3, 3.0])
-def test_a_move_at_the_limits_stays_within_them(kind, stroke):
+def test_move_at_the_limits_stays_within_them(kind, stroke):
     reference = double_s([stroke])
     limits = [np.abs(np.diff(reference, order, axis=0)).max() / H**order for order in (1, 2)]
     shaped = shaped_by(a_filter(kind), reference)
@@ -86,7 +86,7 @@ def impulses_of(tvist):
 
 
 @pytest.mark.parametrize(("kind", "share"), [("product", 0.05), ("short", 1.0)])
-def test_no_more_is_left_of_a_mode_than_was_asked_two_ways(kind, share):
+def test_residual_of_each_mode_is_at_most_the_permitted_one(kind, share):
     """By the formula on the taps, and by an oscillator driven with a shaped step, against one with the step itself."""
     tvist = a_filter(kind, Fixed(F_D[:3], ZETA[:3]) if kind == "product" else Fixed(F_D, ZETA))
     impulses = impulses_of(tvist)
@@ -102,7 +102,7 @@ def test_no_more_is_left_of_a_mode_than_was_asked_two_ways(kind, share):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_mode_comes_to_rest_after_a_move(kind):
+def test_little_vibration_is_left_after_a_short_move(kind):
     """Of a short jog, which excites the lowest mode most, less than a tenth is left; the modes move on the way."""
     estimator = Arm(3 if kind == "product" else 4, depth=0.2)
     reference = double_s([0.1])
@@ -118,7 +118,7 @@ def test_a_mode_comes_to_rest_after_a_move(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("steady_first", [True, False])
-def test_a_fade_between_it_and_the_papers_filter_has_no_step(kind, steady_first):
+def test_fade_to_or_from_the_papers_filter_has_no_step(kind, steady_first):
     reference = double_s([2.0])
     slow = 0.7 * reference  # room for the fade
     make = [lambda: a_filter(kind), lambda: TvistFilter(SHAPERS["zv"], Arm(1), joints=1)]
@@ -134,7 +134,7 @@ def test_a_fade_between_it_and_the_papers_filter_has_no_step(kind, steady_first)
     assert np.abs(np.diff(output, 2, axis=0)).max() / H**2 <= ACCELERATION * 1.005
 
 
-def test_a_product_that_does_not_fit_is_said_to_be_clipped_and_no_longer_when_it_does():
+def test_product_that_does_not_fit_is_reported_as_clipped():
     """Too long on average, where the mean delay is the product's own; and longer than what is held."""
     slow = Fixed([3.0], [0.05])
     short_of_mean = SteadyFilter(ProductDesign(0.04, modes=1), slow, joints=1)
@@ -159,7 +159,7 @@ class Falling(Arm):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_lowest_frequency_that_does_not_fit_is_refused_nobody_and_said_where_it_comes(kind):
+def test_low_frequency_beyond_the_buffer_is_reported_only_where_it_occurs(kind):
     """Half periods of three modes at 2 Hz are 0.75 s; the line holds 0.26 s, and 0.15 s."""
     tvist = a_filter(kind, Falling(3 if kind == "product" else 4))
     assert not tvist.clipped
@@ -176,7 +176,7 @@ def test_a_lowest_frequency_that_does_not_fit_is_refused_nobody_and_said_where_i
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_mode_that_is_held_is_said_though_the_design_has_room_for_it(kind):
+def test_clamped_mode_is_reported_even_if_the_design_fits(kind):
     class Holds(Arm):
         clipped = True
 
@@ -186,7 +186,7 @@ def test_a_mode_that_is_held_is_said_though_the_design_has_room_for_it(kind):
     assert tvist.clipped
 
 
-def test_where_the_programme_is_not_solved_the_old_taps_stand_and_it_is_said():
+def test_unsolved_programme_keeps_the_old_taps_and_is_reported():
     tvist = a_filter("short")
     before = tvist._designed.copy()
     nothing = np.full(4, np.nan)
@@ -211,14 +211,14 @@ def test_where_the_programme_is_not_solved_the_old_taps_stand_and_it_is_said():
     (lambda: SteadyFilter(ProductDesign(0.05, modes=1), Fixed([7.0], [0.1]), joints=0), "joints"),
     (lambda: SteadyFilter(ProductDesign(0.05, modes=1), Fixed([7.0], [0.1]), joints=1, smooth=0), "smooth"),
 ])  # fmt: skip
-def test_what_does_not_fit_is_refused_by_name(make, field):
+def test_invalid_arguments_are_refused_by_name(make, field):
     with pytest.raises(FilterError) as error:
         make()
     assert error.value.field == field
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_after_twenty_thousand_ticks_the_taps_are_what_they_would_be_anew(kind):
+def test_taps_do_not_drift_over_many_ticks(kind):
     tvist = a_filter(kind)
     for i in range(20_000):
         tvist.filter([2.0 * np.sin(1e-3 * i)])
@@ -248,13 +248,13 @@ def tapped(modes, mean, taps=N):
 
 
 @given(modes)
-def test_the_mean_delay_is_that_of_the_product_of_the_impulses(modes):
+def test_mean_delay_is_that_of_the_product_of_impulses(modes):
     impulses = product([zv(*mode) for mode in modes])
     assert mean_delay(*arrays(modes)) == pytest.approx(impulses.mean_delay, rel=1e-12)
 
 
 @given(modes, st.floats(0.0, 0.05))
-def test_taps_sum_to_one_and_have_the_mean_delay_asked_for(modes, more):
+def test_taps_have_sum_one_and_the_requested_mean_delay(modes, more):
     wanted = mean_delay(*arrays(modes)) + more
     taps, fits = tapped(modes, wanted, 400)
     assert fits
@@ -263,7 +263,7 @@ def test_taps_sum_to_one_and_have_the_mean_delay_asked_for(modes, more):
 
 
 @given(modes, st.floats(0.0, 0.05), st.floats(0.0, 1e4))
-def test_taps_do_to_a_cubic_what_the_impulses_do(modes, more, seed):
+def test_taps_and_impulses_give_the_same_result_on_a_cubic(modes, more, seed):
     """Lagrange's cubic is exact for it: the same number as with delays between the ticks."""
     impulses = product([zv(*mode) for mode in modes])
     taps, _ = tapped(modes, impulses.mean_delay + more, 400)
@@ -274,7 +274,7 @@ def test_taps_do_to_a_cubic_what_the_impulses_do(modes, more, seed):
 
 
 @given(modes, st.floats(0.0, 0.05))
-def test_taps_leave_next_to_nothing_of_any_of_their_modes(modes, more):
+def test_taps_suppress_each_of_their_modes(modes, more):
     """What a cubic loses between two ticks grows with (f h)^4: 2 % of a mode of 60 Hz, nothing of a slow one."""
     taps, _ = tapped(modes, mean_delay(*arrays(modes)) + more, 400)
     last = length(taps)
@@ -284,14 +284,14 @@ def test_taps_leave_next_to_nothing_of_any_of_their_modes(modes, more):
         assert abs(waves.sum()) < 0.05 * (abs(s) * H / 0.75) ** 4 + 1e-12
 
 
-def test_a_product_that_lasts_longer_on_average_stands_and_says_so():
+def test_product_with_a_longer_mean_delay_is_kept_and_reported():
     taps, fits = tapped([(5.0, 0.0)], 0.04)
     assert not fits
     assert H * np.arange(N) @ taps == pytest.approx(0.05, abs=1e-12)
     assert taps.sum() == pytest.approx(1.0, abs=1e-12)
 
 
-def test_an_impulse_beyond_the_last_tap_is_put_on_it_and_says_so():
+def test_impulse_beyond_the_last_tap_is_moved_to_it_and_reported():
     taps, fits = tapped([(2.0, 0.0)], 0.125, 60)
     assert not fits
     assert taps.sum() == pytest.approx(1.0, abs=1e-12)

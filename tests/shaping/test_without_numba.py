@@ -34,7 +34,7 @@ print(json.dumps({
 """
 
 
-def test_without_numba_filters_fades_and_estimates_are_the_same():
+def test_results_without_numba_are_the_same():
     with_numba, without = (
         json.loads(
             subprocess.run([sys.executable, "-c", SCRIPT, how], check=True, capture_output=True).stdout

@@ -43,7 +43,7 @@ def outputs(folder):
     return dict(line.split("=", 1) for line in (folder / "output").read_text().splitlines())
 
 
-def test_every_step_of_the_action_is_one_of_its_script():
+def test_every_step_of_the_action_calls_its_script():
     action = yaml.safe_load((ACTION / "action.yml").read_text())
     called = [re.search(r"run\.sh\" (\w+)", step["run"])[1] for step in action["runs"]["steps"]]
     assert called == ["install", "serve", "test", "programs"]
@@ -53,7 +53,7 @@ def test_every_step_of_the_action_is_one_of_its_script():
     assert used == known
 
 
-def test_tests_run_and_the_recordings_of_failed_ones_are_named(run, tmp_path):
+def test_test_step_runs_tests_and_outputs_recordings_of_failed_ones(run, tmp_path):
     (tmp_path / "test_it.py").write_text(TESTS)
     ran = run("test", "test_it.py", "-q")
     assert (ran.returncode, "1 failed, 1 passed" in ran.stdout) == (1, True), ran.stdout + ran.stderr
@@ -61,7 +61,7 @@ def test_tests_run_and_the_recordings_of_failed_ones_are_named(run, tmp_path):
     assert [path.name for path in recordings.rglob("*.mcap")] == ["ur5e.mcap"]
 
 
-def test_a_wrong_step_is_told_in_a_sentence(run):
+def test_invalid_step_is_refused_in_one_line(run):
     for arguments, said in (
         ((), "the first argument is missing: must be install, serve, test, programs or stop"),
         (("fly",), "the first argument is fly: must be install, serve, test, programs or stop"),
@@ -73,7 +73,7 @@ def test_a_wrong_step_is_told_in_a_sentence(run):
         assert (ran.returncode, ran.stderr) == (1, f"tvist action: {said}\n")
 
 
-def test_programs_run_and_their_results_are_named(run, tmp_path):
+def test_programs_step_runs_programs_and_outputs_results(run, tmp_path):
     for name, error in (("good", ""), ("bad", "  y = 1 / 0\n")):
         text = f"def {name}():\n  sleep(0.1)\n{error}end\n"
         (tmp_path / f"{name}.script").write_text(text, encoding="utf-8")
@@ -83,7 +83,7 @@ def test_programs_run_and_their_results_are_named(run, tmp_path):
 
 
 @pytest.mark.nightly
-def test_it_installs_a_checkout_serves_and_tests_in_a_clean_environment(run, tmp_path):
+def test_action_installs_serves_and_tests_in_a_clean_environment(run, tmp_path):
     subprocess.run([sys.executable, "-m", "venv", tmp_path / "clean"], check=True)
     python = tmp_path / "clean" / "bin" / "python"
     installed = run("install", ROOT, python=python)

@@ -40,7 +40,7 @@ class Echo:
 
 
 @pytest.mark.tvist_plant(f"{__file__}:Echo")
-def test_an_arm_of_one_s_own_need_not_know_the_truth(tvist_robot):
+def test_own_plant_works_without_truth(tvist_robot):
     with tvist_robot.control("me") as arm:
         arm.move_j(TARGET)
     assert tvist_robot.state().actual_q == pytest.approx(TARGET, abs=1e-2)
@@ -48,7 +48,7 @@ def test_an_arm_of_one_s_own_need_not_know_the_truth(tvist_robot):
 
 
 @pytest.mark.tvist_cell("clients/examples/cell.toml")
-def test_a_cell_stands_around_a_robot(tvist_robot):
+def test_cell_is_simulated_around_the_robot(tvist_robot):
     assert tvist_robot.io().tcp_offset[2] == 0.163
     assert tvist_robot.io().payload.mass == 0.92
     with tvist_robot.control("me") as arm:
@@ -57,7 +57,7 @@ def test_a_cell_stands_around_a_robot(tvist_robot):
     assert tvist_robot.io().actual_digital_input_bits == 8
 
 
-def test_the_first_state_is_that_of_the_arm_at_rest_and_its_log_and_recording_are_its_own(tvist_robot):
+def test_robot_starts_at_rest_with_its_own_log_and_recording(tvist_robot):
     state = tvist_robot.state()
     assert (state.tick, state.robot_mode) == (0, RobotMode.RUNNING)
     assert state.reference_q == list(tvist_robot.info().poses["Q1"])
@@ -70,11 +70,11 @@ def test_the_first_state_is_that_of_the_arm_at_rest_and_its_log_and_recording_ar
 
 
 class TestTime:
-    def test_passes_while_a_call_waits_without_control(self, tvist_robot):
+    def test_advances_while_a_call_waits_without_control(self, tvist_robot):
         assert tvist_robot.advance(10) == 10
         assert tvist_robot.rest().tick > 10
 
-    def test_passes_by_a_tick_for_each_state_of_an_iterator_and_until_an_event(self, tvist_robot):
+    def test_advances_by_one_tick_per_state_and_until_an_event(self, tvist_robot):
         ticks = [state.tick for state in itertools.islice(tvist_robot.states(), 20)]
         assert ticks == list(range(1, 21))
         events = tvist_robot.events()
@@ -89,7 +89,7 @@ class TestTime:
         assert tvist_robot.rest().reference_q == TARGET
 
 
-def test_robots_of_a_test_are_separate_and_one_that_is_killed_or_frozen_harms_no_other(tvist_robots):
+def test_robots_of_a_test_are_independent(tvist_robots):
     first, second, third = *tvist_robots(2), *tvist_robots(1)
     together = (first, second, third)
     assert [robot.name for robot in together] == ["ur5e-1", "ur5e-2", "ur5e-3"]
@@ -111,25 +111,25 @@ class TestMarkers:
     @pytest.mark.tvist_shaper("none")
     @pytest.mark.tvist_state("Q2")
     @pytest.mark.tvist_seed(3)
-    def test_payload_shaper_pose_and_seed(self, tvist_robot):
+    def test_payload_shaper_pose_and_seed_are_set(self, tvist_robot):
         info = tvist_robot.info()
         assert (info.payload.mass, info.shaper, tvist_robot.seed) == (2.0, "none", 3)
         assert tvist_robot.state().reference_q == list(info.poses["Q2"])
 
     @pytest.mark.tvist_state(q=TARGET, mode="POWER_OFF")
-    def test_fields_to_start_with(self, tvist_robot):
+    def test_fields_of_the_initial_state_are_set(self, tvist_robot):
         state = tvist_robot.state()
         assert state.reference_q == TARGET
         assert state.robot_mode == RobotMode.POWER_OFF
 
     @pytest.mark.tvist_faults("emergency_stop")
-    def test_fault_before_the_first_tick(self, tvist_robot):
+    def test_fault_is_injected_before_the_first_tick(self, tvist_robot):
         tvist_robot.advance(1)
         assert tvist_robot.state().safety_mode == SafetyMode.ROBOT_EMERGENCY_STOP
 
     @pytest.mark.tvist_faults("reduced", after=0.1)
     @pytest.mark.tvist_faults("torque", joint=1, value=-1000.0, seconds=0.1, after=0.3)
-    def test_faults_while_the_code_under_test_has_control(self, tvist_robot):
+    def test_faults_are_injected_while_a_client_has_control(self, tvist_robot):
         events = []
         tvist_robot.on_event(events.append)
         with tvist_robot.control("me") as arm, pytest.raises(MotionStoppedError, match="shoulder"):
@@ -140,7 +140,7 @@ class TestMarkers:
         assert modes[150]
 
     @pytest.mark.tvist_program("def go():\n  movej([0.5, -3.1, 0.2, -1.6, 0, 0])\nend\n")
-    def test_program(self, tvist_robot):
+    def test_program_is_loaded(self, tvist_robot):
         with tvist_robot.control("me") as arm:
             arm.play_program()
             tvist_robot.advance(5)
@@ -149,12 +149,12 @@ class TestMarkers:
 
 @pytest.mark.tvist_payload(3.0)
 @pytest.mark.realtime
-def test_ur_s_interfaces_answer_on_their_own_address_and_move_it(tvist_ur):
+def test_ur_interfaces_answer_on_their_own_address_and_move_the_arm(tvist_ur):
     with socket.create_connection((tvist_ur.host, tvist_ur.ports["dashboard"])) as dashboard:
         assert dashboard.recv(1024).startswith(b"Connected")
         dashboard.sendall(b"robotmode\n")
         assert dashboard.recv(1024) == b"Robotmode: RUNNING\n"
-    target = [-1.5, -1.7, -2.2, -0.8, 1.6, 0.0]
+    target = [angle + 0.1 for angle in tvist_ur.state().reference_q]
     with socket.create_connection((tvist_ur.host, tvist_ur.ports["secondary"])) as scripts:
         scripts.sendall(f"movej({target}, a=3, v=1)\n".encode())
         while tvist_ur.state().reference_q != pytest.approx(target, abs=1e-6):
@@ -163,7 +163,7 @@ def test_ur_s_interfaces_answer_on_their_own_address_and_move_it(tvist_ur):
     assert (tvist_ur.info().clock, tvist_ur.info().payload.mass) == ("realtime", 3.0)
 
 
-def test_without_the_server_the_fixtures_say_what_to_install(monkeypatch):
+def test_missing_packages_are_reported_with_what_to_install(monkeypatch):
     monkeypatch.setattr(making, "find_spec", lambda name: None if name == "numba" else object())
     said = "tvist's fixtures need the server's packages (numba is missing): pip install 'tvist[testing]'"
     assert making.unavailable() == said

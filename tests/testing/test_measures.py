@@ -34,13 +34,13 @@ def decaying(amplitude, rate, seconds):
     ]
 
 
-def test_settling_is_that_of_an_exponential():
+def test_settling_time_of_an_exponential():
     seconds, farthest = settling(decaying(1e-3, 30.0, 1.0), 1e-4)
     assert seconds == pytest.approx(math.log(10.0) / 30.0, abs=PERIOD)
     assert farthest == pytest.approx(1e-3, rel=1e-3)
 
 
-def test_a_tool_that_is_still_outside_at_the_end_has_not_settled():
+def test_tool_outside_the_band_at_the_end_has_not_settled():
     rows = decaying(1e-3, 30.0, 1.0)
     rows[-1].pose[2] += 1e-3
     assert settling(rows, 1e-4)[0] == math.inf
@@ -48,7 +48,7 @@ def test_a_tool_that_is_still_outside_at_the_end_has_not_settled():
 
 @examples(20)
 @given(st.lists(st.integers(-4, 4), min_size=30, max_size=30), st.sets(st.integers(1, 30)))
-def test_a_tick_is_measured_at_one_point_in_whatever_order_state_and_truth_come(delays, lost):
+def test_state_and_truth_are_matched_by_tick_in_any_order(delays, lost):
     state = decode(State, (PROTOCOL / "fixtures" / "v1" / "state.msgpack").read_bytes())
     truth = decode(Truth, (PROTOCOL / "fixtures" / "v1" / "truth.msgpack").read_bytes())
     ticks = range(1, 31)
@@ -70,7 +70,7 @@ def test_a_tick_is_measured_at_one_point_in_whatever_order_state_and_truth_come(
 
 
 @pytest.mark.parametrize("rotation", [(0.3, -1.2, 2.0), (math.pi, 0.0, 0.0)])
-def test_at_rest_in_any_orientation_nothing_vibrates(rotation):
+def test_tool_at_rest_has_no_vibration_in_any_orientation(rotation):
     from scipy.spatial.transform import Rotation
 
     force = Rotation.from_rotvec(rotation).inv().apply([0.0, 0.0, 9.81])
@@ -79,7 +79,7 @@ def test_at_rest_in_any_orientation_nothing_vibrates(rotation):
 
 
 @pytest.mark.tvist_shaper("none")
-def test_residual_vibration_is_the_laboratorys(tvist_robot):
+def test_residual_vibration_matches_the_laboratory(tvist_robot):
     states, truths = [], []
     tvist_robot.on_state(states.append)
     tvist_robot.on_truth(truths.append)
@@ -96,7 +96,7 @@ def test_residual_vibration_is_the_laboratorys(tvist_robot):
         assert_settles_within(tvist_robot, took - PERIOD)
 
 
-def test_limits_are_the_robots_own_unless_stricter_ones_are_given(tvist_robot):
+def test_limits_are_the_robots_own_unless_given(tvist_robot):
     with pytest.raises(AssertionError, match="no time has passed"):
         assert_within_limits(tvist_robot)
     for check in (assert_settles_within, assert_residual_vibration_below):
@@ -114,7 +114,7 @@ def test_limits_are_the_robots_own_unless_stricter_ones_are_given(tvist_robot):
     assert_within_limits(tvist_robot, speed=[fast, *[0.5] * 5])
 
 
-def test_limits_that_are_none_are_refused():
+def test_invalid_limits_are_refused():
     checks = assert_settles_within, assert_residual_vibration_below
     for check, wrong in product(checks, (-1.0, math.nan, "fast", True)):
         with pytest.raises(ValueError, match="must be a number"):

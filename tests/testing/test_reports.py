@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from tvist_kernels.cache import own_folder
 from tvist_lab.recordings import mcap_file, read
 from tvist_lab.replay import replay_file
 
 pytest_plugins = ["pytester"]
+
+KERNELS = str(own_folder())
 
 ABSENT = ("scipy", "matplotlib", "mujoco", "polars", "marimo", "distributed", "tvist_lab", "tvist_view")
 """Packages that the extra `testing` does not bring."""
@@ -108,6 +111,12 @@ def properties(case):
     return {one.get("name"): one.get("value") for one in case.iter("property")}
 
 
+@pytest.fixture(autouse=True)
+def _kernels(monkeypatch):
+    """Let tests in another home directory find the machine code of this one, rather than compile for a minute."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", KERNELS)
+
+
 @pytest.fixture
 def light(pytester, monkeypatch):
     """A folder whose tests see nothing of what the extra `testing` does not bring."""
@@ -118,7 +127,7 @@ def light(pytester, monkeypatch):
 
 
 @pytest.mark.nightly
-def test_of_failed_tests_everything_is_kept_and_of_others_nothing(light):
+def test_recordings_are_kept_only_for_failed_tests(light):
     light.makepyfile(test_it=OUTCOMES)
     ran = light.runpytest_subprocess("--junitxml=report.xml", "-p", "no:cacheprovider")
     ran.assert_outcomes(passed=2, failed=3, errors=1, xfailed=1)
@@ -145,7 +154,7 @@ def test_of_failed_tests_everything_is_kept_and_of_others_nothing(light):
 
 
 @pytest.mark.nightly
-def test_markers_with_wrong_arguments_fail_with_a_sentence(pytester):
+def test_markers_with_invalid_arguments_fail_with_one_line(pytester):
     pytester.makepyfile(MISUSES)
     ran = pytester.runpytest_subprocess("--junitxml=report.xml", "--strict-markers")
     ran.assert_outcomes(errors=len(SAID))
@@ -158,7 +167,7 @@ def test_markers_with_wrong_arguments_fail_with_a_sentence(pytester):
 
 
 @pytest.mark.nightly
-def test_two_workers_side_by_side_never_meet(pytester):
+def test_parallel_workers_have_separate_robots(pytester):
     pytester.makepyfile("""
         import pytest
         @pytest.mark.parametrize("number", range(4))
@@ -184,7 +193,7 @@ def test_two_workers_side_by_side_never_meet(pytester):
 
 @pytest.mark.nightly
 @pytest.mark.realtime
-def test_clients_of_ur_rtde_that_are_left_open_do_not_abort_the_tests(pytester):
+def test_open_ur_rtde_clients_do_not_abort_the_tests(pytester):
     """In a failed test, by a fixture, and for good: the robot goes on until they have gone."""
     pytest.importorskip("rtde_io")
     pytester.makepyfile("""
@@ -233,7 +242,7 @@ def test_robots_end_with_the_process_of_the_tests(pytester):
     assert ended
 
 
-def test_loading_the_plugin_imports_nothing_but_pytest(pytester):
+def test_loading_the_plugin_imports_only_pytest(pytester):
     """It is loaded for the tests of every project that has the client."""
     pytester.makepyfile(f"""
         import sys

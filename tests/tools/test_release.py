@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 BUMP = tomllib.loads((ROOT / ".bumpversion.toml").read_text(encoding="utf-8"))["tool"]["bumpversion"]
 
 
-def test_each_place_of_the_version_is_one_that_a_release_changes():
+def test_release_changes_every_place_of_the_version():
     present = BUMP["current_version"]
     for place in BUMP["files"]:
         files = list(ROOT.glob(place.get("glob") or place["filename"]))
@@ -31,7 +31,7 @@ def test_each_place_of_the_version_is_one_that_a_release_changes():
         assert {first or second for first, second in own} == {present}
 
 
-def test_a_wheel_with_machine_code_says_what_it_holds_and_what_it_needs(tmp_path):
+def test_wheel_with_machine_code_has_valid_metadata(tmp_path):
     wheel = written(tmp_path, {"a.b.c-d-e.kernel": b"code"}, "cp312", "1.2.3", "0.68.1", "0.50.0")
     assert wheel.name.startswith("tvist_compiled-1.2.3-cp312-cp312-manylinux")
     with zipfile.ZipFile(wheel) as archive:
@@ -45,13 +45,13 @@ def test_a_wheel_with_machine_code_says_what_it_holds_and_what_it_needs(tmp_path
     assert all(str(len(content[name])) == size for name, _, size in (line.split(",") for line in lines[:-1]))
 
 
-def test_constraints_are_the_versions_of_a_lock_without_its_hashes():
+def test_constraints_are_the_versions_of_a_lock_without_hashes():
     lock = "a-b==1.2 \\\n  --hash=sha256:00 \\\n  --hash=sha256:01\nc==3 ; python_version < '3.12' \\\n  --hash=x:02\n"
     assert constraints(lock) == "a-b==1.2\nc==3 ; python_version < '3.12'\n"
 
 
 @pytest.mark.parametrize(("digest", "same"), [("x", True), ("y", False)])
-def test_a_distribution_from_elsewhere_is_no_built_one(tmp_path, digest, same):
+def test_installed_distribution_must_be_the_built_one(tmp_path, digest, same):
     record = "tvist-9.dist-info/RECORD"
     with zipfile.ZipFile(tmp_path / "tvist-9-py3.whl", "w") as wheel:
         wheel.writestr(record, f"tvist.py,sha256=x,1\n{record},,\n")

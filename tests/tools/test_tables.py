@@ -8,12 +8,12 @@ from tools.tables.pages import PAGES, page_of
 ROOT = Path(__file__).parents[2]
 
 
-def test_the_published_page_of_robustness_is_that_of_its_published_result():
+def test_robustness_page_matches_its_result():
     result = json.loads((ROOT / "docs/results/robustness.json").read_text(encoding="utf-8"))
     assert result["command"] == PAGES["robustness"].command
     assert page_of("robustness", result) == (ROOT / PAGES["robustness"].path).read_text(encoding="utf-8")
 
 
-def test_each_published_page_names_the_command_that_makes_it():
+def test_each_page_names_its_command():
     for page in PAGES.values():
         assert page.command in (ROOT / page.path).read_text(encoding="utf-8")

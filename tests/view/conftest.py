@@ -28,7 +28,7 @@ def moved():
     return asyncio.run(move())
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def tracks():
     """Q1 to Q2, unshaped and shaped."""
     found = []

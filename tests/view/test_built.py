@@ -17,7 +17,7 @@ def contents(file):
 
 
 @pytest.mark.skipif(shutil.which("npm") is None, reason="there is no npm; only who changes the page needs it")
-def test_building_the_page_again_gives_the_same_bytes(tmp_path):
+def test_built_pages_match_their_sources(tmp_path):
     shutil.copytree(VIEW / "page", tmp_path / "page", ignore=shutil.ignore_patterns("node_modules"))
     got = subprocess.run(
         ["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund"],
@@ -34,7 +34,7 @@ def test_building_the_page_again_gives_the_same_bytes(tmp_path):
         assert built == kept, f"{name} is not what view/page builds: run make page"
 
 
-def test_the_logo_of_page_and_report_is_that_of_the_documents():
+def test_pages_have_the_logo_of_the_documents():
     drawn = re.findall(r' d="([^"]+)"', (VIEW.parent / "docs" / "images" / "logo.svg").read_text())
     assert drawn
     for file in ("view/tvist_view/page.html.gz", "lab/tvist_lab/report/page.html.j2"):

@@ -1,6 +1,7 @@
 """The arm that the page draws, in a browser: against pinocchio and against the simulated arm's truth."""
 
 import asyncio
+import itertools
 import struct
 import threading
 
@@ -8,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from msgspec.structs import replace
+from tests.conformance.served import PATIENCE
 
 from tvist_controller.about import geometry_of
 from tvist_plant.description import load
@@ -42,45 +44,51 @@ def chromium(moved):  # whose event loop playwright would not suffer beside its 
         yield started
 
 
-@pytest.fixture
-def opened(chromium, tmp_path):
+@pytest.fixture(scope="module")
+def opened(chromium, tmp_path_factory):
     """Opens a page that plays tracks back."""
-    pages = []
+    folder, numbers = tmp_path_factory.mktemp("pages"), itertools.count()
 
-    def open_page(*tracks, theme="dark"):
-        file = tmp_path / "page.html"
+    def open_page(*tracks):
+        file = folder / f"{next(numbers)}.html"
         file.write_text(playback(tracks, "test", factor=100.0), encoding="utf-8")
-        tab = chromium.new_page(viewport={"width": 500, "height": 500}, color_scheme=theme)
+        tab = chromium.new_page(viewport={"width": 250, "height": 250})
         failed = []
         tab.on("pageerror", lambda error: failed.append(str(error)))
+        tab.set_default_timeout(PATIENCE * 1000.0)
         tab.goto(file.as_uri())
         tab.wait_for_function("tvist.shown !== undefined")
         assert not failed
-        pages.append(tab)
         return tab
 
-    yield open_page
-    for tab in pages:
-        tab.close()
+    return open_page
 
 
-def flanges(tab, angles, bends):
+@pytest.fixture(scope="module")
+def tab(opened, moved):
+    """A page of the UR5e in motion and of another arm, which pauses: drawing takes a processor."""
+    ur5e, seven = (look_of(name) for name in ("ur5e", SEVEN))
+    page = opened(Track("x", ur5e, moved.states, moved.truths), Track("y", seven, standing(moved, seven), []))
+    page.evaluate("tvist.toggle()")
+    return page
+
+
+def flanges(tab, angles, bends, track=0):
     """Poses of the flange that the page computes, shape (count, 4, 4)."""
     found = tab.evaluate(
-        "([all, bends]) => { const { chain } = tvist.tracks[0].robot.arm;"
+        "([all, bends, track]) => { const { chain } = tvist.tracks[track].robot.arm;"
         " return all.map((q, i) => chain.frames(q, bends[i]).at(-1).elements); }",
-        [angles.tolist(), bends.tolist()],
+        [angles.tolist(), bends.tolist(), track],
     )
     return np.array(found).reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
-@pytest.mark.parametrize("name", ["ur5e", SEVEN])
-def test_the_flange_is_where_pinocchio_has_it(opened, moved, name):
+@pytest.mark.parametrize(("track", "name"), [(0, "ur5e"), (1, SEVEN)])
+def test_drawn_flange_matches_pinocchio(tab, track, name):
     look, description, random = look_of(name), load(name), np.random.default_rng(0)
-    tab = opened(Track("x", look, standing(moved, look), []))
     q = random.uniform(-3.0, 3.0, (50, look.joints))
     bends = random.uniform(-0.5, 0.5, (50, 2 * len(look.geometry.bending)))
-    found = flanges(tab, q, bends)
+    found = flanges(tab, q, bends, track)
     if name == "ur5e":
         flexible = flexible_model(description, description.payload)
         model, frame = flexible.model, flexible.flange
@@ -97,9 +105,8 @@ def test_the_flange_is_where_pinocchio_has_it(opened, moved, name):
         np.testing.assert_allclose(found[number], data.oMf[frame].homogeneous, atol=1e-9)
 
 
-def test_at_factor_one_the_drawn_flange_is_the_truths_and_deflections_are_the_factor_times_it(opened, moved):
+def test_drawn_deflections_are_the_true_ones_times_the_factor(tab, moved):
     look = look_of("ur5e")
-    tab = opened(Track("x", look, moved.states, moved.truths))
     truths = moved.truths[::100]
     rows = [look.row(moved.states[truth.tick - moved.states[0].tick], truth) for truth in truths]
     drawn = tab.evaluate(
@@ -120,10 +127,8 @@ def test_at_factor_one_the_drawn_flange_is_the_truths_and_deflections_are_the_fa
         np.testing.assert_allclose(entry["bends"], 7.5 * np.array(truth.link_deflection), atol=1e-9)
 
 
-def test_between_two_rows_the_page_draws_what_is_between(opened, moved):
+def test_page_interpolates_between_two_rows(tab, moved):
     look = look_of("ur5e")
-    track = Track("x", look, moved.states, moved.truths)
-    tab = opened(track)
     for time in (0.0, 0.5, 0.504, 1e3):
         row = tab.evaluate("(time) => Array.from(tvist.tracks[0].row(time))", time)
         at = min(round(time / 0.002), len(moved.states) - 1)
@@ -131,13 +136,14 @@ def test_between_two_rows_the_page_draws_what_is_between(opened, moved):
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_every_arm_is_drawn_in_one_piece_and_fills_the_picture(opened, moved, name):
+def test_every_arm_is_connected_and_fills_the_picture(opened, moved, name):
     look = look_of(name)
     tab = opened(Track("x", look, standing(moved, look), []))
     found = tab.evaluate(
         "() => { const { arm } = tvist.tracks[0].robot; const [a, b] = [tvist.stage.scene.filled(), arm.outline()];"
         " return { ...a, points: b.map((p) => p.toArray()), parts: arm.frames.map((f) => f.children.length) }; }"
     )
+    tab.close()
     points = np.array(found["points"])
     assert np.isfinite(points).all()
     assert np.linalg.norm(points, axis=1).max() < 1.8 * look.reach + 0.3
@@ -147,7 +153,7 @@ def test_every_arm_is_drawn_in_one_piece_and_fills_the_picture(opened, moved, na
     assert sum(found["parts"]) >= 2 * look.joints
 
 
-def test_a_urdfs_own_meshes_stand_in_for_what_is_drawn(chromium, moved, tmp_path):
+def test_meshes_of_a_urdf_replace_the_drawn_links(chromium, moved, tmp_path):
     corners = [(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0.3)]
     facet = struct.pack("<12fH", *(0, 0, 1), *(value for corner in corners for value in corner), 0)
     for number in range(2):
@@ -185,6 +191,7 @@ def _in_browser(chromium, text, files):
     try:
         assert ready.wait(30)
         tab = chromium.new_page()
+        tab.set_default_timeout(PATIENCE * 1000.0)
         tab.goto(urls[0])
         tab.wait_for_function(
             "tvist.tracks?.[0].robot.arm.frames.flatMap((f) => f.children).filter((c) => c.userData.mesh).length === 2"
@@ -211,7 +218,7 @@ def _in_browser(chromium, text, files):
         ({"capsules": [Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)]}, "not exist"),
     ],
 )
-def test_a_geometry_that_cannot_be_drawn_is_said(changes, says):
+def test_geometry_that_cannot_be_drawn_is_refused(changes, says):
     with pytest.raises(GeometryError, match=says):
         Look(Geometry(**{"a": [0.1, 0.2], "d": [0.0, 0.0], "alpha": [0.0, 0.0], **changes}), UR5E.payload)
 
@@ -222,7 +229,7 @@ def test_deflections_of_another_arm_are_refused(moved):
         look.row(moved.states[0], moved.truths[0])
 
 
-def test_without_truth_the_arm_is_stiff_and_an_older_truth_has_no_static_part(moved):
+def test_arm_without_truth_is_stiff_and_old_truth_has_no_static_part(moved):
     look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
     assert look.row(state, None) == [*state.actual_q, *state.reference_q, *[0.0] * 20]
     old = look.row(state, replace(truth, static_gear_deflection=[], static_link_deflection=[]))
@@ -230,7 +237,7 @@ def test_without_truth_the_arm_is_stiff_and_an_older_truth_has_no_static_part(mo
     assert old[18:24] == truth.gear_deflection
 
 
-def test_bodies_of_a_world_follow_the_arm_and_are_nowhere_while_unknown(moved):
+def test_bodies_of_a_world_are_nan_while_unknown(moved):
     look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
     there = Look(replace(look.geometry, world=World(name="table", bodies=["box"], shapes=[])), look.payload)
     pose = [-0.4, 0.1, 0.2, 0.0, 0.0, 0.3]

@@ -7,13 +7,13 @@ from tools.film import Film, FilmError
 from .browser import CHROMIUM
 
 
-def test_the_film_is_slow_where_the_arm_rings(tracks):
+def test_film_is_slow_after_each_stop(tracks):
     film = Film(tracks, 100.0)
     steps = np.diff(film.times())
     assert sorted(set(steps.round(6))) == [0.008, 0.04]
 
 
-async def test_a_films_pictures_are_drawn_by_a_browser_and_differ(tracks):
+async def test_browser_draws_different_frames(tracks):
     if CHROMIUM is None:
         pytest.skip("there is no Chromium")
     film = Film(tracks, 100.0, size=(300, 200))
@@ -23,7 +23,7 @@ async def test_a_films_pictures_are_drawn_by_a_browser_and_differ(tracks):
     assert len(np.unique(np.asarray(first).reshape(-1, 3), axis=0)) > 50
 
 
-async def test_without_a_browser_a_film_says_what_to_install(tracks, monkeypatch):
+async def test_missing_browser_is_reported_with_what_to_install(tracks, monkeypatch):
     monkeypatch.setattr("tools.film.BROWSERS", ("no-such-browser",))
     film = Film(tracks, 100.0)
     with pytest.raises(FilmError, match="apt-get install chromium"):

@@ -26,7 +26,7 @@ class Tab:
             yield json.dumps(message)
 
 
-async def test_a_page_is_connected_to_the_few_robots_that_tabs_show_and_a_tab_leaves_nothing(monkeypatch):
+async def test_page_connects_only_to_robots_that_tabs_show(monkeypatch):
     connected, tab = {}, Tab()
 
     @asynccontextmanager

@@ -55,7 +55,7 @@ async def control(robot):
     return (await robot.info()).control
 
 
-async def test_one_tab_has_control_and_gives_it_back(robot, pilot, said):
+async def test_one_tab_has_control_until_it_gives_it_back(robot, pilot, said):
     assert await pilot.take(1)
     assert await control(robot) == "view"
     assert not await pilot.take(2)
@@ -66,7 +66,7 @@ async def test_one_tab_has_control_and_gives_it_back(robot, pilot, said):
     assert (pilot.holder, await control(robot)) == (None, None)
 
 
-async def test_a_tab_that_closes_while_control_is_taken_does_not_keep_it(robot, pilot):
+async def test_tab_that_closes_while_taking_control_does_not_keep_it(robot, pilot):
     robot.gate.clear()
     taking = asyncio.create_task(pilot.take(1))
     await asyncio.sleep(0)
@@ -77,13 +77,13 @@ async def test_a_tab_that_closes_while_control_is_taken_does_not_keep_it(robot, 
     assert (pilot.holder, await control(robot)) == (None, None)
 
 
-async def test_a_second_click_takes_control_once(robot, pilot):
+async def test_second_click_takes_control_only_once(robot, pilot):
     assert all(await asyncio.gather(pilot.take(1), pilot.take(1)))
     await pilot.give_back(1)
     assert await control(robot) is None
 
 
-async def test_control_that_the_robot_ended_is_noticed(robot, pilot, said):
+async def test_loss_of_control_is_noticed(robot, pilot, said):
     await pilot.take(1)
     await pilot.heard("view")
     assert pilot.holder == 1
@@ -92,19 +92,19 @@ async def test_control_that_the_robot_ended_is_noticed(robot, pilot, said):
     assert "lost control" in said[-1]
 
 
-async def test_control_of_another_client_is_said(robot, pilot, said):
+async def test_control_of_another_client_is_reported(robot, pilot, said):
     async with robot._robot.control("somebody"):
         assert not await pilot.take(1)
     assert "somebody" in said[-1]
 
 
-async def test_a_robot_whose_time_is_stepped_is_only_watched(robot, said):
+async def test_robot_in_lockstep_is_only_watched(robot, said):
     pilot = Pilot(robot._robot, "view", said.append)
     assert not await pilot.take(1)
     assert "steps the time" in said[-1]
 
 
-async def test_a_stop_ends_a_jog_until_the_button_is_let_go(robot, pilot, monkeypatch):
+async def test_stop_ends_a_jog_until_the_button_is_released(robot, pilot, monkeypatch):
     began = []
 
     async def play(_arm):
@@ -133,7 +133,7 @@ async def test_a_stop_ends_a_jog_until_the_button_is_let_go(robot, pilot, monkey
     await pilot.give_back(1)
 
 
-async def test_another_tab_cannot_jog_or_move(robot, pilot, said):
+async def test_tab_without_control_cannot_jog_or_move(robot, pilot, said):
     await pilot.take(1)
     pilot.jog(2, 0, 1.0)
     pilot.jog(2, 0, 1.0)
@@ -143,7 +143,7 @@ async def test_another_tab_cannot_jog_or_move(robot, pilot, said):
     await pilot.give_back(1)
 
 
-async def test_a_refusal_is_said_and_ends_nothing_else(robot, pilot, said):
+async def test_refusal_is_shown_and_has_no_other_effect(robot, pilot, said):
     await pilot.take(1)
 
     async def refused(arm):

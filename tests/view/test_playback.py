@@ -1,11 +1,14 @@
 """Recorded and compared runs: on the page, and as a page of its own."""
 
+import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.conformance.served import finished
 
+from tvist_cli.main import main
 from tvist_view.playback import playback, said
 from tvist_view.track import Track, TrackError
 
@@ -14,36 +17,78 @@ from .browser import browser
 OLD = Path(__file__).parents[1] / "journals" / "live_lost_lease.mcap"
 
 
-def run(*arguments):
-    return finished("-m", "tvist_cli", "view", *arguments)
-
-
-@pytest.fixture(scope="module")
-def chromium(tracks):  # whose event loop playwright would not suffer beside its own
-    with browser() as started:
-        yield started
-
-
-def test_compared_runs_are_at_the_same_tick_and_begin_each_motion_together(tracks):
+def test_compared_runs_start_together(tracks):
     none, zv = tracks
     assert (none.start, none.end) == (zv.start, zv.end)
     starts = [np.flatnonzero(track.signals.unshaped > 0.1)[0] for track in tracks]
     assert starts[0] == starts[1]
 
 
-def test_nothing_to_show_is_said(tracks):
+def test_empty_run_is_refused(tracks):
     with pytest.raises(TrackError, match="no state"):
         Track("x", tracks[0].look, [], [])
 
 
-def test_a_run_has_stops_where_its_reference_rests(tracks):
+def test_stops_of_a_run_are_where_its_reference_rests(tracks):
     for track in tracks:
         (stop,) = track.stops  # a cruise is no stop
         q = np.array([state.reference_q for state in track._states])
         assert np.ptp(q[track.signals.time > stop + 0.01], axis=0).max() < 1e-6
 
 
-def test_the_page_of_its_own_plays_seeks_and_asks_nothing_of_the_network(chromium, tracks, tmp_path):
+@pytest.mark.nightly
+def test_command_writes_a_page(tmp_path):
+    html = tmp_path / "x.html"
+    ended = finished("-m", "tvist_cli", "view", "--compare", "none", "zv", "--html", html)
+    assert (ended.returncode, ended.stdout) == (0, ""), ended.stderr
+    assert html.stat().st_size > 200_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        (("--compare", "none"), 2, "compare has 1 shapers: give two or three"),
+        (("--compare", "none", "--compare", "nope"), 2, "nope"),
+        (("--magnify", "0.5"), 2, "magnify is 0.5: must be 1 to 300"),
+        (("--magnify", "nan"), 2, "magnify"),
+        (("missing.mcap",), 1, "missing.mcap"),
+        (("--html", "x.html"), 2, "needs a recording or --compare"),
+        (("--address", "0.0.0.0"), 1, "--insecure"),  # noqa: S104
+    ],
+)
+def test_misuse_is_refused_in_one_line(arguments, code, says, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["tvist", "view", *arguments])
+    monkeypatch.setattr("tvist_cli.main.end_like_interrupted", lambda: None)  # signals are those of the tests
+    monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    told = capsys.readouterr().err
+    assert ended.value.code == code, told
+    assert says in told
+    assert told.startswith("tvist: ")
+    assert told.count("\n") == 1
+
+
+def test_port_out_of_range_is_refused_in_one_line():
+    """In a process of its own, as Python leaves the socket open."""
+    ended = finished("-m", "tvist_cli", "view", "--port", "70000")
+    assert (ended.returncode, ended.stderr.count("\n")) == (1, 1), ended.stderr
+    assert "port 70000" in ended.stderr
+
+
+def test_recording_of_an_older_server_is_drawn_by_its_robot_file(tmp_path):
+    ended = finished("-m", "tvist_cli", "view", OLD, "--html", tmp_path / "x.html")
+    assert ended.returncode == 0, ended.stderr
+    assert "drawn stiff" in (tmp_path / "x.html").read_text()
+
+
+@pytest.fixture(scope="module")
+def chromium(tracks):  # and after all tests that run an event loop, which playwright would not suffer
+    with browser() as started:
+        yield started
+
+
+def test_page_in_a_file_plays_and_seeks_without_network(chromium, tracks, tmp_path):
     file = tmp_path / "page.html"
     result = said({"less_percent": 94.0, "earlier_ms": 134.0, "before": 0.61, "after": 0.04}, "zv", "Q1 → Q2")
     file.write_text(playback(tracks, "both", factor=100.0, result=result), encoding="utf-8")
@@ -60,38 +105,3 @@ def test_the_page_of_its_own_plays_seeks_and_asks_nothing_of_the_network(chromiu
     assert page.evaluate("tvist.tracks.map((track) => track.label)") == [track.label for track in tracks]
     page.close()
     assert all(url.startswith(("file:", "data:", "blob:")) for url in asked), asked
-
-
-@pytest.mark.nightly
-def test_a_page_is_written_by_a_command(tmp_path):
-    html = tmp_path / "x.html"
-    ended = run("--compare", "none", "zv", "--html", html)
-    assert (ended.returncode, ended.stdout) == (0, ""), ended.stderr
-    assert html.stat().st_size > 200_000
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "says"),
-    [
-        (("--compare", "none"), 2, "compare has 1 shapers: give two or three"),
-        (("--compare", "none", "--compare", "nope"), 2, "nope"),
-        (("--magnify", "0.5"), 2, "magnify is 0.5: must be 1 to 300"),
-        (("--magnify", "nan"), 2, "magnify"),
-        (("missing.mcap",), 1, "missing.mcap"),
-        (("--html", "x.html"), 2, "needs a recording or --compare"),
-        (("--address", "0.0.0.0"), 1, "--insecure"),  # noqa: S104
-        (("--port", "70000"), 1, "port 70000"),
-    ],
-)
-def test_misuse_is_a_sentence(arguments, code, says):
-    ended = run(*arguments)
-    assert ended.returncode == code, ended.stderr
-    assert says in ended.stderr
-    assert ended.stderr.startswith("tvist: ")
-    assert ended.stderr.count("\n") == 1
-
-
-def test_a_recording_of_an_older_server_is_drawn_by_the_robot_file_in_it(tmp_path):
-    ended = run(OLD, "--html", tmp_path / "x.html")
-    assert ended.returncode == 0, ended.stderr
-    assert "drawn stiff" in (tmp_path / "x.html").read_text()

@@ -30,11 +30,11 @@ def done(way, info, state, io=None):
     return [step[0] for step in way.steps(info, state, io)]
 
 
-def test_a_simulated_robot_has_no_steps(info):
+def test_simulated_robot_has_no_checklist(info):
     assert done(ObservedArm(), info, Seen()) == []
 
 
-def test_a_watched_robot_is_connected_released_moving_and_identified(info):
+def test_checklist_of_a_watched_robot(info):
     way, there = ObservedArm(), replace(info, watched="ur://robot")
     assert done(way, there, Seen(RobotMode.DISCONNECTED, SafetyMode.UNDEFINED)) == [False] * 5
     assert done(way, there, Seen(RobotMode.POWER_OFF)) == [True, *[False] * 4]
@@ -43,7 +43,7 @@ def test_a_watched_robot_is_connected_released_moving_and_identified(info):
     assert done(way, replace(there, calibration=own), Seen()) == [True, True, True, True, False]
 
 
-def test_a_moved_robot_is_held_moved_stopped_and_stopped_by_others(info):
+def test_checklist_of_a_moved_robot(info):
     way, there = ObservedArm(), replace(info, moved="ur://robot")
     assert done(way, there, Seen(RobotMode.POWER_OFF)) == [False] * 7
     assert done(way, there, Seen()) == [True, *[False] * 6]
@@ -54,7 +54,7 @@ def test_a_moved_robot_is_held_moved_stopped_and_stopped_by_others(info):
     assert done(way, there, Seen()) == [True, False, True, True, True, True, False]
 
 
-def test_the_cap_and_why_it_is_not_held_are_said(info):
+def test_checklist_shows_the_speed_cap_and_the_reason_of_a_stop(info):
     slow = replace(info.limits, velocity=[0.5] * 6)
     stop = StopReason(tick=1, code=None, why="its program was paused")
     there = replace(info, moved="ur://robot", limits=slow, stop=stop)
@@ -65,7 +65,7 @@ def test_the_cap_and_why_it_is_not_held_are_said(info):
 
 @pytest.mark.nightly
 @pytest.mark.realtime
-def test_the_page_leads_and_offers_nothing_that_does_nothing():
+def test_page_leads_through_the_checklist_and_disables_what_has_no_effect():
     host, endpoint = own_address(73), free_endpoint()
     robot = ("--ur", "--ur-address", host, "--hidden", "1001", "--profile", "real", "--shaper", "none")
     with (

@@ -21,13 +21,13 @@ def signals(moved, *, truth=True):
 
 
 @pytest.mark.parametrize("truth", [True, False])
-def test_alpha_is_the_laboratorys(moved, truth):
+def test_tool_acceleration_matches_the_laboratory(moved, truth):
     expected = amplitude(tool_acceleration(moved.recording(), truth=truth))
     np.testing.assert_allclose(signals(moved, truth=truth).alpha, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["ur5e", "tests/plant/urdf/seven.urdf"])
-def test_up_is_where_an_independent_model_has_it(name):
+def test_upward_direction_matches_pinocchio(name):
     description = load(name)
     look = Look(geometry_of(description), description.payload)
     rigid = rigid_model(description, description.payload)
@@ -39,7 +39,7 @@ def test_up_is_where_an_independent_model_has_it(name):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_what_is_drawn_and_plotted_is_of_one_tick_in_whatever_order_state_and_truth_come(moved, seed):
+def test_state_and_truth_are_matched_by_tick_in_any_order(moved, seed):
     random = np.random.default_rng(seed)
     count = 200
     times = np.arange(count) + random.integers(-4, 5, count) + 0.5
@@ -67,7 +67,7 @@ def test_what_is_drawn_and_plotted_is_of_one_tick_in_whatever_order_state_and_tr
     assert len(running.signals().time) == 0
 
 
-def test_what_is_told_since_a_count_is_told_once(moved):
+def test_each_sample_is_sent_once(moved):
     running, told = LatestSignals(LOOK), []
     count = 0
     for number, state in enumerate(moved.states):
@@ -82,7 +82,7 @@ def test_what_is_told_since_a_count_is_told_once(moved):
     assert running.count == len(moved.states) - 2
 
 
-def test_the_shaped_reference_comes_to_rest_after_the_unshaped_one(moved):
+def test_shaped_reference_comes_to_rest_after_the_unshaped_one(moved):
     found = signals(moved)
     rests = rests_since(found)
     assert rests is not None
@@ -91,14 +91,14 @@ def test_the_shaped_reference_comes_to_rest_after_the_unshaped_one(moved):
     assert rests_since(found.between(0.0, reference - 0.1)) is None
 
 
-def test_the_acceleration_before_the_shaper_keeps_the_limit_and_none_is_made_up_over_a_hole(moved):
+def test_unshaped_acceleration_is_right_and_zero_at_gaps(moved):
     found = signals(moved)
     assert 1.9 < found.unshaped.max() < 2.0 + 1e-6
     sparse = signals_of(LOOK, moved.states[::7] + moved.states[-3:], {})
     assert sparse.unshaped.max() < 2.1
 
 
-def test_nothing_is_there_before_the_first_state():
+def test_there_are_no_signals_before_the_first_state():
     found = LatestSignals(LOOK).signals()
     assert len(found.time) == len(found.alpha) == 0
     assert rests_since(found) is None

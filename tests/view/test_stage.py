@@ -20,14 +20,14 @@ def opened(**options):
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", "null"])
-async def test_another_site_is_turned_away(origin):
+async def test_websocket_of_another_site_is_refused(origin):
     async with opened() as url:
         with pytest.raises(websockets.InvalidStatus, match="403"):
             await websockets.connect(url.replace("http", "ws"), origin=origin)
 
 
 @pytest.mark.parametrize("named", [True, False])
-async def test_the_page_itself_and_programs_are_let_in(named):
+async def test_websocket_of_the_page_or_a_program_is_accepted(named):
     async with (
         opened() as url,
         websockets.connect(url.replace("http", "ws"), origin=url if named else None) as tab,
@@ -46,7 +46,7 @@ async def test_the_page_itself_and_programs_are_let_in(named):
         ("/../../etc/passwd", None, 404),
     ],
 )
-async def test_what_is_asked_for_by_name(path, host, code):
+async def test_http_status_by_path_and_host(path, host, code):
     async with opened(parts={"/mesh/0.stl": b"solid"}.get) as url:
         request = urllib.request.Request(url + path, headers={"Host": host} if host else {})  # noqa: S310
         assert await asyncio.to_thread(_code, request) == code
@@ -62,7 +62,7 @@ def _code(request):
             return error.code
 
 
-async def test_other_machines_are_served_only_if_that_is_asked_for():
+async def test_other_machines_are_served_only_with_insecure():
     with pytest.raises(StageError, match="--insecure"):
         async with open_stage("", _echo, "0.0.0.0", 0):  # noqa: S104
             pass
@@ -70,12 +70,12 @@ async def test_other_machines_are_served_only_if_that_is_asked_for():
         assert url.startswith("http://0.0.0.0:")
 
 
-async def test_a_port_in_use_is_said():
+async def test_port_in_use_is_refused_with_advice():
     async with opened() as url:
         with pytest.raises(StageError, match="Another port: --port"):
             async with open_stage("", _echo, "127.0.0.1", int(url.rpartition(":")[2])):
                 pass
 
 
-def test_nothing_that_the_page_is_told_ends_its_script():
+def test_page_escapes_markup_in_its_data():
     assert "</script><b>" not in page({"kind": "</script><b>"})

@@ -1,6 +1,7 @@
 """The page for trying shaping, as it is shipped: its numbers are the packages', and it shows what its address says."""
 
 import json
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -22,28 +23,43 @@ def chromium():
         yield started
 
 
-@pytest.fixture
-def opened(chromium):
-    pages, errors = [], []
+@contextmanager
+def pages(chromium):
+    """Opens pages of a state and a size, in which nothing may fail."""
+    opened, errors = [], []
 
     def at(state="", width=1280, height=800):
         page = chromium.new_context(viewport={"width": width, "height": height}, offline=True).new_page()
         page.set_default_timeout(PATIENCE_MS)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(f"{FILE.as_uri()}{state}")
-        pages.append(page)
+        opened.append(page)
         return page
 
     yield at
-    for page in pages:
+    for page in opened:
         page.context.close()
     assert not errors
 
 
+@pytest.fixture
+def opened(chromium):
+    with pages(chromium) as at:
+        yield at
+
+
+@pytest.fixture(scope="module")
+def own(chromium):
+    """A page for an own shaper."""
+    with pages(chromium) as at:
+        yield at("#scene=own&z=0")
+
+
 @pytest.fixture(scope="module")
 def numbers(chromium):
-    page = chromium.new_page()
+    page = chromium.new_page(viewport={"width": 200, "height": 200})
     page.goto(FILE.as_uri())
+    page.get_by_role("button", name="pause").click()
     yield page
     page.close()
 
@@ -53,13 +69,13 @@ def close(found, wanted, most=1e-9):
     assert np.abs(np.array(found) - np.array(wanted)).max() <= most
 
 
-def test_the_page_has_every_row_of_the_catalogue(numbers):
+def test_page_has_every_catalogued_shaper(numbers):
     assert numbers.evaluate("tried.missing") == []
     assert numbers.evaluate("Object.keys(tried.SHAPERS)") == list(SHAPERS)
 
 
 @pytest.mark.parametrize("name", SHAPERS)
-def test_a_shaper_is_that_of_the_library(numbers, name):
+def test_shapers_of_the_page_match_the_library(numbers, name):
     for mode in page_numbers.MODES:
         true, wanted = page_numbers.of_shaper(name, *mode)
         found = numbers.evaluate(
@@ -73,7 +89,7 @@ def test_a_shaper_is_that_of_the_library(numbers, name):
     assert found == pytest.approx(SHAPERS[name].band(0.05), abs=1e-9, nan_ok=True)
 
 
-def test_the_filter_is_that_of_the_library(numbers):
+def test_filter_of_the_page_matches_the_library(numbers):
     samples, wanted = page_numbers.filtered()
     found = numbers.evaluate(
         """(samples) => { const mode = tried.following(tried.parameters);
@@ -84,7 +100,7 @@ def test_the_filter_is_that_of_the_library(numbers):
     close(found, wanted)
 
 
-def test_the_mass_swings_as_the_lesson_says(numbers):
+def test_mass_of_the_page_matches_a_linear_simulation(numbers):
     found = numbers.evaluate(
         "([mode, believed]) => tried.swing(...mode, tried.SHAPERS.zv(...believed))", page_numbers.SWING
     )
@@ -93,7 +109,7 @@ def test_the_mass_swings_as_the_lesson_says(numbers):
 
 
 @pytest.mark.parametrize("motion", page_numbers.MOTIONS, ids=lambda one: f"{one[0]} {one[1]}")
-def test_a_whole_motion_is_that_of_the_simulated_arm(numbers, motion):
+def test_motion_of_the_page_matches_the_simulated_arm(numbers, motion):
     wanted = page_numbers.moved(*motion)
     found = numbers.evaluate(
         """([shaper, estimator, start, target]) => { const arm = tried.parameters;
@@ -104,18 +120,20 @@ def test_a_whole_motion_is_that_of_the_simulated_arm(numbers, motion):
     close(found[: len(wanted)], wanted)
 
 
-@pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
-@pytest.mark.parametrize("scene", ["mass", "arm", "own", "ur5e"])
-def test_every_scene_opens_from_a_file_without_a_network(opened, scene, size):
-    page = opened(f"#scene={scene}", *size)
-    page.get_by_text("is left").first.wait_for()
-    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-    box = page.locator("#stage").bounding_box()
-    assert box["y"] + box["height"] <= size[1]
+def test_every_scene_opens_offline_and_fits_the_window(opened):
+    page = opened("#scene=ur5e")
+    for width, height in (1280, 800), (390, 844):
+        page.set_viewport_size({"width": width, "height": height})
+        for scene in ("ur5e", "mass", "arm", "own"):
+            page.goto(f"{FILE.as_uri()}#scene={scene}")
+            page.locator(f"body[data-scene={scene}]").get_by_text("is left").first.wait_for()
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            box = page.locator("#stage").bounding_box()
+            assert box["y"] + box["height"] <= height
     assert FILE.stat().st_size <= 1.5e6
 
 
-def test_a_slider_changes_the_address_and_the_address_the_page(opened):
+def test_address_and_sliders_stay_in_step(opened):
     page = opened("#scene=mass&e=20")
     left = page.locator("#large").inner_text()
     page.get_by_role("slider", name="model error").press("Home")
@@ -125,7 +143,7 @@ def test_a_slider_changes_the_address_and_the_address_the_page(opened):
     assert again.locator("#large").inner_text() == page.locator("#large").inner_text()
 
 
-def test_what_of_a_link_is_not_understood_is_said(opened):
+def test_unknown_parts_of_a_link_are_listed(opened):
     page = opened("#scene=mass&f=900&s=nothing&toString=1&__proto__=1")
     assert "f=900, s=nothing, toString=1, __proto__=1" in page.get_by_role("alert").first.inner_text()
 
@@ -144,28 +162,25 @@ def test_what_of_a_link_is_not_understood_is_said(opened):
         ("1/0, 1", "0, 1", "A", "no finite number"),
     ],
 )  # fmt: skip
-def test_a_wrong_shaper_is_one_sentence_beside_its_field(opened, A, t, field, said):
-    page = opened("#scene=own")
-    page.locator("#own-A").fill(A)
-    page.locator("#own-t").fill(t)
-    error = page.locator(f".field:has(#own-{field}) .wrong")
-    assert said in error.inner_text()
-    assert page.locator(".verdict").is_hidden()
+def test_invalid_shaper_is_explained_beside_its_field(own, A, t, field, said):
+    own.locator("#own-A").fill(A)
+    own.locator("#own-t").fill(t)
+    assert said in own.locator(f".field:has(#own-{field}) .wrong").inner_text()
+    assert own.locator(".verdict").is_hidden()
 
 
-def test_a_right_shaper_of_ones_own_is_judged_at_once(opened):
-    page = opened("#scene=own&z=0")
-    page.locator("#own-A").fill("1/3, 1/3, 1/3")
-    page.locator("#own-t").fill("0, T/3, 2T/3")
-    assert page.locator("#large").inner_text() == "0.0 % is left"
-    assert "417 ms = 0.67 swings" in page.locator(".judged").inner_text()
-    page.locator("#own-A").fill("1, 2, 1")
-    page.get_by_role("button", name="divide by the sum").click()
-    assert page.locator("#own-A").input_value() == "(1)/4, (2)/4, (1)/4"
-    assert page.locator(".verdict").is_visible()
+def test_valid_own_shaper_is_judged_at_once(own):
+    own.locator("#own-A").fill("1/3, 1/3, 1/3")
+    own.locator("#own-t").fill("0, T/3, 2T/3")
+    assert own.locator("#large").inner_text() == "0.0 % is left"
+    assert "417 ms = 0.67 swings" in own.locator(".judged").inner_text()
+    own.locator("#own-A").fill("1, 2, 1")
+    own.get_by_role("button", name="divide by the sum").click()
+    assert own.locator("#own-A").input_value() == "(1)/4, (2)/4, (1)/4"
+    assert own.locator(".verdict").is_visible()
 
 
-def test_every_word_is_in_the_one_file_and_is_used():
+def test_every_word_of_the_page_is_used():
     words = json.loads((SOURCES / "words.json").read_text())
     code = "".join(path.read_text() for path in SOURCES.glob("*.ts"))
     unused = [

@@ -43,15 +43,12 @@ def written(site: Path) -> dict[str, list[str]]:
     return groups
 
 
-class Tables:
-    """Writes the panels of a help text as Markdown tables."""
+def _write_panel(console: "Console", options: "ConsoleOptions", panel: "HelpPanel") -> None:  # noqa: ARG001
+    """Write a panel of a help text as a Markdown table below its title, unless it is empty."""
+    from tvist_cli.help_boxes import named_once
 
-    def __call__(self, console: "Console", options: "ConsoleOptions", panel: "HelpPanel") -> None:  # noqa: ARG002
-        """Write a panel below its title, unless it is empty."""
-        from tvist_cli.help_boxes import named_once
-
-        if rows := [_row(named_once(entry)) for entry in panel.entries]:
-            console.file.write(f"## {panel.title}\n\n| | |\n|---|---|\n{''.join(rows)}\n")
+    if rows := [_row(named_once(entry)) for entry in panel.entries]:
+        console.file.write(f"## {panel.title}\n\n| | |\n|---|---|\n{''.join(rows)}\n")
 
 
 def _row(entry: "HelpEntry") -> str:
@@ -81,7 +78,7 @@ def page(command: str) -> str:
 
     words, said = command.split(), io.StringIO()
     app = application(words)
-    app.help_format, app.help_formatter = "plaintext", Tables()
+    app.help_format, app.help_formatter = "plaintext", _write_panel
     app.help_print(words, console=Console(file=said, width=10_000))
     usage, _, text = said.getvalue().strip().partition("\n")
     text, _, example = text.rpartition("Example: ")

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,7 +17,7 @@ from tvist_protocol.stream import Event, State, Truth
 from tvist_view import asked
 from tvist_view.described import usual
 from tvist_view.look import Look
-from tvist_view.pilot import Doing, Pilot, carry, declare, go, motion
+from tvist_view.pilot import Pilot, carry, declare, go, motion
 from tvist_view.signals import moves, signals_of
 
 REST = 500  # ticks recorded after a motion; before it, the arm comes to rest for half as many
@@ -39,46 +39,6 @@ Verdict = Mapping[str, float | None]
 Keys: `before`, `after`, `less_percent`, `earlier_ms`.
 """
 Judge = Callable[[MotionRecord, MotionRecord], Verdict]  # compares a motion without and with the shaper
-
-
-def beside(
-    robot: Robot,
-    look: Look,
-    poses: Sequence[Sequence[float]],
-    shaper: str,
-    judge: Judge,
-    tell: Callable[[str | None], None],
-    done: Callable[[dict[str, Any]], None],
-) -> Doing:
-    """Run a motion between two poses [rad] without and with a shaper, judge both, and restore the shaper.
-
-    `tell` is called with the present step in words, and with None at the end; `done` with the result for the
-    page.
-    """
-    start, end = poses
-
-    async def run(arm: Arm) -> None:
-        info = await robot.info()
-        runs = []
-        try:
-            for name, words in (("none", "without"), (shaper, f"with {shaper}")):
-                tell(f"{words}: to the start …")
-                await motion([start])(arm)
-                await robot.advance(REST // 2)
-                await arm.set_shaper(name, modes=info.modes)
-                tell(f"{words} …")
-                with _gathered(robot) as gathered:
-                    await go(arm, end)
-                    await robot.advance(REST)
-                runs.append(gathered)
-            verdict = await asyncio.to_thread(judge, *runs)
-            done({**verdict, "with": shaper, **_curves(look, *runs)})
-        finally:
-            tell(None)
-            with contextlib.suppress(RefusedError, ClientError, ProtocolError):  # the robot may be gone
-                await arm.set_shaper(info.shaper, modes=info.modes)
-
-    return run
 
 
 @contextlib.contextmanager
@@ -141,45 +101,57 @@ class Doer:
             case asked.Move() | asked.Compare():
                 await self._go(info, tab, message)
             case asked.Carry(mass):
-                pilot.do(tab, carry(mass))
+                pilot.do(tab, lambda arm: carry(arm, mass))
             case asked.Setting():
                 if not isinstance(message, asked.Shape | asked.Ready) or await pilot.take(tab):
-                    await pilot.set(tab, _setting(pilot, info, message))
+                    await pilot.set(tab, lambda arm: self._set(arm, info, message))
             case asked.Jog(joint):
                 self.say(f"joint is {joint}: the robot has {len(info.joints)} joints, from 0")
 
     async def _go(self, info: Info, tab: int, message: asked.Move | asked.Compare) -> None:
-        unknown = [name for name in (message.first, message.last) if name not in info.poses]
+        ends = message.first, message.last
+        unknown = [name for name in ends if name not in info.poses]
         if unknown:
             self.say(f"the robot has no pose {unknown[0]}: it has {', '.join(info.poses)}")
         elif await self.pilot.take(tab):
-            self.pilot.do(tab, self._moving(info, message))
+            if isinstance(message, asked.Move):
+                self.pilot.do(tab, lambda arm: motion(arm, [info.poses[name] for name in ends]))
+            else:
+                self.pilot.do(tab, lambda arm: self._compare(arm, message))
 
-    def _moving(self, info: Info, message: asked.Move | asked.Compare) -> Doing:
-        poses = [info.poses[message.first], info.poses[message.last]]
-        if isinstance(message, asked.Move):
-            return motion(poses)
+    async def _compare(self, arm: Arm, message: asked.Compare) -> None:
+        """Make a motion without and with a shaper, show both and what the judge says, and restore the shaper."""
+        info = await self.robot.info()
         shaper = message.shaper if message.shaper not in {"", "none"} else usual(info)
+        runs = []
+        try:
+            for name, words in (("none", "without"), (shaper, f"with {shaper}")):
+                self.comparing = f"{words}: to the start …"
+                await motion(arm, [info.poses[message.first]])
+                await self.robot.advance(REST // 2)
+                await arm.set_shaper(name, modes=info.modes)
+                self.comparing = f"{words} …"
+                with _gathered(self.robot) as gathered:
+                    await go(arm, info.poses[message.last])
+                    await self.robot.advance(REST)
+                runs.append(gathered)
+            verdict = await asyncio.to_thread(self.judge, *runs)
+            shown = {"with": shaper, "poses": [message.first, message.last], **_curves(self.look, *runs)}
+            self.result({**verdict, **shown})
+        finally:
+            self.comparing = None
+            with contextlib.suppress(RefusedError, ClientError, ProtocolError):  # the robot may be gone
+                await arm.set_shaper(info.shaper, modes=info.modes)
 
-        def tell(words: str | None) -> None:
-            self.comparing = words
-
-        def done(result: dict[str, Any]) -> None:
-            self.result({**result, "poses": [message.first, message.last]})
-
-        return beside(self.robot, self.look, poses, shaper, self.judge, tell, done)
-
-
-def _setting(pilot: Pilot, info: Info, message: asked.Setting) -> Doing:
-    """Return the action for a setting that a tab requests."""
-    match message:
-        case asked.Shape(shaper, modes):
-            return lambda arm: arm.set_shaper(shaper, modes=modes or info.modes)
-        case asked.Speed(fraction):
-            return lambda arm: arm.set_speed(fraction)
-        case asked.Declare(mass):
-            return declare(mass)
-        case asked.Fault(name):
-            return lambda arm: arm.inject(name)
-        case _:
-            return pilot.make_ready
+    async def _set(self, arm: Arm, info: Info, message: asked.Setting) -> None:
+        match message:
+            case asked.Shape(shaper, modes):
+                await arm.set_shaper(shaper, modes=modes or info.modes)
+            case asked.Speed(fraction):
+                await arm.set_speed(fraction)
+            case asked.Declare(mass):
+                await declare(arm, mass)
+            case asked.Fault(name):
+                await arm.inject(name)
+            case _:
+                await self.pilot.make_ready(arm)

@@ -7,8 +7,7 @@ from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import Event, State
-from tvist_view.look import Look
-from tvist_view.meshes import Meshes
+from tvist_view.look import Look, Meshes
 
 NO_TRUTH = "this robot does not publish how it bends; simulated robots do, for pages on the same machine"
 REAL = "a real arm does not report how it bends"

@@ -6,10 +6,9 @@ import msgspec
 
 from tvist_view import asked
 from tvist_view.beside import Judge
-from tvist_view.meshes import Meshes
-from tvist_view.shown_robot import RobotPlace, ShownRobot
+from tvist_view.look import Meshes
+from tvist_view.shown_robot import RobotPlace, ShownRobot, Watcher
 from tvist_view.stage import Tab, page
-from tvist_view.watcher import Watcher
 
 MOST_SHOWN = 8  # most robots that tabs show at once, since each takes one of a server's limited sessions
 

@@ -1,19 +1,23 @@
-"""What the page draws, as plain numbers: a robot's shape, and its position at one tick."""
+"""What the page draws: a robot's shape and its position at one tick, as plain numbers, and mesh files."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from tvist_plant.model import rotation_of
 from tvist_protocol.geometry import GEOMETRY_VERSION, Geometry
 from tvist_protocol.stream import State, Truth
 from tvist_protocol.values import Payload
 
 Floats = npt.NDArray[np.float64]
+MESHES = (".stl", ".obj", ".dae")  # suffixes of mesh files that the page can draw
+LARGEST = 64 * 2**20  # largest mesh file that is offered [byte]
 
 
 class GeometryError(ValueError):
@@ -54,11 +58,8 @@ class Look:
     def turns(self) -> list[Floats]:
         """Rotation of each link's frame in that of its joint, shape (3, 3)."""
         if not self.geometry.placement:
-            return [_about(0, angle) for angle in self.geometry.alpha]
-        return [
-            _about(2, yaw) @ _about(1, pitch) @ _about(0, roll)
-            for *_, roll, pitch, yaw in self.geometry.placement
-        ]
+            return [rotation_of(alpha, 0.0, 0.0) for alpha in self.geometry.alpha]
+        return [rotation_of(*angles) for _, _, _, *angles in self.geometry.placement]
 
     @property
     def reach(self) -> float:
@@ -104,10 +105,25 @@ def _parts(deflection: Sequence[float], static: Sequence[float], count: int) -> 
     return [*known, *(whole - part for whole, part in zip(deflection, known, strict=True))]
 
 
-def _about(axis: int, angle: float) -> Floats:
-    c, s = math.cos(angle), math.sin(angle)
-    out = np.eye(3)
-    first, second = ((1, 2), (2, 0), (0, 1))[axis]
-    out[first, first] = out[second, second] = c
-    out[first, second], out[second, first] = -s, s
-    return out
+class Meshes:
+    """Mesh files on this machine that robots' geometries name, each with a path on the page's server."""
+
+    def __init__(self) -> None:
+        self._paths: dict[Path, str] = {}
+
+    def offer(self, geometry: Geometry) -> list[str]:
+        """Return paths of a robot's meshes; none if any is missing or unsuitable, and the page draws the arm itself."""
+        found = [Path(mesh.file) for mesh in geometry.meshes]
+        if not all(
+            file.suffix.lower() in MESHES and file.is_file() and file.stat().st_size <= LARGEST
+            for file in found
+        ):
+            return []
+        for file in found:
+            # A robot that reconnects keeps its paths.
+            self._paths.setdefault(file, f"/mesh/{len(self._paths)}{file.suffix.lower()}")
+        return [self._paths[file] for file in found]
+
+    def content(self, path: str) -> bytes | None:
+        """Return the content of an offered file; None for another path."""
+        return next((file.read_bytes() for file, its in self._paths.items() if its == path), None)

@@ -194,35 +194,23 @@ async def go(arm: Arm, q: Sequence[float]) -> None:
     await arm.move_j(q, velocity=min(SPEED, *limits.velocity))
 
 
-def motion(poses: Sequence[Sequence[float]]) -> Doing:
-    """Return a motion to the first pose, unless the arm is there, and on through the others."""
-
-    async def run(arm: Arm) -> None:
-        for place, q in enumerate(poses):
-            at = (await arm.robot.state()).target_q
-            if place or max(abs(a - b) for a, b in zip(at, q, strict=True)) > 1e-6:
-                await go(arm, q)
-
-    return run
+async def motion(arm: Arm, poses: Sequence[Sequence[float]]) -> None:
+    """Move to the first pose, unless the arm is there, and on through the others."""
+    for place, q in enumerate(poses):
+        at = (await arm.robot.state()).target_q
+        if place or max(abs(a - b) for a, b in zip(at, q, strict=True)) > 1e-6:
+            await go(arm, q)
 
 
-def carry(mass: float) -> Doing:
+async def carry(arm: Arm, mass: float) -> None:
     """Let a simulated arm at rest carry another mass [kg] without declaring it."""
-
-    async def run(arm: Arm) -> None:
-        await arm.reset(payload=_scaled((await arm.robot.info()).payload, mass))
-
-    return run
+    await arm.reset(payload=_scaled((await arm.robot.info()).payload, mass))
 
 
-def declare(mass: float) -> Doing:
+async def declare(arm: Arm, mass: float) -> None:
     """Declare another payload mass [kg]."""
-
-    async def run(arm: Arm) -> None:
-        payload = _scaled((await arm.robot.info()).payload, mass)
-        await arm.set_payload(payload.mass, payload.com, payload.inertia)
-
-    return run
+    payload = _scaled((await arm.robot.info()).payload, mass)
+    await arm.set_payload(payload.mass, payload.com, payload.inertia)
 
 
 def _scaled(payload: Payload, mass: float) -> Payload:

@@ -2,10 +2,11 @@
 
 import asyncio
 import contextlib
+import itertools
 import logging
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,15 @@ from tvist_protocol.stream import Event
 from tvist_view import asked
 from tvist_view.beside import Doer, Judge
 from tvist_view.described import ObservedArm, described, state_in_words
-from tvist_view.look import GeometryError, Look
-from tvist_view.meshes import Meshes
+from tvist_view.look import GeometryError, Look, Meshes
 from tvist_view.pilot import Pilot
-from tvist_view.signals import LatestSignals
-from tvist_view.watcher import Watcher
+from tvist_view.signals import LatestSignals, after_stop
+from tvist_view.stage import Tab
 
 log = logging.getLogger("tvist.view")
 
+FRAME_S = 1.0 / 30.0  # time between two frames [s]
+NOTES_EVERY = 6  # frames between two updates of the note on the last stop
 INFO_S = 1.0  # time between two queries of which client has control [s]
 RETRY_S = 2.0  # time between two attempts to find the robot [s]
 MOST_ASKED = 16  # most requests of a tab that are carried out at once; further ones wait
@@ -42,6 +44,65 @@ class RobotPlace:
     endpoint: str  # zenoh endpoint
     security: Path | None = None  # folder with a certificate for the robot's server
     namespace: str = ""  # namespace of the robots
+
+
+@dataclass(eq=False)
+class Watcher:
+    """A tab, and what has been sent to it."""
+
+    tab: Tab
+    robot: "ShownRobot | None" = None
+    waiting: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
+    tasks: set[asyncio.Task[Any]] = field(default_factory=set)  # its requests that are being carried out
+    status: dict[str, Any] = field(default_factory=dict)
+    count: int = 0
+    free: bool = True
+    """Whether the tab has drawn its last frame; frames queued in a slow browser would delay everything after them."""
+
+    def put(self, kind: str, content: dict[str, Any]) -> None:
+        """Queue a message for the next frame."""
+        self.waiting.append((kind, content))
+
+    def say(self, sentence: str) -> None:
+        """Show a notice."""
+        self.put("notice", {"text": sentence})
+
+    async def tell(self) -> None:
+        """Send the tab what is new, frame by frame; a slow tab gets fewer frames."""
+        loop, note = asyncio.get_running_loop(), ""
+        due = loop.time()
+        for number in itertools.count():
+            due = max(due, loop.time())  # a late frame delays the following ones
+            await asyncio.sleep(due - loop.time())
+            due += FRAME_S
+            waiting, self.waiting = self.waiting, []
+            for kind, content in waiting:
+                await self.tab.send(kind, content)
+            robot = self.robot
+            if robot is None or robot.running is None:
+                continue
+            if (status := robot.status(self.tab.number)) is not None and status != self.status:
+                self.status = status
+                await self.tab.send("status", status)
+            running = robot.running
+            running.update()
+            if (row := running.row()) is None or running.state is None or not self.free:
+                continue
+            self.free = False
+            if number % NOTES_EVERY == 0:
+                note = after_stop(running.signals())
+            state, columns = running.state, running.since(self.count)
+            self.count = running.count
+            frame = {
+                "t": state.timestamp,
+                "row": [round(value, 6) for value in row],
+                "samples": columns,
+                "f_d": state.estimated_f_d[0] if state.estimated_f_d else None,
+                "zeta": state.estimated_zeta[0] if state.estimated_zeta else None,
+                "delay": state.shaper_delay,
+                "note": note,
+            }
+            await self.tab.send("frame", frame)
 
 
 class ShownRobot:

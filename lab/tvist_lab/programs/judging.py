@@ -13,7 +13,8 @@ from tvist_lab.programs.limits import EXPECTED, UNITS, RunLimits
 from tvist_lab.programs.results import Shortcoming, seconds
 from tvist_lab.programs.watch import Fastest, ProgramWatch
 from tvist_plant.model import Floats
-from tvist_plant.plant import PERIOD, Plant, Shape
+from tvist_plant.plant import PERIOD, Plant
+from tvist_plant.surroundings import Shape
 from tvist_plant.user_file import UserFileError, read_text
 
 

@@ -54,15 +54,6 @@ class BasisFunctions:
         ]
         return np.array(rows, dtype=np.int64).reshape(len(rows), n)
 
-    def terms(self, q: npt.ArrayLike) -> Floats:
-        """Return the design matrix of a fit, shape (N, terms): 1, then cos and sin of each combination."""
-        angles = np.asarray(q, dtype=float)
-        if angles.ndim != 2 or angles.shape[1] <= max(self.joints):
-            raise EstimatorError("q", angles.shape, f"of shape (N, n), n > {max(self.joints)}")
-        phase = (angles[:, self.joints] - self.centre) @ self.multiples().T
-        pairs = np.stack((np.cos(phase), np.sin(phase)), axis=2).reshape(len(phase), -1)
-        return np.hstack((np.ones((len(phase), 1)), pairs))
-
 
 def _rows(n: int, total: int) -> Iterator[tuple[int, ...]]:
     """Yield the integer vectors of length n with Σ|m| = total."""
@@ -83,7 +74,7 @@ def terms(
 ) -> Floats:
     """Return the design matrix for fitting the coefficients of a `Polynomial` with these parameters [-].
 
-    Its shape is (N, terms), in the order of the coefficients.
+    Its shape is (N, terms), in the order of the coefficients: 1, then cos and sin of each combination.
 
     Args:
         q: Configurations [rad], shape (N, n).
@@ -94,4 +85,9 @@ def terms(
     Raises:
         EstimatorError: A parameter is invalid.
     """
-    return BasisFunctions(tuple(joints), degree, centre).terms(q)
+    basis, angles = BasisFunctions(tuple(joints), degree, centre), np.asarray(q, dtype=float)
+    if angles.ndim != 2 or angles.shape[1] <= max(basis.joints):
+        raise EstimatorError("q", angles.shape, f"of shape (N, n), n > {max(basis.joints)}")
+    phase = (angles[:, basis.joints] - basis.centre) @ basis.multiples().T
+    pairs = np.stack((np.cos(phase), np.sin(phase)), axis=2).reshape(len(phase), -1)
+    return np.hstack((np.ones((len(phase), 1)), pairs))

@@ -35,11 +35,8 @@ class Fixed(Estimator):
             raise EstimatorError("zeta", zeta, "at least 0 and less than 1")
         self._f_d.setflags(write=False)
         self._zeta.setflags(write=False)
-        self.modes, self.f_d_min, self.zeta_max = (
-            self._f_d.size,
-            float(self._f_d.min()),
-            float(self._zeta.max()),
-        )
+        self.modes = self._f_d.size
+        self.f_d_min, self.zeta_max = float(self._f_d.min()), float(self._zeta.max())
 
     def __repr__(self) -> str:
         return f"Fixed(f_d={self._f_d.tolist()}, zeta={self._zeta.tolist()})"

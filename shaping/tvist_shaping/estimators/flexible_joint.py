@@ -31,9 +31,7 @@ def flexible_joint(inertia: float, stiffness: float, damping: float) -> tuple[fl
     Raises:
         EstimatorError: A value is out of range, or so much damping leaves no vibration.
     """
-    for field, value in (("inertia", inertia), ("stiffness", stiffness)):
-        if not 0.0 < value < math.inf:
-            raise EstimatorError(field, value, "a finite number above 0")
+    EstimatorError.check_positive(inertia=inertia, stiffness=stiffness)
     critical = 2.0 * math.sqrt(stiffness * inertia)
     if not 0.0 <= damping < critical:
         raise EstimatorError(

@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tvist_shaping._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.base import Estimator
@@ -92,8 +92,7 @@ class Modal(Estimator):
         size = len(drivetrain.stiffness)
         if not 1 <= modes <= size:
             raise EstimatorError("modes", modes, f"1 to {size}, the number of coordinates")
-        if not 0.0 < f_d_min < np.inf:
-            raise EstimatorError("f_d_min", f_d_min, "a finite number of Hz above 0")
+        EstimatorError.check_positive(f_d_min=f_d_min)
         if not 0.0 < zeta_max < 1.0:
             raise EstimatorError("zeta_max", zeta_max, "between 0 and 1")
         self.drivetrain = drivetrain

@@ -3,8 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from tvist_kernels.compiling import inlined
-from tvist_shaping._compiled import compiled
+from tvist_kernels.compiling import compiled, inlined
 from tvist_shaping._types import Floats
 
 Complex = npt.NDArray[np.complex128]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping._compiled import compiled
+from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.base import Estimator
@@ -114,12 +114,8 @@ class Polynomial(Estimator):
         """
         self.basis = BasisFunctions(tuple(joints), degree, centre)
         self.saturating = False
-        self._coefficients: Floats = np.stack(
-            (
-                self._row("f_d_coefficients", f_d_coefficients),
-                self._row("zeta_coefficients", zeta_coefficients),
-            )
-        )
+        f_d_row = self._row("f_d_coefficients", f_d_coefficients)
+        zeta_row = self._row("zeta_coefficients", zeta_coefficients)
         f_low, f_high = self._range("f_d_range", f_d_range)
         z_low, z_high = self._range("zeta_range", zeta_range)
         if f_low < F_D_RANGE[0] or f_high > F_D_RANGE[1]:
@@ -127,16 +123,18 @@ class Polynomial(Estimator):
         if z_low < 0.0 or z_high >= 1.0:
             raise EstimatorError("zeta_range", zeta_range, "within 0 <= ζ < 1")
         self.modes, self.f_d_min, self.zeta_max = 1, f_low, z_high
-        self._ranges: Floats = np.array([[f_low, f_high], [z_low, z_high]])
-        joints_used = np.array(self.basis.joints, dtype=np.int64)
         self.coefficients = Coefficients(
-            joints_used, self.basis.centre.copy(), self.basis.multiples(), self._coefficients, self._ranges,
-        )  # fmt: skip
+            np.array(self.basis.joints, dtype=np.int64),
+            self.basis.centre.copy(),
+            self.basis.multiples(),
+            np.stack((f_d_row, zeta_row)),
+            np.array([[f_low, f_high], [z_low, z_high]]),
+        )
         """Arguments of `evaluate`, as writable arrays, since numba's fast path accepts only those."""
         self._joints_needed = max(self.basis.joints) + 1
 
     def __repr__(self) -> str:
-        (f_low, f_high), (z_low, z_high) = self._ranges.tolist()
+        (f_low, f_high), (z_low, z_high) = self.coefficients.ranges.tolist()
         return (
             f"Polynomial(joints={self.basis.joints}, degree={self.basis.degree}, "
             f"{len(self.basis)} terms, f_d_range=({f_low}, {f_high}), zeta_range=({z_low}, {z_high}))"

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import Hand
+from tvist_plant.surroundings import Hand
 from tvist_plant.user_file import named, one_line
 from tvist_plant.world.arm_form import settle
 from tvist_plant.world.scene import World, build

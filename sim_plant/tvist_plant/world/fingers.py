@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from tvist_plant.plant import Hand
+from tvist_plant.surroundings import Hand
 from tvist_plant.world.contacts import ALL
 
 PAD = (0.011, 0.004, 0.03)  # half lengths of a finger along x y z of the tool centre point [m]

@@ -7,7 +7,7 @@ them (semi-implicit Euler with implicit damping, first order). Gears have no kin
 import math
 from collections.abc import Callable
 from copy import copy
-from typing import Any, Final
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -18,8 +18,9 @@ from tvist_kernels.compiling import compiled
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import FLANGE, Floats
-from tvist_plant.plant import PERIOD, Hand, Measurement, Plant, PlantError, PlantTruth, SimulatedArm, Things
+from tvist_plant.plant import PERIOD, Measurement, Plant, PlantError, PlantTruth, SimulatedArm
 from tvist_plant.sensors import Accelerometer, ForceSensor
+from tvist_plant.surroundings import Hand, Things
 from tvist_plant.world.apart import build_apart
 from tvist_plant.world.arm_form import LOAD, Hinges, arm_spec, carry, settle
 from tvist_plant.world.contacts import PREFIX, set_contacts
@@ -29,7 +30,7 @@ from tvist_plant.world.scene_file import SceneFile
 
 TIMESTEP = 0.00025  # time step at which MuJoCo agrees with `FlexibleArm` [s]
 DEEPEST = 1e-4  # largest penetration of an arm at the pose of a reset [m]
-_OF_HANDS: Final = (Plant.mount, Plant.grip, Plant.opening)
+_OF_HANDS = (Plant.mount, Plant.grip, Plant.opening)
 
 
 @compiled

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import Hand, Shape, Things
+from tvist_plant.surroundings import Hand, Shape, Things
 from tvist_plant.world.arm_form import LOAD, arm_spec, link_name
 from tvist_plant.world.contacts import ALL, IMPRATIO, PREFIX, Contacts, add_pairs, check_masses, set_contacts
 from tvist_plant.world.fingers import add_fingers
