@@ -10,7 +10,7 @@ import numpy as np
 
 from tvist_controller.cell.description import Cell
 from tvist_controller.foresight.collision import CollisionModel
-from tvist_controller.paths.poses import placement
+from tvist_controller.kinematics.pose import placement
 from tvist_controller.sources.mode_source import ModeSource, first_source
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_controller.sources.own_shapers import OwnShaper
@@ -177,8 +177,7 @@ class Setup:
             "adapt": self.adapt,
         }
         content |= {name: value for name, value in optional.items() if value is not None}
-        recorded: dict[str, Any] = msgspec.to_builtins(content)
-        return recorded
+        return dict(msgspec.to_builtins(content))
 
     @classmethod
     def from_builtins(

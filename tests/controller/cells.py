@@ -5,7 +5,7 @@ import numpy as np
 
 from tvist_controller.cell.description import Cell, as_declared
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.paths.poses import Placement, placement
+from tvist_controller.kinematics.pose import Placement, placement
 
 from .robots import UR5E
 from .scripts import URSIM, a_robot

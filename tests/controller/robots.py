@@ -92,15 +92,13 @@ class Line(ControlCycle):
     reference = property(lambda self: self.sample.reference)
 
     def plan(self, target, limits: MotionLimits, speed: float = 1.0):
-        return quickest_motion(JointLine(self.reference, target), limits, H, speed)
+        return quickest_motion(JointLine(self.reference, target), limits, speed)
 
     def stream(self, stream_period: float, limits: MotionLimits) -> SetpointStream:
         """Follow set-points from rest; no guard watches."""
         spared, reach = self.filter.spared(limits), np.array(self.description.limits.position)
         torque = StreamTorqueMargin(self.description, self.dynamics)
-        return self.begin(
-            SetpointStream(self.reference, stream_period, spared, H, reach=reach, torque=torque)
-        )
+        return self.begin(SetpointStream(self.reference, stream_period, spared, reach=reach, torque=torque))
 
 
 def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | None = None) -> Line:

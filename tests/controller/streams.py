@@ -63,8 +63,8 @@ def there_and_back(limits: MotionLimits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), d
     """A double-S there, a rest, and one back, again and again; positions by times."""
     target, start = np.array(way), np.zeros(len(way))
     go, back = (
-        quickest_motion(JointLine(start, target), limits, H),
-        quickest_motion(JointLine(target, start), limits, H),
+        quickest_motion(JointLine(start, target), limits),
+        quickest_motion(JointLine(target, start), limits),
     )
     turn, cycle = go.duration + dwell, 2 * (go.duration + dwell)
 

@@ -12,9 +12,10 @@ from tvist_controller.about import info_of
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import resting_after
+from tvist_controller.kinematics.arm import SLEW, InverseDynamics
 from tvist_controller.line.differentiator import STILL
-from tvist_controller.line.inverse_dynamics import SLEW, InverseDynamics
 from tvist_controller.line.limits import TORQUE_SHARE
+from tvist_controller.line.line_tick import TORQUE as TORQUE_ROW
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
@@ -44,7 +45,7 @@ def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_be
     for tick in range(700):
         if tick == 100:
             changed.dynamics.declare(then)
-        torques.append([line.step().torque for line in (changed, never, always)])
+        torques.append([line.step().signals[TORQUE_ROW] for line in (changed, never, always)])
     torque, old, new = np.swapaxes(np.array(torques), 0, 1)
     assert (torque[:100] == old[:100]).all()
     np.testing.assert_allclose(torque[100 + SLEW :], new[100 + SLEW :], atol=1e-9)

@@ -8,9 +8,9 @@ import pytest
 from tests.plant.arms import frames
 from tests.search.spaces import BENT, pose_of, tool_pose
 
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import STILL, Target, central_differences
 from tvist_controller.line.drive_feed_forward import DriveFeedForward
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.joint_controllers import command_drives
 from tvist_controller.line.line_mode import LineMode, check_change
 from tvist_controller.setup import body, paper_payload
@@ -131,7 +131,7 @@ def test_it_is_the_reference_of_a_tick_ago_with_its_central_differences(motion, 
     states = moved(motion, shaper).states
     reference = np.array([state.reference_q for state in states])
     assert np.abs(reference - np.array([state.target_q for state in states])).max() > 1e-3
-    for number, expected in enumerate(central_differences(reference, H)):
+    for number, expected in enumerate(central_differences(reference)):
         # Velocities are differences of neighbours here, which rounds in another way.
         np.testing.assert_allclose(
             column(states, number)[2:], expected, rtol=0.0, atol=(0.0, 1e-12, 0.0)[number]
@@ -228,7 +228,7 @@ def command_of(controllers, target, torque, gravity):
 def commanded(description, *targets):
     """Last of several drive commands, with torque and gravity as inverse dynamics gives them."""
     dynamics = InverseDynamics(description, body(paper_payload(description)))
-    controllers = DriveFeedForward(description, H)
+    controllers = DriveFeedForward(description)
     for target in targets:
         torque, gravity = dynamics.torque(target.q, target.qd, target.qdd), dynamics.gravity(target.q)
         command = command_of(controllers, target, torque, gravity)

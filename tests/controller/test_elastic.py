@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.elastic_lead import follow
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.joint_controllers import LAWS, STICTION, described_friction
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
@@ -57,7 +57,7 @@ def line(shaper: str, q=Q1, *, mass=None, description=UR5E, calibration=MODAL, p
 
 def moves(cycle: Line, target, limits=PAPER):
     """Make a motion, and yield its samples with 0.6 s of rest."""
-    cycle.begin(quickest_motion(JointLine(cycle.sample.reference, np.array(target)), limits, H))
+    cycle.begin(quickest_motion(JointLine(cycle.sample.reference, np.array(target)), limits))
     cycle.tvist.aim(np.array(target))
     rest = 0
     while rest < 300:

@@ -12,9 +12,14 @@ from hypothesis import strategies as st
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.planning.snapshot import FilterState
-from tvist_controller.safety.experience import AFTER, Experience, MotionRecord
+from tvist_controller.safety.payload_learning import (
+    AFTER,
+    DEAD,
+    MotionRecord,
+    PayloadEstimator,
+    PayloadLearning,
+)
 from tvist_controller.safety.payload_monitor import TOLERATED, PayloadMonitor
-from tvist_controller.safety.payload_student import DEAD, PayloadStudent
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_controller.sources.mode_source import first_source
@@ -53,7 +58,7 @@ class Served:
     def __init__(self, student=None, shaper="elastic", **changes):
         setup = free_setup(None, shaper=shaper)
         self.setup = replace(setup, description=setup.description.clean(), **changes)
-        self.host = LoopbackHost(self.setup, experience=student and Experience(student.study))
+        self.host = LoopbackHost(self.setup, learning=student and PayloadLearning(student.study))
         self.states, self.events = [], []
         self.host.subscribe("state", lambda data: self.states.append(decode(State, data)))
         self.host.subscribe("event", self.events.append)
@@ -170,8 +175,7 @@ def test_one_motion_tells_what_is_carried_and_no_warning_nags(declared, carried)
     assert f"not {declared:g} kg" in event.why
     assert robot.host.controller.io().assumed_payload == robot.assumed
     assert robot.host.controller.declared.mass == declared
-    robot.move(Q1)
-    robot.tick(700)
+    robot.move(Q1, 2.4)
     assert not robot.told("warning")
     assert len(robot.told("learnt")) == 1
 
@@ -189,16 +193,13 @@ def test_more_than_the_rating_is_said_and_the_rating_assumed():
 def test_lessons_come_at_rest_are_replayed_and_forgotten_to_the_last_bit():
     robot, plain = Following(1.0, 3.0), Following(1.0, 3.0, adapt=None)
     robot.move(Q2)
-    robot.move(Q1)
     taught = [entry.tick for entry in robot.host.entries if entry.kind == "lesson"]
     moving = {state.tick for state in robot.states if np.abs(state.target_qd).max() > 1e-6}
     assert taught
     assert not moving & set(taught)
     robot.ask(Forget(token=robot.token, what="payload"))
-    plain.move(Q2)
-    plain.move(Q1)
     for one in (robot, plain):  # both now move as the declared payload needs, whatever one has learnt before
-        one.tick(500)
+        one.tick(100)
         one.ask(SimulationReset(token=one.token, q=Q1, seed=3))
         one.move(Q2, 1.0)
     assert "are assumed again" in robot.told("learnt")[1].why
@@ -241,8 +242,8 @@ def odd(motion, what):
 
 @pytest.mark.parametrize("what", ["short", "stopped", "hardly moving", "NaN", "huge", "pushed"])
 def test_a_motion_that_tells_nothing_teaches_nothing(motion, what):
-    assert PayloadStudent(ROBOT).study(motion) is not None
-    assert PayloadStudent(ROBOT).study(replace(motion, **odd(motion, what))) is None
+    assert PayloadEstimator(ROBOT).study(motion) is not None
+    assert PayloadEstimator(ROBOT).study(replace(motion, **odd(motion, what))) is None
 
 
 @settings(deadline=None)
@@ -251,7 +252,7 @@ def test_no_record_makes_a_payload_that_is_none(seed, ticks, size):
     random = np.random.default_rng(seed)
     q, moments = random.standard_normal((ticks, 6)), size * random.standard_normal((ticks, 6))
     record = MotionRecord(q, moments, min(ticks, 5), True, taken_for(paper_payload(ROBOT, 2.0)))
-    lesson = PayloadStudent(ROBOT).study(record)
+    lesson = PayloadEstimator(ROBOT).study(record)
     if lesson is not None:
         assert 0.0 <= lesson.payload.mass <= 5.0
         assert abs(lesson.payload.mass - 2.0) > DEAD

@@ -30,7 +30,7 @@ def test_the_law_keeps_its_speeds_and_takes_no_more_energy_than_the_force_gives(
     inertia = task.mass * np.repeat([1.0, 0.22**2], 3)
     velocity = np.zeros(6)
     for force in forces:
-        before, velocity = velocity, compliant_velocity(task, velocity, force, PERIOD)
+        before, velocity = velocity, compliant_velocity(task, velocity, force)
         assert np.abs(velocity).max() <= limit
         gained = 0.5 * inertia * (velocity**2 - before**2)
         assert (gained <= gain * PERIOD * np.abs(force * velocity) + 1e-12).all()

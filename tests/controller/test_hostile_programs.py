@@ -12,7 +12,7 @@ from tests.search.scripts import Author
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.host import Host
-from tvist_controller.programs.journey import PAUSE
+from tvist_controller.programs.blended_moves import PAUSE
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.programs import ProgramRun, ProgramStop
@@ -81,7 +81,7 @@ def test_few_ticks_plan_or_stop_whatever_the_programs_do(seed, monkeypatch):
     """Threads that are killed while they move, and short moves in quick succession, are held back."""
     robot, beside, _ = begin(seed)
     plans, stops = Counts(monkeypatch, Planner, "plan"), Counts(monkeypatch, Stopper, "plan_stop")
-    ticks, dear = 900, 0
+    ticks, dear = 600, 0
     for _ in range(ticks):
         robot.controller.begin_tick()
         robot.controller.complete_tick()

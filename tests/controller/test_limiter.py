@@ -16,10 +16,10 @@ from .robots import PAPER, Q1, Q3, H, Robot
 from .streams import assert_within
 
 
-def at_rest(q, limits, period, reach=np.inf, torque=None):
+def at_rest(q, limits, reach=np.inf, torque=None):
     """A limiter that starts at rest."""
     still = np.zeros_like(q)
-    return Limiter((q, still, still), limits, period, np.broadcast_to(reach, q.shape), torque)
+    return Limiter((q, still, still), limits, np.broadcast_to(reach, q.shape), torque)
 
 
 def followed(limiter: Limiter, points) -> np.ndarray:
@@ -50,7 +50,7 @@ def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalle
     random = np.random.default_rng(seed)
     walk = np.cumsum(np.cumsum(random.normal(0, roughness, (150, joints)), axis=0) / 10, axis=0)
     walk = np.clip(walk, -6.0, 6.0)
-    limiter = at_rest(np.zeros(joints), limits, H)
+    limiter = at_rest(np.zeros(joints), limits)
     out = followed(limiter, walk)
     way = np.abs(out[-1] - walk[-1]).max()
     ramps = limits.velocity / limits.acceleration + 4 * limits.acceleration / limits.jerk
@@ -78,7 +78,7 @@ def test_after_catching_up_with_what_moves_it_passes_to_the_bit_again(motion, ju
     """The closer, the slower: as fast as the signal could still brake, so that it is not overshot."""
     time = np.arange(2500) * H
     walk = np.stack([motion(time) + jump * (time > 1.0), 0.1 * motion(time)], axis=1)
-    limiter = at_rest(walk[0], PAPER, H)
+    limiter = at_rest(walk[0], PAPER)
     out = followed(limiter, walk[1:])
     assert_within(out, beyond=(2e-6, 1e-5))
     equal = out == walk
@@ -115,7 +115,7 @@ def test_a_limit_that_falls_in_motion_is_kept_to_what_jerk_needs(seed):
     time = np.arange(1500) * H
     walk = swing * (1 - np.cos(random.uniform(2, 6) * time))[:, None] ** 2
     torque = Narrow(lambda asked: 1.0 + 0.7 * (1 + np.cos(0.01 * asked)))
-    limiter = at_rest(np.zeros(3), PAPER, H, torque=torque)
+    limiter = at_rest(np.zeros(3), PAPER, torque=torque)
     excess, before = 0.0, (limiter.q, limiter.q)
     for point, last in zip(walk[1:], walk, strict=False):
         q = limiter.follow(point, (point - last) / H)
@@ -129,7 +129,7 @@ def test_a_limit_that_falls_in_motion_is_kept_to_what_jerk_needs(seed):
 def test_a_joint_whose_torque_is_low_still_stops_inside_its_range(speed):
     """Its stop is judged by the acceleration that the torque permits, which is what it stops with."""
     reach, weak = 2.0, Narrow(lambda _: 4.0)
-    limiter = at_rest(np.zeros(2), MotionLimits(3.0, 40.0, 2000.0), H, reach=np.full(2, reach), torque=weak)
+    limiter = at_rest(np.zeros(2), MotionLimits(3.0, 40.0, 2000.0), reach=np.full(2, reach), torque=weak)
     ramp = np.minimum(speed * H * np.arange(4000), reach)
     out = followed(limiter, np.column_stack((ramp, -ramp)))
     assert np.abs(out).max() <= reach
@@ -161,7 +161,7 @@ def test_limits_hold_by_differences_and_the_end_is_exact(ends, velocity, acceler
     of ruckig's own polynomials is some ten times more.
     """
     start, target = np.array(ends).T
-    motion = quickest_motion(JointLine(start, target), MotionLimits(velocity, acceleration, jerk), H)
+    motion = quickest_motion(JointLine(start, target), MotionLimits(velocity, acceleration, jerk))
     assert motion.duration < 300.0
     points = played(motion, start)
     assert (points[-1] == target).all()
@@ -177,7 +177,7 @@ TOLERANCE = 1.002
 
 def with_speeds(speeds, limits=PAPER, most=20_000):
     """A motion from Q1 to Q3 with the speed given at each tick; positions, and rates after each tick."""
-    motion = quickest_motion(JointLine(Q1, Q3), limits, H)
+    motion = quickest_motion(JointLine(Q1, Q3), limits)
     q, rates = [Q1, Q1], []
     for tick in range(most):
         motion.speed = speeds(tick)

@@ -41,17 +41,17 @@ def at(activity: Activity, **changes) -> Robot:
     if activity in {Activity.POWER_OFF, Activity.IDLE}:
         robot.send(SimulationReset, mode=activity.value)
     elif activity in {Activity.STREAMING, Activity.ENDING}:
-        robot.stream(200)
+        robot.stream(100)
         if activity is Activity.ENDING:
             robot.send(c.ServoStop)
     elif activity is Activity.GUIDED:
         robot.send(m.ServoJ, q=Q3_)
-        robot.tick(100)
+        robot.tick(40)
     elif activity is Activity.PROTECTIVE_STOP:
         robot.send(SimulationInject, fault="protective_stop")
     elif activity is not Activity.REST:
         robot.send(c.MoveJ, q=Q3_)
-        robot.tick(300)
+        robot.tick(120)
         ends = {
             Activity.PAUSED: (c.Pause, {}),
             Activity.STOPPING: (c.Stop, {}),

@@ -170,7 +170,7 @@ def test_one_that_measures_what_is_no_number_stops_the_robot(field):
     step = plant.step
     plant.step = lambda command: replace(step(command), **{field: np.full(6, np.nan)})
     robot.tick()
-    assert any("no number" in (event.why or "") for event in robot.events)
+    assert any("not finite numbers" in (event.why or "") for event in robot.events)
     assert modes(robot)[1] is SafetyMode.FAULT
 
 
@@ -458,7 +458,11 @@ def test_what_no_robot_can_say_stops_it_and_names_the_field(arm, said):
 def test_what_it_would_not_get_is_refused(robot):
     for command, given, words in (
         (SetIo, {"digital_output_mask": 1, "digital_outputs": 1}, "only set-points are sent"),
-        (c.SetPayload, {"mass": 1.0, "com": (0.0, 0.0, 0.0), "inertia": (0.0,) * 6}, "tell it first"),
+        (
+            c.SetPayload,
+            {"mass": 1.0, "com": (0.0, 0.0, 0.0), "inertia": (0.0,) * 6},
+            "change it there first",
+        ),
         (c.SetShaper, {"name": "elastic"}, "takes positions only"),
     ):
         reply = robot.send(command, **given)

@@ -11,8 +11,8 @@ from .robots import Q1, Q2, Q3, Robot
 
 ALL = [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
 """Where the program `paper.urp` goes."""
-LONG = 3000
-"""Ticks that are enough for a line."""
+LONG = 600
+"""Ticks in which a line would begin and a stop ends."""
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.paths.poses import placement_vector
+from tvist_controller.kinematics.pose import placement_vector
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetRegisters
 from tvist_protocol.motions import MoveL
@@ -100,11 +100,11 @@ FORCE = "force_mode(p[0,0,0,0,0,0], {}, [0,0,1,0,0,0], {}, {})"
     ("movel(p[1e8, 0, 0, 0, 0, 0])", "pose[0] is 1e+08: it must be from -1000 to 1000"),
     ("movec(get_target_tcp_pose(), p[0, -1e8, 0, 0, 0, 0])", "pose_to[1] is -1e+08"),
     ("set_tcp(p[1e160, 0, 0, 0, 0, 0])", "tcp[0] is 1e+160: it must be from -10 to 10"),
-    ("set_payload(99)", "rated for 5"),
+    ("set_payload(99)", "at most 5 kg, the arm's rating"),
     ("set_payload(1e300)", "m is 1e+300: it must be from 0 to 100"),
     ("set_target_payload(1, [0, 0, 3])", "cog[2] is 3: it must be from -2 to 2"),
-    ("set_target_payload(1, [0, 0, .05], [.001, .001, .0022, 0, 0, 0])", "no body has these moments of inertia"),
-    ("set_target_payload(1, [0, 0, .05], [1, 1, 1, 3, 0, 0])", "no body has these moments of inertia"),
+    ("set_target_payload(1, [0, 0, .05], [.001, .001, .0022, 0, 0, 0])", "the moments of inertia of a real body"),
+    ("set_target_payload(1, [0, 0, .05], [1, 1, 1, 3, 0, 0])", "the moments of inertia of a real body"),
     ("set_gravity([0, 9.82, 0])", "stands upright"),
     ("get_inverse_kin(p[10,0,0,0,0,0])", "no joint positions reach"),
     ("get_actual_joint_positions_history(5000)", "steps is 5000"),
@@ -121,13 +121,26 @@ FORCE = "force_mode(p[0,0,0,0,0,0], {}, [0,0,1,0,0,0], {}, {})"
     ("socket_read_binary_integer(31)", "number is 31"),
     ("socket_send_int(2147483648)", "value is"),
     ("direct_torque([0, 0, 0, 0, 0, 0])", "does not simulate torque control"),
+    ("set_tool_analog_input_domain(2, 0)", "port is 2: it must be from 0 to 1"),
+    ("set_tool_output_mode(2)", "mode is 2: it must be from 0 to 1"),
+    ("set_tool_communication(True, 9601, 0, 1, 1.5, 3.5)", "baud_rate is 9601: it must be one of 9600"),
+    ("set_tool_communication(True, 9600, 0, 1, 0.5, 3.5)", "rx_idle_chars is 0.5: it must be from 1 to 40"),
+    ('set_gp_boolean_input_action(128, "default")', "port is 128: it must be from 0 to 127"),
+    ('set_standard_digital_input_action(0, "stop")', 'action is stop: it must be "default" or "freedrive"'),
+    ("jerk_gain_scaling_set(0)", "gain is 0: it must be from 0.01 to 1"),
+    ("set_base_acceleration([0.1, 0, 0])", "the simulated arm's base stands"),
+    ("set_runstate_tool_digital_output_to_value(2, 1)", "outputId is 2: it must be from 0 to 1"),
+    ("set_runstate_standard_digital_output_to_value(0, 6)", "whether the arm has power are not simulated"),
+    ("time(2)", "mode is 2; this controller has no clock of the day"),
+    ('modbus_add_signal("1.2.3.4", 255, 0, 0, "x", True)', "does not simulate Modbus"),
+    ("x = struct(a=1)\nx.go(1)", "go: this controller does not simulate remote procedure calls and Ethernet/IP"),
 ])  # fmt: skip
 def test_what_cannot_be_done_ends_the_program_at_its_call_and_the_arm_stays(call, why):
     robot = a_robot()
     run(robot, "textmsg(1)", call, "textmsg(2)")
     error = failure(robot)
     assert why in error.why
-    assert (error.line, error.column, error.program) == (3, 3, "prog")
+    assert (error.line, error.column, error.program) == (3 + call.count("\n"), 3, "prog")
     assert said(robot) == ["1"]
     assert all(state.reference_q == list(URSIM) for state in robot.states)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.programs.checking import check_program
+from tvist_controller.programs.compiling import check_program
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import known_signatures
 from tvist_controller.programs.table import page
@@ -61,28 +61,6 @@ def test_a_preamble_is_accepted_and_what_it_sets_shows_in_rtde():
     snapshot = Instruments(UR5E).snapshot(robot.states[-1], robot.controller.io())
     assert (snapshot.tool_analog_input_types, snapshot.tool_output_mode) == (2, 1)
     assert (snapshot.tool_digital_output0_mode, snapshot.tool_digital_output1_mode) == (2, 3)
-
-
-@pytest.mark.parametrize(
-    ("call", "why"),
-    [
-        ("set_tool_analog_input_domain(2, 0)", "port is 2: it must be from 0 to 1"),
-        ("set_tool_output_mode(2)", "mode is 2: it must be from 0 to 1"),
-        ("set_tool_communication(True, 9601, 0, 1, 1.5, 3.5)", "baud_rate is 9601: it must be one of 9600"),
-        ("set_tool_communication(True, 9600, 0, 1, 0.5, 3.5)", "rx_idle_chars is 0.5: it must be from 1 to 40"),
-        ('set_gp_boolean_input_action(128, "default")', "port is 128: it must be from 0 to 127"),
-        ('set_standard_digital_input_action(0, "stop")', 'action is stop: it must be "default" or "freedrive"'),
-        ("jerk_gain_scaling_set(0)", "gain is 0: it must be from 0.01 to 1"),
-        ("set_base_acceleration([0.1, 0, 0])", "the simulated arm's base stands"),
-        ("set_runstate_tool_digital_output_to_value(2, 1)", "outputId is 2: it must be from 0 to 1"),
-        ("set_runstate_standard_digital_output_to_value(0, 6)", "whether the arm has power are not simulated"),
-        ("time(2)", "mode is 2; this controller has no clock of the day"),
-        ('modbus_add_signal("1.2.3.4", 255, 0, 0, "x", True)', "does not simulate Modbus"),
-        ("x = struct(a=1)\n  x.go(1)", "go: this controller does not simulate remote procedure calls and Ethernet/IP"),
-    ],
-)  # fmt: skip
-def test_what_does_not_fit_ends_the_program_with_name_value_and_limit(call, why):
-    assert why in failure(run(a_robot(), call)).why
 
 
 @pytest.mark.parametrize(

@@ -140,10 +140,10 @@ def end_of(host, sink):
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        ({"q": Q1[:5]}, "q has 5 angles; the arm has 6"),
+        ({"q": Q1[:5]}, "q has 5 values: must be 6, one per joint"),
         ({"q": (math.nan, *Q1[1:])}, "q[0] is NaN, not a number"),
         ({"q": (*Q1[:5], math.inf)}, "q[5] is inf: must be at most 1000"),
-        ({"q": (*Q1[:5], 6.5)}, "q[5] is 6.5 rad; the joint goes to ±6.28319"),
+        ({"q": (*Q1[:5], 6.5)}, "q[5] is 6.5 rad: must be within ±6.28319 rad"),
     ],
 )
 def test_the_end_of_a_silent_stream_names_the_last_refusal(streaming, fault, said):

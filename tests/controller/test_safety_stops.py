@@ -132,7 +132,7 @@ def test_brakes_bring_the_arm_to_rest_and_take_energy_all_the_way(seed):
     """Joints never speed up by the brakes themselves, each stays once it rests, and all rest in the end."""
     random = np.random.default_rng(seed)
     state = Target(random.uniform(-3, 3, 6), random.uniform(-3, 3, 6), np.zeros(6))
-    way = brake(UR5E, body(paper_payload(UR5E, float(random.uniform(0, 5)))), state, H)
+    way = brake(UR5E, body(paper_payload(UR5E, float(random.uniform(0, 5)))), state)
     q = [state.q]
     while not way.finished:
         q.append(way.next())

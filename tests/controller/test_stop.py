@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tvist_controller.foresight.stops import DECELERATION_RATIO, StopPlanner
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Target
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GENTLEST_STOP, TORQUE_SHARE, StopTorque, acceleration_on_way
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_protocol import commands as c
@@ -101,7 +101,7 @@ LIMITS = UR5E.limits
 def plan(q, qd, qdd, wanted=None, *, payload=DISC, description=UR5E, clear=lambda _: True):
     """The stop of every joint by itself, as a stream is stopped."""
     state = Target(*(np.array(values, dtype=float) for values in (q, qd, qdd)))
-    planner = StopPlanner(description, InverseDynamics(description, payload), H)
+    planner = StopPlanner(description, InverseDynamics(description, payload))
     return planner.by_joints(state, wanted, clear)
 
 
@@ -116,7 +116,7 @@ def test_of_all_decelerations_that_keep_the_torque_the_hardest_is_taken(seed):
     state = Target(*map(np.array, moving(seed)))
     stop = plan(*state.__reduce__()[1])
     torque = StopTorque(InverseDynamics(UR5E, DISC), state, np.array(LIMITS.torque))
-    planner = StopPlanner(UR5E, InverseDynamics(UR5E, DISC), H)
+    planner = StopPlanner(UR5E, InverseDynamics(UR5E, DISC))
     tried = [min(LIMITS.acceleration) * DECELERATION_RATIO**k for k in range(16)]
     held = [a for a in tried if torque.holds(planner.stop(state, a))]
     if held:
@@ -174,7 +174,7 @@ def test_a_motion_with_the_acceleration_that_its_way_leaves_keeps_its_share_of_t
     line, dynamics, most = JointLine(start, target), InverseDynamics(UR5E, DISC), np.array(LIMITS.torque)
     velocity = random.uniform(0.5, 3.1)
     room = acceleration_on_way(dynamics, line, start, target - start, velocity, most)
-    motion, q = quickest_motion(line, MotionLimits(velocity, room, 2000.0), H), [start, start]
+    motion, q = quickest_motion(line, MotionLimits(velocity, room, 2000.0)), [start, start]
     while not motion.finished:
         q.append(motion.next())
     q = np.array(q)

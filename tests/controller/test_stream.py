@@ -9,11 +9,12 @@ from tests.plant.arms import chain
 
 from tvist_controller.foresight import clearance
 from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line import differentiator
 from tvist_controller.line import limits as line_limits
 from tvist_controller.line.differentiator import Target
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import TORQUE_SHARE, StreamTorqueMargin
+from tvist_controller.line.line_tick import TORQUE
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import JointStop, MotionLimits, SetpointStream, limiter, stream
 from tvist_plant.description import load
@@ -30,7 +31,7 @@ def regular(function, count, *, every=1, first=0):
 
 
 def start(period=H, limits=PAPER, q=(0.0,)):
-    return SetpointStream(np.array(q, dtype=float), period, limits, H)
+    return SetpointStream(np.array(q, dtype=float), period, limits)
 
 
 def gentle(time, amplitude=0.2, omega=2.0):
@@ -208,7 +209,7 @@ def test_the_shaped_torque_stays_within_its_share_whatever_the_stream_asks_for(s
     for k, q in enumerate(motion(np.arange(900) * H)):
         stream.offer(k, start + q)
         samples.append(line.step())
-    shares = np.abs([sample.torque for sample in samples]) / MOST
+    shares = np.abs([sample.signals[TORQUE] for sample in samples]) / MOST
     assert shares.max() <= TORQUE_SHARE * 1.002
     asked = np.array([start + q for q in motion(np.arange(900) * H)])
     needed = [
@@ -228,7 +229,7 @@ MOTIONS = {
 
 
 def begin(motion, period, limits=PAPER):
-    return SetpointStream(motion(np.zeros(1))[0], period, limits, H)
+    return SetpointStream(motion(np.zeros(1))[0], period, limits)
 
 
 def follow(motion, period, limits=PAPER, **network_):
@@ -297,7 +298,7 @@ def test_whatever_comes_stays_finite_in_range_and_inside_the_limits(seed, period
     arrivals = network(
         motion, period, 1.0, seed=seed, jitter=jitter, loss=0.2, twice=0.2, burst=random.integers(1, 12)
     )
-    stream = SetpointStream(np.zeros(2), period, limits, H, reach=reach)
+    stream = SetpointStream(np.zeros(2), period, limits, reach=reach)
     out = played(stream, arrivals, 700)
     velocity, acceleration, jerk = (np.abs(np.diff(out, n, axis=0)).max() / H**n for n in (1, 2, 3))
     assert np.isfinite(out).all()
@@ -335,7 +336,7 @@ def test_a_stream_is_played_alike_in_python_to_the_bit(period, share, in_python)
     room = StreamTorqueMargin(UR5E, InverseDynamics(UR5E, UR5E.payload))
 
     def play():
-        stream = SetpointStream(np.zeros(6), period, PAPER, H, reach=np.full(6, 6.28), torque=room)
+        stream = SetpointStream(np.zeros(6), period, PAPER, reach=np.full(6, 6.28), torque=room)
         return played(stream, arrivals, 600), stream.limited
 
     (compiled, limited), (plain, limited_plain) = play(), in_python(play)
@@ -370,7 +371,7 @@ def test_the_stop_in_closed_form_is_ruckigs(limit):
     for scale in (1e-3, 1.0):
         qd, qdd = scale * random.uniform(-3, 3, 40), scale * random.uniform(-60, 60, 40)
         qd[:4], qdd[4:8] = 0.0, 0.0
-        stop = JointStop(np.zeros(40), qd, qdd, acceleration=limit, jerk=2000.0, period=H)
+        stop = JointStop(np.zeros(40), qd, qdd, acceleration=limit, jerk=2000.0)
         durations = []
         for j, (v, a) in enumerate(zip(qd.tolist(), qdd.tolist(), strict=True)):
             phases = clearance.stop_phases(v, a, limit, 2000.0)
@@ -393,7 +394,7 @@ def test_a_stop_that_is_proved_clear_is_found_clear(arm):
         q, qd, qdd = random.uniform(-1, 1, (3, joints)) * [[2.0], [2.0], [9.0]]
         state, limit = Target(q, qd, qdd), float(random.choice([2.0, 9.0, 40.0]))
         spacious = model.stop_is_spacious(state, limit, 2000.0)
-        stop = JointStop(q, qd, qdd, acceleration=limit, jerk=2000.0, period=H)
+        stop = JointStop(q, qd, qdd, acceleration=limit, jerk=2000.0)
         free = all(model.meeting(stop.at(time)[0]) is None for time in np.linspace(0.0, stop.duration, 60))
         assert spacious <= free
         turned = np.abs(qd) * stop.duration + 0.01

@@ -15,7 +15,7 @@ from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.report import Report, truth_of
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.line.cycle import ControlCycle
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance

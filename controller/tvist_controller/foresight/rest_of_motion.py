@@ -122,7 +122,7 @@ class StreamGuard(Guard):
         jerk = self._stops.jerk if jerk is None else jerk
         fastest = _fastest(qd, qdd, jerk)
         ramps = (acceleration + np.abs(qdd)) / jerk
-        return np.asarray(fastest * (fastest / (2.0 * acceleration) + ramps + self._stops.period))
+        return np.asarray(fastest * (fastest / (2.0 * acceleration) + ramps + PERIOD))
 
 
 def _fastest(qd: Floats, qdd: Floats, jerk: float) -> Floats:

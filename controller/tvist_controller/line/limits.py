@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Floats, Target, central_differences
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.trajectory import AnyStop, MotionLimits, Path
 from tvist_plant.chain import collect_inertia, torques
 from tvist_plant.description import RobotDescription
@@ -185,10 +185,9 @@ def acceleration_on_way(
     return max(room, 0.0)
 
 
-def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:
+def torque_along(dynamics: InverseDynamics, references: Floats) -> Floats:
     """Return the largest torques along references (k >= 3, n) [rad] by central differences, (n,) [N m]."""
-    q, qd, qdd = central_differences(references, period)
+    q, qd, qdd = central_differences(references)
     looked = np.append(np.arange(0, len(q) - 1, LOOK_EVERY), len(q) - 1)
     states = zip(q[looked], qd[looked], qdd[looked], strict=True)
-    most: Floats = np.max([dynamics.effort(*state) for state in states], axis=0)
-    return most
+    return np.asarray(np.max([dynamics.effort(*state) for state in states], axis=0))

@@ -7,7 +7,7 @@ import numpy as np
 
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.monitor import Monitor, MonitorFinding
 from tvist_plant.plant import PERIOD
 
