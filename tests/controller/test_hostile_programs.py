@@ -59,7 +59,7 @@ def spending(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", [*range(4), 12, 93, 156])
-def test_no_tick_spends_more_than_the_budget_whatever_the_programs_do(seed, monkeypatch):
+def test_no_tick_exceeds_the_evaluation_budget_with_hostile_programs(seed, monkeypatch):
     """All programs of the robot together; a statement that a tick began late is borne by the next one."""
     robot, beside, _ = begin(seed)
     spent = spending(monkeypatch)
@@ -77,7 +77,7 @@ def test_no_tick_spends_more_than_the_budget_whatever_the_programs_do(seed, monk
 
 
 @pytest.mark.parametrize("seed", [6, 81, 240, 490])
-def test_few_ticks_plan_or_stop_whatever_the_programs_do(seed, monkeypatch):
+def test_hostile_programs_cause_few_plans_and_stops(seed, monkeypatch):
     """Threads that are killed while they move, and short moves in quick succession, are held back."""
     robot, beside, _ = begin(seed)
     plans, stops = Counts(monkeypatch, Planner, "plan"), Counts(monkeypatch, Stopper, "plan_stop")
@@ -119,7 +119,7 @@ def written(robot):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_what_has_ended_or_stopped_does_nothing_any_more(seed):
+def test_ended_or_stopped_programs_have_no_further_effects(seed):
     """Not even in the same tick: after a stop no output, register or message changes, and no motion begins."""
     robot = a_robot()
     player = robot.controller.programs
@@ -158,7 +158,7 @@ def little_memory():
 
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 3000), marks=pytest.mark.nightly)])
-def test_a_random_program_with_odd_numbers_ends_alone(seeds, little_memory, monkeypatch):
+def test_random_programs_with_odd_numbers_raise_no_exception(seeds, little_memory, monkeypatch):
     """Nothing is raised out of a tick, or by a function that does not blame its arguments."""
     spent = spending(monkeypatch)
     for seed in seeds:
@@ -187,7 +187,7 @@ def fails(*_):
     raise ArithmeticError("on purpose")
 
 
-def test_a_plan_that_fails_ends_its_program_which_names_the_line_and_is_logged(monkeypatch):
+def test_a_failing_plan_ends_its_program_with_its_line_and_is_logged(monkeypatch):
     robot, heard = a_robot(), Heard()
     monkeypatch.setattr(robot.controller.plans, "_order", lambda *_: fails)
     start(robot, "sync()", "movel(p[0.1, -0.4, 0.3, 2, 2, 0])")
@@ -200,7 +200,7 @@ def test_a_plan_that_fails_ends_its_program_which_names_the_line_and_is_logged(m
 
 
 @pytest.mark.parametrize(("part", "name"), [("motion", "step"), ("programs", "advance"), ("motion", "stop")])
-def test_what_fails_stops_the_robot_which_goes_on_when_it_is_unlocked(part, name, monkeypatch):
+def test_an_internal_failure_causes_a_protective_stop_that_can_be_unlocked(part, name, monkeypatch):
     robot, heard = a_robot(), Heard()
     host, owner = Host(robot.controller, heard, survives=True), getattr(robot.controller, part)
     start(robot, "sleep(1)")

@@ -44,9 +44,7 @@ def followed(limiter: Limiter, points) -> np.ndarray:
         jerk=st.floats(10.0, 2000.0),
     ),
 )
-def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalled(
-    seed, joints, roughness, limits
-):
+def test_the_limiter_keeps_limits_and_catches_up_with_random_walks(seed, joints, roughness, limits):
     random = np.random.default_rng(seed)
     walk = np.cumsum(np.cumsum(random.normal(0, roughness, (150, joints)), axis=0) / 10, axis=0)
     walk = np.clip(walk, -6.0, 6.0)
@@ -74,7 +72,7 @@ def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalle
         lambda t: 0.05 * (1 - np.cos(2.5 * t)) ** 2,
     ],
 )
-def test_after_catching_up_with_what_moves_it_passes_to_the_bit_again(motion, jump):
+def test_the_limiter_passes_a_moving_signal_unchanged_after_catching_up(motion, jump):
     """The closer, the slower: as fast as the signal could still brake, so that it is not overshot."""
     time = np.arange(2500) * H
     walk = np.stack([motion(time) + jump * (time > 1.0), 0.1 * motion(time)], axis=1)
@@ -108,7 +106,7 @@ class Narrow:
 
 @examples(10)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_a_limit_that_falls_in_motion_is_kept_to_what_jerk_needs(seed):
+def test_a_falling_torque_limit_is_kept_within_the_jerk_limit(seed):
     """Acceleration is taken back at the jerk limit; until then it is beyond by what the limit fell."""
     random = np.random.default_rng(seed)
     swing = random.uniform(0.02, 0.1, 3)
@@ -126,7 +124,7 @@ def test_a_limit_that_falls_in_motion_is_kept_to_what_jerk_needs(seed):
 
 
 @pytest.mark.parametrize("speed", [0.3, 1.0, 2.5])
-def test_a_joint_whose_torque_is_low_still_stops_inside_its_range(speed):
+def test_a_joint_with_little_torque_stops_inside_its_range(speed):
     """Its stop is judged by the acceleration that the torque permits, which is what it stops with."""
     reach, weak = 2.0, Narrow(lambda _: 4.0)
     limiter = at_rest(np.zeros(2), MotionLimits(3.0, 40.0, 2000.0), reach=np.full(2, reach), torque=weak)
@@ -154,7 +152,7 @@ def played(motion: PlannedMotion, start) -> np.ndarray:
     acceleration=st.floats(0.5, 40.0),
     jerk=st.floats(10.0, 2000.0),
 )
-def test_limits_hold_by_differences_and_the_end_is_exact(ends, velocity, acceleration, jerk):
+def test_planned_motions_keep_limits_by_differences_and_end_exactly(ends, velocity, acceleration, jerk):
     """Differences over a tick are means over it, and so within the limits; the last tick is cut at the target.
 
     Rounding of ε = 2e-16 in 2π is worth 2ε·2π/h in velocity, 4ε·2π/h² in acceleration, 8ε·2π/h³ in jerk; that
@@ -194,7 +192,7 @@ def accelerations(q):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_whatever_the_slider_does_acceleration_and_velocity_stay_inside_the_limits(seed):
+def test_speed_changes_keep_velocity_and_acceleration_limits(seed):
     random = np.random.default_rng(seed)
     speeds = np.repeat(random.choice([0.0, 0.1, 0.5, 0.8, 1.0], 400), random.integers(5, 200, 400))
     q, _ = with_speeds(lambda tick: float(speeds[tick]) if tick < len(speeds) else 1.0)
@@ -203,7 +201,7 @@ def test_whatever_the_slider_does_acceleration_and_velocity_stay_inside_the_limi
     assert np.array_equal(q[-1], Q3)
 
 
-def test_half_speed_from_the_start_takes_twice_as_long_on_the_same_way():
+def test_half_speed_takes_twice_as_long_on_the_same_path():
     robot = Robot()
     assert robot.send(c.SetSpeed, fraction=0.5) == Done()
     robot.send(c.SetShaper, name="none")
@@ -219,7 +217,7 @@ def test_half_speed_from_the_start_takes_twice_as_long_on_the_same_way():
     assert {state.speed_scaling for state in robot.states} == {0.5}
 
 
-def test_a_pause_brings_the_arm_to_rest_on_its_way_and_resume_takes_it_to_the_target():
+def test_pause_stops_on_the_path_and_resume_continues_to_the_target():
     robot = Robot()
     robot.send(c.MoveJ, q=tuple(Q3))
     robot.tick(500)

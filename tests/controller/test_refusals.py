@@ -211,16 +211,16 @@ def assert_refused(robot, twin, table):
 
 
 @pytest.mark.parametrize("begin", [Robot.tick, moving, Robot.stream])
-def test_wrong_content_is_refused_and_changes_nothing(begin):
+def test_invalid_commands_are_refused_and_change_nothing(begin):
     """Before it is looked at what the arm does."""
     assert_refused(*alike(begin), WRONG)
 
 
-def test_what_cannot_be_planned_is_refused_and_changes_nothing():
+def test_impossible_paths_are_refused_and_change_nothing():
     assert_refused(*alike(Robot.tick, q=tuple(BENT), plant=NoArm()), PLANNED)
 
 
-def test_a_stale_token_is_refused_first_of_all():
+def test_a_stale_token_is_refused_before_other_checks():
     robot, twin = alike(moving)
     wrong = [
         (kind, fields) for kind, fields, *_ in WRONG if kind is not c.TakeControl and "token" not in fields
@@ -232,7 +232,7 @@ def test_a_stale_token_is_refused_first_of_all():
         assert_unchanged(robot, twin, 3)
 
 
-def test_a_step_s_set_points_are_checked():
+def test_set_points_of_a_step_are_checked():
     robot = Robot()
     robot.send(c.ServoStart)
     good, bad = StepSetpoint(sequence=0, q=Q1_), StepSetpoint(sequence=1, q=(9.0, *Q1_[1:]))
@@ -250,14 +250,14 @@ def test_a_step_s_set_points_are_checked():
         *({"q": q} for q in (Q1_[:5], (*Q1_, 0.0), (7.0, *Q1_[1:]), (NAN, *Q1_[1:]))),
     ],
 )
-def test_a_wrong_set_point_is_counted_and_dropped(setpoint):
+def test_an_invalid_set_point_is_counted_and_dropped(setpoint):
     robot, twin = alike(Robot.stream)
     robot.setpoint(**({"sequence": 100, "q": Q1_} | setpoint))
     assert robot.controller.counters.setpoints_refused == 1
     assert_unchanged(robot, twin)
 
 
-def test_a_move_that_would_last_for_hours_is_refused():
+def test_a_move_lasting_hours_is_refused():
     wide = msgspec.structs.replace(UR5E.limits, position=(1e3,) * 6)
     robot = Robot(msgspec.structs.replace(UR5E, limits=wide))
     reply = robot.send(c.MoveJ, q=(900.0, *Q1_[1:]), velocity=0.01)
@@ -266,7 +266,7 @@ def test_a_move_that_would_last_for_hours_is_refused():
 
 
 @pytest.mark.parametrize("name", BUILT_IN.names())
-def test_every_shaper_that_is_named_can_be_chosen(name):
+def test_every_built_in_shaper_can_be_chosen(name):
     modes = wanted_modes(name, 1, "name")
     f_d, zeta = [10.0, 20.0, 40.0, 80.0], [0.1, 0.1, 0.08, 0.08]
     assert choose_filter(name, Fixed(f_d[:modes], zeta[:modes]), 6).name == name
@@ -282,7 +282,7 @@ def estimator(own=None, **fields):
     return choose_source(c.SetEstimator(token="", **fields), setup(calibration=own))
 
 
-def test_a_calibration_comes_as_a_map_or_by_its_name_or_is_the_server_s_own():
+def test_a_calibration_is_given_as_a_map_by_name_or_by_the_setup():
     source = estimator(name="polynomial", calibration=content(name="mine"))
     assert source.calibration.name == "mine"
     assert source.estimator(1, DISC).f_d_min == 5.0
@@ -291,7 +291,7 @@ def test_a_calibration_comes_as_a_map_or_by_its_name_or_is_the_server_s_own():
         assert estimator(own, name="polynomial", calibration=named).calibration is own
 
 
-def test_the_number_of_modes_is_that_of_the_estimator_or_the_filter_s_own():
+def test_the_number_of_modes_is_limited_by_estimator_and_filter():
     source = estimator(name="fixed", f_d=(8.0, 15.0), zeta=(0.2, 0.1))
     assert source.estimator(2, DISC).modes == 2
     reply = refused(make_estimator, source, 3, DISC, "modes")

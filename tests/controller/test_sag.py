@@ -63,7 +63,7 @@ def random_payload(random):
 
 
 @pytest.mark.parametrize("arm", [UR5E, UR5E.clean(), UR5E.quiet()], ids=["real", "clean", "quiet"])
-def test_a_resting_arm_is_on_its_target_in_any_posture_with_any_payload(arm):
+def test_sag_compensation_places_a_resting_arm_on_its_target(arm):
     random, sagged = np.random.default_rng(7), 0.0
     compensated, plain = line(arm), line(arm, compensated=False)
     for _ in range(40):
@@ -80,7 +80,7 @@ def test_a_resting_arm_is_on_its_target_in_any_posture_with_any_payload(arm):
 
 
 @pytest.mark.parametrize(("name", "mass"), [("none", 0.0), ("zv", 5.0)])
-def test_friction_leaves_the_arm_on_its_target_a_fifth_of_a_second_after_a_move(name, mass):
+def test_sag_compensation_holds_after_a_move_despite_friction(name, mass):
     for start, end in ((Q1, Q3), (Q1, Q2)):
         cycle = line(mass=mass, q=start, name=name)
         samples = play(cycle, cycle.plan(end, PAPER), rest=600)
@@ -93,7 +93,7 @@ def leads(found):
     return lead, np.diff(lead, axis=0) / H, np.diff(lead, 2, axis=0) / H**2
 
 
-def test_in_motion_the_lead_moves_without_steps_and_as_little_as_the_twist_that_it_compensates():
+def test_sag_compensation_changes_smoothly_in_motion():
     """Of 3.3 mrad, over a motion of two seconds; the wind-up feed-forward is the same with and without."""
     found = {}
     for compensated in (True, False):

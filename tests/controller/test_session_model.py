@@ -513,11 +513,11 @@ def check(clock, full):
 
 
 @FULL
-def test_every_reply_and_every_change_is_as_the_table_says(full):
+def test_random_sessions_match_the_model_in_real_time(full):
     check("realtime", full)
 
 
 @pytest.mark.parametrize("clock", ["lockstep", "free"])
 @FULL
-def test_time_passes_by_the_steps_of_who_may_and_by_nothing_else(full, clock):
+def test_random_sessions_match_the_model_with_stepped_time(full, clock):
     check(clock, full)

@@ -142,7 +142,7 @@ def server():
 @pytest.mark.parametrize(
     "count", [2_000, pytest.param(30_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
-def test_every_message_is_answered_and_a_refused_one_changes_nothing(server, count):
+def test_every_message_gets_a_reply_and_refused_ones_change_nothing(server, count):
     @settings(
         max_examples=share(count // TOGETHER),
         deadline=None,
@@ -166,7 +166,7 @@ def test_every_message_is_answered_and_a_refused_one_changes_nothing(server, cou
     run()
 
 
-def test_a_flood_of_messages_leaves_nothing_behind(server):
+def test_a_flood_of_messages_leaks_no_memory(server):
     """Memory after the second half of it is what it was after the first."""
     sent = []
 

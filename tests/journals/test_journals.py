@@ -52,7 +52,7 @@ AS_MADE = MADE_ON.read_text(encoding="utf-8").strip() == processor()
 """Whether this processor computes as the one that made the runs did: then not a bit may differ."""
 
 
-def test_a_run_that_is_made_anew_has_what_clients_sent_and_what_the_robot_does(tmp_path):
+def test_a_remade_journal_has_the_same_inputs_and_events(tmp_path):
     before, made = FOLDER / "live_lost_lease.mcap", tmp_path / "made.mcap"
     make(before, made)
     old, new = read(before), read(made)
@@ -64,7 +64,7 @@ def test_a_run_that_is_made_anew_has_what_clients_sent_and_what_the_robot_does(t
 @pytest.mark.parametrize(
     "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.nightly) for name in OTHERS)]
 )
-def test_a_recorded_run_comes_out_again(name):
+def test_recorded_runs_are_reproduced(name):
     content = read(FOLDER / f"{name}.mcap")
     again = replay_file(content)
     assert again.notes == []  # such as that a scene is another one now
@@ -77,7 +77,7 @@ def test_a_recorded_run_comes_out_again(name):
 
 
 @pytest.mark.nightly
-def test_what_is_compiled_for_any_processor_gives_the_same_bits(tmp_path):
+def test_generic_kernels_give_the_same_bits(tmp_path):
     """As in the wheels of `tvist-compiled`; all that is not compiled is the same."""
     any_processor = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(tmp_path)}
     run = [sys.executable, "-c", DIGEST, *map(str, RUNS)]
@@ -89,7 +89,7 @@ def test_what_is_compiled_for_any_processor_gives_the_same_bits(tmp_path):
     assert there == here
 
 
-def test_a_run_of_another_behaviour_says_so():
+def test_a_journal_of_another_behaviour_number_adds_a_note():
     again = replay_file(replace(read(FOLDER / "live_lost_lease.mcap"), behaviour=1))
     assert any(f"is of behaviour 1, and this is {THIS_BEHAVIOUR}" in note for note in again.notes)
 

@@ -78,7 +78,7 @@ class Served:
         self.tick(round(seconds / 0.002))
 
 
-def test_a_motion_is_recorded_from_its_first_command_until_the_arm_has_rung_down():
+def test_a_motion_is_recorded_with_its_ring_down():
     student = Recalling()
     robot = Served(student)
     robot.move(Q2)
@@ -92,7 +92,7 @@ def test_a_motion_is_recorded_from_its_first_command_until_the_arm_has_rung_down
 
 
 @pytest.mark.parametrize("what", ["stopped", "soon moved again"])
-def test_a_motion_that_did_not_go_as_planned_says_so(what):
+def test_interrupted_motions_are_recorded_as_such(what):
     student = Recalling()
     robot = Served(student)
     if what == "stopped":
@@ -117,7 +117,7 @@ class Failing:
         raise OSError(28, "No space left on device")
 
 
-def test_a_study_that_fails_is_told_once():
+def test_a_failing_study_is_reported_once():
     robot = Served(Failing())
     for q in (Q2, Q1):
         robot.move(q)
@@ -162,12 +162,12 @@ def motion(deceived):
     return deceived[1].motions[0]
 
 
-def test_a_robot_that_does_not_follow_its_payload_warns_of_it(deceived):
+def test_a_wrong_payload_causes_a_warning_without_learning(deceived):
     assert {event.code for event in deceived[0].told("warning")} == {"payload_mismatch"}
 
 
 @pytest.mark.parametrize(("declared", "carried"), [(0.0, 3.0), (4.0, 1.5), (2.5, 0.0)])
-def test_one_motion_tells_what_is_carried_and_no_warning_nags(declared, carried):
+def test_one_motion_is_enough_to_learn_the_payload(declared, carried):
     robot = Following(declared, carried)
     robot.move(Q2)
     assert robot.assumed.mass == pytest.approx(carried, abs=0.2)
@@ -180,7 +180,7 @@ def test_one_motion_tells_what_is_carried_and_no_warning_nags(declared, carried)
     assert len(robot.told("learnt")) == 1
 
 
-def test_more_than_the_rating_is_said_and_the_rating_assumed():
+def test_a_learnt_payload_above_the_rating_is_limited_with_a_warning():
     robot = Following(2.0, 6.5)
     for q in (Q2, Q1):
         robot.move(q)
@@ -190,7 +190,7 @@ def test_more_than_the_rating_is_said_and_the_rating_assumed():
     assert "above its rating: 5 kg are assumed" in warning.why
 
 
-def test_lessons_come_at_rest_are_replayed_and_forgotten_to_the_last_bit():
+def test_lessons_are_applied_at_rest_replayed_and_forgotten_bit_equally():
     robot, plain = Following(1.0, 3.0), Following(1.0, 3.0, adapt=None)
     robot.move(Q2)
     taught = [entry.tick for entry in robot.host.entries if entry.kind == "lesson"]
@@ -212,7 +212,7 @@ def test_lessons_come_at_rest_are_replayed_and_forgotten_to_the_last_bit():
     assert replay(robot.setup, robot.host.entries, robot.states[1:]).first_difference is None
 
 
-def test_what_is_declared_anew_counts():
+def test_a_new_declaration_replaces_the_learnt_payload():
     robot = Following(1.0, 3.0)
     robot.move(Q2)
     assert robot.assumed.mass > 2.5
@@ -222,7 +222,7 @@ def test_what_is_declared_anew_counts():
     assert robot.host.controller.io().assumed_payload is None
 
 
-def test_an_arm_that_carries_no_weight_cannot_follow_it():
+def test_an_arm_without_gravity_load_cannot_learn_its_payload():
     with pytest.raises(StartError, match="no joint of a one-joint arm carries weight"):
         free_setup(robot="one-joint", adapt="payload")
 
@@ -241,14 +241,14 @@ def odd(motion, what):
 
 
 @pytest.mark.parametrize("what", ["short", "stopped", "hardly moving", "NaN", "huge", "pushed"])
-def test_a_motion_that_tells_nothing_teaches_nothing(motion, what):
+def test_uninformative_motions_teach_nothing(motion, what):
     assert PayloadEstimator(ROBOT).study(motion) is not None
     assert PayloadEstimator(ROBOT).study(replace(motion, **odd(motion, what))) is None
 
 
 @settings(deadline=None)
 @given(st.integers(0, 2**32), st.integers(1, 600), st.floats(1e-9, 1e9))
-def test_no_record_makes_a_payload_that_is_none(seed, ticks, size):
+def test_random_records_never_yield_an_invalid_payload(seed, ticks, size):
     random = np.random.default_rng(seed)
     q, moments = random.standard_normal((ticks, 6)), size * random.standard_normal((ticks, 6))
     record = MotionRecord(q, moments, min(ticks, 5), True, taken_for(paper_payload(ROBOT, 2.0)))
@@ -325,7 +325,7 @@ def told_and_false(rounds, seed):
 @pytest.mark.parametrize(
     "rounds", [5, pytest.param(100, marks=[pytest.mark.nightly, pytest.mark.timeout(1200)])]
 )
-def test_within_three_random_moves_a_wrong_payload_is_told_and_a_right_one_never(rounds):
+def test_a_wrong_payload_causes_a_warning_within_three_moves_a_right_one_never(rounds):
     missed, false, worst = told_and_false(rounds, seed=1)
     assert max(missed, false) <= rounds // 100
     assert rounds > 5 or worst < 0.6  # far from a false alarm
