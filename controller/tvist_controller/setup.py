@@ -100,7 +100,7 @@ class Setup:
         joints = self.description.joints
         if len(self.q) != joints:
             model = self.description.robot.model
-            raise ValueError(f"start has {len(self.q)} angles; {model} has {joints} joints")
+            raise ValueError(f"start has {len(self.q)} angles: must be {joints}, one per joint of a {model}")
         if placed:
             self._check_start()
         if self.hidden is not None and (self.truth or self.plant is not None):

@@ -1,10 +1,10 @@
-"""Power, protective stops and reduced speed: what the table of transitions says is what happens."""
+"""Power, protective stops and reduced speed follow the table of transitions."""
 
 import numpy as np
 import pytest
 
 from tvist_controller.line.limits import REDUCED_SHARE
-from tvist_controller.safety.monitors import TICKS
+from tvist_controller.motion.monitors import TICKS
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
 from tvist_protocol.modes import RobotMode, SafetyMode
@@ -36,7 +36,7 @@ STOPS = {"stop", "stop_j", "stop_l"}
 
 
 def at(activity: Activity, **changes) -> Robot:
-    """A robot that does this, brought there by commands."""
+    """Return a robot brought into an activity by commands."""
     robot = Robot(**changes)
     if activity in {Activity.POWER_OFF, Activity.IDLE}:
         robot.send(SimulationReset, mode=activity.value)
@@ -104,7 +104,7 @@ def test_power_off_stops_the_arm_before_cutting_power():
 
 
 def longest_run(true) -> int:
-    """Of consecutive ticks."""
+    """Return the largest number of consecutive ticks."""
     longest = run = 0
     for each in true:
         run = run + 1 if each else 0

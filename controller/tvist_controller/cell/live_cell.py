@@ -162,8 +162,7 @@ class LiveCell:
         def meet(_: float, narrow: float) -> float | None:
             return opening if opening - narrow > STALLED else None
 
-        moved = gripper.tick(meet)
-        if moved.gripped:
+        if gripper.tick(meet).gripped:
             self._emit("text", why=f"cell: the gripper holds something {1e3 * opening:.1f} mm wide")
         hand.grip(0.0 if gripper.holds else gripper.opening, gripper.grip_force)
 

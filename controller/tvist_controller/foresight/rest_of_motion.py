@@ -166,8 +166,7 @@ class RemainingMotion:
         ahead = self._stopper.foresee()
         if ahead is None:
             return None, None
-        last = resting_after(ahead)
-        return max(last - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
+        return max(resting_after(ahead) - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 
     def after_stream(self, end: JointStop) -> CloseBodies | None:
         """Return the first meeting while the end of a stream runs through the filter, else None."""

@@ -179,13 +179,7 @@ class StopPlanner:
             return self._behind(stop, along) and stop.hardest <= self.highest
 
         stops = (
-            SlowedStop(
-                path,
-                samples,
-                acceleration=acceleration,
-                jerk=0.5 * self.jerk,
-                fastest=fastest,
-            )
+            SlowedStop(path, samples, acceleration=acceleration, jerk=0.5 * self.jerk, fastest=fastest)
             for acceleration in self._ladder(wanted)
         )
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))

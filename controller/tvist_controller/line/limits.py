@@ -181,8 +181,7 @@ def acceleration_on_way(
     gravity = dynamics.gravities(path.states(x, still, still)[0])
     resting = np.maximum(np.abs(gravity), np.abs(dynamics.torques(*path.states(x, velocity * along, still))))
     pushed = np.abs(dynamics.torques(*path.states(x, still, along)) - gravity)
-    room = float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min())
-    return max(room, 0.0)
+    return max(float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min()), 0.0)
 
 
 def torque_along(dynamics: InverseDynamics, references: Floats) -> Floats:

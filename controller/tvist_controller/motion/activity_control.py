@@ -171,11 +171,8 @@ class MotionControl:
         """Start to follow set-points; raise RefusalError if busy or above the reduced velocity limit."""
         target = self.check("servo_start")
         if (most := self.motions.slowest) is not None and limits.velocity > most:
-            value, must = (
-                f"{limits.velocity:g} rad/s",
-                f"at most {most:.3g} rad/s while safety_mode is REDUCED",
-            )
-            raise out_of_range("velocity", value, must, most, "limit_velocity")
+            must = f"at most {most:.3g} rad/s while safety_mode is REDUCED"
+            raise out_of_range("velocity", f"{limits.velocity:g} rad/s", must, most, "limit_velocity")
         self.activity = target
         self.streams.begin(self._stream(period, limits), now)
 

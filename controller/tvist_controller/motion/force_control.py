@@ -12,7 +12,7 @@ from tvist_controller.kinematics.pose import turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.guidance import Guidance
-from tvist_controller.motion.monitor import Monitor, MonitorFinding
+from tvist_controller.motion.monitors import Monitor, MonitorFinding
 from tvist_controller.refusal import wrong_mode
 from tvist_controller.trajectory import Compliant, ForceTask
 from tvist_controller.trajectory.compliant import CRAWL, FREE_DAMPING

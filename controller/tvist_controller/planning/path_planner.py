@@ -164,8 +164,8 @@ class PathPlanner:
     ) -> PlannedMove:
         """Plan a motion from rest along a run of a route with `count` segments."""
         if not run:  # already there
-            still = JointLine(now.q, now.q)
-            motion = quickest_motion(still, arm_limits(self._description), now.speed)
+            limits = arm_limits(self._description)
+            motion = quickest_motion(JointLine(now.q, now.q), limits, now.speed)
             return PlannedMove((motion,), 0.0, None, window=0.0, peak=tvist.peak)
         curve, joints = self._curve(joined(run), run, tvist, now)
         delay, ground = self._delay(curve, tvist), ground_of(run, curve)

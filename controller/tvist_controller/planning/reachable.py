@@ -75,8 +75,7 @@ class Reachable:
     ) -> Iterator[Leg]:
         """Yield the parts of a command's path that move the arm; raise RefusalError if impossible."""
         frame, q = placement(command.frame), now.q
-        before = 0 if now.after is None else now.after.segments
-        for segment, where in _segments(command, before):
+        for segment, where in _segments(command, 0 if now.after is None else now.after.segments):
             start = tracker.pose(q)
             way: ToolWay | JointWay
             match segment:

@@ -193,9 +193,7 @@ class BlendedMoves:
             self._rate_limit.charge()
             return plans.now(command, within_tick=True)
         while True:
-            while (
-                self._rate_limit.planning > 0
-            ):  # of a thread that was killed meanwhile; plan only one at a time
+            while self._rate_limit.planning > 0:  # one at a time, also of killed threads
                 yield
             self._rate_limit.planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
             ordered = plans.later(command)

@@ -47,8 +47,7 @@ class ProgramKinematics:
         self, pose: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None = None
     ) -> tuple[float, ...]:
         """Return the joint positions nearest to `near` with a tool pose [rad]."""
-        tool = placement(self._motion.tcp if tcp is None else tcp)
-        flange = placement(pose) @ tool.inverse
+        flange = placement(pose) @ placement(self._motion.tcp if tcp is None else tcp).inverse
         try:
             q = self._inverse.solve(flange.rotation, flange.position, np.array(near, dtype=float))
         except InverseKinematicsError as error:

@@ -11,7 +11,7 @@ from tvist_controller.line.differentiator import Target
 from tvist_controller.line.limits import REDUCED_SHARE
 from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.motion.monitor import Monitor
+from tvist_controller.motion.monitors import Monitor
 from tvist_controller.motion.safety_system import PUT, Emergency, Latched, at_rest
 from tvist_controller.refusal import wrong_mode
 from tvist_controller.trajectory import Compliant, SampledPositions
